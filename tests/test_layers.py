@@ -1,0 +1,168 @@
+"""The floors of the house: imports point down, never up, and loading a file loads nothing heavy.
+
+`violations` reads one file without running it, so an import inside a function counts for the floors too. Heavy
+packages may be imported inside functions, where they cost only those who call them.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+FLOORS = {
+    "errors": 0,
+    "sources": 0,
+    "algebra": 1,
+    "systems": 2,
+    "family": 2,
+    "maps": 3,
+    "invariants": 4,
+    "checks": 5,
+    "experiments": 6,
+    "plots": 7,
+}
+CLI_FLOOR = 8
+
+NEVER_IN_THE_LIBRARY = {"click", "rich", "kahanmaps_cli"}
+NEVER_WHILE_LOADING = {"matplotlib", "numba", "distributed"}
+NUMPY_WHILE_LOADING = ("kahanmaps/maps/fast.py", "kahanmaps/plots/")
+
+
+def python_files() -> list[Path]:
+    """The files of both packages."""
+    return sorted([*(ROOT / "kahanmaps").rglob("*.py"), *(ROOT / "cli" / "kahanmaps_cli").rglob("*.py")])
+
+
+def violations(path: str, source: str) -> list[str]:
+    """What the file `path` (from the top folder, with slashes) imports and should not, one sentence each."""
+    tree = ast.parse(source, path)
+    module = path.removeprefix("cli/").removesuffix(".py").split("/")
+    package = module[:-1]
+    found = []
+    for line, target in _imports(tree.body, package):
+        found += [f"{path}:{line}: {what}" for what in _off_floor(module, target.split("."))]
+    for line, target in _imports(tree.body, package, only_while_loading=True):
+        top = target.split(".")[0]
+        if top in NEVER_WHILE_LOADING:
+            found.append(f"{path}:{line}: imports {top} while it is loaded: import it inside the function")
+        if top == "numpy" and not path.startswith(NUMPY_WHILE_LOADING):
+            found.append(f"{path}:{line}: imports numpy while it is loaded: only {NUMPY_WHILE_LOADING} may")
+    return list(dict.fromkeys(found))
+
+
+def _off_floor(importer: list[str], target: list[str]) -> list[str]:
+    if importer[0] == "kahanmaps" and target[0] in NEVER_IN_THE_LIBRARY:
+        return [f"the library imports {target[0]}"]
+    if importer[0] == "kahanmaps_cli" or target[0] != "kahanmaps" or importer == ["kahanmaps", "__init__"]:
+        return []
+    if importer[1] not in FLOORS:
+        return [f"kahanmaps/{importer[1]} has no floor in FLOORS"]
+    if target[1:] == ["__version__"]:  # set in kahanmaps/__init__.py before anything else; records carry it
+        return []
+    if len(target) == 1 or target[1] not in FLOORS:
+        return [f"imports {'.'.join(target)}, which stands above all floors: import the module that defines it"]
+    if FLOORS[target[1]] > FLOORS[importer[1]]:
+        return [f"{importer[1]} [{FLOORS[importer[1]]}] imports {target[1]} [{FLOORS[target[1]]}], a floor above"]
+    return []
+
+
+def _imports(body: list[ast.stmt], package: list[str], only_while_loading: bool = False) -> Iterator[tuple[int, str]]:
+    """Line and full dotted name of every import; `from a import b` gives a.b.
+
+    With `only_while_loading`, leaves out what loading the file does not run: functions and `if TYPE_CHECKING`.
+    """
+    waiting: list[ast.AST] = list(body)
+    while waiting:
+        node = waiting.pop(0)
+        if isinstance(node, ast.Import):
+            for name in node.names:
+                yield node.lineno, name.name
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else []
+            base = [*above, *(node.module.split(".") if node.module else [])]
+            for name in node.names:
+                yield node.lineno, ".".join([*base, name.name])
+        elif only_while_loading and isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            continue
+        elif only_while_loading and isinstance(node, ast.If) and _is_type_checking(node.test):
+            waiting += node.orelse
+        else:
+            waiting += ast.iter_child_nodes(node)
+
+
+def _is_type_checking(test: ast.expr) -> bool:
+    return ast.unparse(test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+
+
+def test_there_are_files_of_both_packages_to_look_at():
+    tops = {path.relative_to(ROOT).parts[0] for path in python_files()}
+    assert tops == {"kahanmaps", "cli"}
+
+
+def test_every_file_imports_its_own_floor_and_those_below():
+    found = []
+    for path in python_files():
+        found += violations(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8"))
+    assert not found, "\n" + "\n".join(found)
+
+
+MAPS = "kahanmaps/maps/kahan.py"
+
+WRONG = [
+    ("kahanmaps/algebra/fields.py", "from kahanmaps.maps.kahan import step", "maps [3], a floor above"),
+    ("kahanmaps/algebra/fields.py", "from kahanmaps import maps", "maps [3], a floor above"),
+    ("kahanmaps/algebra/fields.py", "import kahanmaps.systems.files as f", "systems [2], a floor above"),
+    ("kahanmaps/errors.py", "from .algebra import fields", "algebra [1], a floor above"),
+    (MAPS, "from ..checks.claims import Claim", "checks [5], a floor above"),
+    ("kahanmaps/maps/__init__.py", "from ..checks import claims", "checks [5], a floor above"),
+    (MAPS, "def f():\n    from kahanmaps.plots import draw", "plots [7], a floor above"),
+    (MAPS, "if TYPE_CHECKING:\n    from kahanmaps.checks import Claim", "checks [5], a floor above"),
+    (MAPS, "from kahanmaps import QuadraticSystem", "above all floors"),
+    (MAPS, "import kahanmaps", "above all floors"),
+    ("kahanmaps/helpers.py", "from kahanmaps import errors", "has no floor"),
+    (MAPS, "def f():\n    import click", "the library imports click"),
+    ("kahanmaps/__init__.py", "from rich.console import Console", "the library imports rich"),
+    (MAPS, "from kahanmaps_cli.main import main", "the library imports kahanmaps_cli"),
+    (MAPS, "import numpy as np", "imports numpy while it is loaded"),
+    ("kahanmaps/maps/fast_too.py", "import numpy as np", "imports numpy while it is loaded"),
+    ("cli/kahanmaps_cli/render.py", "from numpy import array", "imports numpy while it is loaded"),
+    ("kahanmaps/maps/fast.py", "try:\n    import numba\nexcept ImportError:\n    pass", "imports numba while"),
+    ("kahanmaps/plots/figures.py", "from matplotlib.figure import Figure", "imports matplotlib while"),
+    ("kahanmaps/experiments/run.py", "class A:\n    import distributed", "imports distributed while"),
+    ("kahanmaps/maps/fast.py", "if TYPE_CHECKING:\n    pass\nelse:\n    import numba", "imports numba while"),
+]
+
+
+@pytest.mark.parametrize(("path", "source", "sentence"), WRONG)
+def test_a_file_that_breaks_the_rule_is_reported_with_its_line(path, source, sentence):
+    (found,) = violations(path, source)
+    assert sentence in found
+    line = next(number for number, text in enumerate(source.splitlines(), 1) if "import " in text)
+    assert found.startswith(f"{path}:{line}: ")
+
+
+RIGHT = [
+    (MAPS, "from kahanmaps.algebra import fields"),
+    (MAPS, "from .orbits import Orbit"),
+    (MAPS, "from kahanmaps import errors, sources"),
+    (MAPS, "def f():\n    import numpy"),
+    (MAPS, "if TYPE_CHECKING:\n    import numpy"),
+    ("kahanmaps/systems/catalog/__init__.py", "from ...family import cubics"),
+    ("kahanmaps/family/planar.py", "from kahanmaps.systems.quadratic import QuadraticSystem"),
+    ("kahanmaps/experiments/store.py", "from kahanmaps import __version__"),
+    ("kahanmaps/maps/fast.py", "import numpy as np"),
+    ("kahanmaps/plots/figures.py", "import numpy as np\ndef f():\n    from matplotlib.figure import Figure"),
+    ("kahanmaps/__init__.py", "from kahanmaps.plots import draw"),
+    ("cli/kahanmaps_cli/main.py", "import click\nimport kahanmaps\nfrom kahanmaps.plots import draw"),
+    ("cli/kahanmaps_cli/commands/orbit.py", "from ..render import table"),
+]
+
+
+@pytest.mark.parametrize(("path", "source"), RIGHT)
+def test_a_file_that_keeps_the_rule_is_not_reported(path, source):
+    assert violations(path, source) == []

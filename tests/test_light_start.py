@@ -1,0 +1,43 @@
+"""What a command loads: `--help` next to nothing, an exact orbit no numpy.
+
+Loading is what a user waits for: numpy costs about as long as all of `--help` may take. Each command runs in
+an interpreter of its own, since the one that runs the tests has loaded everything already.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+HEAVY = {"numpy", "flint", "lark", "rich", "numba", "matplotlib", "pydantic", "distributed"}
+
+COMMAND = """
+from kahanmaps_cli.main import main
+status = main({arguments!r})
+assert status == 0, f"exit status {{status}}"
+"""
+
+
+def modules_loaded_by(code: str) -> set[str]:
+    """The top-level modules in memory after `code` has run in a fresh interpreter."""
+    report = "\nimport json, sys\nprint('\\n' + json.dumps(sorted(sys.modules)), file=sys.stderr)\n"
+    done = subprocess.run([sys.executable, "-c", code + report], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    return {name.split(".")[0] for name in json.loads(done.stderr.splitlines()[-1])}
+
+
+def test_a_module_that_is_loaded_is_seen():
+    assert "numpy" in modules_loaded_by("import numpy.linalg")
+
+
+def test_help_loads_nothing_heavy():
+    assert modules_loaded_by(COMMAND.format(arguments=["--help"])) & HEAVY == set()
+
+
+def test_an_exact_orbit_does_not_load_numpy():
+    inline = ["--vars", "x,y", "--rhs", "y", "--rhs", "-x"]
+    arguments = ["orbit", *inline, "--start", "1,0", "--eps", "1/10", "--steps", "2"]
+    loaded = modules_loaded_by(COMMAND.format(arguments=arguments))
+    assert loaded & {"numpy", "numba", "matplotlib", "pydantic", "distributed"} == set()
+    assert "flint" in loaded
