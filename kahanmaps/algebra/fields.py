@@ -1,0 +1,335 @@
+"""The fields of numbers: the rationals QQ, the prime fields GF(p), and real balls RR(bits).
+
+One protocol serves all three, so that the Kahan map is written once. Elements are FLINT's own numbers (`fmpq`,
+`nmod` for p < 2^63, `fmpz_mod` for larger p, `arb`) and use the ordinary operators; what FLINT does
+not do under one name stands here. `convert` is the door to exactness: text, integers and fractions come in,
+machine floats do not.
+"""
+
+from __future__ import annotations
+
+import random
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+import flint
+from flint import arb, arb_mat, fmpq, fmpq_mat, fmpz, fmpz_mod, fmpz_mod_ctx, fmpz_mod_mat, nmod, nmod_mat
+
+from kahanmaps.algebra.text import format_number, parse_number
+from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
+
+# FLINT proves primality of 512 bits in about 0.1 s; the cost grows steeply beyond.
+MAX_PRIME_BITS = 512
+MAX_BALL_BITS = 1_000_000
+
+_DECIMAL = r"[+-]?[0-9]*\.?[0-9]*(?:e[+-]?[0-9]{1,8})?"
+_BALL = re.compile(rf"\[(?:{_DECIMAL} )?\+/- {_DECIMAL}\]")
+
+
+def rational(value: Any) -> fmpq:
+    """The exact rational number that `value` stands for.
+
+    Accepts int, Fraction, text (`"1/3"`, `"0.1"`), fmpz and fmpq. Raises `InexactNumber` for machine floats and
+    numpy scalars, whose decimal look is not their value.
+
+    >>> rational("0.1")
+    1/10
+    >>> rational(0.1)
+    Traceback (most recent call last):
+        ...
+    kahanmaps.errors.InexactNumber: found the machine number 0.1, expected an exact one: write an integer, p/q or a decimal as text, e.g. "0.1"
+    """
+    if isinstance(value, fmpq):
+        return value
+    if isinstance(value, str):
+        return parse_number(value)
+    if isinstance(value, bool):
+        raise InputError(f"found {value}, expected a number")
+    if isinstance(value, int | fmpz):
+        return fmpq(value)
+    if isinstance(value, Fraction):
+        return fmpq(value.numerator, value.denominator)
+    if isinstance(value, float | complex) or type(value).__module__ == "numpy":
+        raise InexactNumber(
+            f"found the machine number {value!s}, expected an exact one: "
+            f'write an integer, p/q or a decimal as text, e.g. "{value!s}"'
+        )
+    raise InputError(f"found {value!r} of type {type(value).__name__}, expected an exact number")
+
+
+class Field(ABC):
+    """A field of numbers; `exact` says whether equality of two elements can be decided."""
+
+    name: str
+    characteristic: int
+    exact: bool = True
+
+    @property
+    @abstractmethod
+    def zero(self) -> Any:
+        """The element 0."""
+
+    @property
+    @abstractmethod
+    def one(self) -> Any:
+        """The element 1."""
+
+    @abstractmethod
+    def convert(self, value: Any) -> Any:
+        """The element that an exact number (int, Fraction, text, fmpz, fmpq) or an element stands for."""
+
+    def parse(self, text: str) -> Any:
+        """The element written as an integer, p/q or a decimal."""
+        return self.convert(text)
+
+    def format(self, element: Any) -> str:
+        """The element as text that `parse` reads back."""
+        return str(element)
+
+    @abstractmethod
+    def random(self, rng: random.Random, height: int = 10) -> Any:
+        """A random element; `height` bounds numerator and denominator where that has a meaning."""
+
+    @abstractmethod
+    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
+        """FLINT's matrix over this field from its entries, row by row."""
+
+    def column(self, entries: Sequence[Any]) -> Any:
+        """The entries as a matrix of one column."""
+        return self.matrix(len(entries), 1, entries)
+
+    def identity(self, size: int) -> Any:
+        """The identity matrix."""
+        return self.matrix(size, size, [self.one if i == j else self.zero for i in range(size) for j in range(size)])
+
+    def convert_matrix(self, matrix: fmpq_mat) -> Any:
+        """A matrix of rationals carried into this field."""
+        return self.matrix(matrix.nrows(), matrix.ncols(), [self.convert(entry) for entry in matrix.entries()])
+
+    def is_zero(self, element: Any) -> bool:
+        """Whether the element is certainly zero."""
+        return bool(element == 0)
+
+    def equal(self, left: Any, right: Any) -> bool:
+        """Whether two elements are equal (for balls: whether they may be, that is, overlap)."""
+        return bool(left == right)
+
+    def working(self) -> AbstractContextManager[Any]:
+        """The context in which this field's arithmetic has to run (balls: the precision)."""
+        return nullcontext()
+
+    def __repr__(self) -> str:
+        return self.name
+
+
+class RationalField(Field):
+    """The field of rational numbers; elements are fmpq.
+
+    >>> QQ.convert("0.5") + QQ.one
+    3/2
+    """
+
+    name = "QQ"
+    characteristic = 0
+
+    @property
+    def zero(self) -> fmpq:
+        return fmpq(0)
+
+    @property
+    def one(self) -> fmpq:
+        return fmpq(1)
+
+    def convert(self, value: Any) -> fmpq:
+        return rational(value)
+
+    def format(self, element: fmpq) -> str:
+        return format_number(element)
+
+    def random(self, rng: random.Random, height: int = 10) -> fmpq:
+        return fmpq(rng.randint(-height, height), rng.randint(1, height))
+
+    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> fmpq_mat:
+        return fmpq_mat(rows, columns, [rational(entry) for entry in entries])
+
+    def convert_matrix(self, matrix: fmpq_mat) -> fmpq_mat:
+        return matrix
+
+
+class PrimeField(Field):
+    """The field of p elements; elements are nmod for p < 2^63, fmpz_mod above. Made by `GF`."""
+
+    def __init__(self, prime: int) -> None:
+        self.prime = prime
+        self.characteristic = prime
+        self.name = f"GF({prime})"
+        self._large = fmpz_mod_ctx(prime) if prime >= 2**63 else None
+        self._zero = self._element(0)
+        self._one = self._element(1)
+
+    def _element(self, value: int | fmpz) -> nmod | fmpz_mod:
+        if self._large is not None:
+            return self._large(value)
+        return nmod(value, self.prime)
+
+    @property
+    def zero(self) -> Any:
+        return self._zero
+
+    @property
+    def one(self) -> Any:
+        return self._one
+
+    def convert(self, value: Any) -> Any:
+        if isinstance(value, nmod):
+            if self._large is None and value.modulus() == self.prime:
+                return value
+            raise InputError(f"found an element of another field, expected one of {self.name}")
+        if isinstance(value, fmpz_mod):
+            try:
+                return value + self._zero  # FLINT refuses to mix moduli, and offers no way to ask for one
+            except (TypeError, ValueError) as error:
+                raise InputError(f"found an element of another field, expected one of {self.name}") from error
+        if isinstance(value, int | fmpz) and not isinstance(value, bool):
+            return self._element(value)
+        number = rational(value)
+        below = self._element(number.q)
+        if below == 0:
+            raise BadPrime(
+                f"the prime {self.prime} divides the denominator of {_shorten(format_number(number))}: "
+                "take another prime",
+                self.prime,
+            )
+        return self._element(number.p) / below
+
+    def random(self, rng: random.Random, height: int = 10) -> Any:
+        return self._element(rng.randrange(self.prime))
+
+    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
+        elements = [self.convert(entry) for entry in entries]
+        if self._large is not None:
+            return fmpz_mod_mat(rows, columns, elements, self._large)
+        return nmod_mat(rows, columns, elements, self.prime)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PrimeField) and other.prime == self.prime
+
+    def __hash__(self) -> int:
+        return hash(("GF", self.prime))
+
+
+class BallField(Field):
+    """Real numbers enclosed in balls of `bits` bits of precision; elements are arb. Made by `RR`.
+
+    Every result encloses the true number. A ball that contains zero without being zero is neither zero nor
+    invertible: dividing by it raises `PrecisionLost`.
+    """
+
+    exact = False
+    characteristic = 0
+
+    def __init__(self, bits: int) -> None:
+        self.bits = bits
+        self.name = f"RR({bits})"
+
+    @property
+    def zero(self) -> arb:
+        return arb(0)
+
+    @property
+    def one(self) -> arb:
+        return arb(1)
+
+    def convert(self, value: Any) -> arb:
+        if isinstance(value, arb):
+            return value
+        with self.working():
+            return arb(rational(value))
+
+    def format(self, element: arb) -> str:
+        """Midpoint and radius, `[0.333333 +/- 1.0e-6]`; `parse` reads exact numbers and this form."""
+        with self.working():
+            return str(element.str(max(1, int(self.bits * 0.30103))))
+
+    def parse(self, text: str) -> arb:
+        match = _BALL.fullmatch(text.strip())
+        if match is None:
+            return self.convert(text)
+        if len(text) > self.bits + 100:
+            raise InputError(f"found a ball of {len(text)} characters, too long for {self.bits} bits")
+        with self.working():
+            return arb(text.strip())
+
+    def random(self, rng: random.Random, height: int = 10) -> arb:
+        return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
+
+    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> arb_mat:
+        return arb_mat(rows, columns, [self.convert(entry) for entry in entries])
+
+    def is_zero(self, element: arb) -> bool:
+        if element.is_zero():
+            return True
+        if element.contains(0):
+            raise PrecisionLost(f"a number with {self.bits} bits cannot be told from zero any more: ask for more bits")
+        return False
+
+    def equal(self, left: arb, right: arb) -> bool:
+        return bool(left.overlaps(right))
+
+    def working(self) -> AbstractContextManager[Any]:
+        # flint.ctx.prec is global to the process, so it is set for the time of each computation only.
+        return flint.ctx.workprec(self.bits)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, BallField) and other.bits == self.bits
+
+    def __hash__(self) -> int:
+        return hash(("RR", self.bits))
+
+
+QQ = RationalField()
+
+
+@lru_cache(maxsize=256)
+def GF(prime: int) -> PrimeField:
+    """The field of `prime` elements.
+
+    Raises InputError where the number is not a prime: FLINT would end the whole process on a composite modulus.
+
+    >>> GF(7).convert("1/3")
+    5
+    >>> GF(91)
+    Traceback (most recent call last):
+        ...
+    kahanmaps.errors.InputError: found the modulus 91, expected a prime: 91 is composite
+    """
+    if isinstance(prime, bool) or not isinstance(prime, int):
+        raise InputError(f"found the modulus {prime!r}, expected a prime number as an integer")
+    if prime < 2:
+        raise InputError(f"found the modulus {prime}, expected a prime, at least 2")
+    if prime.bit_length() > MAX_PRIME_BITS:
+        raise InputError(f"found a modulus of {prime.bit_length()} bits, expected at most {MAX_PRIME_BITS}")
+    if not fmpz(prime).is_prime():
+        raise InputError(f"found the modulus {prime}, expected a prime: {prime} is composite")
+    return PrimeField(prime)
+
+
+@lru_cache(maxsize=64)
+def RR(bits: int) -> BallField:
+    """Real balls with `bits` bits of precision (2 to 1,000,000).
+
+    >>> RR(64).convert("1/3") * 3 == 1, RR(64).equal(RR(64).convert("1/3") * 3, RR(64).one)
+    (False, True)
+    """
+    if isinstance(bits, bool) or not isinstance(bits, int) or not 2 <= bits <= MAX_BALL_BITS:
+        raise InputError(f"found the precision {bits!r}, expected an integer from 2 to {MAX_BALL_BITS} bits")
+    return BallField(bits)
+
+
+def _shorten(text: str, width: int = 40) -> str:
+    return text if len(text) <= width else f"{text[: width // 2]}...{text[-width // 2 :]}"

@@ -1,0 +1,179 @@
+"""Polynomials and rational functions in named variables with exact rational coefficients.
+
+A polynomial is FLINT's `fmpq_mpoly` in a ring made by `ring`; this file adds what FLINT leaves out: values over
+any field (`evaluate`), primitive integer forms, monomials up to a degree, and quotients of two polynomials.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
+
+from kahanmaps.errors import InputError
+
+
+def ring(names: Sequence[str]) -> fmpq_mpoly_ctx:
+    """The ring Q[names], monomials ordered by degree and then reverse lexicographically.
+
+    >>> ring(["x", "y"]).gens()
+    (x, y)
+    """
+    if len(set(names)) != len(names):
+        twice = sorted({name for name in names if list(names).count(name) > 1})
+        raise InputError(f"found the variable {twice[0]!r} twice, expected distinct names")
+    return fmpq_mpoly_ctx.get(tuple(names), Ordering.degrevlex)
+
+
+def names_of(polynomial: fmpq_mpoly) -> tuple[str, ...]:
+    """The names of the variables of the ring that `polynomial` lives in."""
+    return tuple(polynomial.context().names())
+
+
+def degree(polynomial: fmpq_mpoly) -> int:
+    """The total degree; -1 for the zero polynomial."""
+    return -1 if polynomial.is_zero() else int(polynomial.total_degree())
+
+
+def is_homogeneous(polynomial: fmpq_mpoly, of_degree: int) -> bool:
+    """Whether every monomial has total degree `of_degree` (true for the zero polynomial)."""
+    return all(sum(monomial) == of_degree for monomial in polynomial.monoms())
+
+
+def gradient(polynomial: fmpq_mpoly) -> tuple[fmpq_mpoly, ...]:
+    """The partial derivatives, in the order of the ring's variables.
+
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> gradient(x**2*y)
+    (2*x*y, x^2)
+    """
+    return tuple(polynomial.derivative(i) for i in range(polynomial.context().nvars()))
+
+
+def monomials(count: int, of_degree: int) -> Iterator[tuple[int, ...]]:
+    """Exponent vectors of all monomials of one degree in `count` variables, x1 first.
+
+    >>> list(monomials(2, 2))
+    [(2, 0), (1, 1), (0, 2)]
+    """
+    if count == 0:
+        if of_degree == 0:
+            yield ()
+        return
+    if count == 1:
+        yield (of_degree,)
+        return
+    for first in range(of_degree, -1, -1):
+        for rest in monomials(count - 1, of_degree - first):
+            yield (first, *rest)
+
+
+def common_denominator(polynomial: fmpq_mpoly) -> fmpz:
+    """The least positive integer whose product with `polynomial` has integer coefficients."""
+    common = fmpz(1)
+    for coefficient in polynomial.coeffs():
+        common = common.lcm(coefficient.q)
+    return common
+
+
+def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
+    """The pair (c, P) with polynomial = c P, P of coprime integer coefficients, its leading one positive.
+
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> primitive_part(x/2 - 3*y/4)
+    (1/4, 2*x - 3*y)
+    """
+    if polynomial.is_zero():
+        return fmpq(1), polynomial
+    below = common_denominator(polynomial)
+    above = fmpz(0)
+    for coefficient in polynomial.coeffs():
+        above = above.gcd(coefficient.p * (below // coefficient.q))
+    factor = fmpq(above, below)
+    if polynomial.leading_coefficient() < 0:
+        factor = -factor
+    return factor, polynomial / factor
+
+
+def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
+    """The value at `point`, whose entries are elements of `field`; coefficients are carried into the field.
+
+    Raises `BadPrime` where the field is GF(p) and p divides the denominator of a coefficient.
+    """
+    powers: list[list[Any]] = [[field.one, entry] for entry in point]
+    total = field.zero
+    for monomial, coefficient in polynomial.terms():
+        term = field.convert(coefficient)
+        for i, exponent in enumerate(monomial):
+            if exponent:
+                table = powers[i]
+                while len(table) <= exponent:
+                    table.append(table[-1] * table[1])
+                term = term * table[exponent]
+        total = total + term
+    return total
+
+
+def substitute(polynomial: fmpq_mpoly, values: Mapping[str, fmpq]) -> fmpq_mpoly:
+    """The polynomial with some variables replaced by numbers, in the ring of the remaining variables."""
+    names = names_of(polynomial)
+    keep = [i for i, name in enumerate(names) if name not in values]
+    target = ring([names[i] for i in keep])
+    terms: dict[tuple[int, ...], fmpq] = {}
+    for monomial, coefficient in polynomial.terms():
+        for i, exponent in enumerate(monomial):
+            if exponent and names[i] in values:
+                coefficient = coefficient * values[names[i]] ** exponent
+        key = tuple(monomial[i] for i in keep)
+        terms[key] = terms.get(key, fmpq(0)) + coefficient
+    return target.from_dict(terms)
+
+
+@dataclass(frozen=True, eq=False)
+class RationalFunction:
+    """A quotient of two polynomials over Q; the denominator has coprime integer coefficients, the first positive.
+
+    Common factors are not removed (a gcd of large polynomials costs more than it is worth here); two rational
+    functions are equal when the cross products are.
+
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> RationalFunction(x, 2*y) == RationalFunction(x*y, 2*y**2)
+    True
+    """
+
+    numerator: fmpq_mpoly
+    denominator: fmpq_mpoly
+
+    def __post_init__(self) -> None:
+        if self.denominator.is_zero():
+            raise InputError("found a rational function with denominator 0")
+        factor, primitive = primitive_part(self.denominator)
+        object.__setattr__(self, "numerator", self.numerator / factor)
+        object.__setattr__(self, "denominator", primitive)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RationalFunction):
+            return NotImplemented
+        if names_of(self.numerator) != names_of(other.numerator):
+            return False
+        return bool(self.numerator * other.denominator == other.numerator * self.denominator)
+
+    # Equal functions may be written with different common factors, so no cheap hash is consistent with ==.
+    __hash__ = None  # type: ignore[assignment]
+
+    @property
+    def is_polynomial(self) -> bool:
+        return bool(self.denominator.is_constant())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return names_of(self.numerator)
+
+    def value(self, field: Any, point: Sequence[Any]) -> Any:
+        """The value at `point` over `field`, or None where the denominator vanishes."""
+        below = evaluate(self.denominator, field, point)
+        if field.is_zero(below):
+            return None
+        return evaluate(self.numerator, field, point) / below

@@ -1,0 +1,333 @@
+"""Numbers, points, polynomials and rational functions in text: parsed and printed with an exact round trip.
+
+    number      -3, 1/2, 0.1 (which is 1/10), .5, 1e-3
+    point       1/2,-1/3,0
+    expression  + - * / ^ ** ( ) with names and numbers, for instance (x^2 + y^2)/(1 - eps^2*z^2)
+
+Text is exact: a decimal means the rational number that it spells. Nothing is evaluated as code, and `Limits` bounds
+what a text may cost before FLINT is asked, since FLINT ends the process where Python would raise.
+
+What is printed parses back to the same value wherever that value lies within the limits.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly, fmpz
+
+from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
+from kahanmaps.errors import ExpressionError, InexactNumber, InputError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How large a text, and what it stands for, may be. Meant to be out of the way of honest use.
+
+    The limits hold for results and for every value on the way to them.
+    """
+
+    number_digits: int = 1_000_000  # of one number read by parse_number or parse_point
+    power_of_ten: int = 10_000  # the e in 1e-3, in size
+    characters: int = 200_000  # of an expression
+    depth: int = 100  # of brackets
+    degree: int = 64  # total degree of a numerator or denominator
+    exponent: int = 1_000  # in size
+    digits: int = 100_000  # of a coefficient written over the common denominator of its polynomial
+    terms: int = 20_000  # of a polynomial
+    work: int = 300_000_000  # estimated nanoseconds of arithmetic, by a fixed formula: the same on every machine
+
+
+LIMITS = Limits()
+NO_CONSTANTS: Mapping[str, fmpq] = MappingProxyType({})
+
+BLANKS = " \t\r\n"
+_NUMBER = re.compile(r"([+-]?)(?:([0-9]+)/([0-9]+)|([0-9]+)?(?:\.([0-9]*))?(?:[eE]([+-]?[0-9]+))?)")
+_START_OF_NUMBER = re.compile(
+    r"[+-]?(?:[0-9]+(?:/[0-9]*|\.?[0-9]*(?:[eE][+-]?[0-9]*)?)|\.(?:[0-9]+(?:[eE][+-]?[0-9]*)?)?)?"
+)
+_NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]*")
+_EXPECTED = "expected an integer, p/q or a decimal such as 0.1"
+
+
+def parse_number(text: str, *, limits: Limits = LIMITS) -> fmpq:
+    """The rational number that `text` spells: an integer, p/q or a finite decimal, with blanks around it.
+
+    Raises `ExpressionError` for anything else, and for numbers beyond the limits.
+
+    >>> parse_number("0.1"), parse_number(" -6/4 "), parse_number("1e-3")
+    (1/10, -3/2, 1/1000)
+    >>> parse_number("1_000")
+    Traceback (most recent call last):
+    kahanmaps.errors.ExpressionError: found '1_000', expected an integer, p/q or a decimal such as 0.1
+      1_000
+       ^
+    """
+    require_text(text, "a number", "write an integer, p/q or a decimal as text, e.g. '1/10'")
+    return number_in(text, 0, len(text), limits.number_digits, limits)
+
+
+def format_number(value: fmpq) -> str:
+    """The number as `p` or `p/q` in lowest terms, of any length.
+
+    >>> format_number(fmpq(-2, 4)), format_number(fmpq(3))
+    ('-1/2', '3')
+    """
+    if not isinstance(value, fmpq):
+        raise _wrong_kind(value, "an exact number (fmpq)", "make one with parse_number('1/10')")
+    return str(value)
+
+
+def parse_point(text: str, dimension: int | None = None, *, limits: Limits = LIMITS) -> tuple[fmpq, ...]:
+    """The numbers in a comma separated list; there must be `dimension` of them if that is given.
+
+    Raises `ExpressionError`, which names the entry (counted from 1) and its column in the whole text.
+
+    >>> parse_point("1/2, -1/3, 0")
+    (1/2, -1/3, 0)
+    >>> parse_point("1,2", 3)
+    Traceback (most recent call last):
+    kahanmaps.errors.ExpressionError: found 2 numbers, expected 3, separated by commas
+    """
+    require_text(text, "a point", "write its numbers as text, separated by commas, e.g. '1/2,-1/3,0'")
+    if not text.strip(BLANKS):
+        if dimension == 0:
+            return ()
+        raise ExpressionError("found nothing, expected a point: numbers separated by commas, e.g. 1/2,-1/3,0", text)
+    count = text.count(",") + 1
+    if dimension is not None and count != dimension:
+        found = "1 number" if count == 1 else f"{count} numbers"
+        raise ExpressionError(f"found {found}, expected {dimension}, separated by commas", text)
+    point = []
+    start = 0
+    for entry in range(1, count + 1):
+        end = text.find(",", start)
+        end = len(text) if end < 0 else end
+        try:
+            point.append(number_in(text, start, end, limits.number_digits, limits))
+        except ExpressionError as error:
+            raise ExpressionError(f"entry {entry}: {error.message}", text, error.column) from None
+        start = end + 1
+    return tuple(point)
+
+
+def format_point(point: Sequence[fmpq]) -> str:
+    """The numbers of a point, separated by commas: the inverse of `parse_point`.
+
+    >>> format_point((fmpq(1, 2), fmpq(-1, 3), fmpq(0)))
+    '1/2,-1/3,0'
+    """
+    return ",".join(format_number(entry) for entry in point)
+
+
+def parse_polynomial(
+    text: str,
+    variables: Sequence[str],
+    constants: Mapping[str, fmpq] = NO_CONSTANTS,
+    *,
+    limits: Limits = LIMITS,
+) -> fmpq_mpoly:
+    """The polynomial in `ring(variables)` that `text` spells; `constants` are names that stand for numbers.
+
+    A division by something that is not constant is refused, even where it would leave no remainder (`x^2/x`).
+    Raises `ExpressionError` with the column of the mistake; `InputError` for bad names or inexact constants.
+
+    >>> parse_polynomial("x^3/3 + a*x*y^2", ["x", "y"], {"a": fmpq(2, 3)})
+    1/3*x^3 + 2/3*x*y^2
+    >>> parse_polynomial("2x", ["x"])
+    Traceback (most recent call last):
+    kahanmaps.errors.ExpressionError: found 'x' right after '2', expected an operator between them: write 2*x
+      2x
+       ^
+    """
+    from kahanmaps.algebra.expressions import read_polynomial
+
+    _check_expression(text, variables, constants)
+    return read_polynomial(text, ring(variables), constants, limits)
+
+
+def parse_rational_function(
+    text: str,
+    variables: Sequence[str],
+    constants: Mapping[str, fmpq] = NO_CONSTANTS,
+    *,
+    limits: Limits = LIMITS,
+) -> RationalFunction:
+    """The quotient of polynomials in `ring(variables)` that `text` spells; common factors stay as they are written.
+
+    Raises as `parse_polynomial` does.
+
+    >>> format_rational_function(parse_rational_function("x/(y-1) + 1/(y-1)", ["x", "y"]))
+    '(x + 1)/(y - 1)'
+    """
+    from kahanmaps.algebra.expressions import read_rational_function
+
+    _check_expression(text, variables, constants)
+    return read_rational_function(text, ring(variables), constants, limits)
+
+
+def parse_constant(text: str, constants: Mapping[str, fmpq] = NO_CONSTANTS, *, limits: Limits = LIMITS) -> fmpq:
+    """The number that an expression in numbers and `constants` comes to. Raises as `parse_polynomial` does.
+
+    >>> parse_constant("(1 + a)^2/3", {"a": fmpq(1, 2)})
+    3/4
+    """
+    from kahanmaps.algebra.expressions import read_constant
+
+    _check_expression(text, (), constants)
+    return read_constant(text, constants, limits)
+
+
+def format_polynomial(polynomial: fmpq_mpoly) -> str:
+    """The polynomial, its terms in the order of its ring: the inverse of `parse_polynomial`.
+
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> format_polynomial(x**3/3 + fmpq(2, 3)*x*y**2 - y)
+    'x^3/3 + 2/3*x*y^2 - y'
+    """
+    if not isinstance(polynomial, fmpq_mpoly):
+        raise _wrong_kind(polynomial, "a polynomial (fmpq_mpoly)", "make one with parse_polynomial")
+    names = names_of(polynomial)
+    pieces: list[str] = []
+    for monomial, coefficient in polynomial.terms():
+        if coefficient < 0:
+            pieces.append(" - " if pieces else "-")
+            coefficient = -coefficient
+        elif pieces:
+            pieces.append(" + ")
+        pieces.append(_term(coefficient, monomial, names))
+    return "".join(pieces) or "0"
+
+
+def format_rational_function(function: RationalFunction) -> str:
+    """The quotient, with brackets only where they are needed: the inverse of `parse_rational_function`.
+
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> format_rational_function(RationalFunction(x + 1, 2*y)), format_rational_function(RationalFunction(x, y**2))
+    ('(x/2 + 1/2)/y', 'x/y^2')
+    """
+    if not isinstance(function, RationalFunction):
+        raise _wrong_kind(function, "a RationalFunction", "make one with parse_rational_function")
+    above = format_polynomial(function.numerator)
+    if function.numerator.is_zero() or function.denominator.is_one():
+        return above
+    below = format_polynomial(function.denominator)
+    if len(function.numerator) > 1:
+        above = f"({above})"
+    # A name or its power stands by itself; a/2*y would be a*y/2.
+    if any(sign in below for sign in "*+- "):
+        below = f"({below})"
+    return f"{above}/{below}"
+
+
+def is_name(text: str) -> bool:
+    """Whether `text` can name a variable: ASCII letters, digits and _, no digit first (FLINT accepts ASCII only).
+
+    >>> is_name("x1"), is_name("1x"), is_name("ε")
+    (True, False, False)
+    """
+    return isinstance(text, str) and _NAME.fullmatch(text) is not None
+
+
+def check_names(names: Sequence[str]) -> None:
+    """Raise `InputError` unless `names` are distinct and all of them can name a variable.
+
+    >>> check_names(["x", "y", "x"])
+    Traceback (most recent call last):
+    kahanmaps.errors.InputError: found the name 'x' twice, expected distinct names
+    """
+    if isinstance(names, str):
+        raise InputError(f"found the text {shorten(names)}, expected a list of names such as ['x', 'y']")
+    seen = set()
+    for name in names:
+        if not is_name(name):
+            found = shorten(name) if isinstance(name, str) else f"a {type(name).__name__}"
+            raise InputError(f"found {found}, expected a name: ASCII letters, digits and _, not starting with a digit")
+        if name in seen:
+            raise InputError(f"found the name {name!r} twice, expected distinct names")
+        seen.add(name)
+
+
+def number_in(text: str, start: int, end: int, digits: int, limits: Limits) -> fmpq:
+    """The number in `text[start:end]`; mistakes are reported with their column in the whole text."""
+    while start < end and text[start] in BLANKS:
+        start += 1
+    while start < end and text[end - 1] in BLANKS:
+        end -= 1
+    if start == end:
+        raise ExpressionError(f"found nothing, {_EXPECTED}", text, start)
+    if end - start > digits + 20:
+        found = f"found a number of {end - start} characters"
+        raise ExpressionError(f"{found}, expected at most {digits} digits", text, start)
+    match = _NUMBER.fullmatch(text, start, end)
+    if match is None or not (match[2] or match[4] or match[5]):
+        prefix = _START_OF_NUMBER.match(text, start, end)
+        column = start if prefix is None else prefix.end()
+        raise ExpressionError(f"found {shorten(text[start:end])}, {_EXPECTED}", text, column)
+    sign, above, below, whole, fraction, power = match.groups()
+    if max(len(above or ""), len(below or ""), len(whole or "") + len(fraction or "")) > digits:
+        raise ExpressionError(f"found a number of more than {digits} digits, expected at most so many", text, start)
+    if below is not None:
+        divisor = fmpz(below)
+        if divisor == 0:
+            raise ExpressionError("found the denominator 0, expected a nonzero integer", text, match.start(3))
+        value = fmpq(fmpz(above), divisor)
+    else:
+        value = fmpq(fmpz((whole or "") + (fraction or "")))
+        shift = -len(fraction or "")
+        if power is not None:
+            # The length first: Python's int() stops at 4300 digits.
+            size = power.lstrip("+-").lstrip("0")
+            if len(size) > 9 or int(size or "0") > limits.power_of_ten:
+                found = f"found the power of ten {shorten(power)}"
+                raise ExpressionError(f"{found}, expected at most {limits.power_of_ten} in size", text, match.start(6))
+            shift += int(power)
+        if shift:
+            ten = fmpz(10) ** abs(shift)
+            value = value * ten if shift > 0 else value / ten
+    return -value if sign == "-" else value
+
+
+def require_text(text: object, what: str, hint: str) -> None:
+    """Raise `InputError` (for a float `InexactNumber`) unless `text` is a str."""
+    if not isinstance(text, str):
+        raise _wrong_kind(text, f"{what} as text", hint)
+
+
+def shorten(text: str, width: int = 40) -> str:
+    """`text` in quotes, safe to print, cut where it is long."""
+    return repr(str(text) if len(text) <= width else text[:width] + "...")
+
+
+def _term(coefficient: fmpq, monomial: Sequence[int], names: Sequence[str]) -> str:
+    """One term with a positive coefficient, such as `2/3*x*y^2` or `x^3/3`."""
+    factors = [
+        name if exponent == 1 else f"{name}^{exponent}"
+        for name, exponent in zip(names, monomial, strict=True)
+        if exponent
+    ]
+    if not factors:
+        return str(coefficient)
+    if coefficient.p != 1:
+        return "*".join([str(coefficient), *factors])
+    product = "*".join(factors)
+    return product if coefficient.q == 1 else f"{product}/{coefficient.q}"
+
+
+def _check_expression(text: object, variables: Sequence[str], constants: Mapping[str, fmpq]) -> None:
+    require_text(text, "an expression", "write it as text, e.g. '1/10*x^2'")
+    check_names(variables)
+    check_names([*variables, *constants])
+    for name, value in constants.items():
+        if not isinstance(value, fmpq):
+            raise _wrong_kind(value, f"an exact number (fmpq) as {name}", "make one with parse_number('1/10')")
+
+
+def _wrong_kind(value: Any, expected: str, hint: str) -> InputError:
+    if isinstance(value, float):
+        return InexactNumber(f"found the machine number {value!s}, expected {expected}: {hint}")
+    return InputError(f"found a value of type {type(value).__name__}, expected {expected}: {hint}")

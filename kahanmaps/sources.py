@@ -1,0 +1,58 @@
+"""The sources that docstrings, catalogue files and evidence cite, by key."""
+
+from __future__ import annotations
+
+SOURCES: dict[str, str] = {
+    "petrera-suris-2016": (
+        "M. Petrera, Yu. B. Suris. A construction of commuting systems of integrable symplectic birational maps. "
+        "arXiv:1607.07085"
+    ),
+    "petrera-suris-4d": (
+        "M. Petrera, Yu. B. Suris. A construction of a large family of commuting pairs of integrable symplectic "
+        "birational 4-dimensional maps. arXiv:1606.08238"
+    ),
+    "petrera-suris-euler": (
+        "M. Petrera, Yu. B. Suris. On the Hamiltonian structure of Hirota-Kimura discretization of the Euler top. "
+        "Math. Nachr. 283 (2010), 1654-1663. arXiv:0707.4382"
+    ),
+    "petrera-pfadler-suris-2011": (
+        "M. Petrera, A. Pfadler, Yu. B. Suris. On integrability of Hirota-Kimura type discretizations. "
+        "Regul. Chaotic Dyn. 16 (2011), 245-289. arXiv:1008.1040"
+    ),
+    "cmoq-2013": (
+        "E. Celledoni, R. I. McLachlan, B. Owren, G. R. W. Quispel. Geometric properties of Kahan's method. "
+        "J. Phys. A 46 (2013), 025201. arXiv:1209.1164"
+    ),
+    "hirota-kimura-2000": (
+        "R. Hirota, K. Kimura. Discretization of the Euler top. J. Phys. Soc. Japan 69 (2000), 627-630"
+    ),
+    "kahan-1993": "W. Kahan. Unconventional numerical methods for trajectory calculations. Lecture notes, 1993",
+    "sanz-serna-1994": (
+        "J. M. Sanz-Serna. An unconventional symplectic integrator of W. Kahan. Appl. Numer. Math. 16 (1994), 245-250"
+    ),
+    "fassbender-1999": (
+        "H. Fassbender, D. S. Mackey, N. Mackey, H. Xu. Hamiltonian square roots of skew-Hamiltonian matrices. "
+        "Linear Algebra Appl. 287 (1999), 125-159"
+    ),
+    "henon-heiles-1964": (
+        "M. Henon, C. Heiles. The applicability of the third integral of motion: some numerical experiments. "
+        "Astron. J. 69 (1964), 73-79"
+    ),
+    "rosser-schoenfeld-1962": (
+        "J. B. Rosser, L. Schoenfeld. Approximate formulas for some functions of prime numbers. "
+        "Illinois J. Math. 6 (1962), 64-94"
+    ),
+    "schwartz-1980": (
+        "J. T. Schwartz. Fast probabilistic algorithms for verification of polynomial identities. "
+        "J. ACM 27 (1980), 701-717"
+    ),
+}
+
+
+def source(key: str) -> str:
+    """The full reference that a key stands for.
+
+    >>> source("kahan-1993")
+    'W. Kahan. Unconventional numerical methods for trajectory calculations. Lecture notes, 1993'
+    """
+    return SOURCES[key]
