@@ -1,0 +1,166 @@
+"""Members of the family and their associated systems.
+
+For signs s the matrix B_s is the polynomial in A with B_s = s_i on the part of A that belongs to the i-th irreducible factor
+of chi; then B_s^2 = I, and f_s = B_s^T f_0 = J grad K_s with grad K_s = B_s grad H. Kahan maps of
+associated systems commute. Source: petrera-suris-2016, Sect. 5; every m, and any chi, in docs/mathematics.md.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
+
+from kahanmaps.algebra.polynomials import names_of
+from kahanmaps.errors import HypothesisError, InputError
+from kahanmaps.family.cubics import chain
+from kahanmaps.family.skew_hamiltonian import (
+    Factor,
+    evaluate_at_matrix,
+    factors_of_chi,
+    require_skew_hamiltonian,
+)
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+@dataclass(frozen=True, eq=False)
+class AssociatedSystem:
+    """f_s = B^T f_0: the signs, the matrix B with its coefficients as a polynomial in A, and the cubic K."""
+
+    signs: tuple[int, ...]
+    coefficients: tuple[fmpq, ...]
+    B: fmpq_mat
+    K: fmpq_mpoly
+
+    @cached_property
+    def hamiltonian(self) -> CubicHamiltonian:
+        """K with the standard structure J."""
+        return CubicHamiltonian(self.K, standard_structure(self.B.nrows()))
+
+    @property
+    def system(self) -> QuadraticSystem:
+        """The quadratic system x' = J grad K(x)."""
+        return self.hamiltonian.system
+
+    @property
+    def label(self) -> str:
+        """The signs as text, `++-`."""
+        return "".join("+" if sign > 0 else "-" for sign in self.signs)
+
+
+@dataclass(frozen=True, eq=False)
+class FamilyMember:
+    """A skew-Hamiltonian A, a cubic H of its space, and signs that pick one associated system (all + : f_0 itself).
+
+    Raises HypothesisError where A is not skew-Hamiltonian or H not in its space.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> A = fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2])
+    >>> H = parse_polynomial("x1^3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
+    >>> [g.label for g in FamilyMember(A, H).associated()]
+    ['++', '+-']
+    """
+
+    A: fmpq_mat
+    H: fmpq_mpoly
+    signs: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_skew_hamiltonian(self.A)
+        chain(self.A, self.H, 1)
+        count = len(self.factors)
+        if not self.signs:
+            object.__setattr__(self, "signs", (1,) * count)
+        if len(self.signs) != count or any(sign not in (1, -1) for sign in self.signs):
+            named = ", ".join(f"({factor})" for factor in self.factors)
+            raise HypothesisError(
+                f"found the signs {list(self.signs)}, expected {count} numbers 1 or -1: "
+                f"one for each irreducible factor of chi, here {named}"
+            )
+
+    @property
+    def dim(self) -> int:
+        """2m."""
+        return int(self.A.nrows())
+
+    @property
+    def m(self) -> int:
+        """Half the dimension."""
+        return self.dim // 2
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        return names_of(self.H)
+
+    @cached_property
+    def factors(self) -> tuple[Factor, ...]:
+        """The irreducible factors of chi over Q, in the order of the signs."""
+        return factors_of_chi(self.A)
+
+    @property
+    def is_generic(self) -> bool:
+        """Whether chi has no repeated root."""
+        return all(factor.multiplicity == 1 for factor in self.factors)
+
+    @cached_property
+    def chain(self) -> tuple[fmpq_mpoly, ...]:
+        """H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}."""
+        return chain(self.A, self.H)
+
+    def associate(self, signs: Sequence[int]) -> AssociatedSystem:
+        """The associated system with these signs."""
+        if len(signs) != len(self.factors):
+            raise InputError(f"found {len(signs)} signs, expected {len(self.factors)}, one for each factor of chi")
+        polynomial = sign_polynomial(self.factors, signs)
+        coefficients = tuple(polynomial[k] for k in range(self.m))
+        K = self.H.context().constant(0)
+        for coefficient, H in zip(coefficients, self.chain, strict=True):
+            if coefficient != 0:
+                K = K + coefficient * H
+        return AssociatedSystem(tuple(signs), coefficients, evaluate_at_matrix(polynomial, self.A), K)
+
+    def associated(self) -> Iterator[AssociatedSystem]:
+        """All rational associated systems up to an overall sign, 2^(r-1) for r factors; the first is f_0 itself."""
+        for rest in itertools.product((1, -1), repeat=len(self.factors) - 1):
+            yield self.associate((1, *rest))
+
+    @cached_property
+    def chosen(self) -> AssociatedSystem:
+        """The associated system that `signs` picks."""
+        return self.associate(self.signs)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, FamilyMember):
+            return NotImplemented
+        return bool(
+            self.A == other.A and self.signs == other.signs and self.variables == other.variables and self.H == other.H
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.variables, self.signs, str(self.H)))
+
+
+def sign_polynomial(factors: Sequence[Factor], signs: Sequence[int]) -> fmpq_poly:
+    """The polynomial of degree < m that is s_i modulo the i-th factor to its power, by Chinese remainders.
+
+    Its square is 1 modulo chi, and chi(A) = 0, so B = polynomial(A) has B^2 = I for every skew-Hamiltonian A, also
+    where chi has repeated roots.
+
+    >>> t = fmpq_poly([0, 1])
+    >>> sign_polynomial([Factor(t - 1, 1), Factor(t - 2, 1)], (1, -1))
+    (-2)*x + 3
+    """
+    modulus = fmpq_poly([1])
+    for factor in factors:
+        modulus *= factor.polynomial**factor.multiplicity
+    total = fmpq_poly([0])
+    for factor, sign in zip(factors, signs, strict=True):
+        part = factor.polynomial**factor.multiplicity
+        rest = modulus // part
+        _, inverse, _ = rest.xgcd(part)
+        total += sign * rest * (inverse % part)
+    return total % modulus

@@ -1,0 +1,175 @@
+"""The cubics that belong to a skew-Hamiltonian A: A (Hess H) = (Hess H) A^T.
+
+They form a vector space, of dimension 4m for generic A, and come in chains: grad H_i = A grad H_{i-1}.
+Source: petrera-suris-2016, eqs. (d2H), (grad K), (grad L) and the proposition on dimension 12 for m = 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import nullspace, primitive_integers
+from kahanmaps.algebra.polynomials import gradient, is_homogeneous, monomials, names_of, ring
+from kahanmaps.algebra.text import format_number
+from kahanmaps.errors import HypothesisError
+from kahanmaps.family.skew_hamiltonian import require_skew_hamiltonian
+from kahanmaps.systems.hamiltonian import linear_combinations
+
+
+@dataclass(frozen=True)
+class CubicSpace:
+    """The solutions of A (Hess H) = (Hess H) A^T among homogeneous cubics.
+
+    `basis` has coprime integer coefficients; `unknowns` counts the monomials and `rank` is that of the linear system.
+    """
+
+    basis: tuple[fmpq_mpoly, ...]
+    unknowns: int
+    rank: int
+    expected: int
+
+    @property
+    def dimension(self) -> int:
+        return len(self.basis)
+
+
+def default_variables(dim: int) -> tuple[str, ...]:
+    """x1, ..., x{dim}."""
+    return tuple(f"x{i + 1}" for i in range(dim))
+
+
+def cubic_space(A: fmpq_mat, variables: tuple[str, ...] | None = None) -> CubicSpace:
+    """The exact space of cubics for a skew-Hamiltonian A, generic or not.
+
+    >>> space = cubic_space(fmpq_mat(4, 4, [1, 0, 0, 0,  0, 2, 0, 0,  0, 0, 1, 0,  0, 0, 0, 2]))
+    >>> space.dimension, space.rank, space.unknowns
+    (8, 12, 20)
+    """
+    require_skew_hamiltonian(A)
+    n = A.nrows()
+    names = variables or default_variables(n)
+    context = ring(names)
+    exponents = list(monomials(n, 3))
+    place = {_indices(exponent): k for k, exponent in enumerate(exponents)}
+    weight = {key: _symmetry(key) for key in place}
+    entries = [(i, k, A[i, k]) for i in range(n) for k in range(n) if A[i, k] != 0]
+    by_row: list[list[tuple[int, fmpq]]] = [[] for _ in range(n)]
+    for i, k, value in entries:
+        by_row[i].append((k, value))
+    zero = fmpq(0)
+    flat: list[fmpq] = []
+    equations = 0
+    # The matrix A Hess - Hess A^T is skew with entries linear in x: one equation for i < j and each variable l.
+    for i in range(n):
+        for j in range(i + 1, n):
+            for l in range(n):
+                row = [zero] * len(exponents)
+                for k, value in by_row[i]:
+                    key = _sorted(k, j, l)
+                    row[place[key]] += value * weight[key]
+                for k, value in by_row[j]:
+                    key = _sorted(i, k, l)
+                    row[place[key]] -= value * weight[key]
+                flat += row
+                equations += 1
+    solutions = nullspace(QQ, fmpq_mat(equations, len(exponents), flat))
+    basis = tuple(
+        context.from_dict({exponents[k]: fmpq(c) for k, c in enumerate(primitive_integers(vector)) if c != 0})
+        for vector in solutions
+    )
+    return CubicSpace(basis, len(exponents), len(exponents) - len(basis), 2 * n)
+
+
+def belongs(A: fmpq_mat, H: fmpq_mpoly) -> bool:
+    """Whether H is a homogeneous cubic with A (Hess H) = (Hess H) A^T."""
+    return is_homogeneous(H, 3) and next(_failures(A, H), None) is None
+
+
+def require_member(A: fmpq_mat, H: fmpq_mpoly) -> None:
+    """Raises HypothesisError, naming an entry that fails, unless H belongs to the cubics of A."""
+    if len(names_of(H)) != A.nrows():
+        raise HypothesisError(
+            f"A is {A.nrows()} x {A.ncols()} and H has {len(names_of(H))} variables, expected as many as A has rows"
+        )
+    if not is_homogeneous(H, 3):
+        other = next(exponent for exponent in H.monoms() if sum(exponent) != 3)
+        term = H.context().from_dict({tuple(other): fmpq(1)})
+        raise HypothesisError(f"H has the term {term} of degree {sum(other)}, expected a homogeneous cubic")
+    failure = next(_failures(A, H), None)
+    if failure is not None:
+        i, j, l, left, right = failure
+        raise HypothesisError(
+            "H is not in the space of A: A Hess(H) = Hess(H) A^T fails in entry "
+            f"({i + 1},{j + 1}), where the coefficient of {names_of(H)[l]} is {format_number(left)} on the left and "
+            f"{format_number(right)} on the right ('kahanmaps family space' shows the space)"
+        )
+
+
+def chain(A: fmpq_mat, H: fmpq_mpoly, length: int | None = None) -> tuple[fmpq_mpoly, ...]:
+    """H_0 = H, H_1, ..., with grad H_i = A grad H_{i-1}; m of them unless `length` says otherwise.
+
+    Raises HypothesisError where H does not belong to the cubics of A, so that no H_1 exists.
+    """
+    require_member(A, H)
+    hamiltonians = [H]
+    for _ in range((A.nrows() // 2 if length is None else length) - 1):
+        hamiltonians.append(potential(linear_combinations(A, gradient(hamiltonians[-1]))))
+    return tuple(hamiltonians)
+
+
+def potential(field: tuple[fmpq_mpoly, ...]) -> fmpq_mpoly:
+    """The homogeneous cubic with this gradient, by Euler's formula 3 H = x . grad H, checked.
+
+    Raises HypothesisError where the quadratic forms are not a gradient.
+    """
+    context = field[0].context()
+    total = context.constant(0)
+    for x, component in zip(context.gens(), field, strict=True):
+        total = total + x * component
+    H = total / 3
+    if gradient(H) != field:
+        raise HypothesisError("the vector of quadratic forms is not the gradient of a homogeneous cubic")
+    return H
+
+
+def _failures(A: fmpq_mat, H: fmpq_mpoly) -> Iterator[tuple[int, int, int, fmpq, fmpq]]:
+    """Entries (i, j, variable l) where A T_l and T_l A^T differ, T_l the derivative of the Hessian along x_l."""
+    n = A.nrows()
+    for l, third in enumerate(third_derivatives(H)):
+        left = A * third
+        for i in range(n):
+            for j in range(i + 1, n):
+                if left[i, j] != left[j, i]:
+                    yield i, j, l, left[i, j], left[j, i]
+
+
+def third_derivatives(H: fmpq_mpoly) -> list[fmpq_mat]:
+    """The constant matrices T_l = d(Hess H)/dx_l of a homogeneous cubic."""
+    n = len(names_of(H))
+    tensors = [[fmpq(0)] * (n * n) for _ in range(n)]
+    for exponent, coefficient in H.terms():
+        key = _indices(tuple(exponent))
+        value = coefficient * _symmetry(key)
+        for a, b, c in {(key[i], key[j], key[3 - i - j]) for i in range(3) for j in range(3) if i != j}:
+            tensors[a][b * n + c] = value
+    return [fmpq_mat(n, n, tensor) for tensor in tensors]
+
+
+def _indices(exponents: tuple[int, ...]) -> tuple[int, int, int]:
+    """The variables of a cubic monomial, in increasing order."""
+    a, b, c = (i for i, exponent in enumerate(exponents) for _ in range(exponent))
+    return a, b, c
+
+
+def _sorted(a: int, b: int, c: int) -> tuple[int, int, int]:
+    x, y, z = sorted((a, b, c))
+    return x, y, z
+
+
+def _symmetry(key: tuple[int, int, int]) -> int:
+    """The third derivative of the monomial: 6 for x^3, 2 for x^2 y, 1 for x y z."""
+    return {1: 6, 2: 2, 3: 1}[len(set(key))]

@@ -1,0 +1,164 @@
+"""Members of the family drawn at random, reproducible from a seed.
+
+In normal form A = diag(W^T, W) with W = diag(eigenvalues), or W the companion matrix of chi, and the
+cubics of A are written down at once: sums of planar cubics in the first case; in the second the t^(m-1)-coefficient
+of a cubic form in X = q_1 + q_2 t + ... and Y over Q[t]/chi. A random symplectic integer matrix then
+hides the normal form. So everything stays small and integral, whatever m is.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.errors import InputError
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.cubics import default_variables
+from kahanmaps.family.skew_hamiltonian import random_symplectic, symplectic_inverse
+
+MAX_M = 20
+
+
+def draw_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) -> FamilyMember:
+    """A member whose A has these rational eigenvalues (each twice), hidden by a random symplectic matrix.
+
+    `size` bounds the integer coefficients of the planar cubics. Repeated eigenvalues are allowed and give a diagonalisable,
+    non-generic A.
+
+    >>> member = draw_with_eigenvalues([1, -2], seed=7)
+    >>> [str(factor) for factor in member.factors]
+    ['t + 2', 't - 1']
+    """
+    values = [rational(value) for value in eigenvalues]
+    m = _require_m(len(values))
+    rng = random.Random(seed)
+    normal = fmpq_mat(2 * m, 2 * m)
+    for i, value in enumerate(values):
+        normal[i, i] = normal[m + i, m + i] = value
+    S = random_symplectic(m, rng)
+    forms = _coordinates(symplectic_inverse(S), default_variables(2 * m))
+    H = forms[0].context().constant(0)
+    for i in range(m):
+        u, v = forms[i], forms[m + i]
+        a, b, c, d = _planar_coefficients(rng, size)
+        H += a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3
+    return FamilyMember(_hidden(normal, S), H)
+
+
+def draw_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
+    """A member whose A has characteristic polynomial chi(t)^2, chi of degree m, hidden by a random symplectic matrix.
+
+    `size` bounds the integer coefficients of the cubic form over Q[t]/chi. Where chi has repeated roots A is not
+    diagonalisable.
+
+    >>> draw_with_chi(fmpq_poly([-2, 0, 1]), seed=7).factors[0].degree
+    2
+    """
+    m = _require_m(chi.degree())
+    chi = chi / chi.leading_coefficient()
+    rng = random.Random(seed)
+    companion = fmpq_mat(m, m)
+    for i in range(m):
+        companion[i, m - 1] = -chi[i]
+        if i:
+            companion[i, i - 1] = fmpq(1)
+    normal = fmpq_mat(2 * m, 2 * m)
+    for i in range(m):
+        for j in range(m):
+            normal[j, i] = normal[m + i, m + j] = companion[i, j]
+    S = random_symplectic(m, rng)
+    forms = _coordinates(symplectic_inverse(S), default_variables(2 * m))
+    zero = forms[0].context().constant(0)
+    X = forms[:m]
+    # Y in the basis dual to 1, t, ..., t^(m-1) under (a, b) -> coefficient of t^(m-1) in a b, so that J is standard.
+    Y = [zero] * m
+    for j in range(m):
+        for k in range(j, m):
+            coefficient = fmpq(1) if k == m - 1 else chi[k + 1]
+            Y[k - j] = Y[k - j] + coefficient * forms[m + j]
+    products = _Products(chi, zero)
+    squares = [products(X, X), products(X, Y), products(Y, Y)]
+    cubes = [products(squares[0], X), products(squares[0], Y), products(squares[2], X), products(squares[2], Y)]
+    H = zero
+    for cube in cubes:
+        factor: list[fmpq_mpoly] = [zero + c for c in _coefficients(rng, m, size)]
+        H += products(factor, cube)[m - 1]
+    return FamilyMember(_hidden(normal, S), H)
+
+
+def draw_generic(m: int, seed: int, size: int = 1) -> FamilyMember:
+    """A member with a random integer chi without repeated roots, typically irreducible.
+
+    >>> draw_generic(3, seed=7).is_generic
+    True
+    """
+    _require_m(m)
+    rng = random.Random(f"chi {seed}")
+    while True:
+        chi = fmpq_poly([rng.choice((-3, -2, -1, 1, 2, 3)), *(rng.randint(-2, 2) for _ in range(m - 1)), 1])
+        if all(multiplicity == 1 for _, multiplicity in chi.factor()[1]):
+            return draw_with_chi(chi, seed, size)
+
+
+class _Products:
+    """Multiplication in (Q[t]/chi)[x], elements as lists of m polynomials in x."""
+
+    def __init__(self, chi: fmpq_poly, zero: fmpq_mpoly) -> None:
+        self.chi = chi
+        self.zero = zero
+
+    def __call__(self, left: Sequence[fmpq_mpoly], right: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly]:
+        m = len(left)
+        full = [self.zero] * (2 * m - 1)
+        for i, a in enumerate(left):
+            if not a.is_zero():
+                for j, b in enumerate(right):
+                    full[i + j] = full[i + j] + a * b
+        for power in range(2 * m - 2, m - 1, -1):
+            for k in range(m):
+                if self.chi[k] != 0:
+                    full[power - m + k] = full[power - m + k] - self.chi[k] * full[power]
+        return full[:m]
+
+
+def _hidden(normal: fmpq_mat, S: fmpq_mat) -> fmpq_mat:
+    """A in the coordinates x = S z: Hess_x = S^{-T} Hess_z S^{-1}, so A_x = S^{-T} A_z S^T."""
+    return symplectic_inverse(S).transpose() * normal * S.transpose()
+
+
+def _coordinates(matrix: fmpq_mat, variables: tuple[str, ...]) -> list[fmpq_mpoly]:
+    """The rows of `matrix` as linear forms."""
+    context = ring(variables)
+    forms = []
+    for row in matrix.tolist():
+        form = context.constant(0)
+        for entry, x in zip(row, context.gens(), strict=True):
+            form = form + entry * x
+        forms.append(form)
+    return forms
+
+
+def _planar_coefficients(rng: random.Random, size: int) -> list[int]:
+    """A binary cubic with nonzero discriminant, so that its map is a genuine one."""
+    while True:
+        a, b, c, d = (rng.randint(-size, size) for _ in range(4))
+        if b * b * c * c - 4 * a * c**3 - 4 * b**3 * d - 27 * a * a * d * d + 18 * a * b * c * d != 0:
+            return [a, b, c, d]
+
+
+def _coefficients(rng: random.Random, m: int, size: int) -> list[int]:
+    while True:
+        coefficients = [rng.randint(-size, size) for _ in range(m)]
+        if any(coefficients):
+            return coefficients
+
+
+def _require_m(m: int) -> int:
+    if not 1 <= m <= MAX_M:
+        raise InputError(f"found m = {m}, expected 1 <= m <= {MAX_M} (dimension 2m)")
+    return m

@@ -1,0 +1,240 @@
+"""Skew-Hamiltonian matrices: A^T J = J A, with J = [[0, I], [-I, 0]].
+
+In blocks A = [[W, X], [Y, W^T]] with X and Y skew. The characteristic polynomial is a square chi^2 with chi of degree m;
+A is generic when chi has no repeated root. Source: petrera-suris-2016, eqs. (cond A), (cond2); fassbender-1999.
+"""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+
+from flint import fmpq, fmpq_mat, fmpq_poly
+
+from kahanmaps.algebra.text import format_number
+from kahanmaps.errors import HypothesisError
+from kahanmaps.systems.hamiltonian import standard_structure
+
+
+@dataclass(frozen=True)
+class Factor:
+    """An irreducible factor of chi over Q, monic, with its multiplicity."""
+
+    polynomial: fmpq_poly
+    multiplicity: int
+
+    @property
+    def degree(self) -> int:
+        return int(self.polynomial.degree())
+
+    @property
+    def root(self) -> fmpq | None:
+        """The root of a linear factor."""
+        return -self.polynomial[0] if self.degree == 1 else None
+
+    def __str__(self) -> str:
+        return format_univariate(self.polynomial)
+
+
+def defects(A: fmpq_mat) -> list[str]:
+    """What keeps A from being skew-Hamiltonian, entry by entry; empty if it is.
+
+    >>> defects(fmpq_mat([[1, 2], [0, 1]]))
+    ['entry (1,2) is 2, expected 0: the upper right block must be skew']
+    """
+    n = A.nrows()
+    if n != A.ncols() or n % 2 or n == 0:
+        return [f"A is {n} x {A.ncols()}, expected a square matrix of even size 2m"]
+    m = n // 2
+    found = []
+    for i in range(m):
+        for j in range(m):
+            if A[m + j, m + i] != A[i, j]:
+                found.append(
+                    f"entry ({m + j + 1},{m + i + 1}) is {_show(A[m + j, m + i])}, expected {_show(A[i, j])}: "
+                    "the lower right block must be the transpose of the upper left one"
+                )
+    for name, top, left in (("upper right", 0, m), ("lower left", m, 0)):
+        for i in range(m):
+            for j in range(i, m):
+                above, below = A[top + i, left + j], A[top + j, left + i]
+                if i == j and above != 0:
+                    found.append(
+                        f"entry ({top + i + 1},{left + i + 1}) is {_show(above)}, expected 0: "
+                        f"the {name} block must be skew"
+                    )
+                elif i != j and above != -below:
+                    found.append(
+                        f"entry ({top + j + 1},{left + i + 1}) is {_show(below)}, expected {_show(-above)}: "
+                        f"the {name} block must be skew"
+                    )
+    return found
+
+
+def require_skew_hamiltonian(A: fmpq_mat) -> None:
+    """Raises HypothesisError, naming the offending entries, unless A^T J = J A."""
+    found = defects(A)
+    if found:
+        shown = found[:4]
+        if len(found) > len(shown):
+            shown.append(f"and {len(found) - len(shown)} more")
+        raise HypothesisError("A is not skew-Hamiltonian: " + "; ".join(shown))
+
+
+def factors_of_chi(A: fmpq_mat) -> tuple[Factor, ...]:
+    """The irreducible factors of chi, where det(t - A) = chi(t)^2.
+
+    In the order that signs refer to: linear factors by increasing root, then by degree and by the coefficients of
+    the monic polynomial, constant term first.
+    """
+    require_skew_hamiltonian(A)
+    _, found = A.charpoly().factor()
+    factors = []
+    for polynomial, multiplicity in found:
+        monic = fmpq_poly(polynomial.coeffs()) / polynomial.leading_coefficient()
+        factors.append(Factor(monic, multiplicity // 2))
+    return tuple(sorted(factors, key=_order))
+
+
+def chi(A: fmpq_mat) -> fmpq_poly:
+    """The monic polynomial chi of degree m with det(t - A) = chi(t)^2.
+
+    >>> format_univariate(chi(fmpq_mat([[3, 0], [0, 3]])))
+    't - 3'
+    """
+    product = fmpq_poly([1])
+    for factor in factors_of_chi(A):
+        product *= factor.polynomial**factor.multiplicity
+    return product
+
+
+def is_generic(A: fmpq_mat) -> bool:
+    """Whether chi has no repeated root."""
+    return all(factor.multiplicity == 1 for factor in factors_of_chi(A))
+
+
+def diagnosis(A: fmpq_mat) -> str:
+    """In words: how chi factors over Q, and what that means for A and its associated systems."""
+    factors = factors_of_chi(A)
+    repeated = [factor for factor in factors if factor.multiplicity > 1]
+    product = " ".join(
+        f"({factor})" + (f"^{factor.multiplicity}" if factor.multiplicity > 1 else "") for factor in factors
+    )
+    if not repeated:
+        if all(factor.degree == 1 for factor in factors):
+            how = "all roots rational"
+        elif len(factors) == 1:
+            how = "irreducible over Q"
+        else:
+            how = f"{len(factors)} irreducible factors over Q"
+        return f"A is generic: chi = {product}, without repeated roots, {how}"
+    radical = fmpq_mat(A.nrows(), A.nrows(), [int(i == j) for i in range(A.nrows()) for j in range(A.nrows())])
+    for factor in factors:
+        radical = radical * evaluate_at_matrix(factor.polynomial, A)
+    diagonalisable = not any(entry != 0 for entry in radical.entries())
+    kind = "still diagonalisable" if diagonalisable else "not diagonalisable"
+    names = ", ".join(f"({factor}) {factor.multiplicity} times" for factor in repeated)
+    return (
+        f"A is not generic: chi = {product} has repeated roots, {names}; A is {kind}. The space of cubics may be "
+        "larger than 4m, and the theorems that need m distinct roots (invariant Poisson structure, m independent "
+        "integrals) do not apply; commutativity of associated maps does"
+    )
+
+
+def evaluate_at_matrix(polynomial: fmpq_poly, A: fmpq_mat) -> fmpq_mat:
+    """polynomial(A), by Horner's scheme."""
+    n = A.nrows()
+    identity = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+    value = fmpq_mat(n, n)
+    for coefficient in reversed(polynomial.coeffs()):
+        value = value * A + identity * coefficient
+    return value
+
+
+def random_skew_hamiltonian(m: int, rng: random.Random, bound: int = 3) -> fmpq_mat:
+    """[[W, X], [Y, W^T]] with random integers from -bound to bound in W and in the skew blocks X and Y."""
+    W = [[rng.randint(-bound, bound) for _ in range(m)] for _ in range(m)]
+    X, Y = _random_skew(m, rng, bound), _random_skew(m, rng, bound)
+    upper = [[*W[i], *X[i]] for i in range(m)]
+    lower = [[*Y[i], *(W[j][i] for j in range(m))] for i in range(m)]
+    return fmpq_mat(upper + lower)
+
+
+def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
+    """A random integer matrix S with S^T J S = J and small entries: a product of elementary symplectic matrices.
+
+    Every variable is mixed with every kind of partner, but each factor adds only a few entries, so that what is hidden by S
+    keeps small coefficients.
+    """
+    n = 2 * m
+    S = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+
+    def add(to: int, source: int, times: int) -> None:
+        """Row operation S[to] += times S[source], on the left."""
+        nonlocal S
+        elementary = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+        elementary[to, source] = elementary[to, source] + times
+        S = elementary * S
+
+    for _ in range(rounds):
+        order = list(range(m))
+        rng.shuffle(order)
+        for i, j in zip(order, order[1:] + order[:1], strict=True):
+            sign = rng.choice((-1, 1))
+            if i != j:  # q_i += s q_j goes with p_j -= s p_i
+                add(i, j, sign)
+                add(m + j, m + i, -sign)
+            shear = rng.choice((-1, 1))
+            if rng.random() < 0.5:  # q += X p with X symmetric
+                add(i, m + j, shear)
+                if i != j:
+                    add(j, m + i, shear)
+            else:  # p += Y q with Y symmetric
+                add(m + i, j, shear)
+                if i != j:
+                    add(m + j, i, shear)
+    return S
+
+
+def symplectic_inverse(S: fmpq_mat) -> fmpq_mat:
+    """S^{-1} = J^{-1} S^T J for symplectic S."""
+    J = standard_structure(S.nrows())
+    return -(J * S.transpose() * J)
+
+
+def format_univariate(polynomial: fmpq_poly) -> str:
+    """A polynomial in t as people write it.
+
+    >>> format_univariate(fmpq_poly([-2, 0, 1]))
+    't^2 - 2'
+    """
+    text = ""
+    for power in range(polynomial.degree(), -1, -1):
+        coefficient = polynomial[power]
+        if coefficient == 0:
+            continue
+        size, sign = abs(coefficient), "-" if coefficient < 0 else "+"
+        letter = "" if power == 0 else "t" if power == 1 else f"t^{power}"
+        number = "" if size == 1 and letter else format_number(size) + ("*" if letter else "")
+        text += f" {sign} {number}{letter}" if text else f"{'-' if sign == '-' else ''}{number}{letter}"
+    return text or "0"
+
+
+def _order(factor: Factor) -> tuple[int, tuple[fmpq, ...]]:
+    if factor.degree == 1:
+        return (1, (-factor.polynomial[0],))
+    return (factor.degree, tuple(factor.polynomial.coeffs()))
+
+
+def _random_skew(m: int, rng: random.Random, bound: int) -> list[list[int]]:
+    skew = [[0] * m for _ in range(m)]
+    for i in range(m):
+        for j in range(i):
+            skew[i][j] = rng.randint(-bound, bound)
+            skew[j][i] = -skew[i][j]
+    return skew
+
+
+def _show(number: fmpq) -> str:
+    text = format_number(number)
+    return text if len(text) <= 40 else f"{text[:18]}...{text[-18:]}"

@@ -1,0 +1,1 @@
+"""The differential equations: quadratic vector fields, cubic Hamiltonians, system files, the catalogue."""

@@ -1,0 +1,108 @@
+"""Hamiltonian systems f = J grad H with a cubic H and a constant skew matrix J.
+
+Gradients are columns. The standard structure on R^{2m} is J = [[0, I], [-I, 0]], so that {x_i, x_{m+i}} = 1; any constant
+skew J is admitted, singular ones and odd dimensions included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import degree, gradient, is_homogeneous, names_of
+from kahanmaps.errors import InputError
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def standard_structure(dim: int) -> fmpq_mat:
+    """The matrix [[0, I], [-I, 0]] of even size `dim`.
+
+    >>> standard_structure(2)
+    [ 0, 1]
+    [-1, 0]
+    """
+    if dim % 2 or dim <= 0:
+        raise InputError(f"the standard structure J = [[0, I], [-I, 0]] needs an even dimension, found {dim}")
+    m = dim // 2
+    return fmpq_mat(dim, dim, [(j == i + m) - (i == j + m) for i in range(dim) for j in range(dim)])
+
+
+@dataclass(frozen=True, eq=False)
+class CubicHamiltonian:
+    """A polynomial H of degree at most 3 and a constant skew matrix J; the system is f = J grad H.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> H = parse_polynomial("q^3/3 + p^2/2", ["q", "p"])
+    >>> print(CubicHamiltonian(H, standard_structure(2)).system)
+    q' = p
+    p' = -q^2
+    """
+
+    H: fmpq_mpoly
+    J: fmpq_mat
+
+    def __post_init__(self) -> None:
+        n = len(names_of(self.H))
+        if degree(self.H) > 3:
+            raise InputError(f"H has degree {degree(self.H)}, expected at most 3, or the system is not quadratic")
+        if (self.J.nrows(), self.J.ncols()) != (n, n):
+            raise InputError(f"J is {self.J.nrows()} x {self.J.ncols()}, expected {n} x {n} for {n} variables")
+        for i in range(n):
+            for j in range(i, n):
+                if self.J[i, j] != -self.J[j, i]:
+                    raise InputError(
+                        f"J is not skew: entry ({i + 1},{j + 1}) is {self.J[i, j]}, entry ({j + 1},{i + 1}) is "
+                        f"{self.J[j, i]}, expected opposite numbers"
+                    )
+
+    @property
+    def dim(self) -> int:
+        return len(names_of(self.H))
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        return names_of(self.H)
+
+    @property
+    def is_homogeneous(self) -> bool:
+        """Whether every term of H has degree 3."""
+        return is_homogeneous(self.H, 3)
+
+    @cached_property
+    def is_standard(self) -> bool:
+        """Whether J = [[0, I], [-I, 0]]."""
+        return self.dim % 2 == 0 and bool(self.J == standard_structure(self.dim))
+
+    @cached_property
+    def gradient(self) -> tuple[fmpq_mpoly, ...]:
+        """The partial derivatives of H."""
+        return gradient(self.H)
+
+    @cached_property
+    def system(self) -> QuadraticSystem:
+        """The quadratic system x' = J grad H(x)."""
+        return QuadraticSystem.from_polynomials(linear_combinations(self.J, self.gradient))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, CubicHamiltonian):
+            return NotImplemented
+        return bool(self.variables == other.variables and self.H == other.H and self.J == other.J)
+
+    def __hash__(self) -> int:
+        return hash((self.variables, str(self.H)))
+
+
+def linear_combinations(matrix: fmpq_mat, polynomials: tuple[fmpq_mpoly, ...]) -> tuple[fmpq_mpoly, ...]:
+    """The entries of `matrix` times the column of `polynomials`."""
+    zero: Any = polynomials[0].context().constant(0)
+    combined = []
+    for i in range(matrix.nrows()):
+        total = zero
+        for j, polynomial in enumerate(polynomials):
+            if matrix[i, j] != fmpq(0):
+                total = total + matrix[i, j] * polynomial
+        combined.append(total)
+    return tuple(combined)
