@@ -1,0 +1,232 @@
+"""The Kahan map over Q on integer points: numerators over ONE common denominator.
+
+A point is x = X / W with integers X and W > 0 without a common factor. With eps = p/q, L a common denominator of the
+system, and F = L f'(X / W) W an integer matrix, the step solves
+
+    (q L W I - p F) x~ = q L X + p (L B) X + 2 p W (L c).
+
+No rational number is formed on the way: a rational constructor runs a gcd that costs more than the rest of the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from flint import fmpq, fmpz, fmpz_mat
+
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+@dataclass(frozen=True)
+class IntegerPoint:
+    """The rational point numerators / denominator, in lowest terms as a whole, denominator positive."""
+
+    numerators: tuple[fmpz, ...]
+    denominator: fmpz
+
+    @classmethod
+    def from_rationals(cls, point: Sequence[fmpq]) -> IntegerPoint:
+        """The point with these coordinates."""
+        below = fmpz(1)
+        for entry in point:
+            below = below.lcm(entry.q)
+        return cls(tuple(entry.p * (below // entry.q) for entry in point), below)
+
+    def rationals(self) -> tuple[fmpq, ...]:
+        """The coordinates as reduced fractions; one gcd each."""
+        return tuple(fmpq(entry, self.denominator) for entry in self.numerators)
+
+    @property
+    def bits(self) -> int:
+        """The bit length of the largest of the integers."""
+        return max(self.denominator.bit_length(), *(entry.bit_length() for entry in self.numerators))
+
+
+class IntegerSteps:
+    """Steps of Phi(., eps) on integer points."""
+
+    def __init__(self, system: QuadraticSystem, eps: fmpq) -> None:
+        common, tensor, linear, constant = system.integer_form
+        self._dim = system.dim
+        self._numerator, self._scale = eps.p, eps.q * common
+        self._tensor = tensor * -eps.p
+        self._linear = linear * eps.p if not system.is_homogeneous else None
+        self._constant = constant * (2 * eps.p)
+
+    def step(self, point: IntegerPoint) -> IntegerPoint | None:
+        """The image, or None where det(I - eps f'(x)) = 0."""
+        n, X, W = self._dim, point.numerators, point.denominator
+        column = fmpz_mat(n, 1, X)
+        matrix = fmpz_mat(n, n, (self._tensor * column).entries())
+        right = column * self._scale
+        if self._linear is not None:
+            matrix = matrix - self._linear * W
+            right = right + self._linear * column + self._constant * W
+        scaled = self._scale * W
+        for i in range(n):
+            matrix[i, i] += scaled
+        return _divide(matrix, right, W)
+
+
+# Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact_steps.py).
+_ELIMINATION_BITS = 4000
+# A common divisor shorter than this is not worth a division of every entry.
+_USEFUL_BITS = 64
+
+
+def _divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
+    """The solution of matrix x = right in lowest terms; `likely` is an integer whose powers may divide the minors."""
+    if matrix.nrows() > 2 and likely.bit_length() >= _ELIMINATION_BITS:
+        found = _eliminate(matrix, right, likely)
+        # The elimination assumes that certain divisions are exact; this product is what makes the result certain.
+        if found is not None and matrix * fmpz_mat(right.nrows(), 1, found.numerators) == right * found.denominator:
+            return found
+    try:
+        column, denominator = matrix.solve(right).numer_denom()
+    except ZeroDivisionError:
+        return None
+    return _lowest_terms(column.entries(), denominator, denominator)
+
+
+def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
+    """Fraction-free elimination, two columns at a time, that also removes what the minors share with `likely`.
+
+    For maps of the commuting family the matrix has rank 2 modulo (nearly) every prime of the denominator W, so that minors of
+    order k share the (k - 2)-th power of W up to small primes. Taken out once, at order 3, this keeps all later entries at
+    twice the size of W instead of up to n times: the exact divisions by the previous pivot then take out the
+    higher powers by themselves. Where nothing is shared this is Bareiss' two-step algorithm. The caller has to
+    verify the result; None where a pivot vanishes.
+    """
+    n = matrix.nrows()
+    rows = [[*row, right[i, 0]] for i, row in enumerate(matrix.tolist())]
+    previous: fmpz | None = None
+    k = 0
+    while k + 1 < n:
+        a, b = rows[k], rows[k + 1]
+        below = range(k + 2, n)
+        pivots = [a[k] * b[k + 1] - a[k + 1] * b[k]]
+        pivots += [a[k + 1] * rows[i][k] - a[k] * rows[i][k + 1] for i in below]
+        pivots += [b[k] * rows[i][k + 1] - b[k + 1] * rows[i][k] for i in below]
+        second = [a[k] * b[j] - b[k] * a[j] for j in range(k + 2, n + 1)]
+        if previous is not None:
+            quotients = _exact_quotients(pivots + second, previous)
+            pivots, second = quotients[: len(pivots)], quotients[len(pivots) :]
+        pivot, count = pivots[0], len(below)
+        if pivot == 0 or a[k] == 0:
+            return None
+        block = [
+            rows[i][j] * pivot + b[j] * pivots[1 + i - k - 2] + a[j] * pivots[1 + count + i - k - 2]
+            for i in below
+            for j in range(k + 2, n + 1)
+        ]
+        if block:
+            divisor = previous if previous is not None else _shared(likely, block)
+            if divisor is not None:
+                block = _exact_quotients(block, divisor)
+        b[k + 1 :] = [pivot, *second]
+        width = n - 1 - k
+        for i in below:
+            rows[i][k + 2 :] = block[(i - k - 2) * width : (i - k - 1) * width]
+        previous = pivot
+        k += 2
+    return _substitute_back(rows)
+
+
+def _substitute_back(rows: list[list[fmpz]]) -> IntegerPoint | None:
+    """The solution of a triangular system [U | r], one gcd of large numbers in all."""
+    n = len(rows)
+    if any(rows[i][i] == 0 for i in range(n)):
+        return None
+    numerator, denominator = rows[-1][n], rows[-1][n - 1]
+    content = numerator.gcd(denominator)
+    solution = [numerator // content]
+    denominator = denominator // content
+    added = fmpz(1)
+    for i in range(n - 2, -1, -1):
+        value = denominator * rows[i][n]
+        for j, known in enumerate(solution, start=i + 1):
+            value -= rows[i][j] * known
+        quotient, remainder = divmod(value, rows[i][i])
+        if remainder != 0:
+            content = remainder.gcd(rows[i][i])
+            missing = rows[i][i] // content
+            solution = [known * missing for known in solution]
+            denominator, added = denominator * missing, added * missing
+            quotient = value // content
+        solution.insert(0, quotient)
+    # The last coordinate was in lowest terms, so what all share now divides what was added since.
+    return _lowest_terms(solution, denominator, added)
+
+
+def _shared(likely: fmpz, block: list[fmpz]) -> fmpz | None:
+    """The part of `likely` without small primes that divides the entries, or None where it is not worth removing.
+
+    A few entries decide (the result is verified in the end). Small primes often divide minors of order 3 by accident and
+    then not, to the power needed, those of higher order.
+    """
+    common = likely
+    for value in block[:: max(1, len(block) // 3)]:
+        remainder = value % common
+        if remainder != 0:
+            common = common.gcd(remainder)
+            if common.bit_length() < _USEFUL_BITS:
+                return None
+    while (small := common.gcd(_small_primes())) != 1:
+        common = common // small
+    return common if common.bit_length() >= _USEFUL_BITS else None
+
+
+@lru_cache(maxsize=1)
+def _small_primes() -> fmpz:
+    return fmpz.primorial_ui(1000)
+
+
+def _exact_quotients(values: list[fmpz], divisor: fmpz) -> list[fmpz]:
+    """values / divisor where every division is known to be exact (otherwise the quotients are meaningless).
+
+    Many divisions by one divisor: its inverse modulo a power of 2 turns each into one multiplication.
+    """
+    bits = max(value.bit_length() for value in values) - divisor.bit_length() + 2
+    if len(values) < 4 or bits <= 0:
+        return [value // divisor for value in values]
+    zeros = _trailing_zeros(divisor)
+    modulus = fmpz(1) << bits
+    mask, half = modulus - 1, modulus >> 1
+    inverse = _inverse_modulo_power_of_two(divisor >> zeros, bits)
+    quotients = []
+    for value in values:
+        quotient = (((value >> zeros) & mask) * inverse) & mask
+        quotients.append(quotient - modulus if quotient >= half else quotient)
+    return quotients
+
+
+def _inverse_modulo_power_of_two(odd: fmpz, bits: int) -> fmpz:
+    """1 / odd modulo 2^bits, by Newton's iteration."""
+    precision = 64
+    inverse = fmpz(pow(int(odd & ((1 << 64) - 1)), -1, 1 << 64))
+    while precision < bits:
+        precision = min(2 * precision, bits)
+        mask = (fmpz(1) << precision) - 1
+        inverse = (inverse * (2 - (odd & mask) * inverse)) & mask
+    return inverse & ((fmpz(1) << bits) - 1)
+
+
+def _trailing_zeros(value: fmpz) -> int:
+    low = int(value & ((1 << 64) - 1))
+    if low:
+        return (low & -low).bit_length() - 1
+    return int((value & -value).bit_length()) - 1
+
+
+def _lowest_terms(numerators: Sequence[fmpz], denominator: fmpz, content: fmpz) -> IntegerPoint:
+    """The point numerators / denominator, given a multiple `content` of all that they share."""
+    content = content.gcd(denominator)
+    for numerator in numerators:
+        if content == 1:
+            break
+        content = content.gcd(numerator % content)
+    if denominator < 0:
+        content = -content
+    return IntegerPoint(tuple(numerator // content for numerator in numerators), denominator // content)
