@@ -1,4 +1,9 @@
-"""The sources that docstrings, catalogue files and evidence cite, by key."""
+"""The sources that docstrings, catalogue files and evidence cite, by key.
+
+Definitions, propositions, lemmas and theorems of petrera-suris-2016 share one numbering: commutativity is Theorem
+9, the integrals Theorem 11, the Poisson structure Theorem 12. Displayed equations are cited by their label in the
+source text.
+"""
 
 from __future__ import annotations
 
@@ -38,6 +43,7 @@ SOURCES: dict[str, str] = {
         "M. Henon, C. Heiles. The applicability of the third integral of motion: some numerical experiments. "
         "Astron. J. 69 (1964), 73-79"
     ),
+    "lorenz-1963": "E. N. Lorenz. Deterministic nonperiodic flow. J. Atmos. Sci. 20 (1963), 130-141",
     "rosser-schoenfeld-1962": (
         "J. B. Rosser, L. Schoenfeld. Approximate formulas for some functions of prime numbers. "
         "Illinois J. Math. 6 (1962), 64-94"

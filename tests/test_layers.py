@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 FLOORS = {
     "errors": 0,
     "sources": 0,
+    "version": 0,
     "algebra": 1,
     "systems": 2,
     "family": 2,

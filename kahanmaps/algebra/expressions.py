@@ -237,6 +237,7 @@ class _Arithmetic:
         self.names: dict[str, _Value] = dict(constants)
         self.term_cost = 20
         if ring is not None:
+            self.one = self.polynomial(fmpq(1))
             for name, variable in zip(ring.names(), ring.gens(), strict=True):
                 self.names[name] = _Quotient(_Polynomial(variable, fmpz(1), 0), None)
             # FLINT packs the exponents of a monomial into words, some eight to a word.
@@ -353,14 +354,16 @@ class _Arithmetic:
         above, below = cast(_Quotient, value)
         if not self.quotients:
             raise self.refusal("found a division by something with variables in it, expected a polynomial", column)
-        one = self.polynomial(fmpq(1))
+        below = below or self.one
         leading = above.value.leading_coefficient()
         if above.value.is_constant():
-            return _Quotient(self.scaled(below or one, 1 / leading, column), None)
+            return _Quotient(self.scaled(below, 1 / leading, column), None)
+        if leading == 1:
+            return _Quotient(below, above)
         # Leading coefficient 1, so that denominators which differ by a constant are seen to be the same.
         self.spend(len(above.value) * self.term_cost + 30 * _times(above.bits, above.bits), column)
         monic = _Polynomial(above.value / leading, abs((leading * above.scale).p), above.bits)
-        return _Quotient(self.scaled(below or one, 1 / leading, column), monic)
+        return _Quotient(self.scaled(below, 1 / leading, column), monic)
 
     def negative(self, value: _Value, column: int) -> _Value:
         if isinstance(value, fmpq):
@@ -401,6 +404,8 @@ class _Arithmetic:
         return self.counted(left.value + right.value, scale, bits, column)
 
     def times(self, left: _Polynomial, right: _Polynomial, column: int) -> _Polynomial:
+        if right is self.one:
+            return left
         self.check_degree(int(left.value.total_degree()) + int(right.value.total_degree()), "a product", column)
         pairs = len(left.value) * len(right.value)
         bits = left.bits + right.bits + (max(1, min(len(left.value), len(right.value))) - 1).bit_length()

@@ -27,7 +27,7 @@ from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
 MAX_PRIME_BITS = 512
 MAX_BALL_BITS = 1_000_000
 
-_DECIMAL = r"[+-]?[0-9]*\.?[0-9]*(?:e[+-]?[0-9]{1,8})?"
+_DECIMAL = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]{1,8})?"
 _BALL = re.compile(rf"\[(?:{_DECIMAL} )?\+/- {_DECIMAL}\]")
 
 
@@ -39,10 +39,10 @@ def rational(value: Any) -> fmpq:
 
     >>> rational("0.1")
     1/10
-    >>> rational(0.1)
+    >>> rational(0.1)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    kahanmaps.errors.InexactNumber: found the machine number 0.1, expected an exact one: write an integer, p/q or a decimal as text, e.g. "0.1"
+    kahanmaps.errors.InexactNumber: found the machine number 0.1, expected an exact one: write an integer, ...
     """
     if isinstance(value, fmpq):
         return value
@@ -57,7 +57,7 @@ def rational(value: Any) -> fmpq:
     if isinstance(value, float | complex) or type(value).__module__ == "numpy":
         raise InexactNumber(
             f"found the machine number {value!s}, expected an exact one: "
-            f'write an integer, p/q or a decimal as text, e.g. "{value!s}"'
+            f'write an integer, p/q or a decimal as text, e.g. "{_example(str(value))}"'
         )
     raise InputError(f"found {value!r} of type {type(value).__name__}, expected an exact number")
 
@@ -172,7 +172,7 @@ class PrimeField(Field):
         self._zero = self._element(0)
         self._one = self._element(1)
 
-    def _element(self, value: int | fmpz) -> nmod | fmpz_mod:
+    def _element(self, value: int | fmpz) -> Any:
         if self._large is not None:
             return self._large(value)
         return nmod(value, self.prime)
@@ -329,6 +329,15 @@ def RR(bits: int) -> BallField:
     if isinstance(bits, bool) or not isinstance(bits, int) or not 2 <= bits <= MAX_BALL_BITS:
         raise InputError(f"found the precision {bits!r}, expected an integer from 2 to {MAX_BALL_BITS} bits")
     return BallField(bits)
+
+
+def _example(text: str) -> str:
+    """The text if it spells a number (that of nan, inf or 1j does not), or another that does."""
+    try:
+        parse_number(text)
+    except InputError:
+        return "1/10"
+    return text
 
 
 def _shorten(text: str, width: int = 40) -> str:

@@ -58,12 +58,13 @@ def nullspace(field: Field, matrix: Any) -> list[tuple[Any, ...]]:
     columns = matrix.ncols()
     reduced, pivots = _reduced_echelon(field, matrix)
     basis = []
-    for free in (j for j in range(columns) if j not in set(pivots)):
-        vector = [field.zero] * columns
-        vector[free] = field.one
-        for i, pivot in enumerate(pivots):
-            vector[pivot] = -reduced(i, free)
-        basis.append(tuple(vector))
+    with field.working():
+        for free in (j for j in range(columns) if j not in set(pivots)):
+            vector = [field.zero] * columns
+            vector[free] = field.one
+            for i, pivot in enumerate(pivots):
+                vector[pivot] = -reduced(i, free)
+            basis.append(tuple(vector))
     return basis
 
 

@@ -104,15 +104,16 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
     """
     powers: list[list[Any]] = [[field.one, entry] for entry in point]
     total = field.zero
-    for monomial, coefficient in polynomial.terms():
-        term = field.convert(coefficient)
-        for i, exponent in enumerate(monomial):
-            if exponent:
-                table = powers[i]
-                while len(table) <= exponent:
-                    table.append(table[-1] * table[1])
-                term = term * table[exponent]
-        total = total + term
+    with field.working():
+        for monomial, coefficient in polynomial.terms():
+            term = field.convert(coefficient)
+            for i, exponent in enumerate(monomial):
+                if exponent:
+                    table = powers[i]
+                    while len(table) <= exponent:
+                        table.append(table[-1] * table[1])
+                    term = term * table[exponent]
+            total = total + term
     return total
 
 
@@ -176,4 +177,6 @@ class RationalFunction:
         below = evaluate(self.denominator, field, point)
         if field.is_zero(below):
             return None
-        return evaluate(self.numerator, field, point) / below
+        above = evaluate(self.numerator, field, point)
+        with field.working():
+            return above / below

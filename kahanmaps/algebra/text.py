@@ -28,7 +28,8 @@ from kahanmaps.errors import ExpressionError, InexactNumber, InputError
 class Limits:
     """How large a text, and what it stands for, may be. Meant to be out of the way of honest use.
 
-    The limits hold for results and for every value on the way to them.
+    The limits hold for results and for every value on the way to them. Digits and work are estimated before anything
+    is computed, on the high side.
     """
 
     number_digits: int = 1_000_000  # of one number read by parse_number or parse_point

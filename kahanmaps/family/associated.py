@@ -1,8 +1,8 @@
 """Members of the family and their associated systems.
 
-For signs s the matrix B_s is the polynomial in A with B_s = s_i on the part of A that belongs to the i-th irreducible factor
-of chi; then B_s^2 = I, and f_s = B_s^T f_0 = J grad K_s with grad K_s = B_s grad H. Kahan maps of
-associated systems commute. Source: petrera-suris-2016, Sect. 5; every m, and any chi, in docs/mathematics.md.
+For signs s the matrix B_s is the polynomial in A with B_s = s_i on the part of A that belongs to the i-th
+irreducible factor of chi; then B_s^2 = I, and f_s = B_s^T f_0 = J grad K_s with grad K_s = B_s grad H. Kahan maps
+of associated systems commute. Source: petrera-suris-2016, Sect. 5; every m, and any chi, in docs/mathematics.md.
 """
 
 from __future__ import annotations
@@ -112,9 +112,11 @@ class FamilyMember:
         return chain(self.A, self.H)
 
     def associate(self, signs: Sequence[int]) -> AssociatedSystem:
-        """The associated system with these signs."""
+        """The associated system with these signs. Raises InputError unless they are 1 or -1, one for each factor."""
         if len(signs) != len(self.factors):
             raise InputError(f"found {len(signs)} signs, expected {len(self.factors)}, one for each factor of chi")
+        if any(sign not in (1, -1) for sign in signs):
+            raise InputError(f"found the signs {list(signs)}, expected numbers 1 or -1")
         polynomial = sign_polynomial(self.factors, signs)
         coefficients = tuple(polynomial[k] for k in range(self.m))
         K = self.H.context().constant(0)

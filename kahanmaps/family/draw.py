@@ -27,8 +27,8 @@ MAX_M = 20
 def draw_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) -> FamilyMember:
     """A member whose A has these rational eigenvalues (each twice), hidden by a random symplectic matrix.
 
-    `size` bounds the integer coefficients of the planar cubics. Repeated eigenvalues are allowed and give a diagonalisable,
-    non-generic A.
+    `size` bounds the integer coefficients of the planar cubics. Repeated eigenvalues are allowed and give a
+    diagonalisable, non-generic A.
 
     >>> member = draw_with_eigenvalues([1, -2], seed=7)
     >>> [str(factor) for factor in member.factors]
@@ -85,8 +85,8 @@ def draw_with_chi(chi: fmpq_poly, seed: int, size: int = 1) -> FamilyMember:
     squares = [products(X, X), products(X, Y), products(Y, Y)]
     cubes = [products(squares[0], X), products(squares[0], Y), products(squares[2], X), products(squares[2], Y)]
     H = zero
-    for cube in cubes:
-        factor: list[fmpq_mpoly] = [zero + c for c in _coefficients(rng, m, size)]
+    for cube, coefficients in zip(cubes, _planar_coefficients_over(chi, rng, size), strict=True):
+        factor: list[fmpq_mpoly] = [zero + c for c in coefficients]
         H += products(factor, cube)[m - 1]
     return FamilyMember(_hidden(normal, S), H)
 
@@ -103,6 +103,17 @@ def draw_generic(m: int, seed: int, size: int = 1) -> FamilyMember:
         chi = fmpq_poly([rng.choice((-3, -2, -1, 1, 2, 3)), *(rng.randint(-2, 2) for _ in range(m - 1)), 1])
         if all(multiplicity == 1 for _, multiplicity in chi.factor()[1]):
             return draw_with_chi(chi, seed, size)
+
+
+def random_eigenvalues(m: int, seed: int) -> list[int]:
+    """m distinct nonzero integers of small size, drawn from the seed.
+
+    >>> len(set(random_eigenvalues(5, seed=1)))
+    5
+    """
+    _require_m(m)
+    values = [value for value in range(-m - 1, m + 2) if value != 0]
+    return random.Random(f"eigenvalues {seed}").sample(values, m)
 
 
 class _Products:
@@ -145,13 +156,28 @@ def _coordinates(matrix: fmpq_mat, variables: tuple[str, ...]) -> list[fmpq_mpol
 
 def _planar_coefficients(rng: random.Random, size: int) -> list[int]:
     """A binary cubic with nonzero discriminant, so that its map is a genuine one."""
+    _require_size(size)
     while True:
         a, b, c, d = (rng.randint(-size, size) for _ in range(4))
-        if b * b * c * c - 4 * a * c**3 - 4 * b**3 * d - 27 * a * a * d * d + 18 * a * b * c * d != 0:
+        if _discriminant(a, b, c, d) != 0:
             return [a, b, c, d]
 
 
+def _planar_coefficients_over(chi: fmpq_poly, rng: random.Random, size: int) -> list[list[int]]:
+    """A binary cubic over Q[t]/chi with invertible discriminant: a genuine map on the part of every factor."""
+    while True:
+        drawn = [_coefficients(rng, chi.degree(), size) for _ in range(4)]
+        if _discriminant(*(fmpq_poly(element) for element in drawn)).gcd(chi).degree() == 0:
+            return drawn
+
+
+def _discriminant(a: Any, b: Any, c: Any, d: Any) -> Any:
+    """The discriminant of a x^3 + b x^2 y + c x y^2 + d y^3."""
+    return b * b * c * c - 4 * a * c**3 - 4 * b**3 * d - 27 * a * a * d * d + 18 * a * b * c * d
+
+
 def _coefficients(rng: random.Random, m: int, size: int) -> list[int]:
+    _require_size(size)
     while True:
         coefficients = [rng.randint(-size, size) for _ in range(m)]
         if any(coefficients):
@@ -162,3 +188,8 @@ def _require_m(m: int) -> int:
     if not 1 <= m <= MAX_M:
         raise InputError(f"found m = {m}, expected 1 <= m <= {MAX_M} (dimension 2m)")
     return m
+
+
+def _require_size(size: int) -> None:
+    if size < 1:
+        raise InputError(f"found the size {size}, expected at least 1: all coefficients would be 0")

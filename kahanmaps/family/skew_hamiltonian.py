@@ -1,7 +1,8 @@
 """Skew-Hamiltonian matrices: A^T J = J A, with J = [[0, I], [-I, 0]].
 
-In blocks A = [[W, X], [Y, W^T]] with X and Y skew. The characteristic polynomial is a square chi^2 with chi of degree m;
-A is generic when chi has no repeated root. Source: petrera-suris-2016, eqs. (cond A), (cond2); fassbender-1999.
+In blocks A = [[W, X], [Y, W^T]] with X and Y skew. The characteristic polynomial is a square chi^2 with chi of
+degree m; A is generic when chi has no repeated root. Source: petrera-suris-2016, eqs. (cond A), (cond2);
+fassbender-1999.
 """
 
 from __future__ import annotations
@@ -163,8 +164,8 @@ def random_skew_hamiltonian(m: int, rng: random.Random, bound: int = 3) -> fmpq_
 def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
     """A random integer matrix S with S^T J S = J and small entries: a product of elementary symplectic matrices.
 
-    Every variable is mixed with every kind of partner, but each factor adds only a few entries, so that what is hidden by S
-    keeps small coefficients.
+    Every variable is mixed with every kind of partner, but each factor adds only a few entries, so that what is
+    hidden by S keeps small coefficients.
     """
     n = 2 * m
     S = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])

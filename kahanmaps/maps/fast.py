@@ -1,12 +1,13 @@
 """Float orbits: the Kahan map in machine numbers.
 
-A second implementation, apart from the exact one and tested against it. The only road from exact numbers to machine numbers
-is `to_floats`.
+A second implementation, apart from the exact one and tested against it. The only road from exact numbers to machine
+numbers is `to_floats`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.errors import InputError
 from kahanmaps.maps.orbits import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -64,7 +66,8 @@ class FloatKahanMap:
         matrix = self._identity - self._tensor @ x - self._linear
         right = x + self._linear @ x + self._constant
         try:
-            return np.linalg.solve(matrix, right)
+            image: FloatArray = np.linalg.solve(matrix, right).astype(np.float64, copy=False)
+            return image
         except np.linalg.LinAlgError:
             return None
 
@@ -110,6 +113,38 @@ class FloatOrbit:
             x, step = image, step + 1
             yield step, x
         self.end = OrbitEnd("completed", step, f"{step} steps")
+
+
+class _Floats:
+    """Machine numbers, as far as evaluating a rational function needs a field."""
+
+    zero = 0.0
+    one = 1.0
+
+    @staticmethod
+    def convert(value: Any) -> float:
+        return to_float(rational(value))
+
+    @staticmethod
+    def is_zero(value: float) -> bool:
+        return value == 0.0
+
+    @staticmethod
+    def working() -> AbstractContextManager[None]:
+        return nullcontext()
+
+
+def float_function(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:
+    """The rational function in double precision; its value is None where the denominator is 0 or a power overflows."""
+
+    def value(point: Sequence[float]) -> float | None:
+        try:
+            found: float | None = function.value(_Floats, point)
+        except (OverflowError, ZeroDivisionError):
+            return None
+        return found
+
+    return value
 
 
 def _exact(value: float) -> fmpq:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from flint import fmpq, fmpz, fmpz_mat
+from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -38,10 +38,39 @@ class IntegerPoint:
         """The coordinates as reduced fractions; one gcd each."""
         return tuple(fmpq(entry, self.denominator) for entry in self.numerators)
 
+    def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
+        """Numerator and denominator of each coordinate, reduced; one gcd of large numbers in all.
+
+        A prime that a numerator shares with W divides the product of all numerators modulo W.
+        """
+        W = self.denominator
+        product = fmpz(1)
+        for entry in self.numerators:
+            product = product * entry % W
+        common = W.gcd(product)
+        return [(entry // g, W // g) for entry in self.numerators for g in [_gcd_within(entry, W, common)]]
+
     @property
     def bits(self) -> int:
         """The bit length of the largest of the integers."""
         return max(self.denominator.bit_length(), *(entry.bit_length() for entry in self.numerators))
+
+
+def _gcd_within(left: fmpz, right: fmpz, primes: fmpz) -> fmpz:
+    """gcd(left, right), known to have no other primes than those of `primes`, by residues modulo a power of it."""
+    if primes == 1:
+        return primes
+    power = primes**2
+    while power.bit_length() < right.bit_length():
+        found = power.gcd(left % power).gcd(right % power)
+        # The answer is final when no prime occurs in it to the full power of the modulus.
+        left_over, spare = primes, power // found
+        while (common := left_over.gcd(spare)) != 1:
+            left_over = left_over // common
+        if left_over == 1:
+            return found
+        power = power**2
+    return left.gcd(right)
 
 
 class IntegerSteps:
@@ -74,17 +103,24 @@ class IntegerSteps:
 _ELIMINATION_BITS = 4000
 # A common divisor shorter than this is not worth a division of every entry.
 _USEFUL_BITS = 64
+_PRIME = 2**61 - 1
 
 
 def _divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
     """The solution of matrix x = right in lowest terms; `likely` is an integer whose powers may divide the minors."""
     if matrix.nrows() > 2 and likely.bit_length() >= _ELIMINATION_BITS:
         found = _eliminate(matrix, right, likely)
-        # The elimination assumes that certain divisions are exact; this product is what makes the result certain.
-        if found is not None and matrix * fmpz_mat(right.nrows(), 1, found.numerators) == right * found.denominator:
+        # The elimination assumes that certain divisions are exact. What makes the result certain is this: it is a
+        # solution, and there is no other, since the determinant does not vanish modulo a prime.
+        if (
+            found is not None
+            and matrix * fmpz_mat(right.nrows(), 1, found.numerators) == right * found.denominator
+            and int(nmod_mat(matrix, _PRIME).det()) != 0
+        ):
             return found
     try:
-        column, denominator = matrix.solve(right).numer_denom()
+        solution: fmpq_mat = matrix.solve(right)  # type: ignore[assignment]  # the stub promises less
+        column, denominator = solution.numer_denom()
     except ZeroDivisionError:
         return None
     return _lowest_terms(column.entries(), denominator, denominator)
@@ -93,15 +129,15 @@ def _divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | N
 def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
     """Fraction-free elimination, two columns at a time, that also removes what the minors share with `likely`.
 
-    For maps of the commuting family the matrix has rank 2 modulo (nearly) every prime of the denominator W, so that minors of
-    order k share the (k - 2)-th power of W up to small primes. Taken out once, at order 3, this keeps all later entries at
-    twice the size of W instead of up to n times: the exact divisions by the previous pivot then take out the
-    higher powers by themselves. Where nothing is shared this is Bareiss' two-step algorithm. The caller has to
-    verify the result; None where a pivot vanishes.
+    For maps of the commuting family the matrix has rank 2 modulo (nearly) every prime of the denominator W, so that
+    minors of order k share the (k - 2)-th power of W up to small primes. Taken out once, at order 3, this keeps all
+    later entries at twice the size of W instead of up to n times: the exact divisions by the previous pivot then
+    take out the higher powers by themselves. Where nothing is shared this is Bareiss' two-step algorithm. The
+    caller has to verify the result; None where a pivot vanishes.
     """
     n = matrix.nrows()
     rows = [[*row, right[i, 0]] for i, row in enumerate(matrix.tolist())]
-    previous: fmpz | None = None
+    previous: _ExactDivisor | None = None
     k = 0
     while k + 1 < n:
         a, b = rows[k], rows[k + 1]
@@ -111,7 +147,7 @@ def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint 
         pivots += [b[k] * rows[i][k + 1] - b[k + 1] * rows[i][k] for i in below]
         second = [a[k] * b[j] - b[k] * a[j] for j in range(k + 2, n + 1)]
         if previous is not None:
-            quotients = _exact_quotients(pivots + second, previous)
+            quotients = previous.into(pivots + second)
             pivots, second = quotients[: len(pivots)], quotients[len(pivots) :]
         pivot, count = pivots[0], len(below)
         if pivot == 0 or a[k] == 0:
@@ -122,14 +158,14 @@ def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint 
             for j in range(k + 2, n + 1)
         ]
         if block:
-            divisor = previous if previous is not None else _shared(likely, block)
+            divisor = previous or _shared(likely, block)
             if divisor is not None:
-                block = _exact_quotients(block, divisor)
+                block = divisor.into(block)
         b[k + 1 :] = [pivot, *second]
         width = n - 1 - k
         for i in below:
             rows[i][k + 2 :] = block[(i - k - 2) * width : (i - k - 1) * width]
-        previous = pivot
+        previous = _ExactDivisor(pivot)
         k += 2
     return _substitute_back(rows)
 
@@ -160,11 +196,11 @@ def _substitute_back(rows: list[list[fmpz]]) -> IntegerPoint | None:
     return _lowest_terms(solution, denominator, added)
 
 
-def _shared(likely: fmpz, block: list[fmpz]) -> fmpz | None:
+def _shared(likely: fmpz, block: list[fmpz]) -> _ExactDivisor | None:
     """The part of `likely` without small primes that divides the entries, or None where it is not worth removing.
 
-    A few entries decide (the result is verified in the end). Small primes often divide minors of order 3 by accident and
-    then not, to the power needed, those of higher order.
+    A few entries decide (the result is verified in the end). Small primes often divide minors of order 3 by
+    accident and then not, to the power needed, those of higher order.
     """
     common = likely
     for value in block[:: max(1, len(block) // 3)]:
@@ -175,31 +211,42 @@ def _shared(likely: fmpz, block: list[fmpz]) -> fmpz | None:
                 return None
     while (small := common.gcd(_small_primes())) != 1:
         common = common // small
-    return common if common.bit_length() >= _USEFUL_BITS else None
+    return _ExactDivisor(common) if common.bit_length() >= _USEFUL_BITS else None
 
 
 @lru_cache(maxsize=1)
 def _small_primes() -> fmpz:
-    return fmpz.primorial_ui(1000)
+    return fmpz.primorial_ui(fmpz(1000))
 
 
-def _exact_quotients(values: list[fmpz], divisor: fmpz) -> list[fmpz]:
-    """values / divisor where every division is known to be exact (otherwise the quotients are meaningless).
+class _ExactDivisor:
+    """Divides many integers by one, where every division is known to be exact (otherwise quotients are meaningless).
 
-    Many divisions by one divisor: its inverse modulo a power of 2 turns each into one multiplication.
+    The inverse modulo a power of 2 turns each division into one multiplication.
     """
-    bits = max(value.bit_length() for value in values) - divisor.bit_length() + 2
-    if len(values) < 4 or bits <= 0:
-        return [value // divisor for value in values]
-    zeros = _trailing_zeros(divisor)
-    modulus = fmpz(1) << bits
-    mask, half = modulus - 1, modulus >> 1
-    inverse = _inverse_modulo_power_of_two(divisor >> zeros, bits)
-    quotients = []
-    for value in values:
-        quotient = (((value >> zeros) & mask) * inverse) & mask
-        quotients.append(quotient - modulus if quotient >= half else quotient)
-    return quotients
+
+    def __init__(self, divisor: fmpz) -> None:
+        self._divisor = divisor
+        self._zeros = _trailing_zeros(divisor)
+        self._bits = 0
+        self._inverse = fmpz(0)
+
+    def into(self, values: list[fmpz]) -> list[fmpz]:
+        """values / divisor."""
+        bits = max(value.bit_length() for value in values) - self._divisor.bit_length() + 2
+        if bits <= 0 or (bits > self._bits and len(values) < 4):
+            return [value // self._divisor for value in values]
+        if bits > self._bits:
+            self._bits = bits
+            self._inverse = _inverse_modulo_power_of_two(self._divisor >> self._zeros, bits)
+        modulus = fmpz(1) << bits
+        mask, half = modulus - 1, modulus >> 1
+        inverse = self._inverse & mask
+        quotients = []
+        for value in values:
+            quotient = (((value >> self._zeros) & mask) * inverse) & mask
+            quotients.append(quotient - modulus if quotient >= half else quotient)
+        return quotients
 
 
 def _inverse_modulo_power_of_two(odd: fmpz, bits: int) -> fmpz:

@@ -5,14 +5,18 @@ Conventions, for the whole library: `eps` is the paper's epsilon and the time st
     (x~ - x) / (2 eps) = Q(x, x~) + B (x + x~)/2 + c,
 
 which is linear in x~; explicitly Phi(x, eps) = x + 2 eps (I - eps f'(x))^{-1} f(x). Its inverse is Phi(., -eps), its
-Jacobi matrix (I - eps f'(x))^{-1} (I + eps f'(x~)). Source: petrera-suris-2016, eqs. (eq: Kahan gen), (eq: Phi gen), (Jac).
+Jacobi matrix (I - eps f'(x))^{-1} (I + eps f'(x~)). Source: petrera-suris-2016, eqs. (eq: Kahan gen), (eq: Phi
+gen), (Jac).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
+
+from flint import fmpq, fmpz
 
 from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.matrices import det, solve
@@ -39,7 +43,7 @@ class KahanMap:
         self.system = system
         self.field = field
         self.eps = field.convert(eps)
-        if field.exact and field.is_zero(self.eps):
+        if self.eps == 0:
             _refuse_zero_eps(eps, field)
         self._local = system.over(field)
 
@@ -51,7 +55,8 @@ class KahanMap:
     @cached_property
     def inverse(self) -> KahanMap:
         """The inverse map, Phi(., -eps)."""
-        return KahanMap(self.system, -self.eps, self.field)
+        with self.field.working():  # or -eps would be a ball of FLINT's default precision
+            return KahanMap(self.system, -self.eps, self.field)
 
     def point(self, values: Sequence[Any]) -> tuple[Any, ...]:
         """The values as a point over the map's field. Raises InputError for a wrong length or inexact numbers."""
@@ -131,7 +136,7 @@ class KahanMap:
 
 
 def _refuse_zero_eps(eps: Any, field: Field) -> None:
-    if field is not QQ and not isinstance(eps, int) and str(eps) != "0":
+    if isinstance(eps, int | str | Fraction | fmpz | fmpq) and rational(eps) != 0:
         raise BadPrime(
             f"the prime {field.characteristic} divides the numerator of eps = {eps}: take another prime",
             field.characteristic,

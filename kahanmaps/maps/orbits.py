@@ -1,8 +1,8 @@
 """Orbits x, Phi(x), Phi^2(x), ... over any exact field or over balls: lazy, with an end that says what happened.
 
-An orbit is walked with a `for` loop; afterwards `orbit.end` tells how it ended. Meeting the singular set or running out of
-the digit budget is no exception: what was computed is delivered. Heights of non-integrable orbits multiply with every
-step, so the budget is never absent by accident.
+An orbit is walked with a `for` loop; afterwards `orbit.end` tells how it ended. Meeting the singular set or running
+out of the digit budget is no exception: what was computed is delivered. Heights of non-integrable orbits multiply
+with every step, so the budget is never absent by accident.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ _DIGITS_PER_BIT = 0.30103
 class OrbitEnd:
     """How an orbit ended.
 
-    `status` is "completed", "periodic" (completed, and the start came back), "singular", "budget", "precision" (balls too
-    wide), "overflow" (machine floats) or "interrupted"; `steps` is the index of the last point delivered.
+    `status` is "completed", "periodic" (completed, and the start came back), "singular", "budget", "precision"
+    (balls too wide), "overflow" (machine floats) or "interrupted"; `steps` is the index of the last point
+    delivered.
     """
 
     status: str
@@ -55,7 +56,9 @@ class OrbitPoint:
 
     @property
     def text(self) -> list[str]:
-        """The coordinates as text that parses back."""
+        """The coordinates as text that parses back (over Q cheaper than `x`: no fraction has to be formed)."""
+        if isinstance(self.value, IntegerPoint):
+            return [str(above) if below == 1 else f"{above}/{below}" for above, below in self.value.lowest_terms()]
         return [self.field.format(entry) for entry in self.x]
 
     @property
@@ -70,8 +73,8 @@ class OrbitPoint:
 class Orbit:
     """The orbit of `start` under a Kahan map: iterate over it once, then look at `end`.
 
-    `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit), `backward` steps by the inverse
-    map. `max_digits` bounds the decimal digits of the integers over one common denominator (over Q).
+    `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit), `backward` steps by the
+    inverse map. `max_digits` bounds the decimal digits of the integers over one common denominator (over Q).
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> orbit = Orbit(KahanMap(QuadraticSystem.from_text(["x"], ["x^2"]), "1/2"), ["1/5"], 3)

@@ -1,4 +1,4 @@
-"""System files: one differential equation in TOML, read with all its mistakes at once, written so that it reads back equal.
+"""System files: a differential equation in TOML, all its mistakes told at once, written so that it reads back equal.
 
 A file has exactly one of [system] (right-hand sides), [hamiltonian] (H and J) and [family] (A, H, signs), and may have
 [parameters], [integrals] and [density]; docs/system-files.md describes them. Numbers are exact: decimals are read as
@@ -25,6 +25,7 @@ from kahanmaps.algebra.text import (
     parse_constant,
     parse_polynomial,
     parse_rational_function,
+    shorten,
 )
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.family.associated import FamilyMember
@@ -49,9 +50,9 @@ _KEYS = {
 class SystemFile:
     """A system with everything that its file says of it.
 
-    `system` is the quadratic system whose Kahan map is meant; `hamiltonian` and `member` are there when the file (or the
-    Python object it was made from) says so. `integrals` and `density` are claims: rational functions in the variables
-    and `eps`. `document` is the file as plain data, parameters not yet inserted.
+    `system` is the quadratic system whose Kahan map is meant; `hamiltonian` and `member` are there when the file
+    (or the Python object it was made from) says so. `integrals` and `density` are claims: rational functions in the
+    variables and `eps`. `document` is the file as plain data, parameters not yet inserted.
     """
 
     name: str
@@ -68,6 +69,15 @@ class SystemFile:
     def variables(self) -> tuple[str, ...]:
         """The names of the variables."""
         return self.system.variables
+
+    def require_claim(self, what: str, function: RationalFunction) -> None:
+        """Raises InputError unless the function is one of the system's variables and eps, in this order."""
+        expected = (*self.variables, "eps")
+        if function.names != expected:
+            raise InputError(
+                f"found {what} in the variables {', '.join(function.names)}, expected a rational function of "
+                f"{', '.join(expected)}: make it with parse_rational_function(text, {list(expected)})"
+            )
 
     @property
     def catalog(self) -> Mapping[str, Any]:
@@ -131,6 +141,8 @@ def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -
             data = stream.read(MAX_FILE_BYTES + 1)
     except OSError as error:
         raise InputError(f"cannot read the system file {path}: {error.strerror or error}") from error
+    except ValueError as error:  # a path with a NUL character
+        raise InputError(f"cannot read the system file {str(path)!r}: {error}") from error
     return parse_system(data, str(path), parameters)
 
 
@@ -146,7 +158,8 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
     if len(text) > MAX_FILE_BYTES:
         raise InputError(f"{where} is larger than {MAX_FILE_BYTES} bytes, the limit for a system file")
     try:
-        decoded = text.decode("utf-8") if isinstance(text, bytes) else text
+        # Some editors put a byte order mark first.
+        decoded = text.decode("utf-8-sig") if isinstance(text, bytes) else text
         # Python's own limit on digits applies to integers written without quotes, before we see them.
         document = tomllib.loads(decoded, parse_float=str)
     except UnicodeDecodeError as error:
@@ -168,6 +181,7 @@ class _Reader:
         self.overrides = overrides
         self.mistakes: list[tuple[str, str]] = []
         self.parameters: dict[str, fmpq] = {}
+        self.unsure = False  # some parameter has no value: what depends on values is not judged
         self.variables: tuple[str, ...] | None = None
 
     def read(self) -> SystemFile:
@@ -175,7 +189,9 @@ class _Reader:
         kinds = [kind for kind in KINDS if kind in self.document]
         if len(kinds) != 1:
             found = ", ".join(f"[{kind}]" for kind in kinds) or "none"
-            self._mistake("file", f"found {found} of the sections [system], [hamiltonian], [family], expected exactly one")
+            self._mistake(
+                "file", f"found {found} of the sections [system], [hamiltonian], [family], expected exactly one"
+            )
         self._read_parameters()
         name = self.document.get("name", self._default_name())
         if not isinstance(name, str):
@@ -205,7 +221,8 @@ class _Reader:
         )
 
     def _mistake(self, key: str, sentence: str) -> None:
-        self.mistakes.append((key, sentence))
+        # Keys come from the file: nothing in them may reach a terminal as an escape sequence.
+        self.mistakes.append((key if key.isprintable() and len(key) <= 100 else shorten(key, 100), sentence))
 
     def _unknown_keys(self, section: str, table: Mapping[str, Any]) -> None:
         known = _KEYS[section]
@@ -232,13 +249,15 @@ class _Reader:
                 continue
             try:
                 check_names([name])
+                self.parameters[name] = fmpq(1)  # for now, so that a wrong value is one mistake and not many
                 self.parameters[name] = rational(_plain_number(self.overrides.get(name, value)))
             except InputError as error:
                 self._mistake(path, str(error))
+                self.unsure = True
         declared = self.document.get("parameters", {})
         for name in self.overrides:
             if not isinstance(declared, dict) or name not in declared:
-                known = ", ".join(declared) if isinstance(declared, dict) and declared else "none"
+                known = ", ".join(self.parameters) or "none"
                 self._mistake("parameters", f"unknown parameter {name!r}, this system has: {known}")
 
     def _read_variables(self, kind: str) -> None:
@@ -289,7 +308,7 @@ class _Reader:
         except InputError as error:
             self._mistake(path, str(error))
             return None
-        if degree(polynomial) > at_most:
+        if degree(polynomial) > at_most and not self.unsure:
             self._mistake(path, f"found a polynomial of degree {degree(polynomial)}, expected at most {at_most}")
             return None
         return polynomial
@@ -347,20 +366,20 @@ class _Reader:
         value = self._required("hamiltonian", section, "H")
         H = self._polynomial("hamiltonian.H", value, 3) if value is not None else None
         given = self._required("hamiltonian", section, "J")
-        if given is None or self.variables is None:
+        if given is None:
             return None
-        n = len(self.variables)
+        n = len(self.variables) if self.variables is not None else None
         J: fmpq_mat | None = None
         if given == "standard":
             try:
-                J = standard_structure(n)
+                J = standard_structure(n) if n is not None else None
             except InputError as error:
                 self._mistake("hamiltonian.J", str(error))
         elif isinstance(given, str):
             self._mistake("hamiltonian.J", f'found {_show(given)}, expected "standard" or a skew matrix')
         else:
             J = self._matrix("hamiltonian.J", given, n)
-        if J is None:
+        if J is None or self.variables is None or self.unsure:
             return None
         try:
             zero = parse_polynomial("0", self.variables)
@@ -376,13 +395,13 @@ class _Reader:
         A = self._matrix("family.A", given, size) if given is not None else None
         H = self._polynomial("family.H", value, 3) if value is not None else None
         signs = section.get("signs", [])
-        if not isinstance(signs, list) or not all(type(sign) is int and sign in (1, -1) for sign in signs):
+        signs_are_good = isinstance(signs, list) and all(type(sign) is int and sign in (1, -1) for sign in signs)
+        if not signs_are_good:
             self._mistake("family.signs", f"found {_show(signs)}, expected a list of 1 and -1")
-            return None
-        if A is None or H is None:
+        if A is None or H is None or self.unsure:
             return None
         try:
-            return FamilyMember(A, H, tuple(signs))
+            return FamilyMember(A, H, tuple(signs) if signs_are_good else ())
         except InputError as error:
             message = str(error)
             key = "A" if message.startswith("A is") else "signs" if "signs" in message.split(",")[0] else "H"
@@ -416,7 +435,7 @@ class _Reader:
         self._unknown_keys("density", section)
         value = self._required("density", section, "phi")
         claim = self._claim("density.phi", value) if value is not None else None
-        if claim is not None and claim.numerator.is_zero():
+        if claim is not None and claim.numerator.is_zero() and not self.unsure:
             self._mistake("density.phi", "found 0, expected a function that is not zero: the measure is dx/phi")
             return None
         return claim
@@ -439,7 +458,7 @@ class _Reader:
                         self._mistake("catalog.sources", f"unknown source {item!r}, expected a key of sources.py")
 
     def _normalised(self) -> dict[str, Any]:
-        """The document with the parameters that hold, every number as text."""
+        """The document with its name and the parameters that hold."""
         document = {key: value for key, value in self.document.items() if key not in ("name", "parameters")}
         document = {"name": self.document.get("name", self._default_name()), **document}
         if self.parameters:
@@ -464,7 +483,10 @@ def _rows(matrix: fmpq_mat) -> list[list[str]]:
 
 
 def _show(value: Any) -> str:
-    text = repr(value)
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
+        return "a value too large to show"
     return text if len(text) <= 60 else f"{text[:40]}...{text[-15:]}"
 
 
@@ -491,7 +513,8 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, str):
         return _toml_string(value)
     if isinstance(value, int):
-        return str(value)
+        # TOML readers written in Python refuse long decimals without quotes.
+        return str(value) if value.bit_length() <= 10_000 else _toml_string(format_number(fmpq(value)))
     parts = [_toml_value(item) for item in value]
     line = f"[{', '.join(parts)}]"
     if len(line) <= 100 and not any(isinstance(item, list) for item in value):

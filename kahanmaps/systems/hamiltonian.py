@@ -1,7 +1,7 @@
 """Hamiltonian systems f = J grad H with a cubic H and a constant skew matrix J.
 
-Gradients are columns. The standard structure on R^{2m} is J = [[0, I], [-I, 0]], so that {x_i, x_{m+i}} = 1; any constant
-skew J is admitted, singular ones and odd dimensions included.
+Gradients are columns. The standard structure on R^{2m} is J = [[0, I], [-I, 0]], so that {x_i, x_{m+i}} = 1; any
+constant skew J is admitted, singular ones and odd dimensions included.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Quadratic systems x' = f(x) = Q(x, x) + B x + c with rational coefficients.
 
-Source: petrera-suris-2016, eq. (eq: diff eq gen). `QuadraticSystem` is the system over Q, in the named variables; `SystemOver`
-is the same carried into a field, with everything the Kahan map needs: value, Jacobian, polarisation. Both work from
-the constant tensor f'' instead of Q = f''/2, so that they make sense modulo 2 as well.
+Source: petrera-suris-2016, eq. (eq: diff eq gen). `QuadraticSystem` is the system over Q, in the named variables;
+`SystemOver` is the same carried into a field, with everything the Kahan map needs: value, Jacobian, polarisation.
+Both work from the constant tensor f'' instead of Q = f''/2, so that they make sense modulo 2 as well.
 """
 
 from __future__ import annotations
@@ -217,11 +217,13 @@ class SystemOver:
 
     def hessian_times(self, vector: Sequence[Any]) -> Any:
         """The matrix f''(v), with f'(x + v) = f'(x) + f''(v)."""
-        return self.field.matrix(self.dim, self.dim, (self._tensor * self.field.column(vector)).entries())
+        with self.field.working():
+            return self.field.matrix(self.dim, self.dim, (self._tensor * self.field.column(vector)).entries())
 
     def jacobian(self, point: Sequence[Any]) -> Any:
         """The Jacobi matrix f'(x)."""
-        return self.hessian_times(point) + self.B
+        with self.field.working():
+            return self.hessian_times(point) + self.B
 
     def value(self, point: Sequence[Any]) -> tuple[Any, ...]:
         """f(x)."""
@@ -231,9 +233,10 @@ class SystemOver:
         """Q(x, y) + B (x + y)/2 + c, the right-hand side of the Kahan map's defining equation (not modulo 2)."""
         half = self.field.convert(fmpq(1, 2))
         column_x, column_y = self.field.column(x), self.field.column(y)
-        return tuple(
-            (self.hessian_times(x) * column_y * half + self.B * (column_x + column_y) * half + self.c).entries()
-        )
+        with self.field.working():
+            return tuple(
+                (self.hessian_times(x) * column_y * half + self.B * (column_x + column_y) * half + self.c).entries()
+            )
 
 
 def _tensor(system: QuadraticSystem) -> list[fmpq]:

@@ -1,0 +1,293 @@
+"""kahanmaps family new | show | space | associated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.options import load_system
+from kahanmaps_cli.render import on_terminal, print_json, shorten
+
+if TYPE_CHECKING:
+    from flint import fmpq_mat
+
+    from kahanmaps.family.associated import FamilyMember
+    from kahanmaps.systems.files import SystemFile
+
+_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+
+
+@click.group("family")
+def command() -> None:
+    """Members of the commuting family: A skew-Hamiltonian (A^T J = J A), H a cubic with A Hess(H) = Hess(H) A^T.
+
+    \b
+      kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
+      kahanmaps family new --m 3 --generic --seed 7
+      kahanmaps family show pair.toml
+      kahanmaps family space pair.toml
+      kahanmaps family associated pair.toml
+    """
+
+
+@command.command("new")
+@click.option("--m", type=int, help="Half the dimension, 1 to 20.")
+@click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them.")
+@click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q.")
+@click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'.")
+@click.option("--size", type=int, default=None, help="Bound for the integer coefficients drawn (default 2 or 1).")
+@click.option("--signs", metavar="S1,S2,...", help="Pick an associated system: 1 or -1 for each factor of chi.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@click.option("--name", help="The name in the file.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
+@click.option("-q", "--quiet", is_flag=True, help="No talk on standard error.")
+def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **options: Any) -> None:
+    """Draw a member at random and write it as a system file.
+
+    Without --eigenvalues, --generic or --chi the eigenvalues are distinct small integers drawn from the seed.
+
+    \b
+      kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
+      kahanmaps family new --m 3 --generic --seed 7
+      kahanmaps family new --chi '(t-1)*(t^2-2)' --seed 1
+      kahanmaps family new --m 2 --seed 3 --signs 1,-1 -o g.toml
+    """
+    from kahanmaps.family.skew_hamiltonian import diagnosis
+    from kahanmaps.systems.files import SystemFile
+
+    member = _with_signs(_draw(**options), signs)
+    file = SystemFile.from_member(member, name or (Path(output).stem if output else "member"))
+    _write(file, output)
+    if not quiet:
+        where = f"{output}: " if output else ""
+        click.echo(f"{where}dimension {member.dim}; {diagnosis(member.A)}", err=True)
+
+
+@command.command("show")
+@click.argument("system")
+@_JSON
+def show(system: str, as_json: bool) -> None:
+    """Show a member: A, how chi factors, and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.
+
+    \b
+      kahanmaps family show pair.toml
+      kahanmaps family show pair.toml --json | jq -r '.hamiltonians[1]'
+    """
+    from kahanmaps.algebra.text import format_polynomial
+    from kahanmaps.family.skew_hamiltonian import chi, diagnosis, format_univariate
+
+    file, member = _member(system)
+    data: dict[str, Any] = {
+        "system": file.name,
+        "m": member.m,
+        "dim": member.dim,
+        "variables": list(member.variables),
+        "A": _rows(member.A),
+        "chi": format_univariate(chi(member.A)),
+        "factors": [{"factor": str(f), "multiplicity": f.multiplicity} for f in member.factors],
+        "generic": member.is_generic,
+        "diagnosis": diagnosis(member.A),
+        "signs": list(member.signs),
+        "hamiltonians": [format_polynomial(H) for H in member.chain],
+    }
+    if as_json:
+        print_json(data)
+        return
+    click.echo(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
+    click.echo(data["diagnosis"])
+    click.echo("A =")
+    _print_matrix(member.A)
+    for k, text in enumerate(data["hamiltonians"]):
+        click.echo(f"H_{k} = {_formula(text)}")
+    if any(sign < 0 for sign in member.signs):
+        click.echo(f"signs = {','.join(map(str, member.signs))}: K = {_formula(format_polynomial(member.chosen.K))}")
+
+
+@command.command("space")
+@click.argument("system", required=False)
+@click.option("--matrix", metavar="ROWS", help="A itself instead of a file: '1,0;0,1'.")
+@_JSON
+def space(system: str | None, matrix: str | None, as_json: bool) -> None:
+    """The space of cubics H with A Hess(H) = Hess(H) A^T: its dimension, 4m for generic A, and a basis.
+
+    \b
+      kahanmaps family space pair.toml
+      kahanmaps family space --matrix '1,0,0,0; 0,2,0,0; 0,0,1,0; 0,0,0,2'
+    """
+    from kahanmaps.algebra.text import format_polynomial
+    from kahanmaps.family.cubics import cubic_space
+    from kahanmaps.family.skew_hamiltonian import diagnosis
+
+    if (system is None) == (matrix is None):
+        raise click.UsageError("give a SYSTEM of kind [family], or --matrix ROWS, one of the two")
+    if matrix is not None:
+        A, variables = _parse_matrix(matrix), None
+    else:
+        member = _member(str(system))[1]
+        A, variables = member.A, member.variables
+    found = cubic_space(A, variables)
+    data: dict[str, Any] = {
+        "dim": A.nrows(),
+        "dimension": found.dimension,
+        "expected_for_generic_A": found.expected,
+        "unknowns": found.unknowns,
+        "rank": found.rank,
+        "diagnosis": diagnosis(A),
+        "basis": [format_polynomial(H) for H in found.basis],
+    }
+    if as_json:
+        print_json(data)
+        return
+    click.echo(
+        f"dimension {found.dimension} (generic A: 4m = {found.expected}); "
+        f"the linear system has {found.unknowns} unknowns and rank {found.rank}"
+    )
+    click.echo(data["diagnosis"])
+    for k, text in enumerate(data["basis"], start=1):
+        click.echo(f"{k}\t{_formula(text)}")
+
+
+@command.command("associated")
+@click.argument("system")
+@click.option("--write-to", type=click.Path(file_okay=False), metavar="DIR", help="Write each as a system file to DIR.")
+@_JSON
+def associated(system: str, write_to: str | None, as_json: bool) -> None:
+    """All rational associated systems up to sign: signs, B_s as a polynomial in A, and K_s with grad K_s = B_s grad H.
+
+    \b
+      kahanmaps family associated pair.toml
+      kahanmaps family associated pair.toml --write-to associated/
+    """
+    from kahanmaps.algebra.text import format_number, format_polynomial
+    from kahanmaps.family.associated import FamilyMember
+    from kahanmaps.systems.files import SystemFile
+
+    file, member = _member(system)
+    rows = []
+    for associate in member.associated():
+        row: dict[str, Any] = {
+            "label": associate.label,
+            "signs": list(associate.signs),
+            "B_in_powers_of_A": [format_number(c) for c in associate.coefficients],
+            "B": _rows(associate.B),
+            "K": format_polynomial(associate.K),
+        }
+        if write_to is not None:
+            Path(write_to).mkdir(parents=True, exist_ok=True)
+            text = "".join("p" if sign > 0 else "m" for sign in associate.signs)
+            path = Path(write_to) / f"{file.name}-{text}.toml"
+            one = FamilyMember(member.A, member.H, associate.signs)
+            _write(SystemFile.from_member(one, path.stem), str(path))
+            row["file"] = str(path)
+        rows.append(row)
+    if as_json:
+        print_json({"system": file.name, "factors": [str(f) for f in member.factors], "associated": rows})
+        return
+    named = ", ".join(f"({factor})" for factor in member.factors)
+    click.echo(f"{file.name}: signs belong to the factors {named}; {len(rows)} associated up to sign, f_0 first")
+    for row in rows:
+        powers = ", ".join(row["B_in_powers_of_A"])
+        click.echo(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {_formula(row['K'])}")
+
+
+def _draw(
+    m: int | None, eigenvalues: str | None, generic: bool, chi: str | None, size: int | None, seed: int
+) -> FamilyMember:
+    from kahanmaps.algebra.text import parse_point
+    from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues, random_eigenvalues
+
+    if sum((eigenvalues is not None, generic, chi is not None)) > 1:
+        raise click.UsageError("give one of --eigenvalues, --generic and --chi")
+    if size is not None and not 1 <= size <= 10**6:
+        raise click.UsageError(f"found --size {size}, expected 1 to 1000000")
+    if eigenvalues is not None:
+        values = parse_point(eigenvalues)
+        if m is not None and m != len(values):
+            raise click.UsageError(f"found {len(values)} eigenvalues, expected m = {m}")
+        return draw_with_eigenvalues(values, seed, size or 2)
+    if chi is not None:
+        polynomial = _univariate(chi)
+        if m is not None and m != polynomial.degree():
+            raise click.UsageError(f"chi has degree {polynomial.degree()}, expected m = {m}")
+        return draw_with_chi(polynomial, seed, size or 1)
+    if m is None:
+        raise click.UsageError("missing --m M (half the dimension), or --eigenvalues L1,L2,..., or --chi EXPR")
+    if generic:
+        return draw_generic(m, seed, size or 1)
+    return draw_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
+
+
+def _univariate(text: str) -> Any:
+    from flint import fmpq_poly
+
+    from kahanmaps.algebra.text import parse_polynomial
+    from kahanmaps.errors import InputError
+
+    polynomial = parse_polynomial(text, ["t"])
+    coefficients = {monomial[0]: coefficient for monomial, coefficient in polynomial.terms()}
+    top = max(coefficients, default=0)
+    if top < 1:
+        raise InputError(f"found chi = {text}, expected a polynomial in t of degree m >= 1")
+    return fmpq_poly([coefficients.get(k, 0) for k in range(top + 1)])
+
+
+def _with_signs(member: FamilyMember, signs: str | None) -> FamilyMember:
+    from kahanmaps.family.associated import FamilyMember
+
+    if signs is None:
+        return member
+    pieces = [piece.strip() for piece in signs.split(",")]
+    if any(piece not in ("1", "+1", "-1") for piece in pieces):
+        raise click.UsageError(f"found --signs {signs}, expected 1 and -1 separated by commas")
+    return FamilyMember(member.A, member.H, tuple(int(piece) for piece in pieces))
+
+
+def _member(reference: str) -> tuple[SystemFile, FamilyMember]:
+    from kahanmaps.errors import InputError
+
+    file = load_system(reference, None, (), ())
+    if file.member is None:
+        raise InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]: A and H")
+    return file, file.member
+
+
+def _parse_matrix(text: str) -> fmpq_mat:
+    from flint import fmpq_mat
+
+    from kahanmaps.algebra.text import parse_point
+    from kahanmaps.errors import InputError
+    from kahanmaps.systems.quadratic import MAX_DIMENSION
+
+    rows = [parse_point(row) for row in text.split(";")]
+    if len(rows) > MAX_DIMENSION or any(len(row) != len(rows) for row in rows):
+        found = f"{len(rows)} rows of lengths {sorted({len(row) for row in rows})}"
+        raise InputError(f"found {found}, expected a square matrix, at most {MAX_DIMENSION} x {MAX_DIMENSION}")
+    return fmpq_mat([list(row) for row in rows])
+
+
+def _write(file: SystemFile, output: str | None) -> None:
+    if output is None:
+        click.echo(file.to_toml(), nl=False)
+        return
+    with open(output, "w", encoding="utf-8") as stream:
+        stream.write(file.to_toml())
+
+
+def _rows(matrix: fmpq_mat) -> list[list[str]]:
+    from kahanmaps.algebra.text import format_number
+
+    return [[format_number(entry) for entry in row] for row in matrix.tolist()]
+
+
+def _print_matrix(matrix: fmpq_mat) -> None:
+    rows = [[_formula(cell, 24) for cell in row] for row in _rows(matrix)]
+    widths = [max(len(row[j]) for row in rows) for j in range(len(rows))]
+    for row in rows:
+        click.echo("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))
+
+
+def _formula(text: str, width: int = 400) -> str:
+    """A long formula is shortened on a terminal only."""
+    return shorten(text, width) if on_terminal() else text

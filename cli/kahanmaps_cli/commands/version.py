@@ -1,0 +1,41 @@
+"""kahanmaps version."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as version_of
+
+import click
+
+from kahanmaps_cli.render import print_json
+
+
+@click.command("version")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+def command(as_json: bool) -> None:
+    """The versions of kahanmaps and of what it computes with.
+
+    \b
+      kahanmaps version --json
+    """
+    import flint
+
+    from kahanmaps.version import __version__
+
+    versions = {
+        "kahanmaps": __version__,
+        "python": platform.python_version(),
+        "python-flint": version_of("python-flint"),
+        "flint": str(getattr(flint, "__FLINT_VERSION__", "unknown")),
+    }
+    for package in ("numpy", "click", "rich", "lark"):
+        try:
+            versions[package] = version_of(package)
+        except PackageNotFoundError:
+            versions[package] = "absent"
+    if as_json:
+        print_json(versions)
+        return
+    for name, number in versions.items():
+        click.echo(f"{name}\t{number}")

@@ -1,0 +1,135 @@
+"""The entry point: the lazy group of commands, and the one place where errors become messages and exit statuses.
+
+Exit statuses: 0 the claim holds or the work is done; 1 refuted, and nothing else; 2 wrong use or bad input; 3
+undecided or stopped early; 70 an internal error; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+import click
+
+HOLDS, REFUTED, WRONG_USE, UNDECIDED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
+
+# name -> (module in kahanmaps_cli.commands, one line for the list of commands)
+COMMANDS = {
+    "orbit": ("orbit", "Iterate the Kahan map: exactly, modulo a prime, in balls or floats."),
+    "check-commute": ("check_commute", "Do two Kahan maps commute?"),
+    "check-integrals": ("check_integrals", "Are the known or claimed integrals conserved?"),
+    "check-measure": ("check_measure", "Is the measure dx/phi invariant?"),
+    "check-poisson": ("check_poisson", "Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?"),
+    "family": ("family", "Make and look at members of the commuting family."),
+    "systems": ("systems", "The catalogue of named systems."),
+    "version": ("version", "The versions of kahanmaps and of what it computes with."),
+}
+
+
+class LazyGroup(click.Group):
+    """A group that imports a command only when it is needed, so that --help stays light."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(f"kahanmaps_cli.commands.{COMMANDS[cmd_name][0]}")
+        command: click.Command = module.command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            from difflib import get_close_matches
+
+            close = get_close_matches(args[0], COMMANDS, n=3, cutoff=0.5)
+            hint = f" Did you mean {' or '.join(close)}?" if close else ""
+            raise click.UsageError(f"There is no command {args[0]!r}.{hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
+
+
+@click.group(cls=LazyGroup, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--version", "show_version", is_flag=True, help="Print the version and exit.")
+@click.pass_context
+def cli(ctx: click.Context, show_version: bool) -> None:
+    """Kahan (Hirota-Kimura) maps of quadratic systems, exactly over the rationals: what do they preserve, do they
+    commute, are they integrable?
+
+    eps is the paper's epsilon throughout: the time step is 2 eps.
+
+    \b
+    First steps:
+      kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
+      kahanmaps check-commute pair.toml
+      kahanmaps check-integrals pair.toml
+      kahanmaps orbit pair.toml --start 1/2,-1/3,0,1,2/5,-1 --eps 1/10 --steps 5
+      kahanmaps systems
+    """
+    if show_version:
+        from kahanmaps.version import __version__
+
+        click.echo(f"kahanmaps {__version__}")
+    elif ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status."""
+    try:
+        status = cli.main(args=None if argv is None else list(argv), prog_name="kahanmaps", standalone_mode=False)
+        sys.stdout.flush()
+        return status if isinstance(status, int) else HOLDS
+    except click.exceptions.Exit as stop:
+        return stop.exit_code
+    except click.UsageError as error:
+        error.show(sys.stderr)
+        return WRONG_USE
+    except click.ClickException as error:
+        error.show(sys.stderr)
+        return WRONG_USE
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader (head, say) has what it wanted. Python would complain once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return HOLDS
+    except Exception as error:
+        return _report(error)
+
+
+def _report(error: Exception) -> int:
+    from kahanmaps.errors import InputError, KahanmapsError
+
+    if os.environ.get("KAHANMAPS_DEBUG"):
+        import traceback
+
+        traceback.print_exc()
+    if isinstance(error, KahanmapsError):
+        click.echo(f"Error: {error}", err=True)
+        return WRONG_USE if isinstance(error, InputError) else UNDECIDED
+    if isinstance(error, OSError):
+        click.echo(f"Error: {error.strerror or error}{f': {error.filename}' if error.filename else ''}", err=True)
+        return WRONG_USE
+    if isinstance(error, MemoryError):
+        click.echo("Error: out of memory: ask for fewer steps or a smaller --max-digits", err=True)
+        return UNDECIDED
+    click.echo(
+        f"Internal error: {type(error).__name__}: {error}\n"
+        "This is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened.",
+        err=True,
+    )
+    return INTERNAL
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,167 @@
+"""The formats of an orbit: text for people, jsonl and csv streamed line by line, npz in one piece at the end.
+
+All but npz are valid after every record, so that an interrupted orbit leaves a file that can be read.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import IO, Any
+
+from kahanmaps.errors import InputError
+
+# An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
+MAX_PADDED_BYTES = 512_000_000
+
+
+class Writer(ABC):
+    """Receives a header, points and an end; columns are the variables and then the names of the integrals."""
+
+    def __init__(self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str]) -> None:
+        self.stream = stream
+        self.columns = list(columns)
+        self.integrals = list(integrals)
+        self._flushed = time.monotonic()
+
+    @abstractmethod
+    def header(self, header: dict[str, Any]) -> None:
+        """What the orbit is of."""
+
+    @abstractmethod
+    def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
+        """One point, its coordinates and the values of the integrals (None at a pole)."""
+
+    @abstractmethod
+    def end(self, end: dict[str, Any]) -> None:
+        """How it ended."""
+
+    def _line(self, text: str) -> None:
+        self.stream.write(text + "\n")
+        # Now and then, so that a reader of the file sees it grow and a kill loses little.
+        now = time.monotonic()
+        if now - self._flushed > 0.5:
+            self.stream.flush()
+            self._flushed = now
+
+
+class JsonLines(Writer):
+    """One JSON object a line, with "record" header, point or end."""
+
+    def header(self, header: dict[str, Any]) -> None:
+        self._line(json.dumps({"record": "header", **header}, ensure_ascii=False))
+
+    def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
+        record: dict[str, Any] = {"record": "point", "step": step, "x": list(x)}
+        if self.integrals:
+            record["integrals"] = dict(zip(self.integrals, values, strict=True))
+        self._line(json.dumps(record))
+
+    def end(self, end: dict[str, Any]) -> None:
+        self._line(json.dumps({"record": "end", **end}, ensure_ascii=False))
+        self.stream.flush()
+
+
+class Csv(Writer):
+    """Comma-separated values below a row of names; header and end are comment lines that start with #."""
+
+    def header(self, header: dict[str, Any]) -> None:
+        self._line("# " + json.dumps(header, ensure_ascii=False))
+        self._line(",".join(["step", *self.columns, *map(_quoted, self.integrals)]))
+
+    def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
+        self._line(",".join([str(step), *x, *("" if value is None else value for value in values)]))
+
+    def end(self, end: dict[str, Any]) -> None:
+        self._line("# " + json.dumps(end, ensure_ascii=False))
+        self.stream.flush()
+
+
+class Text(Writer):
+    """Tab-separated columns; on a terminal long numbers are shortened and columns aligned."""
+
+    def __init__(self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str], width: int | None) -> None:
+        super().__init__(stream, columns, integrals)
+        self._cell = None if width is None else max(14, (width - 8) // max(1, len(columns) + len(integrals)) - 2)
+
+    def header(self, header: dict[str, Any]) -> None:
+        self._line(
+            f"# {header['system']}, eps = {header['eps']} (time step 2 eps = {header['time_step']}), "
+            f"{header['arithmetic']} arithmetic" + (", backward" if header["direction"] == "backward" else "")
+        )
+        self._row("step", [*self.columns, *self.integrals])
+
+    def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
+        self._row(str(step), [*x, *("pole" if value is None else value for value in values)])
+
+    def end(self, end: dict[str, Any]) -> None:
+        self._line(f"# {end['status']}: {end['message']}")
+        self.stream.flush()
+
+    def _row(self, first: str, cells: Sequence[str]) -> None:
+        if self._cell is None:
+            self._line("\t".join([first, *cells]))
+        else:
+            self._line(first.rjust(6) + "".join("  " + _elided(cell, self._cell).rjust(self._cell) for cell in cells))
+
+
+class Npz(Writer):
+    """Arrays `step`, `x` and one `integral_k` a column, and the header and end as JSON text.
+
+    Floats and residues below 2^63 are machine numbers; exact numbers and balls are text, for a float
+    would no longer be exact.
+    """
+
+    def __init__(self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str], kind: str) -> None:
+        super().__init__(stream, columns, integrals)
+        self.kind = kind  # "float", "int" or "text"
+        self._steps: list[int] = []
+        self._rows: list[list[str]] = []
+        self._longest = 1
+
+    def header(self, header: dict[str, Any]) -> None:
+        self._header = header
+
+    def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
+        row = [*x, *("nan" if value is None and self.kind == "float" else value or "" for value in values)]
+        if self.kind == "text":
+            self._longest = max(self._longest, *(len(cell) for cell in row))
+            if self._longest * len(row) * (len(self._rows) + 1) > MAX_PADDED_BYTES:
+                raise InputError(
+                    f"step {step}: an npz file of exact numbers would exceed {MAX_PADDED_BYTES} bytes: "
+                    "take --format jsonl, fewer steps or --every"
+                )
+        self._steps.append(step)
+        self._rows.append(row)
+
+    def end(self, end: dict[str, Any]) -> None:
+        import numpy as np
+
+        n = len(self.columns)
+        kinds: dict[str, Any] = {"float": np.float64, "int": np.int64, "text": f"S{self._longest}"}
+
+        def array(part: list[list[str]]) -> Any:
+            if self.kind == "int" and any(cell == "" for row in part for cell in row):
+                return np.array([[cell.encode() for cell in row] for row in part])
+            convert: Any = {"float": float, "int": int, "text": str.encode}[self.kind]
+            return np.array([[convert(cell) for cell in row] for row in part], dtype=kinds[self.kind])
+
+        arrays = {"step": np.array(self._steps, dtype=np.int64), "x": array([row[:n] for row in self._rows])}
+        if self.integrals:
+            arrays["integrals"] = array([row[n:] for row in self._rows])
+        meta = {"header": self._header, "columns": self.columns, "integrals": self.integrals, "end": end}
+        np.savez_compressed(self.stream, allow_pickle=False, meta=np.array(json.dumps(meta)), **arrays)
+        self.stream.flush()
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\n') else name
+
+
+def _elided(text: str, width: int) -> str:
+    if len(text) <= width:
+        return text
+    keep = max(2, (width - 3) // 2)
+    return f"{text[:keep]}...{text[-(width - 3 - keep) :]}"

@@ -1,0 +1,98 @@
+"""Kinds of option values: exact numbers, points, names with values, kinds of arithmetic."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps.errors import InputError
+
+if TYPE_CHECKING:
+    _ParamType = click.ParamType[Any]  # generic for the type checker, but not in every version of click we run with
+else:
+    _ParamType = click.ParamType
+
+
+class ExactNumber(_ParamType):
+    """An integer, p/q or a decimal, read exactly."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        from kahanmaps.algebra.text import parse_number
+
+        if not isinstance(value, str):
+            return value
+        try:
+            return parse_number(value)
+        except InputError as error:
+            self.fail(str(error), param, ctx)
+
+
+class PointText(_ParamType):
+    """Numbers separated by commas, read exactly."""
+
+    name = "point"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        from kahanmaps.algebra.text import parse_point
+
+        if not isinstance(value, str):
+            return value
+        try:
+            return parse_point(value)
+        except InputError as error:
+            self.fail(str(error), param, ctx)
+
+
+class NameValue(_ParamType):
+    """NAME=VALUE; without a name the whole text is the value where `name_is_optional`."""
+
+    name = "name=value"
+
+    def __init__(self, name_is_optional: bool = False) -> None:
+        self.name_is_optional = name_is_optional
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value
+        left, equals, right = value.partition("=")
+        if equals and left.strip() and right.strip():
+            return left.strip(), right.strip()
+        if self.name_is_optional and not equals and value.strip():
+            return "", value.strip()
+        self.fail(f"found {value!r}, expected NAME=VALUE", param, ctx)
+
+
+class Arithmetic(_ParamType):
+    """exact, float, mod:P (P a prime) or ball:BITS; gives the pair (kind, number)."""
+
+    name = "exact|float|mod:P|ball:BITS"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value
+        kind, colon, number = value.partition(":")
+        if kind in ("exact", "float") and not colon:
+            return kind, 0
+        if kind in ("mod", "ball") and number.isascii() and number.isdigit() and len(number) <= 400:
+            return kind, int(number)
+        self.fail(f"found {value!r}, expected exact, float, mod:P with a prime P, or ball:BITS", param, ctx)
+
+
+class Steps(_ParamType):
+    """Step numbers separated by commas."""
+
+    name = "n1,n2,..."
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value
+        steps = []
+        for piece in value.split(","):
+            piece = piece.strip()
+            if not (piece.isascii() and piece.isdigit()) or len(piece) > 18:
+                self.fail(f"found {piece!r}, expected step numbers 0, 1, 2, ... separated by commas", param, ctx)
+            steps.append(int(piece))
+        return sorted(set(steps))

@@ -1,0 +1,158 @@
+"""Reports for people (a rich table on a terminal, plain lines in a pipe) and for scripts (one JSON object)."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from kahanmaps.checks.claims import Evidence, Finding, Report, Witness
+
+_COLOURS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "yellow"}
+# On a terminal long numbers are shortened to this many characters, and long lists of claims to this many.
+NUMBER_WIDTH = 40
+CLAIMS_SHOWN = 40
+
+
+def on_terminal() -> bool:
+    """Whether standard output is a terminal."""
+    return sys.stdout.isatty()
+
+
+def print_json(data: Mapping[str, Any]) -> None:
+    """One JSON object on a line of its own."""
+    click.echo(json.dumps(data, ensure_ascii=False))
+
+
+def shorten(text: str, width: int = NUMBER_WIDTH) -> str:
+    """A long number with its middle left out and its length told: 12345...67890 (1234 characters)."""
+    if len(text) <= width:
+        return text
+    keep = max(4, (width - 18) // 2)
+    return f"{text[:keep]}...{text[-keep:]} ({len(text)} chars)"
+
+
+def print_report(report: Report, as_json: bool) -> int:
+    """Print a report and return the exit status that its verdict stands for."""
+    if as_json:
+        print_json(report.to_json())
+    elif on_terminal():
+        _print_table(report)
+    else:
+        _print_plain(report)
+    return exit_status(report)
+
+
+def exit_status(report: Report) -> int:
+    """0 holds, 1 refuted, 3 undecided, or an orbit that was asked for and ended early."""
+    from kahanmaps.checks.claims import Verdict
+
+    if report.verdict is Verdict.REFUTED:
+        return 1
+    if report.verdict is Verdict.UNDECIDED or report.ended_early:
+        return 3
+    return 0
+
+
+def _headline(report: Report) -> str:
+    context = report.context
+    names = context["system"] + (f", {context['other']}" if "other" in context else "")
+    if context["eps"] == "every":
+        eps = "every eps (the time step is 2 eps)"
+    else:
+        eps = f"eps = {context['eps']} (time step 2 eps = {context['time_step']})"
+    if "eps2" in context:
+        eps += f", second map at eps2 = {context['eps2']}"
+    return f"{report.check}: {names}, {eps}"
+
+
+def _verdict_text(finding: Finding) -> str:
+    verdict = str(finding.verdict)
+    return f"{verdict} (as expected)" if finding.control and finding.is_as_expected else verdict
+
+
+def _print_plain(report: Report) -> None:
+    click.echo(_headline(report))
+    told: set[str] = set()
+    for finding in report.findings:
+        click.echo(f"{_verdict_text(finding)}\t{finding.claim}")
+        for line in _details(finding, told):
+            click.echo(f"\t{line}")
+    for note in report.notes:
+        click.echo(f"note\t{note}")
+    click.echo(f"verdict\t{report.verdict}")
+
+
+def _print_table(report: Report) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    console = Console(markup=False, emoji=False, highlight=False)
+    console.print(Text(_headline(report), style="bold"))
+    table = Table(show_header=True, header_style="bold", show_lines=True)
+    table.add_column("verdict", no_wrap=True)
+    table.add_column("claim and evidence", overflow="fold")
+    shown = _selection(report.findings)
+    told: set[str] = set()
+    for finding in shown:
+        style = _COLOURS[str(finding.verdict)] if finding.is_as_expected or not finding.control else "yellow"
+        body = Text(finding.claim)
+        for line in _details(finding, told, NUMBER_WIDTH):
+            body.append("\n" + line, style="dim")
+        table.add_row(Text(_verdict_text(finding).replace(" (", "\n("), style=style), body)
+    console.print(table)
+    if len(shown) < len(report.findings):
+        console.print(f"{len(report.findings) - len(shown)} more claims, proved like those above (--json has all)")
+    for note in report.notes:
+        console.print(f"note: {note}")
+    verdict = Text("verdict: ")
+    verdict.append(str(report.verdict), style=f"bold {_COLOURS[str(report.verdict)]}")
+    console.print(verdict)
+
+
+def _selection(findings: tuple[Finding, ...]) -> list[Finding]:
+    """All findings, or where they are too many for a terminal the first ones and every one that is not proved."""
+    if len(findings) <= CLAIMS_SHOWN:
+        return list(findings)
+    return [f for k, f in enumerate(findings) if k < CLAIMS_SHOWN or str(f.verdict) != "proved" or f.control]
+
+
+def _details(finding: Finding, told: set[str], width: int | None = None) -> list[str]:
+    """What stands below a claim; `told` are the hypotheses that the reader has seen already."""
+    lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
+    lines.append(_summary(finding.evidence, told))
+    lines += [f"also: {evidence.summary}" for evidence in finding.also]
+    if finding.witness is not None:
+        lines += _witness_lines(finding.witness, width)
+    if finding.source:
+        lines.append(f"source: {finding.source}")
+    return [line if width is None else shorten(line, 1200) for line in lines]
+
+
+def _summary(evidence: Evidence, told: set[str]) -> str:
+    """The sentence of the evidence; a hypothesis is spelt out once in a report."""
+    hypotheses = evidence.data.get("hypotheses")
+    if not hypotheses:
+        return evidence.summary
+    new = [text for text in hypotheses if text not in told]
+    told.update(new)
+    rest = len(hypotheses) - len(new)
+    above = f"{rest} hypotheses as above" if rest > 1 else "1 hypothesis as above" if rest else ""
+    return f"{evidence.data['theorem']} applies: {'; '.join(new + [above] * bool(above))}"
+
+
+def _witness_lines(witness: Witness, width: int | None) -> list[str]:
+    def numbers(values: tuple[str, ...]) -> str:
+        return ", ".join(value if width is None else shorten(value, width) for value in values)
+
+    where = "" if witness.field == "QQ" else f" over {witness.field}"
+    return [
+        f"witness: x = ({numbers(witness.point)}), eps = {witness.eps}{where}",
+        f"  {witness.left_label} = {numbers(witness.left)}",
+        f"  {witness.right_label} = {numbers(witness.right)}",
+    ]

@@ -1,0 +1,115 @@
+"""Kahan (Hirota-Kimura) maps of quadratic systems, exactly: orbits, integrals, commutativity, with proofs.
+
+>>> import kahanmaps as km
+>>> member = km.draw_with_eigenvalues([1, -2, 3], seed=7)
+>>> f, g = member.associate([1, 1, 1]), member.associate([1, 1, -1])
+>>> phi_f, phi_g = km.KahanMap(f.system, "1/10"), km.KahanMap(g.system, "1/10")
+>>> x = phi_f.point(["1/2", "-1/3", 0, 1, "2/5", -1])
+>>> phi_f.step(phi_g.step(x)) == phi_g.step(phi_f.step(x))
+True
+>>> km.check_commute(km.SystemFile.from_member(member)).verdict
+<Verdict.PROVED: 'proved'>
+
+Names are imported when they are first used, so that `import kahanmaps` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from kahanmaps.version import __version__
+
+if TYPE_CHECKING:
+    from kahanmaps.algebra.fields import GF, QQ, RR
+    from kahanmaps.algebra.text import parse_point, parse_polynomial, parse_rational_function
+    from kahanmaps.checks.claims import Finding, Report, Verdict
+    from kahanmaps.checks.commute import check_commute
+    from kahanmaps.checks.conserve import check_integrals
+    from kahanmaps.checks.preserve import check_measure, check_poisson
+    from kahanmaps.checks.settings import Settings
+    from kahanmaps.errors import InputError, KahanmapsError, SingularStep, SystemFileError
+    from kahanmaps.family.associated import AssociatedSystem, FamilyMember
+    from kahanmaps.family.cubics import cubic_space
+    from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
+    from kahanmaps.maps.fast import FloatOrbit, to_floats
+    from kahanmaps.maps.kahan import KahanMap
+    from kahanmaps.maps.orbits import Orbit
+    from kahanmaps.systems.catalog import load, names
+    from kahanmaps.systems.files import SystemFile, parse_system, read_system
+    from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+    from kahanmaps.systems.quadratic import QuadraticSystem
+
+_HOME = {
+    "algebra.fields": ("GF", "QQ", "RR"),
+    "algebra.text": ("parse_point", "parse_polynomial", "parse_rational_function"),
+    "systems.quadratic": ("QuadraticSystem",),
+    "systems.hamiltonian": ("CubicHamiltonian", "standard_structure"),
+    "systems.files": ("SystemFile", "parse_system", "read_system"),
+    "systems.catalog": ("load", "names"),
+    "family.associated": ("AssociatedSystem", "FamilyMember"),
+    "family.cubics": ("cubic_space",),
+    "family.draw": ("draw_generic", "draw_with_chi", "draw_with_eigenvalues"),
+    "maps.kahan": ("KahanMap",),
+    "maps.orbits": ("Orbit",),
+    "maps.fast": ("FloatOrbit", "to_floats"),
+    "checks.claims": ("Finding", "Report", "Verdict"),
+    "checks.settings": ("Settings",),
+    "checks.commute": ("check_commute",),
+    "checks.conserve": ("check_integrals",),
+    "checks.preserve": ("check_measure", "check_poisson"),
+    "errors": ("InputError", "KahanmapsError", "SingularStep", "SystemFileError"),
+}
+_MODULE_OF = {name: module for module, exported in _HOME.items() for name in exported}
+
+__all__ = [
+    "GF",
+    "QQ",
+    "RR",
+    "parse_point",
+    "parse_polynomial",
+    "parse_rational_function",
+    "QuadraticSystem",
+    "CubicHamiltonian",
+    "standard_structure",
+    "SystemFile",
+    "parse_system",
+    "read_system",
+    "load",
+    "names",
+    "AssociatedSystem",
+    "FamilyMember",
+    "cubic_space",
+    "draw_generic",
+    "draw_with_chi",
+    "draw_with_eigenvalues",
+    "KahanMap",
+    "Orbit",
+    "FloatOrbit",
+    "to_floats",
+    "Finding",
+    "Report",
+    "Verdict",
+    "Settings",
+    "check_commute",
+    "check_integrals",
+    "check_measure",
+    "check_poisson",
+    "InputError",
+    "KahanmapsError",
+    "SingularStep",
+    "SystemFileError",
+    "__version__",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULE_OF:
+        value = getattr(import_module(f"kahanmaps.{_MODULE_OF[name]}"), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'kahanmaps' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

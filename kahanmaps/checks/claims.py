@@ -1,0 +1,149 @@
+"""What a check says: verdicts, evidence, witnesses, findings, and the report that holds them.
+
+`proved`: exact, for this system and every eps (or the eps named). `refuted`: there is a witness, a point with both
+sides. `supported`: held at random points over GF(p) with a stated error bound, or along an orbit; the evidence says
+which. `undecided`: the reason is given. The four words are never mixed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Any
+
+
+class Verdict(StrEnum):
+    """How much is known of a claim."""
+
+    PROVED = "proved"
+    REFUTED = "refuted"
+    SUPPORTED = "supported"
+    UNDECIDED = "undecided"
+
+    @property
+    def holds(self) -> bool | None:
+        """True, False, or None where nothing is known."""
+        return {Verdict.REFUTED: False, Verdict.UNDECIDED: None}.get(self, True)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Why a verdict was given: the method, a sentence, and data (plain numbers and text) for scripts."""
+
+    method: str
+    summary: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        return {"method": self.method, "summary": self.summary, **self.data}
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A point at which a claim fails: x and eps, and the two sides that should be equal, all as exact text."""
+
+    point: tuple[str, ...]
+    eps: str
+    left: tuple[str, ...]
+    right: tuple[str, ...]
+    left_label: str
+    right_label: str
+    field: str = "QQ"
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "point": list(self.point),
+            "eps": self.eps,
+            "field": self.field,
+            "left": {"is": self.left_label, "value": list(self.left)},
+            "right": {"is": self.right_label, "value": list(self.right)},
+        }
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One claim with its verdict. A `control` is a claim that is expected to be refuted and proves the check alive."""
+
+    claim: str
+    verdict: Verdict
+    evidence: Evidence
+    also: tuple[Evidence, ...] = ()
+    witness: Witness | None = None
+    formula: str = ""
+    source: str = ""
+    control: bool = False
+
+    def with_also(self, *more: Evidence) -> Finding:
+        """The same finding with further evidence beside the one that decided."""
+        return replace(self, also=(*self.also, *more))
+
+    @property
+    def is_as_expected(self) -> bool:
+        """Whether a control was refuted; true for everything that is not a control."""
+        return not self.control or self.verdict is Verdict.REFUTED
+
+    def to_json(self) -> dict[str, Any]:
+        plain: dict[str, Any] = {
+            "claim": self.claim,
+            "verdict": str(self.verdict),
+            "evidence": self.evidence.to_json(),
+            "witness": self.witness.to_json() if self.witness else None,
+        }
+        if self.also:
+            plain["also"] = [evidence.to_json() for evidence in self.also]
+        if self.formula:
+            plain["formula"] = self.formula
+        if self.source:
+            plain["source"] = self.source
+        if self.control:
+            plain["control"] = True
+            plain["expected"] = str(Verdict.REFUTED)
+        return plain
+
+
+@dataclass(frozen=True)
+class Report:
+    """The findings of one check, and what is needed to do it again (`context`)."""
+
+    check: str
+    findings: tuple[Finding, ...]
+    context: Mapping[str, Any] = field(default_factory=dict)
+    notes: Sequence[str] = ()
+    ended_early: bool = False  # an orbit that the user asked for could not be walked to its end
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict on all claims together; controls do not count."""
+        return combined(finding.verdict for finding in self.findings if not finding.control)
+
+    @property
+    def holds(self) -> bool | None:
+        """Whether everything claimed holds; None where that is undecided."""
+        return self.verdict.holds
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as plain data, the shape that scripts rely on."""
+        return {
+            "check": self.check,
+            "verdict": str(self.verdict),
+            "holds": self.holds,
+            **self.context,
+            "claims": [finding.to_json() for finding in self.findings],
+            "notes": list(self.notes),
+        }
+
+
+def combined(verdicts: Iterable[Verdict]) -> Verdict:
+    """The weakest of several verdicts: refuted before undecided before supported before proved.
+
+    Without any verdict nothing has been decided.
+
+    >>> combined([Verdict.PROVED, Verdict.SUPPORTED])
+    <Verdict.SUPPORTED: 'supported'>
+    """
+    found = set(verdicts)
+    for verdict in (Verdict.REFUTED, Verdict.UNDECIDED, Verdict.SUPPORTED, Verdict.PROVED):
+        if verdict in found:
+            return verdict
+    return Verdict.UNDECIDED

@@ -1,0 +1,215 @@
+"""Do two Kahan maps commute?  Phi_f o Phi_g = Phi_g o Phi_f."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import Field, rational
+from kahanmaps.algebra.text import format_number
+from kahanmaps.checks import theorems
+from kahanmaps.checks.claims import Evidence, Finding, Report
+from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.checks.judge import judge
+from kahanmaps.checks.settings import OrbitRun, Settings, run_orbit
+from kahanmaps.errors import InputError
+from kahanmaps.family.associated import AssociatedSystem, FamilyMember
+from kahanmaps.invariants.sizes import VARIABLE, eps_size, step_size
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+SOURCE = "petrera-suris-2016, Theorem 9"
+# All pairs of 2^(r-1) associated maps: 8128 of them for r = 8 rational factors.
+MAX_FACTORS = 8
+# The pairs that are also tried along an orbit and at random points; the proof covers all of them.
+_PAIRS_TRIED = 30
+
+
+def commutativity(f: QuadraticSystem, g: QuadraticSystem, eps: fmpq | None, names: tuple[str, str]) -> Identity:
+    """Phi_f o Phi_g = Phi_g o Phi_f as an identity, both maps with the same eps (scale g for another step)."""
+
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
+        phi_f, phi_g = KahanMap(f, eps_value, field), KahanMap(g, eps_value, field)
+        return phi_g.step(phi_f.step(point)), phi_f.step(phi_g.step(point))
+
+    size = eps_size(eps)
+    after_f, after_g = step_size(f, size, VARIABLE), step_size(g, size, VARIABLE)
+    left, right = step_size(g, size, after_f), step_size(f, size, after_g)
+    poles = after_f.degree + after_g.degree + left.degree + right.degree
+    first, second = names
+    labels = (f"Phi_{second}(Phi_{first}(x))", f"Phi_{first}(Phi_{second}(x))")
+    return Identity(f.dim, sides, left * right + right * left, poles, eps, *labels)
+
+
+def check_commute(
+    file: SystemFile, other: SystemFile | None = None, settings: Settings | None = None, eps2: fmpq | None = None
+) -> Report:
+    """Do the Kahan maps of two systems commute; of one member of the family: all its rational associated maps?
+
+    `eps2` is the step of the second map where it differs (then `settings.eps` has to be given). For a family member the
+    maps of H_0 and H_1 = A H_0 are the control: they do not commute in general, and a check that finds them
+    commuting would be worthless. Raises InputError where there is nothing to compare.
+    """
+    settings = settings or Settings()
+    if other is None:
+        if eps2 is not None:
+            raise InputError("a second step needs a second system: kahanmaps check-commute SYSTEM OTHER --eps2 E")
+        if file.member is None:
+            raise InputError(
+                f"{file.name} is of kind [{file.kind}], and one system commutes with itself: "
+                "give a second system, or one of kind [family], whose associated maps are compared pairwise"
+            )
+        return _check_member(file, file.member, settings)
+    return _check_pair(file, other, settings, eps2)
+
+
+def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: fmpq | None) -> Report:
+    f, g = file.system, other.system
+    if f.dim != g.dim:
+        raise InputError(f"{file.name} has dimension {f.dim} and {other.name} {g.dim}, expected the same dimension")
+    notes = []
+    if f.variables != g.variables:
+        notes.append(f"variables are matched by position: {', '.join(f.variables)} with {', '.join(g.variables)}")
+    same_step = True
+    if eps2 is not None:
+        if settings.eps is None:
+            raise InputError("a second step needs the first one as well: give both --eps and --eps2")
+        eps2 = rational(eps2)
+        if eps2 == 0:
+            raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")
+        # Phi_g at eps2 is the map of (eps2/eps) g at eps: the map depends on the product eps g only.
+        same_step = eps2 == settings.eps
+        g = g.scaled(eps2 / settings.eps)
+    proof = None
+    if same_step and file.member is not None and other.member is not None:
+        proof = theorems.commuting_by_involution_of_members(file.member, other.member)
+    if proof is None:
+        proof = theorems.commuting_by_splitting(f, g)
+    identity = commutativity(f, g, settings.eps, ("f", "g"))
+    orbit = run_orbit(KahanMap(f, settings.orbit_eps), settings)
+    finding = judge(
+        f"the Kahan maps of f = {file.name} and g = {other.name} commute",
+        identity,
+        settings,
+        proof,
+        orbit,
+        formula="Phi_f o Phi_g = Phi_g o Phi_f",
+        source=SOURCE,
+    )
+    more = {"eps2": format_number(eps2)} if eps2 is not None else {}
+    context = settings.context([file.name, other.name], orbit=orbit.to_json(), **more)
+    return Report("commute", (finding,), context, notes, settings.cut_short(orbit))
+
+
+def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) -> Report:
+    count = len(member.factors)
+    notes = []
+    if count > MAX_FACTORS:
+        notes.append(f"chi has {count} factors: of the 2^{count - 1} associated maps those with at most one minus sign")
+        associates = [member.associate(signs) for signs in _single_flips(count)]
+    else:
+        associates = list(member.associated())
+    base = theorems.member_hypotheses(member)
+    verified = {}
+    for k, associate in enumerate(associates):
+        settings.progress(f"associated system {k + 1} of {len(associates)}")
+        verified[associate.label] = theorems.associated_hypotheses(member, associate)
+    orbit = run_orbit(KahanMap(associates[0].system, settings.orbit_eps), settings)
+    findings = []
+    pairs = list(combinations(associates, 2))
+    for k, (first, second) in enumerate(pairs):
+        settings.progress(f"pair {k + 1} of {len(pairs)}")
+        proof = theorems.evidence(
+            "Theorem 9 of Petrera and Suris", [*base, *verified[first.label], *verified[second.label]]
+        )
+        findings.append(_pair_finding(first, second, settings, proof, orbit if k < _PAIRS_TRIED else None))
+    if len(pairs) > _PAIRS_TRIED:
+        notes.append(
+            f"the first {_PAIRS_TRIED} pairs were also tried along an orbit; the hypotheses were verified for all"
+        )
+    if len(associates) == 1:
+        findings.append(_inverse_finding(associates[0], settings, orbit))
+    if any(factor.degree > 1 for factor in member.factors):
+        findings.append(_splitting_field_finding(member))
+    control = _control(member, settings, orbit)
+    if not control.is_as_expected:
+        notes.append(
+            "the control was not refuted: these maps commute as well, so this member cannot show that the check "
+            "is able to fail"
+        )
+    context = settings.context([file.name], orbit=orbit.to_json(), m=member.m, factors=[str(f) for f in member.factors])
+    return Report("commute", (*findings, control), context, notes, settings.cut_short(orbit))
+
+
+def _pair_finding(
+    first: AssociatedSystem,
+    second: AssociatedSystem,
+    settings: Settings,
+    proof: Evidence | None,
+    orbit: OrbitRun | None,
+) -> Finding:
+    claim = f"the Kahan maps of f_{first.label} and f_{second.label} commute"
+    names = (f"f_{first.label}", f"f_{second.label}")
+    formula = f"Phi_{names[0]} o Phi_{names[1]} = Phi_{names[1]} o Phi_{names[0]}"
+    if orbit is None and proof is not None:
+        return Finding(claim, theorems.PROVED, proof, formula=formula, source=SOURCE)
+    identity = commutativity(first.system, second.system, settings.eps, names)
+    return judge(claim, identity, settings, proof, orbit, formula=formula, source=SOURCE)
+
+
+def _inverse_finding(only: AssociatedSystem, settings: Settings, orbit: OrbitRun) -> Finding:
+    """Where chi is irreducible f_0 and -f_0 are the only rational associated systems: a map and its inverse."""
+    inverse = only.system.scaled(-1)
+    return judge(
+        "the Kahan maps of f_0 and -f_0, its only rational associated system, commute (they are inverse to each other)",
+        commutativity(only.system, inverse, settings.eps, ("f_0", "-f_0")),
+        settings,
+        theorems.commuting_by_splitting(only.system, inverse),
+        orbit,
+        formula="Phi_f(., eps) o Phi_f(., -eps) = id",
+        source="petrera-suris-2016, eq. (eq: reversible)",
+    )
+
+
+def _splitting_field_finding(member: FamilyMember) -> Finding:
+    proof = theorems.commuting_over_splitting_field(member)
+    irrational = [f"({factor})" for factor in member.factors if factor.degree > 1]
+    claim = (
+        f"over the splitting field of chi, where {', '.join(irrational)} splits, the Kahan maps of all "
+        f"associated systems commute pairwise"
+    )
+    return theorems.finding_by_hypotheses(claim, proof, SOURCE)
+
+
+def _control(member: FamilyMember, settings: Settings, orbit: OrbitRun) -> Finding:
+    """Phi_{H_0} with Phi_{H_1}; for m = 1, where there is no H_1, the map with itself at twice the step."""
+    J = standard_structure(member.dim)
+    f = CubicHamiltonian(member.chain[0], J).system
+    if member.m > 1:
+        g = CubicHamiltonian(member.chain[1], J).system
+        claim, names = (
+            "control: the Kahan maps of J grad H_0 and J grad H_1, grad H_1 = A grad H_0, commute",
+            ("H_0", "H_1"),
+        )
+    else:
+        g = f.scaled(2)
+        claim, names = "control: the Kahan maps of f at eps and at 2 eps commute", ("f(eps)", "f(2 eps)")
+    return judge(
+        claim,
+        commutativity(f, g, settings.eps, names),
+        settings,
+        theorems.commuting_by_splitting(f, g),
+        orbit,
+        formula=f"Phi_{names[0]} o Phi_{names[1]} = Phi_{names[1]} o Phi_{names[0]}",
+        source="petrera-suris-2016, Introduction: in general these maps do not commute",
+        control=True,
+    )
+
+
+def _single_flips(count: int) -> Sequence[tuple[int, ...]]:
+    return [(1,) * count, *(tuple(-1 if i == k else 1 for i in range(count)) for k in range(count))]

@@ -1,0 +1,112 @@
+"""Are integrals conserved?  I(x~) = I(x), for known integrals and for claimed ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.checks import theorems
+from kahanmaps.checks.claims import Evidence, Report
+from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.checks.judge import judge
+from kahanmaps.checks.settings import Settings, run_orbit
+from kahanmaps.errors import InputError
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.invariants.integrals import ClaimedIntegral, Integral, ModifiedHamiltonian, PaperIntegral
+from kahanmaps.invariants.sizes import VARIABLE, eps_size, step_size
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+# With more rational factors than this only the K~ with a single minus sign are listed; the others are their
+# combinations.
+MAX_FACTORS = 8
+
+
+def conservation(system: QuadraticSystem, integral: Integral, eps: fmpq | None) -> Identity:
+    """I(x~) = I(x) as an identity, for an integral and the Kahan map of a system."""
+
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
+        after = integral.value(field, eps_value, KahanMap(system, eps_value, field).step(point))
+        before = integral.value(field, eps_value, point)
+        return None if after is None or before is None else ([after], [before])
+
+    size = eps_size(eps)
+    image = step_size(system, size, VARIABLE)
+    after, before = integral.size(size, image), integral.size(size, VARIABLE)
+    poles = image.degree + after.below.degree + before.below.degree
+    return Identity(system.dim, sides, after.equation(before), poles, eps, "I(x~)", "I(x)")
+
+
+def known_integrals(file: SystemFile) -> list[tuple[Integral, Evidence | None, str]]:
+    """The integrals that a theorem gives for the system: each with its proof and source."""
+    found: list[tuple[Integral, Evidence | None, str]] = []
+    if file.member is not None:
+        return _family_integrals(file.member)
+    if file.hamiltonian is not None:
+        proof = theorems.modified_hamiltonian_conserved(file.hamiltonian)
+        found.append((ModifiedHamiltonian(file.hamiltonian), proof, "cmoq-2013"))
+        if file.hamiltonian.is_homogeneous and file.hamiltonian.is_standard:
+            found.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
+    return found
+
+
+def check_integrals(
+    file: SystemFile, settings: Settings | None = None, extra: Mapping[str, RationalFunction] | None = None
+) -> Report:
+    """Are the known integrals, the claimed ones of the file and `extra` ones conserved: identically, on an orbit?
+
+    `extra` are rational functions of the system's variables and eps. Raises InputError where there is nothing to check.
+    """
+    settings = settings or Settings()
+    candidates = known_integrals(file)
+    for name, function in (extra or {}).items():
+        file.require_claim(f"the integral {name}", function)
+    for name, function in {**file.integrals, **(extra or {})}.items():
+        candidates.append((ClaimedIntegral(name, function), None, ""))
+    if not candidates:
+        raise InputError(
+            f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "
+            "or give --integral 'NAME=EXPRESSION'"
+        )
+    orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings)
+    findings = []
+    for k, (integral, proof, source) in enumerate(candidates):
+        settings.progress(f"integral {k + 1} of {len(candidates)}")
+        findings.append(
+            judge(
+                f"{integral.name} is conserved",
+                conservation(file.system, integral, settings.eps),
+                settings,
+                proof,
+                orbit,
+                formula=integral.formula,
+                source=source,
+            )
+        )
+    context = settings.context([file.name], orbit=orbit.to_json())
+    return Report("integrals", tuple(findings), context, ended_early=settings.cut_short(orbit))
+
+
+def _family_integrals(member: FamilyMember) -> list[tuple[Integral, Evidence | None, str]]:
+    """Modified H in both normalisations, and K~_s for every rational associated system: the whole class shares them."""
+    count = len(member.factors)
+    if count > MAX_FACTORS:
+        flips = [tuple(-1 if i == k else 1 for i in range(count)) for k in range(count)]
+        associates = [member.associate(signs) for signs in [(1,) * count, *flips]]
+    else:
+        associates = list(member.associated())
+    base = associates[0]
+    proof = theorems.shared_integral(member, base)
+    found: list[tuple[Integral, Evidence | None, str]] = [
+        (ModifiedHamiltonian(base.hamiltonian), proof, "petrera-suris-2016, eq. (eq: CMOQ integral)"),
+        (PaperIntegral(base.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"),
+    ]
+    for associate in associates[1:]:
+        integral = PaperIntegral(associate.hamiltonian, f"K_{associate.label}")
+        found.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
+    return found

@@ -1,0 +1,221 @@
+"""Deciding an identity of rational functions at random points, with a bound on the probability of error.
+
+The identity is a polynomial equation P(x, eps) = 0 over the integers once denominators are cleared. For each trial
+a prime p is drawn at random from [2^62, 2^63) and then a point over GF(p). If P is not the zero polynomial, the
+trial passes only if p divides all its coefficients (at most bits/62 of more than 2^55 primes do) or the point is a
+root (probability at most degree/p, given that no denominator vanishes: (degree/p) / (1 - poles/p)). Trials are
+independent, so the bounds multiply. Sources: schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes
+from N to 2N).
+
+A trial that fails refutes the identity; a small rational point is then found at which both sides differ.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import fmpq, fmpz
+
+from kahanmaps.algebra.fields import QQ, Field, PrimeField
+from kahanmaps.checks.claims import Evidence, Verdict, Witness
+from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep
+from kahanmaps.invariants.sizes import Size
+
+DEFAULT_ERROR_BITS = 100
+_PRIME_BITS = 62
+# Rosser and Schoenfeld: at least 3 N / (5 ln N) primes in (N, 2N] for N >= 21; here N = 2^62.
+_PRIMES_LOG2 = math.log2(0.6) + _PRIME_BITS - math.log2(_PRIME_BITS * math.log(2))
+_MAX_POLES = 200
+_WITNESS_TRIES = 400
+
+Sides = tuple[Sequence[Any], Sequence[Any]]
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Two sides to be equal at every point of a space of dimension `dim`.
+
+    `sides(field, x, eps)` gives both as lists of field elements; it returns None, or raises SingularStep, where
+    they are not defined. `equation` bounds the polynomials that vanish when they are equal, `poles` the degree of
+    the product of all denominators. `eps` is the step the identity is stated for, None for every eps.
+    """
+
+    dim: int
+    sides: Callable[[Field, tuple[Any, ...], Any], Sides | None]
+    equation: Size
+    poles: int
+    eps: fmpq | None
+    left_label: str = "left side"
+    right_label: str = "right side"
+    entries: tuple[str, ...] = ()  # names of the entries, where a witness should show only one that differs
+
+    def at(self, field: Field, point: tuple[Any, ...], eps: Any) -> Sides | None:
+        """Both sides, None where they are not defined."""
+        try:
+            return self.sides(field, point, eps)
+        except (SingularStep, SingularMatrix):
+            return None
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The outcome: a verdict (supported, refuted or undecided), its evidence, and for refuted ones a witness."""
+
+    verdict: Verdict
+    evidence: Evidence
+    witness: Witness | None = None
+
+
+def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
+    """Decide an identity at random points over GF(p): supported with error below 2^-error_bits, or refuted."""
+    rng = random.Random(f"identity {seed}")
+    per_trial = trial_bound(identity)
+    if per_trial >= -1:
+        return Decision(
+            Verdict.UNDECIDED,
+            Evidence(
+                "random points over GF(p)",
+                f"the degree bound {identity.equation.degree} is too large for primes of 63 bits to decide anything",
+                {"degree_bound": identity.equation.degree},
+            ),
+        )
+    trials = max(1, math.ceil(error_bits / -per_trial))
+    poles = 0
+    primes = []
+    for _ in range(trials):
+        while True:
+            if poles > _MAX_POLES:
+                return Decision(
+                    Verdict.UNDECIDED,
+                    Evidence(
+                        "random points over GF(p)",
+                        f"the identity is not defined at any of {poles} random points over GF(p): "
+                        "a denominator seems to vanish identically",
+                        {"poles_met": poles},
+                    ),
+                )
+            field = random_prime_field(rng)
+            try:
+                point = tuple(field.random(rng) for _ in range(identity.dim))
+                eps = _draw_eps(identity, field, rng)
+                sides = identity.at(field, point, eps)
+            except BadPrime:
+                poles += 1
+                continue
+            if sides is not None:
+                break
+            poles += 1
+        if not _equal(field, sides):
+            return _refuted(identity, seed, field, point, eps, sides)
+        primes.append(field.prime)
+    bound = per_trial * trials
+    scope = "every eps" if identity.eps is None else f"eps = {identity.eps}"
+    return Decision(
+        Verdict.SUPPORTED,
+        Evidence(
+            "random points over GF(p)",
+            f"held at {trials} random point{'s' * (trials > 1)} over GF(p), p random of 63 bits, for {scope}; "
+            f"false with probability below 2^{math.floor(-bound) * -1}",
+            {
+                "points": trials,
+                "error_bound": f"2^{-math.floor(-bound)}",
+                "degree_bound": identity.equation.degree,
+                "coefficient_bits_bound": math.ceil(identity.equation.bits),
+                "pole_degree_bound": identity.poles,
+                "poles_met": poles,
+                "primes": [str(prime) for prime in primes],
+                "eps": "every" if identity.eps is None else str(identity.eps),
+            },
+        ),
+    )
+
+
+def trial_bound(identity: Identity) -> float:
+    """log2 of the probability that one trial passes although the identity is false."""
+    bad_primes = 2 ** (math.log2(max(1.0, identity.equation.bits / _PRIME_BITS)) - _PRIMES_LOG2)
+    scale = 2.0**_PRIME_BITS
+    roots = (identity.equation.degree / scale) / (1 - min(0.5, identity.poles / scale))
+    return math.log2(bad_primes + roots)
+
+
+def random_prime_field(rng: random.Random) -> PrimeField:
+    """GF(p) for a prime drawn uniformly from [2^62, 2^63), which is where nmod still holds it."""
+    while True:
+        candidate = rng.getrandbits(_PRIME_BITS) | (1 << _PRIME_BITS)
+        if candidate % 2 and fmpz(candidate).is_prime():
+            return PrimeField(candidate)
+
+
+def small_points(dim: int, rng: random.Random, count: int) -> list[tuple[fmpq, ...]]:
+    """Rational points of slowly growing height: integers first, then small fractions."""
+    points = []
+    for k in range(count):
+        height = 1 + k // 10
+        below = 1 if k < count // 2 else 1 + k % 7
+        points.append(tuple(fmpq(rng.randint(-height, height), rng.randint(1, below)) for _ in range(dim)))
+    return points
+
+
+def _refuted(
+    identity: Identity, seed: int, field: PrimeField, point: tuple[Any, ...], eps: Any, sides: Sides
+) -> Decision:
+    """A rational witness for an identity that failed over GF(p); failing that, the modular one, which is as good."""
+    rng = random.Random(f"witness {seed}")
+    for k, candidate in enumerate(small_points(identity.dim, rng, _WITNESS_TRIES)):
+        at_eps = identity.eps if identity.eps is not None else fmpq(1, 1 + k % 5)
+        found = identity.at(QQ, candidate, at_eps)
+        witness = witness_of(identity, QQ, candidate, at_eps, found) if found is not None else None
+        if witness is not None:
+            where = f"fails at a rational point of height at most {_height(candidate)}, exactly"
+            return Decision(Verdict.REFUTED, Evidence("exact rational point", where, {}), witness)
+    witness = witness_of(identity, field, point, eps, sides)
+    summary = (
+        f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
+        f"none of {_WITNESS_TRIES} small rational points shows it"
+    )
+    return Decision(Verdict.REFUTED, Evidence("point over GF(p)", summary, {"prime": str(field.prime)}), witness)
+
+
+def witness_of(identity: Identity, field: Field, point: tuple[Any, ...], eps: Any, sides: Sides) -> Witness | None:
+    """The two sides at a point as a witness; None where they are equal."""
+    left, right = sides
+    if _equal(field, sides):
+        return None
+    labels = (identity.left_label, identity.right_label)
+    if identity.entries:
+        k = next(k for k, (a, b) in enumerate(zip(left, right, strict=True)) if not field.equal(a, b))
+        left, right = [left[k]], [right[k]]
+        labels = (f"{identity.entries[k]} of {labels[0]}", f"{identity.entries[k]} of {labels[1]}")
+    return Witness(
+        tuple(field.format(entry) for entry in point),
+        field.format(eps),
+        tuple(field.format(entry) for entry in left),
+        tuple(field.format(entry) for entry in right),
+        *labels,
+        field.name,
+    )
+
+
+def _equal(field: Field, sides: Sides) -> bool:
+    left, right = sides
+    return len(left) == len(right) and all(field.equal(a, b) for a, b in zip(left, right, strict=True))
+
+
+def _draw_eps(identity: Identity, field: PrimeField, rng: random.Random) -> Any:
+    if identity.eps is not None:
+        eps = field.convert(identity.eps)
+        if eps == 0:
+            raise BadPrime("the prime divides eps", field.prime)
+        return eps
+    while True:
+        eps = field.random(rng)
+        if eps != 0:
+            return eps
+
+
+def _height(point: tuple[fmpq, ...]) -> int:
+    return max(max(abs(int(entry.p)), int(entry.q)) for entry in point)

@@ -1,0 +1,46 @@
+"""One claim from start to end: proof where there is one, random points, an exact orbit, and that they agree.
+
+Proof and experiment are independent ways to the same answer, so each guards the other: a proved claim that fails at
+a point is a bug here, and is reported as one.
+"""
+
+from __future__ import annotations
+
+from kahanmaps.checks.claims import Evidence, Finding, Verdict
+from kahanmaps.checks.decide import Identity, decide
+from kahanmaps.checks.settings import OrbitRun, Settings, along
+
+
+class Contradiction(AssertionError):
+    """A theorem and an exact computation disagree: an error in kahanmaps, never in the input."""
+
+
+def judge(
+    claim: str,
+    identity: Identity,
+    settings: Settings,
+    proof: Evidence | None = None,
+    orbit: OrbitRun | None = None,
+    *,
+    formula: str = "",
+    source: str = "",
+    control: bool = False,
+) -> Finding:
+    """The finding on one claim: proved by `proof`, or decided at random points; tried along `orbit` as well."""
+    decision = decide(identity, settings.seed, settings.error_bits if proof is None else 1)
+    also: list[Evidence] = []
+    verdict, evidence, witness = decision.verdict, decision.evidence, decision.witness
+    if proof is not None:
+        if decision.verdict is Verdict.REFUTED:
+            raise Contradiction(f"{claim}: {proof.summary}, but it {decision.evidence.summary} {decision.witness}")
+        verdict, evidence, witness = Verdict.PROVED, proof, None
+        if decision.verdict is Verdict.SUPPORTED:
+            also.append(decision.evidence)
+    if orbit is not None:
+        experience, failure = along(identity, orbit)
+        also.append(experience)
+        if failure is not None and verdict is not Verdict.REFUTED:
+            if proof is not None:
+                raise Contradiction(f"{claim}: {proof.summary}, but it {experience.summary} {failure}")
+            verdict, evidence, witness = Verdict.REFUTED, experience, failure
+    return Finding(claim, verdict, evidence, tuple(also), witness, formula, source, control)

@@ -1,0 +1,158 @@
+"""Invariant measures and Poisson structures of Kahan maps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.checks import theorems
+from kahanmaps.checks.claims import Evidence, Report
+from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.checks.judge import judge
+from kahanmaps.checks.settings import Settings, run_orbit
+from kahanmaps.errors import InputError
+from kahanmaps.invariants.measures import (
+    ClaimedDensity,
+    Density,
+    DeterminantDensity,
+    jacobian_determinant_sides,
+)
+from kahanmaps.invariants.poisson import jacobi_defects, jacobi_size, transformation_sides, transformation_size
+from kahanmaps.invariants.sizes import VARIABLE, Fraction, determinant_size, eps_size, step_size
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def density_identity(system: QuadraticSystem, density: Density, eps: fmpq | None) -> Identity:
+    """phi(x~) det(I - eps f'(x)) = phi(x) det(I + eps f'(x~)): the measure dx/phi is invariant."""
+
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
+        kahan = KahanMap(system, eps_value, field)
+        image = kahan.step(point)
+        after, before = density.value(field, eps_value, image), density.value(field, eps_value, point)
+        if after is None or before is None:
+            return None
+        above, below = jacobian_determinant_sides(kahan, point, image)
+        return [after * below], [before * above]
+
+    size = eps_size(eps)
+    image = step_size(system, size, VARIABLE)
+    after, before = density.size(size, image), density.size(size, VARIABLE)
+    here, there = determinant_size(system, size, VARIABLE), determinant_size(system, size, image)
+    left = Fraction(after.above * here.above, after.below * here.below)
+    right = Fraction(before.above * there.above, before.below * there.below)
+    poles = image.degree + left.below.degree + right.below.degree
+    labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
+    return Identity(system.dim, sides, left.equation(right), poles, eps, *labels)
+
+
+def check_measure(file: SystemFile, settings: Settings | None = None, extra: RationalFunction | None = None) -> Report:
+    """Is dx/phi invariant: for phi = det(I - eps f') of Hamiltonian systems, for the file's [density], for `extra`?
+
+    Raises InputError where no density is known or claimed.
+    """
+    settings = settings or Settings()
+    candidates: list[tuple[Density, Evidence | None, str]] = []
+    if file.hamiltonian is not None:
+        proof = theorems.determinant_density_invariant(file.hamiltonian)
+        candidates.append((DeterminantDensity(file.system), proof, "petrera-suris-2016, eq. (eq: CMOQ measure)"))
+    if extra is not None:
+        file.require_claim("a density", extra)
+        if extra.numerator.is_zero():
+            raise InputError("found the density 0, expected a function that is not zero: the measure is dx/phi")
+    for function in (file.density, extra):
+        if function is not None:
+            candidates.append((ClaimedDensity(function), None, ""))
+    if not candidates:
+        raise InputError(
+            f"no density of {file.name} is known or claimed: add a section [density] with phi to the file, "
+            "or give --density EXPRESSION (the measure is dx/phi)"
+        )
+    orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings)
+    findings = tuple(
+        judge(
+            "the measure dx/phi is invariant",
+            density_identity(file.system, density, settings.eps),
+            settings,
+            proof,
+            orbit,
+            formula=density.formula,
+            source=source,
+        )
+        for density, proof, source in candidates
+    )
+    context = settings.context([file.name], orbit=orbit.to_json())
+    return Report("measure", findings, context, ended_early=settings.cut_short(orbit))
+
+
+def transformation_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> Identity:
+    """dPhi Pi(x) dPhi^T = Pi(x~), multiplied out."""
+    n = hamiltonian.dim
+
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
+        left, right = transformation_sides(KahanMap(hamiltonian.system, eps_value, field), hamiltonian, point)
+        return left.entries(), right.entries()
+
+    size = eps_size(eps)
+    image = step_size(hamiltonian.system, size, VARIABLE)
+    entries = tuple(f"entry ({i + 1},{j + 1})" for i in range(n) for j in range(n))
+    labels = ("(I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T", "(I - eps f'(x)) Pi(x~) (I - eps f'(x))^T")
+    equation = transformation_size(hamiltonian, size, VARIABLE)
+    return Identity(n, sides, equation, 4 * image.degree + 4, eps, *labels, entries)
+
+
+def jacobi_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> Identity:
+    """The Jacobi identity of Pi for all triples of coordinates."""
+    n = hamiltonian.dim
+
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
+        defects = jacobi_defects(hamiltonian, field, eps_value, point)
+        return defects, [field.zero] * len(defects)
+
+    entries = tuple(
+        f"triple ({i + 1},{j + 1},{k + 1})" for i in range(n) for j in range(i + 1, n) for k in range(j + 1, n)
+    )
+    size = eps_size(eps)
+    equation = jacobi_size(hamiltonian, size, VARIABLE)
+    return Identity(n, sides, equation, 8, eps, "the cyclic sum", "zero", entries)
+
+
+def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:
+    """Is Pi(x) = J - eps^2 f'(x)^2 J a Poisson tensor that the Kahan map preserves?
+
+    Raises InputError for systems without a Hamiltonian.
+    """
+    settings = settings or Settings()
+    if file.hamiltonian is None:
+        raise InputError(
+            f"{file.name} is of kind [system]: Pi(x) = J - eps^2 f'(x)^2 J needs a Hamiltonian system, "
+            "expected a file of kind [hamiltonian] or [family]"
+        )
+    hamiltonian = file.hamiltonian
+    proof = theorems.poisson_tensor_invariant(hamiltonian, file.member)
+    orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings)
+    source = "petrera-suris-2016, Theorem 12"
+    law = judge(
+        "the Kahan map is Poisson for Pi",
+        transformation_identity(hamiltonian, settings.eps),
+        settings,
+        proof,
+        orbit,
+        formula="dPhi(x) Pi(x) dPhi(x)^T = Pi(x~), Pi(x) = J - eps^2 f'(x)^2 J",
+        source=source,
+    )
+    jacobi = judge(
+        "Pi is a Poisson tensor",
+        jacobi_identity(hamiltonian, settings.eps),  # of x alone: an orbit would add nothing
+        settings,
+        proof,
+        formula="sum_l Pi_il d_l Pi_jk + cyclic = 0, Pi skew",
+        source=source,
+    )
+    context = settings.context([file.name], orbit=orbit.to_json())
+    return Report("poisson", (law, jacobi), context, ended_early=settings.cut_short(orbit))

@@ -1,0 +1,148 @@
+"""What a check is run with, and the part of a report that lets anyone run it again."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.text import format_number
+from kahanmaps.checks.claims import Evidence, Witness
+from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
+from kahanmaps.errors import InputError
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd
+from kahanmaps.version import __version__
+
+CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
+DEFAULT_ORBIT_EPS = fmpq(1, 10)
+
+
+def _silent(_: str) -> None:
+    return None
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to check: at one `eps` or (None) for every eps; `steps` of an exact orbit from `start` (None: a random one).
+
+    `eps` and the coordinates of `start` may be given as any exact number: 1, Fraction(1, 10), "1/10".
+    `orbit_is_asked` says that the user gave the start or the number of steps, so that an orbit cut short is to be told.
+    """
+
+    eps: fmpq | None = None
+    start: tuple[fmpq, ...] | None = None
+    steps: int = 10
+    seed: int = 0
+    error_bits: int = DEFAULT_ERROR_BITS
+    max_digits: int = DEFAULT_MAX_DIGITS
+    orbit_is_asked: bool = False
+    progress: Callable[[str], None] = _silent
+
+    def __post_init__(self) -> None:
+        if self.eps is not None:
+            object.__setattr__(self, "eps", rational(self.eps))
+        if self.start is not None:
+            object.__setattr__(self, "start", tuple(rational(entry) for entry in self.start))
+        if self.eps == 0:
+            raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+        if self.steps < 0:
+            raise InputError(f"found {self.steps} steps, expected 0 or more")
+        if not 1 <= self.error_bits <= 10_000:
+            raise InputError(f"found an error bound of {self.error_bits} bits, expected 1 to 10000")
+
+    def cut_short(self, run: OrbitRun) -> bool:
+        """Whether an orbit that the user asked for ended early."""
+        return self.orbit_is_asked and not run.end.is_whole
+
+    @property
+    def orbit_eps(self) -> fmpq:
+        """The eps of the exact orbit, 1/10 where the claims are for every eps."""
+        return self.eps if self.eps is not None else DEFAULT_ORBIT_EPS
+
+    def context(self, names: Sequence[str], **more: Any) -> dict[str, Any]:
+        """What is needed to redo the check, as plain data."""
+        return {
+            "version": __version__,
+            "system": names[0],
+            **({"other": names[1]} if len(names) > 1 else {}),
+            "eps": "every" if self.eps is None else format_number(self.eps),
+            "time_step": "every" if self.eps is None else format_number(2 * self.eps),
+            "convention": CONVENTION,
+            "arithmetic": "exact",
+            "seed": self.seed,
+            "error_bits": self.error_bits,
+            **more,
+        }
+
+
+@dataclass(frozen=True)
+class OrbitRun:
+    """An exact orbit on which identities are tried: its points, how it ended, where it started."""
+
+    start: tuple[fmpq, ...]
+    points: tuple[tuple[fmpq, ...], ...]
+    eps: fmpq
+    end: OrbitEnd
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "start": [format_number(entry) for entry in self.start],
+            "eps": format_number(self.eps),
+            "steps": self.end.steps,
+            "status": self.end.status,
+            "message": self.end.message,
+        }
+
+
+def run_orbit(kahan: KahanMap, settings: Settings) -> OrbitRun:
+    """The exact orbit of the given start, or of random small rational starts until one has no singular point."""
+    rng = random.Random(f"start {settings.seed}")
+    attempt = 0
+    while True:
+        if settings.start is not None:
+            start = settings.start
+        else:
+            start = tuple(fmpq(rng.randint(-5, 5), rng.randint(1, 5)) for _ in range(kahan.dim))
+        orbit = Orbit(kahan, start, settings.steps, max_digits=settings.max_digits)
+        points = []
+        for point in orbit:
+            settings.progress(f"orbit: step {point.step} of {settings.steps}")
+            points.append(point.x)
+        end = orbit.end
+        if end is None:  # the loop above runs to its end, and then the orbit has one
+            raise AssertionError("an orbit ended without saying how")
+        attempt += 1
+        if end.status != "singular" or settings.start is not None or attempt >= 20:
+            return OrbitRun(orbit.start, tuple(points), fmpq(kahan.eps), end)
+
+
+def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
+    """Try an identity at every point of an exact orbit."""
+    tried = poles = 0
+    for point in run.points:
+        sides = identity.at(QQ, point, run.eps)
+        if sides is None:
+            poles += 1
+            continue
+        tried += 1
+        witness = witness_of(identity, QQ, point, run.eps, sides)
+        if witness is not None:
+            text = f"fails at step {tried + poles - 1} of an exact orbit"
+            return Evidence("exact orbit", text, _orbit_data(run, tried, poles)), witness
+    text = f"held exactly at {tried} point{'s' * (tried != 1)} of an orbit, eps = {format_number(run.eps)}"
+    if not tried:
+        text = f"could not be tried at any point of an orbit, eps = {format_number(run.eps)}"
+    if poles:
+        text += f", undefined at {poles}"
+    if not run.end.is_whole:
+        text += f" ({run.end.message})"
+    return Evidence("exact orbit", text, _orbit_data(run, tried, poles)), None
+
+
+def _orbit_data(run: OrbitRun, tried: int, poles: int) -> Mapping[str, Any]:
+    return {"points": tried, "undefined_at": poles, "eps": format_number(run.eps)}

@@ -1,0 +1,214 @@
+"""Proof by hypotheses: each function checks the finite hypotheses of a theorem exactly and returns evidence, or None.
+
+The theorems are those of petrera-suris-2016 and cmoq-2013. What is used beyond the paper (splitting without J,
+repeated roots, dimension 2) is proved in docs/mathematics.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from flint import fmpq, fmpq_mat
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import rank
+from kahanmaps.algebra.polynomials import gradient
+from kahanmaps.checks.claims import Evidence, Finding, Verdict
+from kahanmaps.family.associated import AssociatedSystem, FamilyMember
+from kahanmaps.family.cubics import belongs
+from kahanmaps.family.skew_hamiltonian import defects, evaluate_at_matrix
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+METHOD = "hypotheses"
+PROVED = Verdict.PROVED
+
+
+def evidence(theorem: str, hypotheses: Iterable[tuple[str, bool]]) -> Evidence | None:
+    """The evidence that a theorem applies; None unless every hypothesis holds."""
+    checked = list(dict.fromkeys(hypotheses))
+    if not all(holds for _, holds in checked):
+        return None
+    names = [name for name, _ in checked]
+    return Evidence(METHOD, f"{theorem} applies: {'; '.join(names)}", {"theorem": theorem, "hypotheses": names})
+
+
+def finding_by_hypotheses(claim: str, proof: Evidence | None, source: str) -> Finding:
+    """A claim that only a theorem can decide: proved, or undecided where the hypotheses do not hold."""
+    if proof is not None:
+        return Finding(claim, Verdict.PROVED, proof, source=source)
+    reason = Evidence(METHOD, "the hypotheses of the theorem do not all hold, which decides nothing")
+    return Finding(claim, Verdict.UNDECIDED, reason, source=source)
+
+
+def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> list[tuple[str, bool]]:
+    """What makes `associate` an associated system of f_0 = J grad H, each verified here and now."""
+    n = member.dim
+    power, total = _identity(n), fmpq_mat(n, n)
+    for coefficient in associate.coefficients:
+        total = total + power * coefficient
+        power = power * member.A
+    return [
+        (f"B_{associate.label} is a polynomial in A", bool(total == associate.B)),
+        (f"B_{associate.label}^2 = I", bool(associate.B * associate.B == _identity(n))),
+        (
+            f"grad K_{associate.label} = B_{associate.label} grad H",
+            gradient(associate.K) == linear_combinations(associate.B, gradient(member.H)),
+        ),
+    ]
+
+
+def member_hypotheses(member: FamilyMember) -> list[tuple[str, bool]]:
+    """What makes (A, H) a member of the family."""
+    return [
+        ("A^T J = J A", not defects(member.A)),
+        ("H is a homogeneous cubic with A Hess(H) = Hess(H) A^T", belongs(member.A, member.H)),
+    ]
+
+
+def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
+    """The maps of f and g commute if g = C f with a constant C, C^2 = I, C f'(x) = f'(x) C for every x.
+
+    C then splits the space into two invariant parts, on which g is f and -f, so that Phi_g is Phi_f on the one and
+    its inverse on the other. Holds for inhomogeneous f as well; no Hamiltonian structure is needed.
+    """
+    C = linear_relation(f, g)
+    if C is None:
+        return None
+    return evidence(
+        "the splitting lemma (docs/mathematics.md)",
+        [
+            ("g = C f with a constant matrix C", f.transformed(C) == _renamed(g, f)),
+            ("C^2 = I", bool(C * C == _identity(f.dim))),
+            ("C f'(x) = f'(x) C for every x", _commutes(C, f)),
+        ],
+    )
+
+
+def commuting_by_involution_of_members(f: FamilyMember, g: FamilyMember) -> Evidence | None:
+    """Two members with the same A and H, whatever their signs, are associated (petrera-suris-2016, Theorem 9)."""
+    if f.A != g.A or f.variables != g.variables or f.H != g.H:
+        return None
+    return evidence(
+        "Theorem 9 of Petrera and Suris",
+        [*member_hypotheses(f), *associated_hypotheses(f, f.chosen), *associated_hypotheses(g, g.chosen)],
+    )
+
+
+def commuting_over_splitting_field(member: FamilyMember) -> Evidence | None:
+    """Over the splitting field of chi every choice of signs gives a B_s with B_s^2 = I, by Chinese remainders."""
+    return evidence(
+        "Theorem 9 of Petrera and Suris over the splitting field",
+        [
+            *member_hypotheses(member),
+            ("chi(A) = 0, so that B_s^2 = I for the Chinese remainders B_s of the signs", _annihilates(member)),
+        ],
+    )
+
+
+def modified_hamiltonian_conserved(hamiltonian: CubicHamiltonian) -> Evidence | None:
+    """For f = J grad H, H cubic, J constant and skew, Phi_f conserves modified H (cmoq-2013)."""
+    return evidence("the theorem of Celledoni, McLachlan, Owren and Quispel", _cubic_hypotheses(hamiltonian))
+
+
+def determinant_density_invariant(hamiltonian: CubicHamiltonian) -> Evidence | None:
+    """For f = J grad H, H cubic, J constant and skew, dx / det(I - eps f'(x)) is invariant (cmoq-2013)."""
+    return evidence("the theorem of Celledoni, McLachlan, Owren and Quispel", _cubic_hypotheses(hamiltonian))
+
+
+def shared_integral(member: FamilyMember, associate: AssociatedSystem) -> Evidence | None:
+    """Phi of every associated system conserves K~ of every other (petrera-suris-2016, Theorem 11)."""
+    return evidence(
+        "Theorem 11 of Petrera and Suris",
+        [
+            *member_hypotheses(member),
+            *associated_hypotheses(member, member.chosen),
+            *associated_hypotheses(member, associate),
+        ],
+    )
+
+
+def poisson_tensor_invariant(hamiltonian: CubicHamiltonian, member: FamilyMember | None) -> Evidence | None:
+    """Pi(x) = J - eps^2 f'(x)^2 J is an invariant Poisson tensor for generic members, and in dimension 2 for all H."""
+    if hamiltonian.dim == 2:
+        # f' is a traceless 2 x 2 matrix: f'^2 = -det f' I, so Pi = det(I - eps f') J, and this is the invariant
+        # measure.
+        return evidence("the invariant measure in dimension 2", _cubic_hypotheses(hamiltonian))
+    if member is None:
+        return None
+    return evidence(
+        "Theorem 12 of Petrera and Suris",
+        [
+            *member_hypotheses(member),
+            *associated_hypotheses(member, member.chosen),
+            ("chi has no repeated root", member.is_generic),
+        ],
+    )
+
+
+def linear_relation(f: QuadraticSystem, g: QuadraticSystem) -> fmpq_mat | None:
+    """A constant matrix C with g = C f: the only one if the components of f are independent, else +-I for g = +-f."""
+    if f.dim != g.dim:
+        return None
+    n = f.dim
+    F, G = _coefficients(f), _coefficients(g)
+    if rank(QQ, F) < n:
+        for sign in (1, -1):
+            if G == F * fmpq(sign):
+                return _identity(n) * fmpq(sign)
+        return None
+    # F has full row rank, so C F = G has at most one solution, C = G F^T (F F^T)^{-1}.
+    gram = F * F.transpose()
+    C = gram.solve(F * G.transpose()).transpose()
+    return C if C * F == G else None
+
+
+def _annihilates(member: FamilyMember) -> bool:
+    value = _identity(member.dim)
+    for factor in member.factors:
+        for _ in range(factor.multiplicity):
+            value = value * evaluate_at_matrix(factor.polynomial, member.A)
+    return not any(entry != 0 for entry in value.entries())
+
+
+def _cubic_hypotheses(hamiltonian: CubicHamiltonian) -> list[tuple[str, bool]]:
+    J = hamiltonian.J
+    return [
+        ("H is a polynomial of degree at most 3", all(sum(m) <= 3 for m in hamiltonian.H.monoms())),
+        ("J is constant and skew", bool(J.transpose() == -J)),
+        (
+            "f = J grad H",
+            hamiltonian.system.rhs == linear_combinations(J, hamiltonian.gradient),
+        ),
+    ]
+
+
+def _commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
+    """Whether C f'(x) = f'(x) C as polynomials in x: for B and for each of the constant matrices df'/dx_k."""
+    n = f.dim
+    if C * f.B != f.B * C:
+        return False
+    for k in range(n):
+        slope = fmpq_mat(n, n, [2 * f.Q[i][j, k] for i in range(n) for j in range(n)])
+        if C * slope != slope * C:
+            return False
+    return True
+
+
+def _coefficients(system: QuadraticSystem) -> fmpq_mat:
+    """One row a component, one column a monomial of degree at most 2."""
+    n = system.dim
+    rows = []
+    for i in range(n):
+        quadratic = [system.Q[i][j, k] for j in range(n) for k in range(j, n)]
+        rows.append([*quadratic, *(system.B[i, j] for j in range(n)), system.c[i]])
+    return fmpq_mat(rows)
+
+
+def _renamed(g: QuadraticSystem, f: QuadraticSystem) -> QuadraticSystem:
+    """g in the variables of f: the names do not matter, their order does."""
+    return QuadraticSystem(f.variables, g.Q, g.B, g.c)
+
+
+def _identity(n: int) -> fmpq_mat:
+    return fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])

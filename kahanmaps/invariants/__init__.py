@@ -1,0 +1,1 @@
+"""What Kahan maps preserve: integrals, densities, Poisson tensors, and how large the expressions for them are."""

@@ -1,0 +1,111 @@
+"""Integrals of Kahan maps: the modified Hamiltonian in its two normalisations, and claimed rational functions.
+
+For f = J grad H with a cubic H and any constant skew J the map Phi_f conserves
+
+    H + (2 eps/3) grad H^T (I - eps f')^{-1} f  =  H + grad H . (x~ - x)/3  =  H + O(eps^2)    ("modified H"),
+
+and for homogeneous H and J = [[0, I], [-I, 0]] this is -1/6 of the paper's H~ = eps^{-1} x^T J x~.
+Sources: cmoq-2013; petrera-suris-2016, eqs. (eq: CMOQ integral), (tH).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate
+from kahanmaps.algebra.text import format_rational_function
+from kahanmaps.errors import InputError
+from kahanmaps.invariants.sizes import Fraction, Size, function_size, polynomial_size, step_size
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+
+
+class Integral(ABC):
+    """A function of x and eps that some Kahan map may conserve."""
+
+    name: str
+    formula: str
+
+    @abstractmethod
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        """The value at a point over `field`; None at a pole. Raises SingularStep where a map in it has no value."""
+
+    @abstractmethod
+    def size(self, eps: Size, point: Size) -> Fraction:
+        """Bounds for numerator and denominator of the value at a point of this size."""
+
+
+class ModifiedHamiltonian(Integral):
+    """H + grad H . (x~ - x)/3, which tends to H as eps -> 0; x~ is the image under the Kahan map of J grad H."""
+
+    def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H") -> None:
+        self.hamiltonian = hamiltonian
+        self.name = f"modified {letter}"
+        self.formula = f"{letter} + (2 eps/3) grad {letter}^T (I - eps f')^(-1) f"
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        image = KahanMap(self.hamiltonian.system, eps, field).step(point)
+        with field.working():
+            total = field.zero
+            for x, after, slope in zip(point, image, self.hamiltonian.gradient, strict=True):
+                total = total + evaluate(slope, field, point) * (after - x)
+            return evaluate(self.hamiltonian.H, field, point) + total * field.convert(fmpq(1, 3))
+
+    def size(self, eps: Size, point: Size) -> Fraction:
+        # Over the common denominator 3 d W^3 W~: all terms have at most three factors from X / W and one from X~ / W~.
+        H, below = polynomial_size(self.hamiltonian.H)
+        image = step_size(self.hamiltonian.system, eps, point)
+        # |3 H| + |grad H . x~| + |grad H . x| has at most 3 + 3 + 3 times the coefficients of H.
+        factor = Size(0, H.bits + 3.17)
+        return Fraction(factor * point**3 * image, Size(0, below.bit_length() + 1.59) * point**3 * image)
+
+
+class PaperIntegral(Integral):
+    """The paper's H~ = eps^{-1} x^T J x~ = -6 H + O(eps^2), for homogeneous H and J = [[0, I], [-I, 0]]."""
+
+    def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H") -> None:
+        if not (hamiltonian.is_homogeneous and hamiltonian.is_standard):
+            raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
+        self.hamiltonian = hamiltonian
+        self.name = f"{letter}~"
+        self.formula = f"{letter}~ = eps^(-1) x^T J x~ = -6 (modified {letter})"
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        image = KahanMap(self.hamiltonian.system, eps, field).step(point)
+        m = len(image) // 2
+        with field.working():
+            total = field.zero
+            for i in range(m):
+                total = total + point[i] * image[m + i] - point[m + i] * image[i]
+            return total / field.convert(eps)
+
+    def size(self, eps: Size, point: Size) -> Fraction:
+        image = step_size(self.hamiltonian.system, eps, point)
+        dim = Size(0, float(self.hamiltonian.dim.bit_length()))
+        return Fraction(dim * eps * point * image, eps * point * image)
+
+
+class ClaimedIntegral(Integral):
+    """A rational function of the variables and eps that somebody claims is conserved."""
+
+    def __init__(self, name: str, function: RationalFunction) -> None:
+        self.name = name
+        self.function = function
+
+    @cached_property
+    def formula(self) -> str:  # type: ignore[override]
+        """The function as text."""
+        return format_rational_function(self.function)
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        with field.working():
+            return self.function.value(field, (*point, field.convert(eps)))
+
+    def size(self, eps: Size, point: Size) -> Fraction:
+        return function_size(self.function, len(self.function.names) - 1, eps, point)

@@ -1,0 +1,100 @@
+"""The catalogue: named systems, one TOML file each in this folder, with equations, known facts and sources.
+
+>>> names()[:3]
+('dressing_chain_3', 'euler_top', 'harmonic')
+>>> top = load("euler_top", {"a1": 1, "a2": "1/2", "a3": -3})
+>>> print(top.system)
+x1' = x2*x3
+x2' = 1/2*x1*x3
+x3' = -3*x1*x2
+>>> top.catalog["title"]
+'Euler top'
+
+A file is data, in the format of every other system file; its name is that of the system. All claims of [integrals] and
+[density] are put to the test by tests/systems/test_catalog.py, for the default and for random values of the parameters.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kahanmaps.errors import InputError
+
+if TYPE_CHECKING:
+    from kahanmaps.systems.files import SystemFile
+
+_ENDING = ".toml"
+_LIST_THEM = "'kahanmaps systems' lists the catalogue"
+
+
+def names() -> tuple[str, ...]:
+    """The names of all systems of the catalogue, in alphabetical order.
+
+    >>> "lorenz" in names()
+    True
+    """
+    found = (entry.name for entry in resources.files(__name__).iterdir())
+    return tuple(sorted(name.removesuffix(_ENDING) for name in found if name.endswith(_ENDING)))
+
+
+def load(reference: str | Path, parameters: Mapping[str, Any] | None = None) -> SystemFile:
+    """The system of that name in the catalogue, or the one in a TOML file.
+
+    `reference` is a name, or a path: a `Path`, or text that ends in .toml, contains a path separator or names an
+    existing file. Where a name is both, the catalogue wins; write ./name for the file. `parameters` replace the
+    default values: exact numbers (int, Fraction, text such as "2/3").
+
+    Raises InputError for a name that is not in the catalogue and a file that cannot be read, SystemFileError (an
+    InputError too) for a file with mistakes, for parameters that the system does not have and for inexact values.
+
+    >>> load("henon_heiles", {"c": "-6"}).parameters
+    {'c': -6}
+    >>> load("henon_hailes")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    kahanmaps.errors.InputError: found the unknown system 'henon_hailes', did you mean henon_heiles? ...
+    >>> load("henon_heiles", {"d": 1})
+    Traceback (most recent call last):
+        ...
+    kahanmaps.errors.SystemFileError: henon_heiles: 1 mistake
+      parameters: unknown parameter 'd', this system has: c
+    """
+    # Imported here, so that listing names loads no arithmetic.
+    from kahanmaps.systems.files import parse_system, read_system
+
+    if not isinstance(reference, Path):
+        if reference in names():
+            data = resources.files(__name__).joinpath(reference + _ENDING).read_bytes()
+            return parse_system(data, reference, parameters)
+        if not _is_path(reference):
+            raise _unknown(reference)
+    return read_system(reference, parameters)
+
+
+def _is_path(text: str) -> bool:
+    separators = [mark for mark in (os.sep, os.altsep) if mark]
+    return text.endswith(_ENDING) or any(mark in text for mark in separators) or os.path.isfile(text)
+
+
+def _unknown(name: str) -> InputError:
+    if not name or len(name) > 60 or not name.isprintable():  # no name that anybody meant
+        return InputError(f"found {name[:60]!r}, expected the name of a system or a path: {_LIST_THEM}")
+    close = _close_names(name)
+    meant = f", did you mean {' or '.join(close)}?" if close else ":"
+    return InputError(
+        f"found the unknown system {name!r}{meant} {_LIST_THEM}; a file is given by its path, e.g. ./{name}{_ENDING}"
+    )
+
+
+def _close_names(name: str) -> list[str]:
+    """Up to three names that look alike or contain what was written, e.g. "volterra"."""
+    wanted = name.lower().replace("-", "_").replace(" ", "_")
+    known = names()
+    alike = difflib.get_close_matches(wanted, known, 3)
+    longer = [other for other in known if len(wanted) > 2 and wanted in other and other not in alike]
+    return [*alike, *longer][:3]
