@@ -58,7 +58,8 @@ check_options: Callable[[F], F] = _stack(
         show_default=True,
         help="Random points until the probability of error is below 2^-BITS.",
     ),
-    click.option("--max-digits", type=int, help="Digit budget of the orbit."),
+    click.option("--max-digits", type=int, help="Digit budget of that orbit (default: by dimension)."),
+    click.option("-v", "--verbose", is_flag=True, help="On a terminal: all evidence (a pipe always gets it)."),
     output_options,
 )
 
@@ -106,7 +107,6 @@ def load_system(
 def settings_from(options: dict[str, Any], progress: Callable[[str], None]) -> Settings:
     """The settings of a check from the values of `check_options`."""
     from kahanmaps.checks.settings import Settings
-    from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS
 
     steps = options["steps"]
     digits = options["max_digits"]
@@ -118,7 +118,7 @@ def settings_from(options: dict[str, Any], progress: Callable[[str], None]) -> S
         steps=10 if steps is None else steps,
         seed=options["seed"],
         error_bits=options["error_bits"],
-        max_digits=DEFAULT_MAX_DIGITS if digits is None else digits,
+        max_digits=digits,
         orbit_is_asked=options["start"] is not None or steps is not None,
         progress=progress,
     )

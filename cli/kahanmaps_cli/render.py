@@ -36,12 +36,12 @@ def shorten(text: str, width: int = NUMBER_WIDTH) -> str:
     return f"{text[:keep]}...{text[-keep:]} ({len(text)} chars)"
 
 
-def print_report(report: Report, as_json: bool) -> int:
-    """Print a report and return the exit status that its verdict stands for."""
+def print_report(report: Report, as_json: bool, verbose: bool = False) -> int:
+    """Print a report and return the exit status that its verdict stands for; in a pipe everything is printed."""
     if as_json:
         print_json(report.to_json())
     elif on_terminal():
-        _print_table(report)
+        _print_table(report, verbose)
     else:
         _print_plain(report)
     return exit_status(report)
@@ -87,32 +87,67 @@ def _print_plain(report: Report) -> None:
     click.echo(f"verdict\t{report.verdict}")
 
 
-def _print_table(report: Report) -> None:
+def _print_table(report: Report, verbose: bool) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     console = Console(markup=False, emoji=False, highlight=False)
     console.print(Text(_headline(report), style="bold"))
-    table = Table(show_header=True, header_style="bold", show_lines=True)
+    table = Table(header_style="bold", show_lines=verbose)
     table.add_column("verdict", no_wrap=True)
-    table.add_column("claim and evidence", overflow="fold")
+    table.add_column("claim", overflow="fold")
+    if not verbose:
+        table.add_column("decided by", overflow="fold")
     shown = _selection(report.findings)
     told: set[str] = set()
     for finding in shown:
-        style = _COLOURS[str(finding.verdict)] if finding.is_as_expected or not finding.control else "yellow"
-        body = Text(finding.claim)
-        for line in _details(finding, told, NUMBER_WIDTH):
-            body.append("\n" + line, style="dim")
-        table.add_row(Text(_verdict_text(finding).replace(" (", "\n("), style=style), body)
+        style = _COLOURS[str(finding.verdict)] if finding.is_as_expected else "yellow"
+        claim = Text(finding.claim)
+        verdict = Text(_verdict_text(finding).replace(" (", "\n("), style=style)
+        if verbose:
+            for line in _details(finding, told, NUMBER_WIDTH):
+                claim.append("\n" + line, style="dim")
+            table.add_row(verdict, claim)
+        else:
+            if report.check != "commute" and finding.formula not in finding.claim:
+                claim.append("\n" + shorten(finding.formula, 300), style="dim")
+            table.add_row(verdict, claim, _short(finding.evidence))
     console.print(table)
     if len(shown) < len(report.findings):
         console.print(f"{len(report.findings) - len(shown)} more claims, proved like those above (--json has all)")
+    if not verbose:
+        for line in _below(shown):
+            console.print(line)
     for note in report.notes:
         console.print(f"note: {note}")
-    verdict = Text("verdict: ")
-    verdict.append(str(report.verdict), style=f"bold {_COLOURS[str(report.verdict)]}")
-    console.print(verdict)
+    last = Text("verdict: ")
+    last.append(str(report.verdict), style=f"bold {_COLOURS[str(report.verdict)]}")
+    console.print(last)
+
+
+def _short(evidence: Evidence) -> str:
+    """What decided a claim, in a table cell."""
+    hypotheses = evidence.data.get("hypotheses")
+    if not hypotheses:
+        return evidence.summary
+    return f"{evidence.data['theorem']} ({len(hypotheses)} hypotheses verified exactly)"
+
+
+def _below(findings: list[Finding]) -> list[str]:
+    """What a reader of the short table wants to know next: hypotheses, further evidence, witnesses."""
+    lines = []
+    hypotheses = list(dict.fromkeys(text for f in findings for text in f.evidence.data.get("hypotheses", ())))
+    if hypotheses:
+        more = f"; and {len(hypotheses) - 8} more (-v)" if len(hypotheses) > 8 else ""
+        lines.append(f"verified: {'; '.join(hypotheses[:8])}{more}")
+    also = list(dict.fromkeys(evidence.summary for f in findings if not f.control for evidence in f.also))
+    lines += [f"also: {summary}" for summary in also[:4]]
+    for finding in findings:
+        if finding.witness is not None:
+            lines.append(f"{_verdict_text(finding)}: {finding.claim}")
+            lines += [f"  {line}" for line in _witness_lines(finding.witness, NUMBER_WIDTH)]
+    return lines
 
 
 def _selection(findings: tuple[Finding, ...]) -> list[Finding]:

@@ -102,6 +102,8 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
 
     Raises `BadPrime` where the field is GF(p) and p divides the denominator of a coefficient.
     """
+    if field.exact and field.characteristic == 0:
+        return _evaluate_rational(polynomial, point)
     powers: list[list[Any]] = [[field.one, entry] for entry in point]
     total = field.zero
     with field.working():
@@ -109,12 +111,39 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
             term = field.convert(coefficient)
             for i, exponent in enumerate(monomial):
                 if exponent:
-                    table = powers[i]
-                    while len(table) <= exponent:
-                        table.append(table[-1] * table[1])
-                    term = term * table[exponent]
+                    term = term * _power(powers[i], exponent)
             total = total + term
     return total
+
+
+def _evaluate_rational(polynomial: fmpq_mpoly, point: Sequence[fmpq]) -> fmpq:
+    """The value at a rational point, in integers over one denominator: a gcd for the result, none for each term."""
+    top = degree(polynomial)
+    if top <= 0:
+        return polynomial.leading_coefficient() if top == 0 else fmpq(0)
+    W = fmpz(1)
+    for entry in point:
+        W = W.lcm(entry.q)
+    below = common_denominator(polynomial)
+    powers = [[fmpz(1), entry.p * (W // entry.q)] for entry in point]
+    powers_of_W = [fmpz(1), W]
+    total = fmpz(0)
+    for monomial, coefficient in polynomial.terms():
+        term = coefficient.p * (below // coefficient.q)
+        missing = top
+        for i, exponent in enumerate(monomial):
+            if exponent:
+                term = term * _power(powers[i], exponent)
+                missing -= int(exponent)
+        total += term * _power(powers_of_W, missing) if missing else term
+    return fmpq(total, below * _power(powers_of_W, top))
+
+
+def _power(table: list[Any], exponent: int) -> Any:
+    """table[1]^exponent from a table of powers that grows as needed."""
+    while len(table) <= exponent:
+        table.append(table[-1] * table[1])
+    return table[exponent]
 
 
 def substitute(polynomial: fmpq_mpoly, values: Mapping[str, fmpq]) -> fmpq_mpoly:

@@ -91,7 +91,7 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
     if proof is None:
         proof = theorems.commuting_by_splitting(f, g)
     identity = commutativity(f, g, settings.eps, ("f", "g"))
-    orbit = run_orbit(KahanMap(f, settings.orbit_eps), settings)
+    orbit = run_orbit(KahanMap(f, settings.orbit_eps), settings, proof is not None and file.member is not None)
     finding = judge(
         f"the Kahan maps of f = {file.name} and g = {other.name} commute",
         identity,
@@ -119,7 +119,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
     for k, associate in enumerate(associates):
         settings.progress(f"associated system {k + 1} of {len(associates)}")
         verified[associate.label] = theorems.associated_hypotheses(member, associate)
-    orbit = run_orbit(KahanMap(associates[0].system, settings.orbit_eps), settings)
+    orbit = run_orbit(KahanMap(associates[0].system, settings.orbit_eps), settings, is_integrable=True)
     findings = []
     pairs = list(combinations(associates, 2))
     for k, (first, second) in enumerate(pairs):

@@ -136,9 +136,12 @@ def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) 
 
 def trial_bound(identity: Identity) -> float:
     """log2 of the probability that one trial passes although the identity is false."""
+    if max(identity.equation.degree, identity.poles) >= 1 << (_PRIME_BITS - 1):
+        return 0.0  # no bound: half of all points may be roots, or have no value
     bad_primes = 2 ** (math.log2(max(1.0, identity.equation.bits / _PRIME_BITS)) - _PRIMES_LOG2)
     scale = 2.0**_PRIME_BITS
-    roots = (identity.equation.degree / scale) / (1 - min(0.5, identity.poles / scale))
+    # eps = 0 is left out of the draw as well, like one more pole.
+    roots = (identity.equation.degree / scale) / (1 - (identity.poles + 1) / scale)
     return math.log2(bad_primes + roots)
 
 

@@ -73,7 +73,7 @@ def check_measure(file: SystemFile, settings: Settings | None = None, extra: Rat
             f"no density of {file.name} is known or claimed: add a section [density] with phi to the file, "
             "or give --density EXPRESSION (the measure is dx/phi)"
         )
-    orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings)
+    orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings, file.member is not None)
     findings = tuple(
         judge(
             "the measure dx/phi is invariant",
@@ -119,7 +119,7 @@ def jacobi_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> Identity
     )
     size = eps_size(eps)
     equation = jacobi_size(hamiltonian, size, VARIABLE)
-    return Identity(n, sides, equation, 8, eps, "the cyclic sum", "zero", entries)
+    return Identity(n, sides, equation, 8, eps, "the cyclic sum", "what it should be", entries)
 
 
 def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:
@@ -135,7 +135,7 @@ def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:
         )
     hamiltonian = file.hamiltonian
     proof = theorems.poisson_tensor_invariant(hamiltonian, file.member)
-    orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings)
+    orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings, file.member is not None)
     source = "petrera-suris-2016, Theorem 12"
     law = judge(
         "the Kahan map is Poisson for Pi",

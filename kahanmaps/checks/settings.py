@@ -15,7 +15,7 @@ from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
 from kahanmaps.errors import InputError
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd
+from kahanmaps.maps.orbits import Orbit, OrbitEnd
 from kahanmaps.version import __version__
 
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
@@ -31,7 +31,8 @@ class Settings:
     """How to check: at one `eps` or (None) for every eps; `steps` of an exact orbit from `start` (None: a random one).
 
     `eps` and the coordinates of `start` may be given as any exact number: 1, Fraction(1, 10), "1/10".
-    `orbit_is_asked` says that the user gave the start or the number of steps, so that an orbit cut short is to be told.
+    `max_digits` (None: by dimension). `orbit_is_asked` says that the user gave the start or the number of steps, so
+    that an orbit cut short is to be told.
     """
 
     eps: fmpq | None = None
@@ -39,7 +40,7 @@ class Settings:
     steps: int = 10
     seed: int = 0
     error_bits: int = DEFAULT_ERROR_BITS
-    max_digits: int = DEFAULT_MAX_DIGITS
+    max_digits: int | None = None
     orbit_is_asked: bool = False
     progress: Callable[[str], None] = _silent
 
@@ -99,8 +100,12 @@ class OrbitRun:
         }
 
 
-def run_orbit(kahan: KahanMap, settings: Settings) -> OrbitRun:
+def run_orbit(kahan: KahanMap, settings: Settings, is_integrable: bool = False) -> OrbitRun:
     """The exact orbit of the given start, or of random small rational starts until one has no singular point."""
+    # A claim that takes two more steps of a map without structure multiplies the digits by dim^2, and elimination
+    # by dim once more; for the family numbers hardly grow from one step to the next.
+    by_dimension = 20_000 if is_integrable else max(100, 60_000 // kahan.dim**2)
+    max_digits = by_dimension if settings.max_digits is None else settings.max_digits
     rng = random.Random(f"start {settings.seed}")
     attempt = 0
     while True:
@@ -108,7 +113,7 @@ def run_orbit(kahan: KahanMap, settings: Settings) -> OrbitRun:
             start = settings.start
         else:
             start = tuple(fmpq(rng.randint(-5, 5), rng.randint(1, 5)) for _ in range(kahan.dim))
-        orbit = Orbit(kahan, start, settings.steps, max_digits=settings.max_digits)
+        orbit = Orbit(kahan, start, settings.steps, max_digits=max_digits)
         points = []
         for point in orbit:
             settings.progress(f"orbit: step {point.step} of {settings.steps}")

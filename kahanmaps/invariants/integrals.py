@@ -69,12 +69,16 @@ class ModifiedHamiltonian(Integral):
 class PaperIntegral(Integral):
     """The paper's H~ = eps^{-1} x^T J x~ = -6 H + O(eps^2), for homogeneous H and J = [[0, I], [-I, 0]]."""
 
-    def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H") -> None:
+    def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H", index: str = "") -> None:
         if not (hamiltonian.is_homogeneous and hamiltonian.is_standard):
             raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
         self.hamiltonian = hamiltonian
-        self.name = f"{letter}~"
-        self.formula = f"{letter}~ = eps^(-1) x^T J x~ = -6 (modified {letter})"
+        self.name = f"{letter}~{index}"
+        if index:  # not the map whose integral this is: the paper writes x^ for its image
+            image = f"x^, where x^ is the image of x under the Kahan map of J grad {letter}{index}"
+        else:
+            image = f"x~ = -6 (modified {letter})"
+        self.formula = f"{self.name} = eps^(-1) x^T J {image}"
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         image = KahanMap(self.hamiltonian.system, eps, field).step(point)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,7 @@ class _Floats:
 
     zero = 0.0
     one = 1.0
+    exact = False
 
     @staticmethod
     def convert(value: Any) -> float:
@@ -135,14 +137,14 @@ class _Floats:
 
 
 def float_function(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:
-    """The rational function in double precision; its value is None where the denominator is 0 or a power overflows."""
+    """The rational function in double precision; None where the denominator is 0 or the value is no finite number."""
 
     def value(point: Sequence[float]) -> float | None:
         try:
             found: float | None = function.value(_Floats, point)
         except (OverflowError, ZeroDivisionError):
             return None
-        return found
+        return found if found is not None and isfinite(found) else None
 
     return value
 

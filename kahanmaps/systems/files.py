@@ -249,10 +249,14 @@ class _Reader:
                 continue
             try:
                 check_names([name])
-                self.parameters[name] = fmpq(1)  # for now, so that a wrong value is one mistake and not many
+            except InputError as error:
+                self._mistake(path, str(error))
+                continue
+            try:
                 self.parameters[name] = rational(_plain_number(self.overrides.get(name, value)))
             except InputError as error:
                 self._mistake(path, str(error))
+                self.parameters[name] = fmpq(1)  # or every use of it would be a mistake of its own
                 self.unsure = True
         declared = self.document.get("parameters", {})
         for name in self.overrides:

@@ -45,4 +45,4 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
     second = load_system(other, None, (), ()) if other is not None else None
     report = check_commute(file, second, settings, eps2)
     progress.done()
-    return print_report(report, options["as_json"])
+    return print_report(report, options["as_json"], options["verbose"])

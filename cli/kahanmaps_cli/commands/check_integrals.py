@@ -50,4 +50,4 @@ def command(system: str | None, integrals: tuple[tuple[str, str], ...], **option
     }
     report = check_integrals(file, settings, extra)
     progress.done()
-    return print_report(report, options["as_json"])
+    return print_report(report, options["as_json"], options["verbose"])

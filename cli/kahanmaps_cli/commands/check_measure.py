@@ -41,4 +41,4 @@ def command(system: str | None, density: str | None, **options: Any) -> int:
             raise InputError("found the density 0, expected a function that is not zero: the measure is dx/phi")
     report = check_measure(file, settings, extra)
     progress.done()
-    return print_report(report, options["as_json"])
+    return print_report(report, options["as_json"], options["verbose"])

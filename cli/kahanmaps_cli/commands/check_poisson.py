@@ -33,4 +33,4 @@ def command(system: str | None, **options: Any) -> int:
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     report = check_poisson(file, settings)
     progress.done()
-    return print_report(report, options["as_json"])
+    return print_report(report, options["as_json"], options["verbose"])

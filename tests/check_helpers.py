@@ -1,0 +1,334 @@
+"""What the tests of invariants and checks share: the Kahan map computed a second time, and witnesses put to the test.
+
+Nothing here touches the library's arithmetic. Numbers are Python's Fractions, linear systems are solved by the
+elimination written out below, Jacobi matrices come from dual numbers instead of the formula for dPhi. Only
+coefficients are read from the library's objects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+from helpers import fraction, rationals
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.checks.claims import Finding, Report, Verdict, Witness
+from kahanmaps.checks.settings import Settings
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.cubics import cubic_space
+from kahanmaps.systems.files import SystemFile, parse_system
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+# Short orbits: every claim is decided at random points as well.
+QUICK = Settings(steps=2)
+
+Rows = list[list[Any]]
+
+
+@dataclass(frozen=True)
+class Dual:
+    """a + b t with t^2 = 0: arithmetic that differentiates."""
+
+    a: Fraction
+    b: Fraction
+
+    def __add__(self, other: Any) -> Dual:
+        other = _dual(other)
+        return Dual(self.a + other.a, self.b + other.b)
+
+    def __sub__(self, other: Any) -> Dual:
+        other = _dual(other)
+        return Dual(self.a - other.a, self.b - other.b)
+
+    def __mul__(self, other: Any) -> Dual:
+        other = _dual(other)
+        return Dual(self.a * other.a, self.a * other.b + self.b * other.a)
+
+    def __truediv__(self, other: Any) -> Dual:
+        other = _dual(other)
+        return Dual(self.a / other.a, (self.b * other.a - self.a * other.b) / other.a**2)
+
+    def __radd__(self, other: Any) -> Dual:
+        return _dual(other) + self
+
+    def __rsub__(self, other: Any) -> Dual:
+        return _dual(other) - self
+
+    def __rmul__(self, other: Any) -> Dual:
+        return _dual(other) * self
+
+
+def _dual(value: Any) -> Dual:
+    return value if isinstance(value, Dual) else Dual(Fraction(value), Fraction(0))
+
+
+def _vanishes(value: Any) -> bool:
+    return bool((value.a if isinstance(value, Dual) else value) == 0)
+
+
+def exact(*values: Any) -> tuple[Fraction, ...]:
+    """The numbers (text, int, fmpq) as Fractions."""
+    return tuple(Fraction(value) if isinstance(value, str) else fraction(value) for value in values)
+
+
+def texts(values: Sequence[Fraction]) -> tuple[str, ...]:
+    """Fractions as a witness writes them."""
+    return tuple(str(value) for value in values)
+
+
+def solve_by_elimination(matrix: Rows, right: list[Any]) -> list[Any] | None:
+    """The solution of a linear system, None where the matrix is singular."""
+    n = len(matrix)
+    rows = [[*row, entry] for row, entry in zip(matrix, right, strict=True)]
+    for k in range(n):
+        pivot = next((i for i in range(k, n) if not _vanishes(rows[i][k])), None)
+        if pivot is None:
+            return None
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        rows[k] = [entry / rows[k][k] for entry in rows[k]]
+        for i in range(n):
+            if i != k:
+                factor = rows[i][k]
+                rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k], strict=True)]
+    return [row[n] for row in rows]
+
+
+def rank_by_elimination(matrix: Rows) -> int:
+    """The rank of a matrix of Fractions."""
+    rows, found = [list(row) for row in matrix], 0
+    for k in range(len(rows[0])):
+        pivot = next((i for i in range(found, len(rows)) if rows[i][k] != 0), None)
+        if pivot is None:
+            continue
+        rows[found], rows[pivot] = rows[pivot], rows[found]
+        for i in range(found + 1, len(rows)):
+            factor = rows[i][k] / rows[found][k]
+            rows[i] = [a - factor * b for a, b in zip(rows[i], rows[found], strict=True)]
+        found += 1
+    return found
+
+
+def determinant(matrix: Rows) -> Any:
+    """The determinant, by expansion along the first row."""
+    if len(matrix) == 1:
+        return matrix[0][0]
+    total: Any = Fraction(0)
+    for j, entry in enumerate(matrix[0]):
+        if not _vanishes(entry):
+            minor = [row[:j] + row[j + 1 :] for row in matrix[1:]]
+            total = total + (-1) ** j * entry * determinant(minor)
+    return total
+
+
+def times(*matrices: Rows) -> Rows:
+    """The product of matrices."""
+    left = matrices[0]
+    for right in matrices[1:]:
+        columns = list(zip(*right, strict=True))
+        left = [[dot(row, column) for column in columns] for row in left]
+    return left
+
+
+def dot(left: Sequence[Any], right: Sequence[Any]) -> Any:
+    """The sum of the products of entries."""
+    return sum((a * b for a, b in zip(left, right, strict=True)), Fraction(0))
+
+
+def transposed(matrix: Rows) -> Rows:
+    return [list(column) for column in zip(*matrix, strict=True)]
+
+
+def combined_rows(left: Rows, factor: Any, right: Rows) -> Rows:
+    """left + factor right."""
+    return [[a + factor * b for a, b in zip(one, other, strict=True)] for one, other in zip(left, right, strict=True)]
+
+
+def unit(n: int) -> Rows:
+    return [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
+
+
+def rows_of(matrix: fmpq_mat) -> Rows:
+    """A rational matrix as rows of Fractions."""
+    return [[fraction(entry) for entry in row] for row in matrix.tolist()]
+
+
+def slope(system: QuadraticSystem, x: Sequence[Any]) -> Rows:
+    """f'(x)."""
+    n = system.dim
+    return [
+        [sum((2 * fraction(system.Q[i][j, k]) * x[k] for k in range(n)), fraction(system.B[i, j])) for j in range(n)]
+        for i in range(n)
+    ]
+
+
+def kahan_step(system: QuadraticSystem, eps: Fraction, x: Sequence[Any]) -> tuple[Any, ...] | None:
+    """The solution x~ of (x~ - x)/(2 eps) = Q(x, x~) + B (x + x~)/2 + c, None where there is no single one."""
+    n = system.dim
+    matrix, right = [], []
+    for i in range(n):
+        row, entry = [], x[i] + 2 * eps * fraction(system.c[i])
+        for j in range(n):
+            linear = eps * fraction(system.B[i, j])
+            entry = entry + linear * x[j]
+            quadratic = sum((2 * eps * fraction(system.Q[i][j, k]) * x[k] for k in range(n)), linear)
+            row.append(int(i == j) - quadratic)
+        matrix.append(row)
+        right.append(entry)
+    image = solve_by_elimination(matrix, right)
+    return None if image is None else tuple(image)
+
+
+def kahan_jacobian(system: QuadraticSystem, eps: Fraction, x: Sequence[Fraction]) -> Rows | None:
+    """dPhi(x), one column for each direction in which x is moved by t."""
+    columns = []
+    for j in range(system.dim):
+        moved = [Dual(entry, Fraction(int(i == j))) for i, entry in enumerate(x)]
+        image = kahan_step(system, eps, moved)
+        if image is None:
+            return None
+        columns.append([entry.b for entry in image])
+    return transposed(columns)
+
+
+def polynomial_value(polynomial: fmpq_mpoly, point: Sequence[Any]) -> Any:
+    """The value of a polynomial, term by term."""
+    total: Any = Fraction(0)
+    for monomial, coefficient in polynomial.terms():
+        term: Any = fraction(coefficient)
+        for entry, exponent in zip(point, monomial, strict=True):
+            for _ in range(exponent):
+                term = term * entry
+        total = total + term
+    return total
+
+
+def function_value(function: RationalFunction, x: Sequence[Fraction], eps: Fraction) -> Fraction | None:
+    """The value of a claimed rational function of x and eps, None at a pole."""
+    below = polynomial_value(function.denominator, (*x, eps))
+    return None if below == 0 else polynomial_value(function.numerator, (*x, eps)) / below
+
+
+def modified_value(hamiltonian: CubicHamiltonian, eps: Fraction, x: Sequence[Fraction]) -> Fraction | None:
+    """H + (2 eps/3) grad H^T (I - eps f')^{-1} f, as the formula stands."""
+    system = hamiltonian.system
+    f = [polynomial_value(component, x) for component in system.rhs]
+    matrix = combined_rows(unit(system.dim), -eps, slope(system, x))
+    solution = solve_by_elimination(matrix, f)
+    if solution is None:
+        return None
+    grad = [polynomial_value(component, x) for component in hamiltonian.gradient]
+    return polynomial_value(hamiltonian.H, x) + Fraction(2, 3) * eps * dot(grad, solution)
+
+
+def tensor(hamiltonian: CubicHamiltonian, eps: Fraction, x: Sequence[Fraction]) -> Rows:
+    """J - eps^2 f'(x)^2 J."""
+    J, jacobian = rows_of(hamiltonian.J), slope(hamiltonian.system, x)
+    return combined_rows(J, -(eps**2), times(jacobian, jacobian, J))
+
+
+def verify_witness(witness: Witness | None, left: Sequence[Fraction], right: Sequence[Fraction]) -> None:
+    """The sides that a witness shows are those computed independently, and they differ."""
+    assert witness is not None
+    assert witness.field == "QQ"
+    assert witness.left == texts(left)
+    assert witness.right == texts(right)
+    assert tuple(left) != tuple(right)
+
+
+def verify_commute_witness(witness: Witness | None, f: QuadraticSystem, g: QuadraticSystem, g_step: Any = 1) -> None:
+    """Phi_g(Phi_f(x)) and Phi_f(Phi_g(x)) recomputed, the step of g being `g_step` times that of f."""
+    assert witness is not None
+    x, (eps,) = exact(*witness.point), exact(witness.eps)
+    eps_g = eps * exact(g_step)[0]
+    after_f, after_g = kahan_step(f, eps, x), kahan_step(g, eps_g, x)
+    assert after_f is not None
+    assert after_g is not None
+    left, right = kahan_step(g, eps_g, after_f), kahan_step(f, eps, after_g)
+    assert left is not None
+    assert right is not None
+    verify_witness(witness, left, right)
+
+
+def commute_at(f: QuadraticSystem, g: QuadraticSystem, eps: Fraction, x: Sequence[Fraction]) -> bool | None:
+    """Whether the two maps commute at one point, None where one of them has no value."""
+    after_f, after_g = kahan_step(f, eps, x), kahan_step(g, eps, x)
+    if after_f is None or after_g is None:
+        return None
+    left, right = kahan_step(g, eps, after_f), kahan_step(f, eps, after_g)
+    return None if left is None or right is None else left == right
+
+
+def verdicts(report: Report) -> list[Verdict]:
+    """The verdicts of a report, claim by claim."""
+    return [finding.verdict for finding in report.findings]
+
+
+def only(report: Report) -> Finding:
+    """The one finding of a report."""
+    (finding,) = report.findings
+    return finding
+
+
+def system_of(variables: str, *rhs: str, **parameters: Any) -> QuadraticSystem:
+    """A system from a text of names and its right-hand sides."""
+    return QuadraticSystem.from_text(variables.split(), rhs, parameters)
+
+
+def file_of(system: QuadraticSystem, name: str = "f", **claims: str) -> SystemFile:
+    """A system file with claimed integrals; `phi` is a claimed density."""
+    phi = claims.pop("phi", None)
+    text = SystemFile.from_system(system, name).to_toml()
+    if claims:
+        text += "\n[integrals]\n" + "".join(f'{key} = "{value}"\n' for key, value in claims.items())
+    if phi is not None:
+        text += f'\n[density]\nphi = "{phi}"\n'
+    return parse_system(text)
+
+
+def claim(text: str, variables: str) -> RationalFunction:
+    """A rational function of the variables and eps."""
+    return parse_rational_function(text, (*variables.split(), "eps"))
+
+
+def hamiltonian_of(variables: str, H: str, J: Sequence[Sequence[Any]] | None = None) -> CubicHamiltonian:
+    """A Hamiltonian system; J is the standard one unless given."""
+    names = variables.split()
+    matrix = standard_structure(len(names)) if J is None else fmpq_mat([[fmpq(a) for a in row] for row in J])
+    return CubicHamiltonian(parse_polynomial(H, names), matrix)
+
+
+def member_of(A: fmpq_mat, combination: Sequence[int], signs: tuple[int, ...] = ()) -> FamilyMember:
+    """The member with this A and the given combination of basis cubics (continued with 1, -1, 1, ...)."""
+    basis = cubic_space(A).basis
+    H = basis[0].context().constant(0)
+    for k, cubic in enumerate(basis):
+        H = H + (combination[k] if k < len(combination) else (-1) ** k) * cubic
+    return FamilyMember(A, H, signs)
+
+
+@st.composite
+def hamiltonians(
+    draw: Any, dims: Sequence[int] = (1, 2, 3), homogeneous: bool = False, standard: bool = False
+) -> CubicHamiltonian:
+    """Hamiltonian systems with small rational coefficients and any constant skew J, odd dimensions too."""
+    n = draw(st.sampled_from(dims))
+    names = tuple(f"x{i + 1}" for i in range(n))
+    exponents = [e for e in product(range(4), repeat=n) if (sum(e) == 3 if homogeneous else sum(e) <= 3)]
+    small = rationals(4)
+    H = ring(names).from_dict({e: c for e in exponents if (c := draw(small)) != 0})
+    if standard:
+        return CubicHamiltonian(H, standard_structure(n))
+    J = fmpq_mat(n, n)
+    for i in range(n):
+        for j in range(i):
+            J[i, j] = draw(small)
+            J[j, i] = -J[i, j]
+    return CubicHamiltonian(H, J)

@@ -1,0 +1,255 @@
+"""Verdicts, findings and reports: how verdicts combine, what a control is, and the JSON that scripts rely on.
+
+Four words and no others: proved, refuted (with a witness), supported, undecided. The verdict of a report is the weakest
+of its claims, controls left out. What a report says of itself is enough to run it again.
+"""
+
+from __future__ import annotations
+
+import json
+from itertools import product
+
+import pytest
+from check_helpers import QUICK, file_of, hamiltonian_of, system_of
+from flint import fmpq
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness, combined
+from kahanmaps.checks.commute import check_commute
+from kahanmaps.checks.conserve import check_integrals
+from kahanmaps.checks.preserve import check_measure, check_poisson
+from kahanmaps.checks.settings import CONVENTION, Settings
+from kahanmaps.errors import InexactNumber, InputError
+from kahanmaps.family.draw import draw_with_eigenvalues
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.version import __version__
+
+P, R, S, U = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+
+WITNESS = Witness(("1/2", "0"), "1/10", ("1",), ("2",), "I(x~)", "I(x)")
+
+
+def finding(verdict: Verdict, control: bool = False) -> Finding:
+    witness = WITNESS if verdict is R else None
+    return Finding("a claim", verdict, Evidence("method", "why"), witness=witness, control=control)
+
+
+# Verdicts
+
+
+def test_there_are_four_verdicts_spelled_as_documented():
+    assert [str(verdict) for verdict in Verdict] == ["proved", "refuted", "supported", "undecided"]
+
+
+@pytest.mark.parametrize(("verdict", "holds"), [(P, True), (S, True), (R, False), (U, None)])
+def test_a_verdict_says_whether_the_claim_holds(verdict, holds):
+    assert verdict.holds is holds
+
+
+# By hand: refuted before undecided before supported before proved.
+@pytest.mark.parametrize(
+    ("verdicts", "expected"),
+    [
+        ([P], P),
+        ([S], S),
+        ([U], U),
+        ([R], R),
+        ([P, P], P),
+        ([P, S], S),
+        ([P, U], U),
+        ([P, R], R),
+        ([S, U], U),
+        ([S, R], R),
+        ([U, R], R),
+        ([P, S, U, R], R),
+        ([], U),
+    ],
+)
+def test_verdicts_combine_to_the_weakest(verdicts, expected):
+    assert combined(verdicts) is expected
+
+
+@given(st.lists(st.sampled_from(Verdict), min_size=1))
+def test_the_order_of_claims_does_not_matter(verdicts):
+    assert combined(verdicts) is combined(reversed(verdicts))
+
+
+@pytest.mark.parametrize(("first", "second"), list(product(Verdict, repeat=2)))
+def test_a_combination_holds_only_where_every_part_does(first, second):
+    assert (combined([first, second]).holds is True) == (first.holds is True and second.holds is True)
+
+
+# Controls
+
+
+@pytest.mark.parametrize("control", list(Verdict))
+def test_a_control_does_not_count_in_the_verdict_of_a_report(control):
+    assert Report("commute", (finding(P), finding(control, control=True))).verdict is P
+
+
+def test_a_report_of_controls_alone_decides_nothing():
+    assert Report("commute", (finding(R, control=True),)).verdict is U
+
+
+@pytest.mark.parametrize(
+    ("verdict", "control", "expected"),
+    [(R, True, True), (P, True, False), (S, True, False), (U, True, False), (R, False, True), (P, False, True)],
+)
+def test_a_control_is_as_expected_only_when_refuted(verdict, control, expected):
+    assert finding(verdict, control).is_as_expected is expected
+
+
+def test_further_evidence_stands_beside_the_one_that_decided():
+    first, second = Evidence("a", "1"), Evidence("b", "2")
+    found = finding(P).with_also(first).with_also(second)
+    assert found.also == (first, second)
+    assert found.evidence == finding(P).evidence
+
+
+# JSON
+
+
+def test_the_json_of_a_proved_claim_has_the_documented_shape():
+    evidence = Evidence("hypotheses", "Theorem 1 applies", {"hypotheses": ["B^2 = I"]})
+    assert Finding("the maps commute", P, evidence).to_json() == {
+        "claim": "the maps commute",
+        "verdict": "proved",
+        "evidence": {"method": "hypotheses", "summary": "Theorem 1 applies", "hypotheses": ["B^2 = I"]},
+        "witness": None,
+    }
+
+
+def test_the_json_of_a_refuted_control_shows_the_witness_and_what_was_expected():
+    found = Finding("c", R, Evidence("m", "s"), (Evidence("orbit", "too"),), WITNESS, "a = b", "somebody", control=True)
+    assert found.to_json() == {
+        "claim": "c",
+        "verdict": "refuted",
+        "evidence": {"method": "m", "summary": "s"},
+        "witness": {
+            "point": ["1/2", "0"],
+            "eps": "1/10",
+            "field": "QQ",
+            "left": {"is": "I(x~)", "value": ["1"]},
+            "right": {"is": "I(x)", "value": ["2"]},
+        },
+        "also": [{"method": "orbit", "summary": "too"}],
+        "formula": "a = b",
+        "source": "somebody",
+        "control": True,
+        "expected": "refuted",
+    }
+
+
+def test_the_json_of_a_report_has_the_documented_shape():
+    report = Report("commute", (finding(P), finding(R, control=True)), {"seed": 7}, ["a note"])
+    plain = report.to_json()
+    assert list(plain) == ["check", "verdict", "holds", "seed", "claims", "notes"]
+    assert (plain["check"], plain["verdict"], plain["holds"]) == ("commute", "proved", True)
+    assert [claim["verdict"] for claim in plain["claims"]] == ["proved", "refuted"]
+    assert plain["notes"] == ["a note"]
+
+
+def test_an_undecided_report_holds_neither_way():
+    assert Report("commute", (finding(U),)).to_json()["holds"] is None
+
+
+LOTKA_VOLTERRA = file_of(system_of("x y", "x*(2 - y)", "y*(3*x - 1)"), I="x*y/(1 - eps^2*x)", phi="x*y")
+MEMBER = SystemFile.from_member(draw_with_eigenvalues([1, -2], seed=3))
+PLANE = SystemFile.from_hamiltonian(hamiltonian_of("q p", "q^3/3 + p^2/2"))
+REPORTS = {
+    "commute, member": lambda settings: check_commute(MEMBER, None, settings),
+    "commute, pair": lambda settings: check_commute(PLANE, LOTKA_VOLTERRA, settings),
+    "integrals, member": lambda settings: check_integrals(MEMBER, settings),
+    "integrals, claimed": lambda settings: check_integrals(LOTKA_VOLTERRA, settings),
+    "measure, member": lambda settings: check_measure(MEMBER, settings),
+    "measure, claimed": lambda settings: check_measure(LOTKA_VOLTERRA, settings),
+    "poisson, member": lambda settings: check_poisson(MEMBER, settings),
+    "poisson, plane": lambda settings: check_poisson(PLANE, settings),
+}
+over_reports = pytest.mark.parametrize("run", REPORTS.values(), ids=REPORTS.keys())
+
+
+@over_reports
+def test_every_report_is_plain_data_that_json_gives_back(run):
+    plain = run(QUICK).to_json()
+    assert json.loads(json.dumps(plain)) == plain
+
+
+@over_reports
+def test_every_report_carries_what_is_needed_to_run_it_again(run):
+    plain = run(Settings(eps="1/3", steps=2, seed=5, error_bits=60)).to_json()
+    assert plain["version"] == __version__
+    assert plain["eps"] == "1/3"
+    assert plain["time_step"] == "2/3"
+    assert plain["convention"] == CONVENTION
+    assert plain["arithmetic"] == "exact"
+    assert plain["seed"] == 5
+    assert plain["error_bits"] == 60
+    assert plain["system"]
+
+
+@over_reports
+def test_every_report_comes_out_the_same_from_the_same_seed(run):
+    assert run(Settings(steps=2, seed=11)).to_json() == run(Settings(steps=2, seed=11)).to_json()
+
+
+@over_reports
+def test_a_report_run_again_from_its_own_start_takes_the_same_orbit(run):
+    first = run(Settings(steps=2, seed=11)).to_json()["orbit"]
+    again = run(Settings(steps=2, start=first["start"], seed=12)).to_json()["orbit"]
+    assert again == first
+
+
+@over_reports
+def test_refuted_claims_and_no_others_have_a_witness(run):
+    for found in run(QUICK).findings:
+        assert (found.witness is not None) == (found.verdict is R)
+
+
+@over_reports
+def test_every_report_says_every_eps_when_none_is_named(run):
+    plain = run(QUICK).to_json()
+    assert (plain["eps"], plain["time_step"]) == ("every", "every")
+    assert plain["orbit"]["eps"] == "1/10"
+
+
+# Settings
+
+
+def test_settings_take_every_exact_number():
+    settings = Settings(eps="1/10", start=(1, "0.5", fmpq(1, 3)))
+    assert settings.eps == fmpq(1, 10)
+    assert settings.start == (fmpq(1), fmpq(1, 2), fmpq(1, 3))
+
+
+def test_settings_refuse_a_machine_float():
+    with pytest.raises(InexactNumber):
+        Settings(eps=0.1)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"eps": 0}, "eps = 0"),
+        ({"eps": "0/5"}, "eps = 0"),
+        ({"steps": -1}, "-1 steps"),
+        ({"error_bits": 0}, "error bound of 0 bits"),
+        ({"error_bits": 10_001}, "expected 1 to 10000"),
+    ],
+)
+def test_settings_refuse_what_cannot_be_run(wrong, message):
+    with pytest.raises(InputError, match=message):
+        Settings(**wrong)
+
+
+def test_a_start_of_the_wrong_length_is_wrong_input():
+    with pytest.raises(InputError, match="3 coordinates, expected 2"):
+        check_integrals(PLANE, Settings(start=(1, 2, 3)))
+
+
+def test_progress_is_told_along_the_way():
+    told: list[str] = []
+    check_integrals(MEMBER, Settings(steps=2, progress=told.append))
+    assert "orbit: step 2 of 2" in told
+    assert "integral 3 of 3" in told

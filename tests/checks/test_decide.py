@@ -1,0 +1,488 @@
+"""Deciding identities at random points over GF(p), p random: supported with a stated error bound, or refuted.
+
+A true identity is supported with as many trials as its degree and coefficients ask for. A false one is refuted, however
+little its sides differ; the witness is a small rational point, or where none shows it a point over GF(p), and both are
+computed a second time here. What is defined nowhere, or too large to decide, is undecided.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from check_helpers import exact, kahan_step, system_of, texts, verify_witness
+from flint import fmpq
+from helpers import fraction, rationals
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.fields import GF, QQ, Field
+from kahanmaps.checks import decide as decide_module
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.decide import (
+    DEFAULT_ERROR_BITS,
+    Identity,
+    decide,
+    random_prime_field,
+    small_points,
+    trial_bound,
+    witness_of,
+)
+from kahanmaps.errors import SingularMatrix, SingularStep
+from kahanmaps.invariants.sizes import ONE, VARIABLE, Size, eps_size, step_size
+from kahanmaps.invariants.sizes import Fraction as SizeFraction
+from kahanmaps.maps.kahan import KahanMap
+
+SUPPORTED, REFUTED, UNDECIDED = Verdict.SUPPORTED, Verdict.REFUTED, Verdict.UNDECIDED
+
+
+def identity_of(
+    left: Callable[[Any, Any, Field], Any],
+    right: Callable[[Any, Any, Field], Any],
+    *,
+    degree: int = 4,
+    bits: float = 10.0,
+    poles: int = 0,
+    eps: fmpq | None = None,
+    defined: Callable[[Any, Field], bool] = lambda x, field: True,
+) -> Identity:
+    """left(x, eps) = right(x, eps) in one variable, where `defined`."""
+
+    def sides(field, point, eps_value):
+        (x,) = point
+        return ([left(x, eps_value, field)], [right(x, eps_value, field)]) if defined(x, field) else None
+
+    return Identity(1, sides, Size(degree, bits), poles, eps)
+
+
+def counted(identity: Identity) -> tuple[Identity, list[Field]]:
+    """The identity, and a list that fills with the fields it is evaluated over."""
+    fields: list[Field] = []
+
+    def sides(field, point, eps_value):
+        fields.append(field)
+        return identity.sides(field, point, eps_value)
+
+    return Identity(identity.dim, sides, identity.equation, identity.poles, identity.eps), fields
+
+
+def square_left(x: Any, e: Any, K: Field) -> Any:
+    return (x + e) * (x - e)
+
+
+def square_right(x: Any, e: Any, K: Field) -> Any:
+    return x * x - e * e
+
+
+TRUE = identity_of(square_left, square_right)
+FALSE = identity_of(lambda x, e, K: (x + e) * (x + e), lambda x, e, K: x * x + e * e)
+
+
+# True identities
+
+
+@pytest.mark.parametrize("error_bits", [1, 50, 56, 100, 300, 1000])
+def test_a_true_identity_is_supported_with_an_error_below_the_bound_asked_for(error_bits):
+    decision = decide(TRUE, 0, error_bits)
+    assert decision.verdict is SUPPORTED
+    assert decision.witness is None
+    base, exponent = decision.evidence.data["error_bound"].split("^")
+    assert base == "2"
+    assert -int(exponent) >= error_bits or decision.evidence.data["points"] == 1
+
+
+def test_by_default_the_error_is_below_two_to_the_minus_one_hundred():
+    assert DEFAULT_ERROR_BITS == 100
+    assert int(decide(TRUE, 0).evidence.data["error_bound"].split("^")[1]) <= -100
+
+
+@pytest.mark.parametrize("error_bits", [1, 100, 300])
+def test_the_number_of_points_is_that_of_the_trials_made(error_bits):
+    identity, fields = counted(TRUE)
+    data = decide(identity, 0, error_bits).evidence.data
+    assert len(fields) == data["points"]
+    assert [str(field.prime) for field in fields] == data["primes"]
+
+
+@pytest.mark.parametrize("error_bits", [1, 100, 300])
+def test_no_more_points_are_tried_than_the_bound_needs(error_bits):
+    needed = math.ceil(error_bits / -trial_bound(TRUE))
+    assert decide(TRUE, 0, error_bits).evidence.data["points"] == needed
+
+
+def test_the_sentence_of_the_evidence_says_what_the_data_say():
+    evidence = decide(TRUE, 0).evidence
+    points, bound = evidence.data["points"], evidence.data["error_bound"]
+    assert evidence.summary == (
+        f"held at {points} random points over GF(p), p random of 63 bits, for every eps; "
+        f"false with probability below {bound}"
+    )
+
+
+def test_a_larger_degree_asks_for_more_points():
+    data = decide(identity_of(square_left, square_right, degree=2**60), 0).evidence.data
+    assert data["points"] >= 50
+    assert int(data["error_bound"].split("^")[1]) <= -100
+
+
+# The error of one trial, from the sources: bad primes among more than 3N/(5 ln N), roots at most degree/p
+
+
+@given(st.integers(0, 10**9), st.integers(1, 10**9), st.integers(0, 10**9))
+def test_the_error_of_a_trial_covers_bad_primes_and_roots(degree, bits, poles):
+    N = Fraction(2**62)
+    primes = Fraction(3, 5) * N / Fraction(math.log(2**62))
+    bad = Fraction(max(1, math.ceil(bits / 62)), 1) / primes
+    roots = Fraction(degree) / N / (1 - Fraction(poles) / N)
+    found = trial_bound(Identity(1, TRUE.sides, Size(degree, float(bits)), poles, None))
+    # At most floor(bits/62) primes divide a coefficient; ceil is one more at the most.
+    assert found <= math.log2(bad + roots) + 1e-9
+    assert found >= math.log2(max(1, bits // 62) / primes + roots) - 1e-9
+
+
+@pytest.mark.parametrize("larger", [(2**41, 1e3, 2**59), (2**40, 1e9, 2**59), (2**40, 1e3, 2**60)])
+def test_more_degree_coefficients_or_poles_mean_a_larger_error(larger):
+    def error(degree, bits, poles):
+        return trial_bound(Identity(1, TRUE.sides, Size(degree, bits), poles, None))
+
+    assert error(2**40, 1e3, 2**59) < error(*larger) < -1
+
+
+# False identities
+
+
+def test_a_false_identity_is_refuted_with_a_rational_witness():
+    decision = decide(FALSE, 0)
+    assert decision.verdict is REFUTED
+    (x,), (eps,) = exact(*decision.witness.point), exact(decision.witness.eps)
+    verify_witness(decision.witness, [(x + eps) ** 2], [x**2 + eps**2])
+
+
+@given(
+    st.lists(rationals(50), min_size=1, max_size=6),
+    st.lists(rationals(50), min_size=1, max_size=6),
+    st.integers(0, 5),
+)
+@settings(max_examples=40)
+def test_two_polynomials_are_refuted_exactly_when_they_differ(first, second, seed):
+    def value(coefficients):
+        return lambda x, e, K: sum((K.convert(c) * x**k for k, c in enumerate(coefficients)), K.zero)
+
+    decision = decide(identity_of(value(first), value(second), degree=6, bits=200.0), seed)
+    padded = [list(c) + [fmpq(0)] * (6 - len(c)) for c in (first, second)]
+    assert decision.verdict is (SUPPORTED if padded[0] == padded[1] else REFUTED)
+    if decision.witness is not None:
+        (x,) = exact(*decision.witness.point)
+        sides = [[sum(fraction(c) * x**k for k, c in enumerate(coefficients))] for coefficients in (first, second)]
+        verify_witness(decision.witness, *sides)
+
+
+@pytest.mark.parametrize("power", [10, 50, 1000])
+def test_a_difference_in_one_far_digit_is_found(power):
+    tiny = fmpq(1, 10**power)
+    identity = identity_of(lambda x, e, K: x, lambda x, e, K: x + K.convert(tiny), bits=4.0 * power)
+    decision = decide(identity, 0)
+    assert decision.verdict is REFUTED
+    (x,) = exact(*decision.witness.point)
+    verify_witness(decision.witness, [x], [x + Fraction(1, 10**power)])
+
+
+def test_an_identity_that_fails_only_away_from_small_integers_is_refuted():
+    # x (x - 1) ... (x - 40) (x + 1) ... (x + 40) = 0 holds at most points one would try.
+    def product(x, e, K):
+        value = x
+        for a in range(1, 41):
+            value = value * (x - K.convert(a)) * (x + K.convert(a))
+        return value
+
+    decision = decide(identity_of(product, lambda x, e, K: K.zero, degree=81, bits=500.0), 0)
+    assert decision.verdict is REFUTED
+    (x,) = exact(*decision.witness.point)
+    assert x.denominator > 1 or abs(x) > 40
+    verify_witness(decision.witness, [math.prod(x - a for a in range(-40, 41))], [Fraction(0)])
+
+
+def test_where_no_small_rational_point_shows_it_the_witness_is_modular():
+    seed = 3
+    hidden = {point[0] for point in small_points(1, random.Random(f"witness {seed}"), 400)}
+
+    def product(x, e, K):
+        value = K.one
+        for a in hidden:
+            value = value * (x - K.convert(a))
+        return value
+
+    identity = identity_of(product, lambda x, e, K: K.zero, degree=len(hidden), bits=5000.0)
+    decision = decide(identity, seed)
+    assert decision.verdict is REFUTED
+    p = int(decision.evidence.data["prime"])
+    assert decision.witness.field == f"GF({p})"
+    x = int(decision.witness.point[0])
+    value = math.prod((x - int(a.p) * pow(int(a.q), -1, p)) % p for a in hidden) % p
+    assert value != 0
+    assert decision.witness.left == (str(value),)
+    assert decision.witness.right == ("0",)
+
+
+def test_a_difference_that_the_first_prime_divides_is_found_with_the_next():
+    first, second = (int(prime) for prime in decide(TRUE, 0).evidence.data["primes"])
+    identity = identity_of(lambda x, e, K: x, lambda x, e, K: x + K.convert(first), degree=1, bits=64.0)
+    decision = decide(identity, 0)
+    assert second != first
+    assert decision.verdict is REFUTED
+
+
+def test_a_difference_that_all_primes_of_the_run_divide_is_why_they_are_random():
+    # Not a failure: whoever knows the seed can build this; its coefficients are counted in the error bound.
+    primes = [int(prime) for prime in decide(TRUE, 0).evidence.data["primes"]]
+    identity = identity_of(lambda x, e, K: x, lambda x, e, K: x + K.convert(math.prod(primes)), degree=1, bits=127.0)
+    assert decide(identity, 0).verdict is SUPPORTED
+    assert decide(identity, 1).verdict is REFUTED
+
+
+def test_a_false_identity_is_refuted_by_the_first_trial():
+    identity, fields = counted(FALSE)
+    decide(identity, 0)
+    assert sum(field is not QQ for field in fields) == 1
+
+
+# Every eps, or one
+
+
+def one_eps(eps: fmpq | None) -> Identity:
+    """x eps = x/3: true at eps = 1/3 alone."""
+    return identity_of(lambda x, e, K: x * e, lambda x, e, K: x / K.convert(3), eps=eps)
+
+
+def test_an_identity_that_holds_at_one_eps_is_supported_there():
+    assert decide(one_eps(fmpq(1, 3)), 0).verdict is SUPPORTED
+
+
+@pytest.mark.parametrize("eps", [None, fmpq(1, 2), fmpq(-1, 3), fmpq(1, 3) + fmpq(1, 10**60)])
+def test_an_identity_that_holds_at_one_eps_is_refuted_elsewhere(eps):
+    decision = decide(one_eps(eps), 0)
+    assert decision.verdict is REFUTED
+    (x,), (at,) = exact(*decision.witness.point), exact(decision.witness.eps)
+    assert eps is None or at == fraction(eps)
+    verify_witness(decision.witness, [x * at], [x / 3])
+
+
+def fourth_power(w: fmpq | int, eps: fmpq | None) -> Identity:
+    """Phi^4 = id for q'' = -w^2 q + 3 q^2, that is q' = p, p' = -w^2 q + 3 q^2.
+
+    Eliminating p gives (q_{n+1} + q_{n-1})(1 + eps^2 w^2 - 6 eps^2 q_n) = 2 q_n (1 - eps^2 w^2): for eps^2 w^2 = 1 this
+    says q_{n+1} = -q_{n-1}, so that four steps are the identity, and for other eps they are not.
+    """
+    system = system_of("q p", "p", "-w2*q + 3*q^2", w2=fmpq(w) ** 2)
+
+    def sides(field, point, eps_value):
+        kahan, x = KahanMap(system, eps_value, field), point
+        for _ in range(4):
+            x = kahan.step(x)
+        return x, point
+
+    size = eps_size(eps)
+    images = [VARIABLE]
+    for _ in range(4):
+        images.append(step_size(system, size, images[-1]))
+    equation = SizeFraction(images[-1], images[-1]).equation(SizeFraction(VARIABLE, ONE))
+    return Identity(2, sides, equation, sum(image.degree for image in images[1:]), eps)
+
+
+@pytest.mark.parametrize(("w", "eps"), [(1, fmpq(1)), (1, fmpq(-1)), (2, fmpq(1, 2)), (fmpq(3, 5), fmpq(5, 3))])
+def test_four_steps_are_the_identity_where_eps_squared_w_squared_is_one(w, eps):
+    assert decide(fourth_power(w, eps), 0).verdict is SUPPORTED
+
+
+@pytest.mark.parametrize(("w", "eps"), [(1, None), (1, fmpq(1, 2)), (2, fmpq(1)), (2, None)])
+def test_four_steps_are_not_the_identity_for_another_or_for_every_eps(w, eps):
+    decision = decide(fourth_power(w, eps), 0)
+    assert decision.verdict is REFUTED
+    start, (at,) = exact(*decision.witness.point), exact(decision.witness.eps)
+    system, x = system_of("q p", "p", "-w2*q + 3*q^2", w2=fmpq(w) ** 2), start
+    for _ in range(4):
+        x = kahan_step(system, at, x)
+        assert x is not None
+    verify_witness(decision.witness, x, start)
+
+
+def test_a_prime_that_divides_eps_is_drawn_again():
+    first = fmpq(int(decide(TRUE, 0).evidence.data["primes"][0]))
+    identity = identity_of(square_left, square_right, eps=first)
+    evidence = decide(identity, 0).evidence
+    assert evidence.data["poles_met"] == 1
+    assert str(first) not in evidence.data["primes"]
+
+
+def test_a_prime_that_divides_a_denominator_of_eps_is_drawn_again():
+    first = int(decide(TRUE, 0).evidence.data["primes"][0])
+    identity = identity_of(square_left, square_right, eps=fmpq(1, first))
+    evidence = decide(identity, 0).evidence
+    assert evidence.data["poles_met"] == 1
+    assert str(first) not in evidence.data["primes"]
+
+
+# Nowhere defined, or too large
+
+
+def raises(error):
+    def sides(field, point, eps):
+        raise error("no value")
+
+    return sides
+
+
+@pytest.mark.parametrize(
+    "sides",
+    [lambda field, point, eps: None, raises(SingularStep), raises(SingularMatrix)],
+    ids=["pole", "singular step", "singular matrix"],
+)
+def test_an_identity_defined_nowhere_is_undecided(sides):
+    decision = decide(Identity(1, sides, Size(1, 1.0), 1, None), 0)
+    assert decision.verdict is UNDECIDED
+    assert decision.witness is None
+    assert "a denominator seems to vanish identically" in decision.evidence.summary
+
+
+def test_an_identity_defined_at_half_of_the_points_is_decided_there():
+    def is_square(x, field):
+        return field is QQ or pow(int(x), (field.prime - 1) // 2, field.prime) == 1
+
+    decision = decide(identity_of(square_left, square_right, defined=is_square), 1, 1000)
+    assert decision.verdict is SUPPORTED
+    assert decision.evidence.data["poles_met"] > 0
+
+
+@pytest.mark.parametrize("degree", [2**61, 2**62, 2**80, 10**400])
+def test_an_identity_of_too_large_a_degree_is_undecided(degree):
+    identity, fields = counted(identity_of(square_left, square_right, degree=degree))
+    decision = decide(identity, 0)
+    assert decision.verdict is UNDECIDED
+    assert fields == []
+    assert decision.evidence.data["degree_bound"] == degree
+
+
+@pytest.mark.parametrize("poles", [2**61, 2**62, 10**400])
+def test_an_identity_with_too_many_poles_is_undecided(poles):
+    # The few points that are left may all be roots.
+    assert decide(identity_of(square_left, square_right, degree=1, poles=poles), 0).verdict is UNDECIDED
+
+
+def test_an_error_of_another_kind_is_not_swallowed():
+    with pytest.raises(ZeroDivisionError):
+        decide(Identity(1, raises(ZeroDivisionError), Size(1, 1.0), 1, None), 0)
+
+
+# Chance, and how to repeat it
+
+
+@pytest.mark.parametrize("identity", [TRUE, FALSE])
+def test_the_same_seed_gives_the_same_decision(identity):
+    assert decide(identity, 12) == decide(identity, 12)
+
+
+def test_another_seed_draws_other_primes_and_points():
+    drawn = set()
+    for seed in range(20):
+        identity, fields = counted(TRUE)
+        decide(identity, seed)
+        drawn |= {field.prime for field in fields}
+    assert len(drawn) == 40
+
+
+def miller_rabin(n: int) -> bool:
+    """Whether n < 2^64 is prime: these bases leave no composite number over (Sorenson and Webster)."""
+    d, s = n - 1, 0
+    while d % 2 == 0:
+        d, s = d // 2, s + 1
+    for base in (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37):
+        x = pow(base, d, n)
+        if x in (1, n - 1):
+            continue
+        for _ in range(s - 1):
+            x = x * x % n
+            if x == n - 1:
+                break
+        else:
+            return False
+    return True
+
+
+def test_the_numbers_drawn_are_primes_of_63_bits():
+    rng = random.Random(1)
+    primes = [random_prime_field(rng).prime for _ in range(200)]
+    assert all(2**62 < prime < 2**63 for prime in primes)
+    assert all(miller_rabin(prime) for prime in primes)
+    assert len(set(primes)) == 200
+
+
+def test_the_primes_drawn_are_spread_evenly():
+    rng = random.Random(2)
+    eighths = [0] * 8
+    for _ in range(1600):
+        eighths[(random_prime_field(rng).prime - 2**62) >> 59] += 1
+    # 200 expected in each eighth; chi squared with 7 degrees of freedom exceeds 29.9 with probability 10^-4.
+    assert sum((count - 200) ** 2 / 200 for count in eighths) < 29.9
+
+
+def test_primes_of_every_residue_are_drawn():
+    rng = random.Random(3)
+    assert {random_prime_field(rng).prime % 12 for _ in range(100)} == {1, 5, 7, 11}
+
+
+def test_every_eps_is_drawn_from_the_units(monkeypatch):
+    # Over GF(3) a third of all draws would meet 0 if it were allowed.
+    seen = set()
+
+    def sides(field, point, eps):
+        seen.add(int(eps))
+        return [], []
+
+    monkeypatch.setattr(decide_module, "random_prime_field", lambda rng: GF(3))
+    decide(Identity(1, sides, Size(1, 1.0), 0, None), 0, 3000)
+    assert seen == {1, 2}
+
+
+def test_points_to_look_for_a_witness_grow_slowly():
+    points = small_points(3, random.Random(1), 400)
+    heights = [max(max(abs(fraction(a).numerator), fraction(a).denominator) for a in point) for point in points]
+    assert heights[0] <= 1
+    assert max(heights) <= 41
+    assert max(heights[:100]) <= 10
+
+
+def test_points_to_look_for_a_witness_are_integers_first_and_fractions_later():
+    points = small_points(3, random.Random(1), 400)
+    assert all(entry.q == 1 for point in points[:200] for entry in point)
+    assert any(entry.q != 1 for point in points[200:] for entry in point)
+
+
+# Witnesses
+
+
+def test_a_witness_shows_all_of_both_sides():
+    point = (fmpq(1, 2),)
+    witness = witness_of(TRUE, QQ, point, fmpq(1), ([fmpq(1), fmpq(2)], [fmpq(1), fmpq(3)]))
+    assert (witness.point, witness.left, witness.right) == (("1/2",), ("1", "2"), ("1", "3"))
+
+
+def test_a_witness_with_named_entries_shows_the_first_that_differs():
+    named = Identity(1, TRUE.sides, TRUE.equation, 0, None, "Pi", "Pi~", ("entry (1,1)", "entry (1,2)"))
+    witness = witness_of(named, QQ, (fmpq(1),), fmpq(1), ([fmpq(1), fmpq(2)], [fmpq(1), fmpq(3)]))
+    assert (witness.left, witness.right) == (("2",), ("3",))
+    assert (witness.left_label, witness.right_label) == ("entry (1,2) of Pi", "entry (1,2) of Pi~")
+
+
+def test_equal_sides_are_no_witness():
+    assert witness_of(TRUE, QQ, (fmpq(1),), fmpq(1), ([fmpq(1)], [fmpq(1)])) is None
+
+
+@given(rationals(30), rationals(30))
+def test_a_witness_writes_numbers_that_read_back(left, right):
+    witness = witness_of(TRUE, QQ, (left,), fmpq(1), ([left], [right]))
+    assert (witness is None) == (left == right)
+    assert witness is None or (witness.left, witness.right) == (texts(exact(left)), texts(exact(right)))

@@ -1,0 +1,451 @@
+"""Proof by hypotheses: a theorem applies when every one of its finite hypotheses holds exactly, and then only.
+
+Each hypothesis is broken singly here, and the evidence has to be gone. Where a broken hypothesis breaks the conclusion
+as well, that is shown by a point at which the independent computation fails.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+from check_helpers import (
+    commute_at,
+    exact,
+    hamiltonian_of,
+    hamiltonians,
+    member_of,
+    rank_by_elimination,
+    rows_of,
+    system_of,
+)
+from flint import fmpq, fmpq_mat, fmpq_poly
+from helpers import EULER_TOP, HENON_HEILES, LOTKA_VOLTERRA, fraction, matrices, points, rationals, systems
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import monomials as all_monomials
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.checks import theorems
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.errors import HypothesisError, InputError
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+few = settings(max_examples=25)
+
+MEMBER = draw_with_eigenvalues([1, -2, 3], seed=3)
+X = exact("1/2", "-1/3", 1, 2, "2/5", -1)
+EPS = Fraction(1, 7)
+
+
+def failing(hypotheses: list[tuple[str, bool]]) -> list[str]:
+    return [name for name, holds in hypotheses if not holds]
+
+
+# Evidence
+
+
+def test_evidence_names_the_theorem_and_every_hypothesis():
+    found = theorems.evidence("Theorem 1", [("a", True), ("b", True)])
+    assert found.method == "hypotheses"
+    assert found.summary == "Theorem 1 applies: a; b"
+    assert found.data == {"theorem": "Theorem 1", "hypotheses": ["a", "b"]}
+
+
+@given(st.lists(st.booleans(), max_size=5))
+def test_there_is_evidence_exactly_when_all_hypotheses_hold(holds):
+    found = theorems.evidence("Theorem 1", [(str(k), value) for k, value in enumerate(holds)])
+    assert (found is not None) == all(holds)
+
+
+def test_a_claim_that_only_a_theorem_can_decide_is_proved_with_its_evidence():
+    proof = theorems.evidence("Theorem 1", [("a", True)])
+    found = theorems.finding_by_hypotheses("c", proof, "s")
+    assert (found.verdict, found.evidence) == (Verdict.PROVED, proof)
+
+
+def test_a_claim_that_only_a_theorem_can_decide_is_undecided_without_it():
+    found = theorems.finding_by_hypotheses("c", None, "s")
+    assert found.verdict is Verdict.UNDECIDED
+    assert found.evidence.summary
+
+
+# Members and their associated systems
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1), (1, 1, -1), (-1, 1, 1), (-1, -1, -1)])
+def test_every_associated_system_fulfils_the_hypotheses(signs):
+    assert failing(theorems.associated_hypotheses(MEMBER, MEMBER.associate(signs))) == []
+    assert failing(theorems.member_hypotheses(MEMBER)) == []
+
+
+ASSOCIATE = MEMBER.associate((1, 1, -1))
+
+# Each breaks one hypothesis and keeps the others.
+BROKEN_ASSOCIATES = {
+    "B is another polynomial in A": (
+        replace(ASSOCIATE, coefficients=(ASSOCIATE.coefficients[0] + 1, *ASSOCIATE.coefficients[1:])),
+        "B_++- is a polynomial in A",
+    ),
+    "B = 2 I, so that B^2 is not I": (
+        replace(ASSOCIATE, coefficients=(fmpq(2), fmpq(0), fmpq(0)), B=QQ.identity(6) * fmpq(2), K=2 * MEMBER.H),
+        "B_++-^2 = I",
+    ),
+    "K with a term too many": (
+        replace(ASSOCIATE, K=ASSOCIATE.K + parse_polynomial("x1^3", MEMBER.variables)),
+        "grad K_++- = B_++- grad H",
+    ),
+    "K with another sign": (replace(ASSOCIATE, K=-ASSOCIATE.K), "grad K_++- = B_++- grad H"),
+    "the K of other signs": (
+        replace(ASSOCIATE, K=MEMBER.associate((1, -1, 1)).K),
+        "grad K_++- = B_++- grad H",
+    ),
+}  # fmt: skip
+over_broken = pytest.mark.parametrize(
+    ("associate", "hypothesis"), BROKEN_ASSOCIATES.values(), ids=BROKEN_ASSOCIATES.keys()
+)
+
+
+@over_broken
+def test_a_broken_associated_system_fails_in_that_hypothesis_alone(associate, hypothesis):
+    assert failing(theorems.associated_hypotheses(MEMBER, associate)) == [hypothesis]
+
+
+@over_broken
+def test_a_broken_associated_system_has_no_shared_integral(associate, hypothesis):
+    assert theorems.shared_integral(MEMBER, associate) is None
+
+
+def test_an_associated_system_of_another_member_fails():
+    other = draw_with_eigenvalues([1, -2, 4], seed=3).associate((1, 1, -1))
+    assert failing(theorems.associated_hypotheses(MEMBER, other)) != []
+
+
+def test_an_a_that_is_not_skew_hamiltonian_cannot_even_be_built():
+    A = MEMBER.A * fmpq(1)
+    A[0, 0] += 1
+    with pytest.raises(HypothesisError, match="not skew-Hamiltonian"):
+        FamilyMember(A, MEMBER.H)
+
+
+def test_an_h_outside_the_space_of_a_cannot_even_be_built():
+    with pytest.raises(HypothesisError, match="not in the space of A"):
+        FamilyMember(MEMBER.A, MEMBER.H + parse_polynomial("x1^2*x5", MEMBER.variables))
+
+
+def forced(member: FamilyMember, **fields: object) -> FamilyMember:
+    """A member whose fields were changed behind the back of its constructor."""
+    broken = replace(member)
+    for name, value in fields.items():
+        object.__setattr__(broken, name, value)
+    return broken
+
+
+def test_the_hypotheses_on_a_and_h_are_verified_anew():
+    A = MEMBER.A * fmpq(1)
+    A[0, 0] += 1
+    assert "A^T J = J A" in failing(theorems.member_hypotheses(forced(MEMBER, A=A)))
+    H = MEMBER.H + parse_polynomial("x1^2*x5", MEMBER.variables)
+    assert failing(theorems.member_hypotheses(forced(MEMBER, H=H))) == [
+        "H is a homogeneous cubic with A Hess(H) = Hess(H) A^T"
+    ]
+
+
+def test_a_member_forced_out_of_the_family_proves_nothing():
+    H = MEMBER.H + parse_polynomial("x1^2*x5", MEMBER.variables)
+    broken = forced(MEMBER, H=H)
+    assert theorems.shared_integral(broken, ASSOCIATE) is None
+    assert theorems.poisson_tensor_invariant(ASSOCIATE.hamiltonian, broken) is None
+    assert theorems.commuting_by_involution_of_members(broken, broken) is None
+    assert theorems.commuting_over_splitting_field(broken) is None
+
+
+def test_two_members_with_the_same_a_and_h_commute_by_the_theorem():
+    other = FamilyMember(MEMBER.A, MEMBER.H, (1, -1, 1))
+    assert theorems.commuting_by_involution_of_members(MEMBER, other) is not None
+    assert commute_at(MEMBER.chosen.system, other.chosen.system, EPS, X) is True
+
+
+def test_two_members_with_another_a_are_not_covered_by_the_theorem():
+    # A + I has the same cubics and the same B_s, but the theorem is stated for one A.
+    other = FamilyMember(MEMBER.A + QQ.identity(6), MEMBER.H, (1, -1, 1))
+    assert theorems.commuting_by_involution_of_members(MEMBER, other) is None
+
+
+def test_two_members_with_another_h_are_not_covered_and_do_not_commute():
+    other = FamilyMember(MEMBER.A, MEMBER.chain[1])
+    assert theorems.commuting_by_involution_of_members(MEMBER, other) is None
+    assert commute_at(MEMBER.chosen.system, other.chosen.system, EPS, X) is False
+
+
+@pytest.mark.parametrize(
+    "member",
+    [
+        MEMBER,
+        draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
+        draw_with_chi(fmpq_poly([1, -2, 1]), seed=3),  # (t - 1)^2, not diagonalisable
+        draw_with_eigenvalues([1, 1, 2], seed=3),
+    ],
+    ids=["split", "irreducible", "repeated root", "repeated eigenvalue"],
+)
+def test_over_the_splitting_field_every_chi_gives_its_associated_systems(member):
+    assert theorems.commuting_over_splitting_field(member) is not None
+
+
+def test_a_chi_that_does_not_annihilate_a_proves_nothing_over_the_splitting_field():
+    broken = forced(MEMBER)
+    broken.__dict__["factors"] = MEMBER.factors[:2]
+    assert theorems.commuting_over_splitting_field(broken) is None
+
+
+# Poisson tensor, modified H, density
+
+
+def test_generic_members_have_an_invariant_poisson_tensor():
+    assert theorems.poisson_tensor_invariant(MEMBER.chosen.hamiltonian, MEMBER) is not None
+
+
+def test_members_with_a_repeated_root_have_none_by_the_theorem():
+    member = draw_with_eigenvalues([1, 1, 2], seed=3)
+    assert theorems.poisson_tensor_invariant(member.chosen.hamiltonian, member) is None
+
+
+def test_a_hamiltonian_in_dimension_four_has_none_by_the_theorem():
+    assert theorems.poisson_tensor_invariant(hamiltonian_of("x y z w", "x^3 + y*z*w"), None) is None
+
+
+@few
+@given(hamiltonians(dims=(2,)))
+def test_in_dimension_two_every_hamiltonian_has_an_invariant_poisson_tensor(hamiltonian):
+    assert theorems.poisson_tensor_invariant(hamiltonian, None) is not None
+
+
+CMOQ = [theorems.modified_hamiltonian_conserved, theorems.determinant_density_invariant]
+over_cmoq = pytest.mark.parametrize("theorem", CMOQ, ids=["modified H", "density"])
+
+
+@over_cmoq
+@few
+@given(hamiltonian=hamiltonians())
+def test_every_cubic_hamiltonian_and_every_j_fulfil_the_hypotheses(theorem, hamiltonian):
+    assert theorem(hamiltonian) is not None
+
+
+def broken_hamiltonian(**fields: object) -> CubicHamiltonian:
+    """A Hamiltonian system changed behind the back of its constructor."""
+    hamiltonian = hamiltonian_of("q p", "q^3/3 + p^2/2")
+    for name, value in fields.items():
+        hamiltonian.__dict__[name] = value
+    return hamiltonian
+
+
+@over_cmoq
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"J": fmpq_mat([[0, 1], [1, 0]]), "system": system_of("q p", "p", "q^2")},
+        {"H": parse_polynomial("q^4 + p^2/2", ["q", "p"])},
+        {"system": system_of("q p", "p", "-q^2 + q")},
+    ],
+    ids=["J not skew", "H of degree 4", "f is not J grad H"],
+)
+def test_a_broken_hamiltonian_system_proves_nothing(theorem, fields):
+    assert theorem(broken_hamiltonian()) is not None
+    assert theorem(broken_hamiltonian(**fields)) is None
+
+
+@pytest.mark.parametrize(("H", "J"), [("x^4", None), ("x^3", [[0, 1], [1, 0]]), ("x^3", [[0]])])
+def test_a_hamiltonian_system_without_the_hypotheses_cannot_even_be_built(H, J):
+    with pytest.raises(InputError):
+        hamiltonian_of("x y", H, J)
+
+
+# Linear relations g = C f
+
+
+def coefficient_rows(system: QuadraticSystem) -> list[list[Fraction]]:
+    """The coefficients of each component, in one order of the monomials."""
+    n = system.dim
+    monomials = [m for d in range(3) for m in all_monomials(n, d)]
+    tables = [{tuple(map(int, m)): c for m, c in polynomial.terms()} for polynomial in system.rhs]
+    return [[fraction(table.get(m, 0)) for m in monomials] for table in tables]
+
+
+def is_independent(system: QuadraticSystem) -> bool:
+    return rank_by_elimination(coefficient_rows(system)) == system.dim
+
+
+@st.composite
+def system_and_matrix(draw):
+    system = draw(systems(dims=(1, 2, 3)))
+    return system, draw(matrices(system.dim, system.dim))
+
+
+@few
+@given(system_and_matrix())
+def test_a_linear_relation_is_found_where_there_is_one(drawn):
+    f, C = drawn
+    assume(is_independent(f))
+    assert theorems.linear_relation(f, f.transformed(C)) == C
+
+
+@few
+@given(systems(dims=(2,)), systems(dims=(2,)))
+def test_a_linear_relation_that_is_found_holds(f, g):
+    C = theorems.linear_relation(f, g)
+    assert C is None or f.transformed(C).rhs == g.rhs
+
+
+@few
+@given(systems(dims=(2, 3)), st.integers(0, 10))
+def test_a_relation_up_to_a_tiny_term_is_none(f, power):
+    # Adding a monomial that f does not have leaves the span of the components of f.
+    g = list(f.rhs)
+    names = f.variables
+    x = ring(names).gens()
+    free = [m for m in (x[0] * x[1], x[0] ** 2, x[1], x[0] ** 0) if not any(has(p, m) for p in f.rhs)]
+    assume(free)
+    g[0] = g[0] + fmpq(1, 10 ** (4 * power)) * free[0]
+    assert theorems.linear_relation(f, QuadraticSystem.from_polynomials(g)) is None
+
+
+def has(polynomial, monomial) -> bool:
+    return tuple(monomial.monoms()[0]) in {tuple(exponents) for exponents in polynomial.monoms()}
+
+
+DEPENDENT = system_of("x y", "x^2 + y", "2*x^2 + 2*y")
+
+
+@pytest.mark.parametrize(("sign", "C"), [(1, QQ.identity(2)), (-1, QQ.identity(2) * fmpq(-1))])
+def test_where_components_depend_only_plus_and_minus_f_are_recognised(sign, C):
+    assert theorems.linear_relation(DEPENDENT, DEPENDENT.scaled(sign)) == C
+    assert theorems.linear_relation(DEPENDENT, DEPENDENT.scaled(2)) is None
+
+
+def test_systems_of_different_dimension_have_no_relation():
+    assert theorems.linear_relation(LOTKA_VOLTERRA, EULER_TOP) is None
+
+
+# The splitting lemma
+
+# x and (y, z) do not see each other; inhomogeneous on both sides.
+DECOUPLED = system_of("x y z", "x^2 - 3*x + 1", "y*z + 2*y - 1/2", "y^2 - z + 5")
+SPLIT = fmpq_mat([[1, 0, 0], [0, -1, 0], [0, 0, -1]])
+HIDE = fmpq_mat([[1, 2, 0], [0, 1, -1], [1, 0, 1]])
+
+
+def hidden(system: QuadraticSystem, S: fmpq_mat) -> QuadraticSystem:
+    """The system in the coordinates y = S x: y' = S f(S^{-1} y)."""
+    back = S.inv()
+    x = ring(system.variables).gens()
+    old = [sum((back[i, j] * x[j] for j in range(system.dim)), 0 * x[0]) for i in range(system.dim)]
+    moved = [polynomial.compose(*old) for polynomial in system.rhs]
+    n = system.dim
+    return QuadraticSystem.from_polynomials(
+        [sum((S[i, j] * moved[j] for j in range(n)), 0 * x[0]) for i in range(n)]
+    )
+
+
+def test_a_decoupled_inhomogeneous_system_and_its_flip_commute_by_the_lemma():
+    g = DECOUPLED.transformed(SPLIT)
+    proof = theorems.commuting_by_splitting(DECOUPLED, g)
+    assert proof.data["hypotheses"] == [
+        "g = C f with a constant matrix C",
+        "C^2 = I",
+        "C f'(x) = f'(x) C for every x",
+    ]
+    assert commute_at(DECOUPLED, g, EPS, X[:3]) is True
+
+
+def test_the_lemma_sees_through_a_change_of_coordinates():
+    f, C = hidden(DECOUPLED, HIDE), HIDE * SPLIT * HIDE.inv()
+    g = f.transformed(C)
+    assert theorems.commuting_by_splitting(f, g) is not None
+    assert commute_at(f, g, EPS, X[:3]) is True
+
+
+def test_the_names_of_the_variables_do_not_matter_to_the_lemma():
+    g = DECOUPLED.transformed(SPLIT)
+    renamed = QuadraticSystem(("a", "b", "c"), g.Q, g.B, g.c)
+    assert theorems.commuting_by_splitting(DECOUPLED, renamed) is not None
+
+
+@few
+@given(systems(dims=(1, 2)), systems(dims=(1, 2)), points(4, rationals(9)))
+def test_two_systems_side_by_side_and_one_of_them_reversed_commute(first, second, x):
+    n, m = first.dim, second.dim
+    names = [f"x{i + 1}" for i in range(n + m)]
+    gens = ring(names).gens()
+    rhs = [p.compose(*gens[:n], ctx=gens[0].context()) for p in first.rhs]
+    rhs += [p.compose(*gens[n:], ctx=gens[0].context()) for p in second.rhs]
+    f = QuadraticSystem.from_polynomials(rhs)
+    assume(is_independent(f))
+    C = fmpq_mat(n + m, n + m, [(i == j) * (1 if i < n else -1) for i in range(n + m) for j in range(n + m)])
+    g = f.transformed(C)
+    assert theorems.commuting_by_splitting(f, g) is not None
+    assert commute_at(f, g, EPS, exact(*x)[: n + m]) in (True, None)
+
+
+# (what is broken, f, g): no evidence, and the maps indeed do not commute at X.
+SWAP = fmpq_mat([[0, 1, 0], [1, 0, 0], [0, 0, 1]])
+BROKEN_SPLITTINGS = {
+    "g = C f only up to a constant": (
+        DECOUPLED,
+        system_of("x y z", "x^2 - 3*x + 1", "-y*z - 2*y + 1/3", "-y^2 + z - 5"),
+    ),
+    "C^2 is not I": (DECOUPLED, DECOUPLED.scaled(2)),
+    "C^2 = I on one part only": (DECOUPLED, DECOUPLED.transformed(fmpq_mat([[1, 0, 0], [0, 3, 0], [0, 0, 3]]))),
+    "C swaps, f is not symmetric": (DECOUPLED, DECOUPLED.transformed(SWAP)),
+    "C commutes with the quadratic part only": (
+        system_of("x y z", "x^2 + y", "y*z", "y^2 - z^2"),
+        system_of("x y z", "x^2 + y", "-y*z", "z^2 - y^2"),
+    ),
+    "C commutes with the linear part only": (
+        system_of("x y z", "x^2 + y*z - x", "y*z + y", "y^2 - z^2"),
+        system_of("x y z", "x^2 + y*z - x", "-y*z - y", "z^2 - y^2"),
+    ),
+    "C = 0": (DECOUPLED, DECOUPLED.scaled(0)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("f", "g"), BROKEN_SPLITTINGS.values(), ids=BROKEN_SPLITTINGS.keys())
+def test_each_hypothesis_of_the_lemma_is_needed(f, g):
+    assert theorems.commuting_by_splitting(f, g) is None
+
+
+@pytest.mark.parametrize(
+    ("f", "g"), list(BROKEN_SPLITTINGS.values())[:-1], ids=list(BROKEN_SPLITTINGS.keys())[:-1]
+)
+def test_without_a_hypothesis_of_the_lemma_these_maps_do_not_commute(f, g):
+    assert commute_at(f, g, EPS, X[:3]) is False
+
+
+@pytest.mark.parametrize("system", [LOTKA_VOLTERRA, EULER_TOP, HENON_HEILES])
+def test_a_map_commutes_with_itself_and_its_inverse_by_the_lemma(system):
+    assert theorems.commuting_by_splitting(system, system) is not None
+    assert theorems.commuting_by_splitting(system, system.scaled(-1)) is not None
+    assert theorems.commuting_by_splitting(system, system.scaled(2)) is None
+
+
+def test_every_pair_of_a_class_commutes_by_the_lemma_too():
+    # B_s^T is such a C: the lemma is the theorem, seen without J.
+    base = MEMBER.chosen.system
+    for associate in MEMBER.associated():
+        assert theorems.linear_relation(base, associate.system) == associate.B.transpose()
+        assert theorems.commuting_by_splitting(base, associate.system) is not None
+
+
+def test_a_member_with_a_equal_to_the_identity_may_have_any_cubic():
+    member = member_of(QQ.identity(4), [1, 2, 0, -1])
+    assert rows_of(member.A) == [[Fraction(int(i == j)) for j in range(4)] for i in range(4)]
+    assert theorems.member_hypotheses(member) == [
+        ("A^T J = J A", True),
+        ("H is a homogeneous cubic with A Hess(H) = Hess(H) A^T", True),
+    ]
+    assert standard_structure(4) * member.A == member.A.transpose() * standard_structure(4)

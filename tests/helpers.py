@@ -1,0 +1,153 @@
+"""What several test files share: the table of fields, strategies for rational systems and points, named systems.
+
+Strategies draw plain data, so that hypothesis can shrink a failure to something one can compute by hand.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from flint import arb, fmpq, fmpq_mat, fmpz
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.fields import GF, QQ, RR, Field
+from kahanmaps.errors import SingularStep
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+# FLINT has one type of residue below 2^63 and another above.
+LARGEST_WORD_PRIME = 2**63 - 25
+SMALLEST_LARGE_PRIME = 2**63 + 29
+
+EXACT_FIELDS: list[Field] = [QQ, GF(2), GF(7), GF(2**61 - 1), GF(SMALLEST_LARGE_PRIME)]
+FIELDS: list[Field] = [*EXACT_FIELDS, RR(128)]
+
+# For tests that run once a field: fewer examples each, and GF(2), where most matrices are singular, is tolerated.
+some = settings(max_examples=25, suppress_health_check=[HealthCheck.filter_too_much])
+
+over_all_fields = pytest.mark.parametrize("field", FIELDS, ids=repr)
+over_exact_fields = pytest.mark.parametrize("field", EXACT_FIELDS, ids=repr)
+
+# x = (q1, q2, p1, p2); integrable as a flow for c = -6 and two other values, as a Kahan map never.
+HENON_HEILES = QuadraticSystem.from_text(
+    ["q1", "q2", "p1", "p2"], ["p1", "p2", "-q1 - 2*q1*q2", "-q2 - q1^2 + c*q2^2"], {"c": 1}
+)
+LOTKA_VOLTERRA = QuadraticSystem.from_text(["x", "y"], ["x*(2 - y)", "y*(3*x - 1)"])
+LORENZ = QuadraticSystem.from_text(["x", "y", "z"], ["10*(y - x)", "x*(28 - z) - y", "x*y - 8/3*z"])
+EULER_TOP = QuadraticSystem.from_text(["x1", "x2", "x3"], ["x2*x3", "-2*x3*x1", "x1*x2"])
+FORCED_PLANE = QuadraticSystem.from_text(["x", "y"], ["x*y - 1", "y^2 + 2*x + 1/5"])
+NAMED_SYSTEMS = {
+    "henon_heiles": HENON_HEILES,
+    "lotka_volterra": LOTKA_VOLTERRA,
+    "lorenz": LORENZ,
+    "euler_top": EULER_TOP,
+    "forced_plane": FORCED_PLANE,
+}
+
+over_named_systems = pytest.mark.parametrize("system", NAMED_SYSTEMS.values(), ids=NAMED_SYSTEMS.keys())
+
+
+def rationals(height: int = 20) -> st.SearchStrategy[fmpq]:
+    """Rational numbers with numerator and denominator up to `height`."""
+    return st.builds(fmpq, st.integers(-height, height), st.integers(1, height))
+
+
+def points(dim: int, entries: st.SearchStrategy[Any] | None = None) -> st.SearchStrategy[tuple[Any, ...]]:
+    """Points of `dim` coordinates, rational unless `entries` says otherwise."""
+    return st.tuples(*[rationals() if entries is None else entries] * dim)
+
+
+@st.composite
+def systems(
+    draw: Any,
+    dims: Sequence[int] = (1, 2, 3),
+    entries: st.SearchStrategy[Any] | None = None,
+    homogeneous: bool = False,
+) -> QuadraticSystem:
+    """Quadratic systems with every coefficient drawn from `entries` (small rationals unless given)."""
+    one = rationals(6) if entries is None else entries
+    n = draw(st.sampled_from(dims))
+    forms = []
+    for _ in range(n):
+        form = fmpq_mat(n, n)
+        for j in range(n):
+            for k in range(j, n):
+                form[j, k] = form[k, j] = fmpq(draw(one))
+        forms.append(form)
+    linear, constants = fmpq_mat(n, n), [fmpq(0)] * n
+    if not homogeneous:
+        linear = fmpq_mat(n, n, [fmpq(draw(one)) for _ in range(n * n)])
+        constants = [fmpq(draw(one)) for _ in range(n)]
+    return QuadraticSystem(tuple(f"x{i + 1}" for i in range(n)), tuple(forms), linear, tuple(constants))
+
+
+@st.composite
+def systems_with_points(
+    draw: Any,
+    dims: Sequence[int] = (1, 2, 3),
+    entries: st.SearchStrategy[Any] | None = None,
+    homogeneous: bool = False,
+    count: int = 1,
+) -> tuple[Any, ...]:
+    """A system and `count` points of its dimension: (system, x, ...)."""
+    system = draw(systems(dims, entries, homogeneous))
+    return (system, *(draw(points(system.dim, entries)) for _ in range(count)))
+
+
+@st.composite
+def matrices(draw: Any, rows: int, columns: int, entries: st.SearchStrategy[Any] | None = None) -> fmpq_mat:
+    """Rational matrices of one size."""
+    one = rationals(9) if entries is None else entries
+    return fmpq_mat(rows, columns, [fmpq(draw(one)) for _ in range(rows * columns)])
+
+
+def random_point(dim: int, seed: int, height: int = 9) -> tuple[fmpq, ...]:
+    """A rational point that a seed determines."""
+    rng = random.Random(seed)
+    return tuple(QQ.random(rng, height) for _ in range(dim))
+
+
+def step_or_none(phi: KahanMap, x: Sequence[Any]) -> tuple[Any, ...] | None:
+    """The image of x, or None where the map has no value."""
+    try:
+        return phi.step(x)
+    except SingularStep:
+        return None
+
+
+def combine(*terms: tuple[Any, Sequence[Any]]) -> tuple[Any, ...]:
+    """The linear combination of vectors: the sum of a v over the pairs (a, v)."""
+    dim = len(terms[0][1])
+    total = []
+    for i in range(dim):
+        entry = terms[0][0] * terms[0][1][i]
+        for factor, vector in terms[1:]:
+            entry = entry + factor * vector[i]
+        total.append(entry)
+    return tuple(total)
+
+
+def agree(field: Field, left: Sequence[Any], right: Sequence[Any]) -> bool:
+    """Whether two vectors are equal: exactly over an exact field, as far as balls can tell over another."""
+    return len(left) == len(right) and all(field.equal(a, b) for a, b in zip(left, right, strict=True))
+
+
+def encloses(ball: arb, number: fmpq) -> bool:
+    """Whether the ball contains the number. FLINT's own `contains` rounds a fraction to 53 bits first."""
+    middle, radius = ball.mid().man_exp(), ball.rad().man_exp()
+    return abs(number - _dyadic(*middle)) <= _dyadic(*radius)
+
+
+def fraction(number: fmpq | fmpz | int) -> Fraction:
+    """The same number as Python's own Fraction, for computations that must not use FLINT."""
+    number = fmpq(number)
+    return Fraction(int(number.p), int(number.q))
+
+
+def _dyadic(mantissa: fmpz, exponent: fmpz) -> fmpq:
+    return fmpq(mantissa) * fmpq(2) ** int(exponent)

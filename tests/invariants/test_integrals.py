@@ -1,0 +1,281 @@
+"""Integrals of Kahan maps, as functions of x and eps.
+
+For f = J grad H with any cubic H and any constant skew J, "modified H" is H + (2 eps/3) grad H^T (I - eps f')^{-1}
+f. It is conserved, tends to H with a defect of order eps^2, and is -1/6 of the paper's H~ where that is defined.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from check_helpers import (
+    claim,
+    combined_rows,
+    determinant,
+    exact,
+    function_value,
+    hamiltonian_of,
+    hamiltonians,
+    kahan_step,
+    modified_value,
+    polynomial_value,
+    slope,
+    solve_by_elimination,
+    unit,
+)
+from flint import fmpq
+from helpers import fraction, over_exact_fields, points, rationals
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.family.draw import draw_with_eigenvalues
+from kahanmaps.invariants.integrals import ClaimedIntegral, ModifiedHamiltonian, PaperIntegral
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+
+some = settings(max_examples=40)
+nonzero = rationals(6).filter(lambda eps: eps != 0)
+
+HENON = hamiltonian_of("q1 q2 p1 p2", "p1^2/2 + p2^2/2 + q1^2/2 + q2^2/2 + q1^2*q2 - q2^3/3")
+PLANE_CUBIC = hamiltonian_of("q p", "q^3/3 - 2*q*p^2 + p^3")
+
+
+@st.composite
+def with_points(draw, dims=(1, 2, 3), homogeneous=False, standard=False):
+    hamiltonian = draw(hamiltonians(dims, homogeneous, standard))
+    return hamiltonian, draw(points(hamiltonian.dim, rationals(9)))
+
+
+# Modified H
+
+
+@some
+@given(with_points(), nonzero)
+def test_modified_h_is_what_its_formula_says(drawn, eps):
+    hamiltonian, x = drawn
+    expected = modified_value(hamiltonian, fraction(eps), exact(*x))
+    assume(expected is not None)
+    assert fraction(ModifiedHamiltonian(hamiltonian).value(QQ, eps, x)) == expected
+
+
+@some
+@given(with_points(), nonzero)
+def test_modified_h_is_conserved(drawn, eps):
+    hamiltonian, x = drawn
+    image = kahan_step(hamiltonian.system, fraction(eps), exact(*x))
+    assume(image is not None)
+    after = modified_value(hamiltonian, fraction(eps), image)
+    assume(after is not None)
+    assert after == modified_value(hamiltonian, fraction(eps), exact(*x))
+
+
+def test_modified_h_is_not_conserved_by_the_map_of_another_system():
+    x, eps = exact("1/2", "-1/3", 1, 2), Fraction(1, 5)
+    other = hamiltonian_of("q1 q2 p1 p2", "p1^2/2 + p2^2/2 + q1^2/2 + q2^2 + q1^2*q2 - q2^3/3")
+    image = kahan_step(other.system, eps, x)
+    assert image is not None
+    assert modified_value(HENON, eps, image) != modified_value(HENON, eps, x)
+
+
+def test_h_itself_is_not_conserved():
+    x, eps = exact("1/2", "-1/3", 1, 2), Fraction(1, 5)
+    image = kahan_step(HENON.system, eps, x)
+    assert image is not None
+    assert polynomial_value(HENON.H, image) != polynomial_value(HENON.H, x)
+
+
+@some
+@given(with_points(), nonzero)
+def test_modified_h_is_even_in_eps(drawn, eps):
+    hamiltonian, x = drawn
+    integral = ModifiedHamiltonian(hamiltonian)
+    try:
+        forward = integral.value(QQ, eps, x)
+        backward = integral.value(QQ, -eps, x)
+    except SingularStep:
+        assume(False)
+    assert forward == backward
+
+
+def coefficients_in_eps(hamiltonian: CubicHamiltonian, x: tuple[Fraction, ...], weight: Fraction) -> list[Fraction]:
+    """det(I - eps f') (H + weight (modified H - H) - H) as a polynomial in eps, interpolated at n + 2 values of eps.
+
+    The determinant clears the denominator, so the degree is at most n + 1; a last value of eps puts that to the test.
+    """
+    system, degree = hamiltonian.system, hamiltonian.dim + 1
+    steps = [Fraction(k, 97) for k in range(1, degree + 3)]
+
+    def value(eps: Fraction) -> Fraction:
+        clear = determinant(combined_rows(unit(system.dim), -eps, slope(system, x)))
+        modified = ModifiedHamiltonian(hamiltonian).value(QQ, fmpq(eps.numerator, eps.denominator), to_flint(x))
+        return clear * weight * (fraction(modified) - polynomial_value(hamiltonian.H, x))
+
+    *used, last = steps
+    powers = [[eps**k for k in range(degree + 1)] for eps in used]
+    found = solve_by_elimination(powers, [value(eps) for eps in used])
+    assert found is not None
+    assert sum(c * last**k for k, c in enumerate(found)) == value(last)
+    return found
+
+
+def to_flint(x):
+    return tuple(fmpq(entry.numerator, entry.denominator) for entry in x)
+
+
+@pytest.mark.parametrize(
+    ("hamiltonian", "x"),
+    [
+        (HENON, exact("1/2", "-1/3", 1, 2)),
+        (PLANE_CUBIC, exact("2/3", "-1/5")),
+        (
+            hamiltonian_of("x y z", "x^3 - x*y*z + z^2 - y", [[0, 1, 2], [-1, 0, "1/2"], [-2, "-1/2", 0]]),
+            exact(1, 2, 3),
+        ),
+    ],
+)
+def test_modified_h_differs_from_h_by_order_eps_squared_and_no_less(hamiltonian, x):
+    constant, linear, quadratic, *_ = coefficients_in_eps(hamiltonian, x, Fraction(1))
+    assert (constant, linear) == (0, 0)
+    assert quadratic != 0
+
+
+@given(points(4, rationals(9)))
+@settings(max_examples=15)
+def test_modified_h_has_no_term_of_first_order_in_eps(x):
+    constant, linear, *_ = coefficients_in_eps(HENON, exact(*x), Fraction(1))
+    assert (constant, linear) == (0, 0)
+
+
+# The paper's H~
+
+
+@some
+@given(with_points(dims=(2, 4), homogeneous=True, standard=True), nonzero)
+def test_modified_h_is_minus_one_sixth_of_the_papers_integral(drawn, eps):
+    hamiltonian, x = drawn
+    try:
+        modified = ModifiedHamiltonian(hamiltonian).value(QQ, eps, x)
+        paper = PaperIntegral(hamiltonian).value(QQ, eps, x)
+    except SingularStep:
+        assume(False)
+    assert modified == paper / -6
+
+
+@some
+@given(with_points(dims=(2, 4), homogeneous=True, standard=True), nonzero)
+def test_the_papers_integral_is_the_symplectic_product_of_a_point_and_its_image_over_eps(drawn, eps):
+    hamiltonian, x = drawn
+    image = kahan_step(hamiltonian.system, fraction(eps), exact(*x))
+    assume(image is not None)
+    here, m = exact(*x), hamiltonian.dim // 2
+    product = sum(here[i] * image[m + i] - here[m + i] * image[i] for i in range(m))
+    assert fraction(PaperIntegral(hamiltonian).value(QQ, eps, x)) == product / fraction(eps)
+
+
+@pytest.mark.parametrize(
+    "hamiltonian",
+    [
+        HENON,
+        hamiltonian_of("q p", "q^3 + p^2"),
+        hamiltonian_of("q p", "q^3", [[0, 2], [-2, 0]]),
+        hamiltonian_of("x y z", "x^3", [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]),
+    ],
+    ids=["quadratic terms", "p^2", "J doubled", "odd dimension"],
+)
+def test_the_papers_integral_is_refused_for_inhomogeneous_h_and_other_j(hamiltonian):
+    with pytest.raises(InputError, match="homogeneous H and the standard J only"):
+        PaperIntegral(hamiltonian)
+
+
+def test_the_papers_integral_is_not_conserved_once_h_has_lower_terms():
+    # Why it is refused: x^T J x~ / eps along the map of H = q^3/3 + p^2/2.
+    system = hamiltonian_of("q p", "q^3/3 + p^2/2").system
+    x, eps = exact(1, 2), Fraction(1, 3)
+    y = kahan_step(system, eps, x)
+    assert y is not None
+    z = kahan_step(system, eps, y)
+    assert z is not None
+    assert x[0] * y[1] - x[1] * y[0] != y[0] * z[1] - y[1] * z[0]
+
+
+def test_all_members_of_a_class_conserve_the_papers_integrals_of_each_other():
+    member = draw_with_eigenvalues([1, -2], seed=3)
+    associates = list(member.associated())
+    x, eps = tuple(fmpq(k, 3) for k in (1, -2, 4, 1)), fmpq(1, 7)
+    for f in associates:
+        image = KahanMap(f.system, eps).step(x)
+        for g in associates:
+            integral = PaperIntegral(g.hamiltonian)
+            assert integral.value(QQ, eps, image) == integral.value(QQ, eps, x)
+
+
+def test_the_map_of_h1_does_not_conserve_the_papers_integral_of_h0():
+    member = draw_with_eigenvalues([1, -2], seed=3)
+    first, second = (CubicHamiltonian(H, member.associate([1, 1]).hamiltonian.J) for H in member.chain)
+    x, eps = tuple(fmpq(k, 3) for k in (1, -2, 4, 1)), fmpq(1, 7)
+    integral, image = PaperIntegral(first), KahanMap(second.system, eps).step(x)
+    assert integral.value(QQ, eps, image) != integral.value(QQ, eps, x)
+
+
+# Claimed functions
+
+
+@pytest.mark.parametrize("text", ["x^2 + y^2", "(x - 2*eps*y)/(1 - eps^2*x^2)", "3/7", "eps", "y^3/eps"])
+@given(points(2, rationals(9)), nonzero)
+def test_a_claimed_function_has_the_value_that_its_text_says(text, x, eps):
+    function = claim(text, "x y")
+    expected = function_value(function, exact(*x), fraction(eps))
+    found = ClaimedIntegral("I", function).value(QQ, eps, x)
+    assert (found is None) == (expected is None)
+    assert expected is None or fraction(found) == expected
+
+
+def test_a_claimed_function_is_none_at_its_poles():
+    integral = ClaimedIntegral("I", claim("x/(1 - eps^2*y^2)", "x y"))
+    assert integral.value(QQ, fmpq(1, 2), (fmpq(1), fmpq(2))) is None
+
+
+def test_a_claimed_function_is_shown_as_text_that_reads_back():
+    integral = ClaimedIntegral("I", claim("(x^2 + 1/2)/(2 - eps)", "x y"))
+    assert claim(integral.formula, "x y") == integral.function
+
+
+# Fields and singular points
+
+
+@over_exact_fields
+@given(x=points(2, rationals(9)))
+@settings(max_examples=10)
+def test_over_a_prime_field_every_integral_is_its_rational_value_reduced(field, x):
+    eps = fmpq(5, 11)
+    for integral in (ModifiedHamiltonian(PLANE_CUBIC), PaperIntegral(PLANE_CUBIC)):
+        try:
+            value = integral.value(QQ, eps, x)
+            reduced = integral.value(field, field.convert(eps), tuple(field.convert(entry) for entry in x))
+        except (SingularStep, BadPrime):
+            continue
+        assert reduced == field.convert(value)
+
+
+@pytest.mark.parametrize("kind", [ModifiedHamiltonian, PaperIntegral])
+def test_a_singular_point_is_named_by_the_map_and_not_hidden(kind):
+    # det(I - eps f') = 1 + eps^2 det Hess H = 1 - eps^2 for H = q p (q + p)/2 at (0, 1).
+    hamiltonian = hamiltonian_of("q p", "q*p*(q + p)/2")
+    with pytest.raises(SingularStep):
+        kind(hamiltonian).value(QQ, fmpq(1), (fmpq(0), fmpq(1)))
+
+
+def test_a_prime_that_divides_a_coefficient_is_refused():
+    with pytest.raises(BadPrime):
+        ClaimedIntegral("I", claim("x/7", "x y")).value(GF(7), GF(7).one, (GF(7).one, GF(7).one))
+
+
+def test_names_and_formulas_tell_the_two_normalisations_apart():
+    modified, paper = ModifiedHamiltonian(PLANE_CUBIC), PaperIntegral(PLANE_CUBIC, "K")
+    assert modified.name == "modified H"
+    assert modified.formula == "H + (2 eps/3) grad H^T (I - eps f')^(-1) f"
+    assert paper.name == "K~"
+    assert paper.formula == "K~ = eps^(-1) x^T J x~ = -6 (modified K)"

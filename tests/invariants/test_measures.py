@@ -1,0 +1,126 @@
+"""Invariant measures dx/phi: phi(x~) = phi(x) det dPhi(x), with phi = det(I - eps f') for Hamiltonian systems.
+
+det dPhi is computed a second time here, from dual numbers: the Kahan step is taken at x + t e_j with t^2 = 0.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from check_helpers import (
+    claim,
+    combined_rows,
+    determinant,
+    exact,
+    function_value,
+    hamiltonian_of,
+    hamiltonians,
+    kahan_jacobian,
+    kahan_step,
+    slope,
+    unit,
+)
+from flint import fmpq
+from helpers import FORCED_PLANE, LOTKA_VOLTERRA, fraction, points, rationals, systems_with_points
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.errors import SingularStep
+from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity, jacobian_determinant_sides
+from kahanmaps.maps.kahan import KahanMap
+
+some = settings(max_examples=40)
+nonzero = rationals(6).filter(lambda eps: eps != 0)
+
+
+@some
+@given(systems_with_points(), nonzero)
+def test_the_two_determinants_are_numerator_and_denominator_of_det_dphi(drawn, eps):
+    system, x = drawn
+    kahan = KahanMap(system, eps)
+    try:
+        above, below = jacobian_determinant_sides(kahan, x, kahan.step(x))
+    except SingularStep:
+        assume(False)
+    jacobian = kahan_jacobian(system, fraction(eps), exact(*x))
+    assert jacobian is not None
+    assert determinant(jacobian) == fraction(above) / fraction(below)
+
+
+@some
+@given(systems_with_points(), nonzero)
+def test_the_density_is_the_determinant_of_i_minus_eps_jacobian(drawn, eps):
+    system, x = drawn
+    matrix = combined_rows(unit(system.dim), -fraction(eps), slope(system, exact(*x)))
+    assert fraction(DeterminantDensity(system).value(QQ, eps, x)) == determinant(matrix)
+
+
+@st.composite
+def hamiltonian_with_point(draw):
+    hamiltonian = draw(hamiltonians(dims=(1, 2, 3)))
+    return hamiltonian, draw(points(hamiltonian.dim, rationals(9)))
+
+
+@some
+@given(hamiltonian_with_point(), nonzero)
+def test_hamiltonian_maps_preserve_the_determinant_density(drawn, eps):
+    hamiltonian, x = drawn
+    system, step = hamiltonian.system, fraction(eps)
+    image, jacobian = kahan_step(system, step, exact(*x)), kahan_jacobian(system, step, exact(*x))
+    assume(image is not None)
+    phi = DeterminantDensity(system)
+    after = fraction(phi.value(QQ, eps, tuple(fmpq(entry.numerator, entry.denominator) for entry in image)))
+    assert after == fraction(phi.value(QQ, eps, x)) * determinant(jacobian)
+
+
+@pytest.mark.parametrize(
+    ("system", "phi"),
+    [
+        (FORCED_PLANE, None),  # has a divergence
+        (LOTKA_VOLTERRA, None),
+        (LOTKA_VOLTERRA, "x"),
+        (LOTKA_VOLTERRA, "1"),
+        (hamiltonian_of("q p", "q^3/3 + p^2/2").system, "1"),  # the flow preserves dq dp, the map does not
+    ],
+    ids=["forced plane", "Lotka-Volterra", "x", "1", "volume"],
+)
+def test_a_wrong_density_fails_at_a_point(system, phi):
+    x, eps = exact("1/2", "-1/3"), Fraction(1, 5)
+    image, jacobian = kahan_step(system, eps, x), kahan_jacobian(system, eps, x)
+    assert image is not None
+    assert jacobian is not None
+    density = DeterminantDensity(system) if phi is None else ClaimedDensity(claim(phi, " ".join(system.variables)))
+    before, after = (
+        fraction(density.value(QQ, fmpq(1, 5), tuple(fmpq(entry.numerator, entry.denominator) for entry in point)))
+        for point in (x, image)
+    )
+    assert after != before * determinant(jacobian)
+
+
+@some
+@given(points(2, rationals(9)), nonzero)
+def test_lotka_volterra_preserves_dx_dy_over_xy(x, eps):
+    # Sanz-Serna: the Kahan map of Lotka-Volterra is symplectic for dx dy / (x y).
+    image = kahan_step(LOTKA_VOLTERRA, fraction(eps), exact(*x))
+    assume(image is not None)
+    jacobian = kahan_jacobian(LOTKA_VOLTERRA, fraction(eps), exact(*x))
+    here = exact(*x)
+    assert image[0] * image[1] == here[0] * here[1] * determinant(jacobian)
+
+
+@pytest.mark.parametrize("text", ["x*y", "1 - eps^2*x^2", "(x - y)/(x + eps*y)"])
+@given(points(2, rationals(9)), nonzero)
+@settings(max_examples=20)
+def test_a_claimed_density_has_the_value_that_its_text_says(text, x, eps):
+    function = claim(text, "x y")
+    expected = function_value(function, exact(*x), fraction(eps))
+    found = ClaimedDensity(function).value(QQ, eps, x)
+    assert (found is None) == (expected is None)
+    assert expected is None or fraction(found) == expected
+
+
+def test_the_formula_of_a_density_says_phi():
+    assert DeterminantDensity(LOTKA_VOLTERRA).formula == "phi = det(I - eps f'(x))"
+    assert ClaimedDensity(claim("x*y", "x y")).formula == "phi = x*y"

@@ -1,0 +1,201 @@
+"""The tensor Pi(x) = J - eps^2 f'(x)^2 J: its formula, its transformation under the Kahan map, its Jacobi identity.
+
+For generic members of the commuting family, and in dimension 2 for every H, it is a Poisson tensor that the map
+preserves; for other Hamiltonian systems it is neither. The Jacobi defects are computed a second time by differentiating
+polynomials, the transformation law by dPhi from dual numbers.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import pytest
+from check_helpers import (
+    combined_rows,
+    determinant,
+    exact,
+    hamiltonian_of,
+    hamiltonians,
+    kahan_jacobian,
+    kahan_step,
+    rows_of,
+    slope,
+    tensor,
+    times,
+    transposed,
+    unit,
+)
+from flint import fmpq, fmpq_poly
+from helpers import fraction, points, random_point, rationals
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.errors import SingularStep
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.invariants.poisson import jacobi_defects, poisson_tensor, transformation_sides
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+
+some = settings(max_examples=30)
+nonzero = rationals(6).filter(lambda eps: eps != 0)
+
+GENERIC = hamiltonian_of("x y z w", "x^3 + y^2*w - 2*x*z*w + z^3 + x*y*z + w^3/3")
+MEMBERS = {
+    "two eigenvalues": draw_with_eigenvalues([1, -2], seed=3),
+    "irreducible": draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
+    "three eigenvalues": draw_with_eigenvalues([1, -2, 3], seed=3),
+    "partly split": draw_with_chi(fmpq_poly([2, -2, -1, 1]), seed=3),  # (t - 1)(t^2 - 2)
+}
+over_members = pytest.mark.parametrize("member", MEMBERS.values(), ids=MEMBERS.keys())
+
+
+@st.composite
+def hamiltonian_with_point(draw, dims=(1, 2, 3)):
+    hamiltonian = draw(hamiltonians(dims))
+    return hamiltonian, draw(points(hamiltonian.dim, rationals(9)))
+
+
+@some
+@given(hamiltonian_with_point(), nonzero)
+def test_the_tensor_is_j_minus_eps_squared_jacobian_squared_j(drawn, eps):
+    hamiltonian, x = drawn
+    expected = tensor(hamiltonian, fraction(eps), exact(*x))
+    assert rows_of(poisson_tensor(hamiltonian, QQ, eps, x)) == expected
+
+
+@some
+@given(hamiltonian_with_point(), nonzero)
+def test_the_tensor_is_skew(drawn, eps):
+    hamiltonian, x = drawn
+    Pi = poisson_tensor(hamiltonian, QQ, eps, x)
+    assert Pi.transpose() == -Pi
+
+
+@some
+@given(hamiltonian_with_point(dims=(2,)), nonzero)
+def test_in_dimension_two_the_tensor_is_the_density_times_j(drawn, eps):
+    hamiltonian, x = drawn
+    phi = determinant(combined_rows(unit(2), -fraction(eps), slope(hamiltonian.system, exact(*x))))
+    expected = [[phi * entry for entry in row] for row in rows_of(hamiltonian.J)]
+    assert rows_of(poisson_tensor(hamiltonian, QQ, eps, x)) == expected
+
+
+def test_over_a_prime_field_the_tensor_is_the_rational_one_reduced():
+    field, x, eps = GF(2**61 - 1), random_point(4, 1), fmpq(2, 7)
+    reduced = poisson_tensor(GENERIC, field, field.convert(eps), tuple(field.convert(entry) for entry in x))
+    assert reduced == field.convert_matrix(poisson_tensor(GENERIC, QQ, eps, x))
+
+
+# Transformation
+
+
+def is_poisson_at(hamiltonian: CubicHamiltonian, eps: fmpq, x: tuple[fmpq, ...]) -> bool:
+    """dPhi Pi(x) dPhi^T = Pi(x~), everything computed without the library."""
+    step, here = fraction(eps), exact(*x)
+    jacobian, image = kahan_jacobian(hamiltonian.system, step, here), kahan_step(hamiltonian.system, step, here)
+    assert jacobian is not None
+    assert image is not None
+    left = times(jacobian, tensor(hamiltonian, step, here), transposed(jacobian))
+    return left == tensor(hamiltonian, step, image)
+
+
+@some
+@given(hamiltonian_with_point(dims=(2, 3)), nonzero)
+def test_the_two_sides_are_the_law_for_dphi_multiplied_out(drawn, eps):
+    # With D = I - eps f'(x): left - right = D (dPhi Pi(x) dPhi^T - Pi(x~)) D^T.
+    hamiltonian, x = drawn
+    try:
+        left, right = transformation_sides(KahanMap(hamiltonian.system, eps), hamiltonian, x)
+    except SingularStep:
+        assume(False)
+    step, here = fraction(eps), exact(*x)
+    jacobian, image = kahan_jacobian(hamiltonian.system, step, here), kahan_step(hamiltonian.system, step, here)
+    D = combined_rows(unit(hamiltonian.dim), -step, slope(hamiltonian.system, here))
+    moved = times(jacobian, tensor(hamiltonian, step, here), transposed(jacobian))
+    assert rows_of(left) == times(D, moved, transposed(D))
+    assert rows_of(right) == times(D, tensor(hamiltonian, step, image), transposed(D))
+
+
+@over_members
+def test_members_of_the_family_are_poisson(member):
+    hamiltonian = member.chosen.hamiltonian
+    x, eps = random_point(member.dim, 5), fmpq(1, 7)
+    left, right = transformation_sides(KahanMap(hamiltonian.system, eps), hamiltonian, x)
+    assert left == right
+    assert is_poisson_at(hamiltonian, eps, x)
+
+
+def test_a_generic_hamiltonian_in_dimension_four_is_not_poisson():
+    x, eps = random_point(4, 5), fmpq(1, 7)
+    left, right = transformation_sides(KahanMap(GENERIC.system, eps), GENERIC, x)
+    assert left != right
+    assert not is_poisson_at(GENERIC, eps, x)
+
+
+def test_a_singular_point_is_named_by_the_map():
+    # det(I - eps f') = 1 + eps^2 det Hess H = 1 - eps^2 for H = q p (q + p)/2 at (0, 1).
+    hamiltonian = hamiltonian_of("q p", "q*p*(q + p)/2")
+    with pytest.raises(SingularStep):
+        transformation_sides(KahanMap(hamiltonian.system, 1), hamiltonian, (fmpq(0), fmpq(1)))
+
+
+# The Jacobi identity
+
+
+def defects_by_differentiation(hamiltonian: CubicHamiltonian, eps: fmpq, x: tuple[fmpq, ...]) -> list[fmpq]:
+    """sum_l Pi_il d_l Pi_jk + cyclic for i < j < k, Pi written out as polynomials."""
+    n = hamiltonian.dim
+    slopes = [[component.derivative(j) for j in range(n)] for component in hamiltonian.system.rhs]
+    zero = hamiltonian.H.context().constant(0)
+
+    def entry(i, j):
+        total = zero + hamiltonian.J[i, j]
+        for a in range(n):
+            for b in range(n):
+                total = total - eps**2 * hamiltonian.J[b, j] * slopes[i][a] * slopes[a][b]
+        return total
+
+    Pi = [[entry(i, j) for j in range(n)] for i in range(n)]
+    values = []
+    for triple in combinations(range(n), 3):
+        total = zero
+        for turn in range(3):
+            i, j, k = triple[turn:] + triple[:turn]
+            for l in range(n):
+                total = total + Pi[i][l] * Pi[j][k].derivative(l)
+        values.append(evaluate(total, QQ, x))
+    return values
+
+
+@some
+@given(hamiltonian_with_point(dims=(3,)), nonzero)
+def test_the_defects_are_those_found_by_differentiation_in_dimension_three(drawn, eps):
+    hamiltonian, x = drawn
+    assert jacobi_defects(hamiltonian, QQ, eps, x) == defects_by_differentiation(hamiltonian, eps, x)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_defects_are_those_found_by_differentiation_in_dimension_four(seed):
+    x, eps = random_point(4, seed), fmpq(seed + 1, 5)
+    found = jacobi_defects(GENERIC, QQ, eps, x)
+    assert found == defects_by_differentiation(GENERIC, eps, x)
+    assert any(defect != 0 for defect in found)
+
+
+def test_the_defects_are_those_found_by_differentiation_for_another_j():
+    J = [[0, 1, "1/2", -1], [-1, 0, 3, 0], ["-1/2", -3, 0, 2], [1, 0, -2, 0]]
+    hamiltonian, x = hamiltonian_of("x y z w", "x^3 + y^2*w - x*z*w + z^2 - 3*y", J), random_point(4, 2)
+    assert jacobi_defects(hamiltonian, QQ, fmpq(2, 3), x) == defects_by_differentiation(hamiltonian, fmpq(2, 3), x)
+
+
+@over_members
+def test_for_members_of_the_family_all_defects_vanish(member):
+    found = jacobi_defects(member.chosen.hamiltonian, QQ, fmpq(1, 7), random_point(member.dim, 5))
+    assert len(found) == member.dim * (member.dim - 1) * (member.dim - 2) // 6
+    assert set(found) == {fmpq(0)}
+
+
+def test_in_dimension_two_there_is_nothing_to_check():
+    assert jacobi_defects(hamiltonian_of("q p", "q^3 + p"), QQ, fmpq(1), (fmpq(1), fmpq(1))) == []

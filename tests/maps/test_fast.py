@@ -1,0 +1,293 @@
+"""Float orbits: a second implementation in machine numbers, tested against the exact one.
+
+Specified here: numbers are rounded once, to the nearest double; a step differs from the exact one by no more than the
+rounding that LAPACK admits; the method has order 2; over a long orbit of an integrable map the integral does not drift;
+and each way to end has its status. Tolerances say where they come from.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import ldexp, log2, nextafter
+
+import numpy as np
+import pytest
+from flint import fmpq
+from helpers import (
+    EULER_TOP,
+    HENON_HEILES,
+    LOTKA_VOLTERRA,
+    over_named_systems,
+    random_point,
+    rationals,
+    systems_with_points,
+)
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.errors import InexactNumber, InputError
+from kahanmaps.maps.fast import FloatKahanMap, FloatOrbit, float_function, to_float, to_floats
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import OrbitEnd
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+UNIT = 2.0**-53  # the relative error of one rounding to nearest
+
+RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])
+OSCILLATOR = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
+
+
+def ended(orbit: FloatOrbit) -> OrbitEnd:
+    for _ in orbit:
+        pass
+    return orbit.end
+
+
+def last(orbit: FloatOrbit) -> np.ndarray:
+    """The last point."""
+    *_, (_, x) = orbit
+    return x
+
+
+# From exact numbers to machine numbers.
+
+
+@given(a=st.integers(-(10**30), 10**30), b=st.integers(1, 10**30))
+def test_a_number_is_rounded_to_the_nearest_double(a, b):
+    found = to_float(fmpq(a, b))
+    error = abs(fmpq(a, b) - exact(found))
+    for neighbour in (nextafter(found, -np.inf), nextafter(found, np.inf)):
+        assert error <= abs(fmpq(a, b) - exact(neighbour))
+
+
+def exact(number: float) -> fmpq:
+    return fmpq(*number.as_integer_ratio())
+
+
+@given(number=st.floats(allow_nan=False, allow_infinity=False))
+def test_a_double_comes_back_from_the_rational_number_that_it_is(number):
+    assert to_float(exact(number)) == number
+
+
+def test_a_quotient_of_long_integers_is_rounded_like_any_other():
+    assert to_float(fmpq(10**1000 + 1, 3 * 10**1000)) == 1 / 3
+
+
+@pytest.mark.parametrize("number", [fmpq(10**309), fmpq(-(10**400), 3)], ids=["10^309", "-10^400/3"])
+def test_a_number_beyond_the_range_of_doubles_is_refused(number):
+    with pytest.raises(InputError, match="beyond the range of machine floats"):
+        to_float(number)
+
+
+def test_a_number_below_the_range_of_doubles_becomes_zero():
+    assert to_float(fmpq(1, 10**400)) == 0.0
+
+
+def test_numbers_in_text_are_rounded_one_by_one():
+    assert to_floats(["1/3", "0.1", 2]).tolist() == [1 / 3, 0.1, 2.0]
+
+
+def test_a_machine_number_is_not_taken_for_an_exact_one():
+    with pytest.raises(InexactNumber):
+        to_floats([0.1])
+
+
+# One step.
+
+
+def rounding(phi: FloatKahanMap, x: np.ndarray, image: np.ndarray) -> float:
+    """How far a computed image may lie from the exact one, in the largest coordinate.
+
+    Entries of M = I - eps f'(x) and of the right side are sums of at most n^2 + 3 products of numbers rounded two or
+    three times: relative to the sums of absolute values, an error of (n^2 + 6) UNIT. Elimination with partial pivoting
+    solves a system with M changed by at most 3 n^3 2^(n-1) UNIT |M| (Higham, Accuracy and Stability, thm. 9.5). Both
+    changes are magnified by |M^-1|; a factor 2 covers the terms of second order.
+    """
+    n = len(x)
+    tensor, linear = abs(phi._tensor), abs(phi._linear)
+    entries = np.eye(n) + tensor @ abs(x) + linear
+    right = abs(x) + linear @ abs(x) + abs(phi._constant)
+    matrix = np.eye(n) - phi._tensor @ x - phi._linear
+    inverse = np.linalg.norm(np.linalg.inv(matrix), np.inf)
+    forming = (n**2 + 6) * (np.linalg.norm(entries, np.inf) * abs(image).max() + right.max())
+    solving = 3 * n**3 * 2 ** (n - 1) * np.linalg.norm(matrix, np.inf) * abs(image).max()
+    return 2 * UNIT * inverse * (forming + solving)
+
+
+def is_far_from_singular(phi: FloatKahanMap, x: np.ndarray) -> bool:
+    """Where the error bound of first order makes sense."""
+    return np.linalg.cond(np.eye(len(x)) - phi._tensor @ x - phi._linear) < 1e6
+
+
+@given(pair=systems_with_points(dims=(1, 2, 3)), eps=rationals().filter(bool))
+def test_a_step_is_the_exact_step_up_to_rounding(pair, eps):
+    system, point = pair
+    phi, x = FloatKahanMap(system, eps), to_floats(point)
+    assume(KahanMap(system, eps).determinant(point) != 0)
+    assume(is_far_from_singular(phi, x))
+    expected = to_floats(KahanMap(system, eps).step(point))
+    assert abs(phi.step(x) - expected).max() <= rounding(phi, x, expected)
+
+
+@over_named_systems
+def test_the_exact_step_with_another_eps_is_not_within_rounding(system):
+    point = random_point(system.dim, seed=4)
+    phi, x = FloatKahanMap(system, "1/10"), to_floats(point)
+    other = to_floats(KahanMap(system, fmpq(1, 10) + fmpq(1, 10**9)).step(point))
+    assert abs(phi.step(x) - other).max() > rounding(phi, x, other)
+
+
+@over_named_systems
+def test_the_inverse_undoes_a_step_up_to_rounding(system):
+    phi, x = FloatKahanMap(system, "1/10"), to_floats(random_point(system.dim, seed=4))
+    y = phi.step(x)
+    # the error of the first step is magnified by the derivative of the second
+    derivative = np.linalg.inv(np.eye(len(x)) + phi._tensor @ y + phi._linear)
+    magnified = np.linalg.norm(derivative @ (np.eye(len(x)) - phi._tensor @ x - phi._linear), np.inf)
+    bound = rounding(phi, x, y) * magnified + rounding(phi.inverse, y, x)
+    assert abs(phi.inverse.step(y) - x).max() <= 2 * bound
+
+
+def test_numbers_that_doubles_can_hold_are_mapped_exactly():
+    assert FloatKahanMap(RICCATI, "1/4").step(np.array([1.0])).tolist() == [2.0]  # 1/(1 - 1/2)
+
+
+def test_a_point_where_the_matrix_is_exactly_singular_has_no_image():
+    assert FloatKahanMap(RICCATI, "1/2").step(np.array([1.0])) is None
+
+
+@pytest.mark.parametrize("eps", ["0", "1e-400"])
+def test_an_eps_that_rounds_to_zero_is_refused(eps):
+    with pytest.raises(InputError, match="eps is 0 in machine numbers"):
+        FloatKahanMap(RICCATI, eps)
+
+
+def test_a_machine_number_as_eps_is_refused():
+    with pytest.raises(InexactNumber):
+        FloatKahanMap(RICCATI, 0.1)
+
+
+def test_a_coefficient_beyond_the_range_of_doubles_is_refused():
+    with pytest.raises(InputError, match="use exact arithmetic"):
+        FloatKahanMap(RICCATI.scaled(fmpq(10**400)), "1/10")
+
+
+# Orbits.
+
+
+@over_named_systems
+def test_a_short_orbit_stays_close_to_the_exact_one(system):
+    # Rounding errors, some 1e-16 each, are magnified by the derivatives of at most 4 steps, below 1e3 here.
+    point = random_point(system.dim, seed=4, height=3)
+    phi, exact_point = KahanMap(system, "1/50"), point
+    for step, x in FloatOrbit(system, "1/50", point, 4):
+        assert abs(x - to_floats(exact_point)).max() <= 1e-12 * (1 + abs(x).max()), step
+        exact_point = phi.step(exact_point)
+
+
+def test_an_orbit_delivers_the_start_and_every_step_with_its_number():
+    assert [step for step, _ in FloatOrbit(HENON_HEILES, "1/10", [0, 0, 0, 0], 3)] == [0, 1, 2, 3]
+
+
+def test_backward_undoes_forward_up_to_rounding():
+    forward = last(FloatOrbit(LOTKA_VOLTERRA, "1/100", ["1/2", "1/3"], 20))
+    exactly = [exact(entry) for entry in forward.tolist()]
+    back = last(FloatOrbit(LOTKA_VOLTERRA, "1/100", exactly, 20, backward=True))
+    assert abs(back - [1 / 2, 1 / 3]).max() < 1e-13  # 40 steps of 1e-16, magnified by at most 10 on this orbit
+
+
+def test_the_method_has_order_two():
+    # The oscillator from (1, 0) after time 1, against (cos 1, -sin 1). The errors, above 1e-7, are far from rounding.
+    errors = []
+    for k in range(4, 11):
+        x = last(FloatOrbit(OSCILLATOR, fmpq(1, 2 ** (k + 1)), [1, 0], 2**k))  # the time step is 2 eps
+        errors.append(np.hypot(x[0] - np.cos(1), x[1] + np.sin(1)))
+    assert min(errors) > 1e-8
+    slopes = [log2(a / b) for a, b in pairwise(errors)]
+    assert len(slopes) >= 3
+    assert max(abs(slope - 2) for slope in slopes) < 0.01  # the next term of the error is of order 4: h^2 <= 2^-8
+
+
+def test_the_integral_of_an_integrable_map_neither_drifts_nor_leaves_its_band():
+    # F = (1 - e^2 a3 a1 x2^2)/(1 - e^2 a1 a2 x3^2) of the Euler top (Hirota, Kimura 2000), a = (1, -2, 1), e = 1/10.
+    # A step changes it by a few roundings, 1e-16 each; 20,000 of them at random add up to 150 roundings, 1.7e-14.
+    values = [
+        (1 - 0.01 * x[1] ** 2) / (1 + 0.02 * x[2] ** 2)
+        for _, x in FloatOrbit(EULER_TOP, "1/10", [1, "1/2", "1/3"], 20_000)
+    ]
+    errors = np.array(values) - values[0]
+    assert abs(errors).max() < 1e-12
+    # No trend: were every rounding in one direction, the error would be 20,000 * 1.1e-16 = 2e-12.
+    slope = np.polyfit(np.arange(len(errors)), errors, 1)[0]
+    assert abs(slope) * len(errors) < 5e-13
+
+
+def test_the_integral_of_the_flow_is_not_that_of_the_map():
+    # x1^2 + x2^2/2 is kept by the flow; the map with eps = 1/10 changes it by about eps^2.
+    values = [x[0] ** 2 + x[1] ** 2 / 2 for _, x in FloatOrbit(EULER_TOP, "1/10", [1, "1/2", "1/3"], 200)]
+    assert 1e-4 < max(values) - min(values) < 1e-1
+
+
+# Ends.
+
+
+def test_an_orbit_that_takes_all_its_steps_is_completed():
+    assert ended(FloatOrbit(OSCILLATOR, "1/10", [1, 0], 7)) == OrbitEnd("completed", 7, "7 steps")
+
+
+def test_an_orbit_that_meets_a_singular_matrix_ends_there():
+    # x~ = x/(1 - x) from 1/2: then 1, exactly also in doubles
+    end = ended(FloatOrbit(RICCATI, "1/2", ["1/2"], 9))
+    assert (end.status, end.steps, end.is_whole) == ("singular", 1, False)
+
+
+def test_an_orbit_that_leaves_the_range_of_doubles_ends_before():
+    # x~ = 3 x, from 1: 3^646 is the last power below 1.8e308
+    delivered = list(FloatOrbit(QuadraticSystem.from_text(["x"], ["x"]), "1/2", [1], 1000))
+    orbit = FloatOrbit(QuadraticSystem.from_text(["x"], ["x"]), "1/2", [1], 1000)
+    assert (ended(orbit).status, orbit.end.steps) == ("overflow", 646)
+    assert len(delivered) == 647
+    assert delivered[-1][1][0] == pytest.approx(float(3**646), rel=646 * UNIT)  # one rounding a step
+
+
+def test_an_overflow_within_a_step_is_no_warning():
+    # warnings are errors in these tests; x^2 leaves the range at once
+    end = ended(FloatOrbit(QuadraticSystem.from_text(["x", "y"], ["1e200*x*y", "y^2"]), "1/10", ["1e300", "1e300"], 5))
+    assert end.status in ("overflow", "singular", "completed")
+
+
+def test_an_interrupted_orbit_ends_after_the_point_in_hand():
+    orbit = FloatOrbit(OSCILLATOR, "1/10", [1, 0], None)
+    for step, _ in orbit:
+        if step == 5:
+            orbit.interrupt()
+    assert orbit.end == OrbitEnd("interrupted", 5, "interrupted after step 5")
+
+
+def test_a_start_of_another_dimension_is_refused():
+    with pytest.raises(InputError, match="1 coordinates, expected 2: x, y"):
+        FloatOrbit(OSCILLATOR, "1/10", [1], 3)
+
+
+def test_a_start_beyond_the_range_of_doubles_is_refused():
+    with pytest.raises(InputError, match="beyond the range"):
+        FloatOrbit(OSCILLATOR, "1/10", [fmpq(10**400), 0], 3)
+
+
+def test_a_negative_number_of_steps_is_refused():
+    with pytest.raises(InputError, match="found -1 steps"):
+        FloatOrbit(OSCILLATOR, "1/10", [1, 0], -1)
+
+
+# Functions.
+
+
+def test_a_rational_function_is_evaluated_in_doubles():
+    value = float_function(parse_rational_function("(x^2 + 1/4)/(1 - y)", ["x", "y"]))
+    assert value([0.5, 0.75]) == 2.0
+
+
+@pytest.mark.parametrize("point", [[1.0, 1.0], [ldexp(1.0, 1000), 0.0]], ids=["zero denominator", "overflow"])
+def test_a_rational_function_without_value_in_doubles_is_none(point):
+    assert float_function(parse_rational_function("x^2/(1 - y)", ["x", "y"]))(point) is None

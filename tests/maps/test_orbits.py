@@ -1,0 +1,403 @@
+"""Orbits x, Phi(x), Phi^2(x), ...: lazy, exact, and with an end that says what happened.
+
+Specified here: the points are those of the map, one after the other and only when asked for; each way to end
+(completed, periodic, singular, budget, precision, interrupted) with its step and its sentence, and that all before it
+is delivered.
+"""
+
+from __future__ import annotations
+
+from itertools import islice, product
+
+import pytest
+from flint import fmpq
+from helpers import (
+    EULER_TOP,
+    HENON_HEILES,
+    LOTKA_VOLTERRA,
+    encloses,
+    over_all_fields,
+    over_named_systems,
+    random_point,
+    step_or_none,
+    systems_with_points,
+)
+from hypothesis import assume, given, settings
+
+from kahanmaps.algebra.fields import GF, QQ, RR
+from kahanmaps.algebra.text import parse_number
+from kahanmaps.errors import InexactNumber, InputError
+from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd, OrbitPoint, digits_of
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])
+FALL = QuadraticSystem.from_text(["x", "v"], ["v", "1"])  # det(I - eps f') = 1: never singular, over any field
+OSCILLATOR = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
+
+
+def henon_heiles(**options) -> Orbit:
+    return Orbit(KahanMap(HENON_HEILES, "1/10"), ["1/5", "1/7", 0, "1/3"], **{"steps": 6, **options})
+
+
+def ended(orbit: Orbit) -> OrbitEnd:
+    """Walks the orbit to its end."""
+    for _ in orbit:
+        pass
+    return orbit.end
+
+
+# The points.
+
+
+@over_named_systems
+def test_each_point_is_the_image_of_the_one_before(system):
+    phi = KahanMap(system, "1/10")
+    points = [point.x for point in Orbit(phi, random_point(system.dim, seed=2), 5)]
+    assert points[1:] == [phi.step(x) for x in points[:-1]]
+
+
+@over_all_fields
+def test_the_orbit_begins_with_the_start_as_step_zero(field):
+    first = next(iter(Orbit(KahanMap(EULER_TOP, 3, field), [1, 0, 2], 5)))
+    assert (first.step, first.x) == (0, KahanMap(EULER_TOP, 3, field).point([1, 0, 2]))
+
+
+def test_points_are_numbered_from_zero_to_the_number_of_steps():
+    assert [point.step for point in henon_heiles(steps=4)] == [0, 1, 2, 3, 4]
+
+
+def test_no_steps_deliver_the_start_alone():
+    orbit = henon_heiles(steps=0)
+    assert [point.step for point in orbit] == [0]
+    assert (orbit.end.status, orbit.end.steps) == ("completed", 0)
+
+
+def test_an_orbit_without_limit_goes_on_as_long_as_it_is_asked():
+    assert len(list(islice(Orbit(KahanMap(OSCILLATOR, "1/3"), [1, 0], None), 50))) == 50
+
+
+def test_an_orbit_takes_no_step_before_it_is_asked_for(monkeypatch):
+    taken = []
+    step = IntegerSteps.step
+    monkeypatch.setattr(IntegerSteps, "step", lambda self, point: taken.append(1) or step(self, point))
+    walk = iter(henon_heiles(steps=5))
+    counts = [len(taken)]
+    for _ in range(3):
+        next(walk)
+        counts.append(len(taken))
+    assert counts == [0, 0, 1, 2]
+
+
+def test_a_stepped_orbit_has_no_end_until_it_is_over():
+    orbit = henon_heiles(steps=2)
+    ends = [orbit.end for _ in orbit]
+    assert ends == [None, None, None]
+    assert orbit.end is not None
+
+
+@settings(max_examples=25)
+@given(pair=systems_with_points())
+def test_backward_undoes_forward(pair):
+    system, x = pair
+    phi = KahanMap(system, "1/3")
+    there = list(Orbit(phi, x, 3))
+    assume(len(there) == 4)
+    back = list(Orbit(phi, there[-1].x, 3, backward=True))
+    assume(len(back) == 4)
+    assert [point.x for point in back] == [point.x for point in reversed(there)]
+
+
+def test_forward_again_does_not_undo_forward():
+    phi = KahanMap(HENON_HEILES, "1/10")
+    *_, last = henon_heiles(steps=2)
+    assert [point.x for point in Orbit(phi, last.x, 2)][-1] != henon_heiles().start
+
+
+@pytest.mark.parametrize("prime", [1009, 2**61 - 1, 2**89 - 1])
+def test_an_orbit_modulo_a_prime_is_the_rational_orbit_reduced(prime):
+    K = GF(prime)
+    exact = [point.x for point in henon_heiles(steps=5)]
+    modular = [point.x for point in Orbit(KahanMap(HENON_HEILES, "1/10", K), exact[0], 5)]
+    assert modular == [tuple(K.convert(entry) for entry in x) for x in exact]
+
+
+def test_an_orbit_of_balls_encloses_the_rational_orbit():
+    exact = [point.x for point in henon_heiles(steps=6)]
+    balls = [point.x for point in Orbit(KahanMap(HENON_HEILES, "1/10", RR(128)), exact[0], 6)]
+    assert all(
+        encloses(ball, number) for b, x in zip(balls, exact, strict=True) for ball, number in zip(b, x, strict=True)
+    )
+
+
+def test_an_orbit_of_balls_of_other_midpoint_does_not_enclose_the_rational_orbit():
+    exact = [point.x for point in henon_heiles(steps=6)]
+    start = (exact[0][0] + fmpq(1, 10**20), *exact[0][1:])
+    *_, last = Orbit(KahanMap(HENON_HEILES, "1/10", RR(128)), start, 6)
+    assert not encloses(last.x[0], exact[-1][0])
+
+
+# A point of an orbit.
+
+
+@over_all_fields
+def test_the_text_of_a_point_parses_back(field):
+    *_, last = Orbit(KahanMap(HENON_HEILES, 3, field), [1, 0, 0, 0], 3)
+    with field.working():
+        assert all(field.equal(field.parse(text), entry) for text, entry in zip(last.text, last.x, strict=True))
+
+
+def test_the_text_of_a_rational_point_is_in_lowest_terms_and_of_any_length():
+    *_, last = Orbit(KahanMap(HENON_HEILES, "1/10"), ["1/5", "1/7", 0, "1/3"], 9)
+    assert len(last.text[0]) > 10_000  # Python's own str stops at 4300 digits
+    assert [parse_number(text) for text in last.text] == list(last.x)
+    assert last.text == [QQ.format(entry) for entry in last.x]
+
+
+@pytest.mark.parametrize(
+    ("x", "digits"),
+    [((fmpq(9),), 2), ((fmpq(1, 10**100),), 101), ((fmpq(-(10**1000)), fmpq(1, 3)), 1001)],
+    ids=["9", "10^-100", "-10^1000/3"],
+)
+def test_the_digits_of_a_point_are_about_those_of_its_longest_integer(x, digits):
+    assert abs(digits_of(IntegerPoint.from_rationals(x)) - digits) <= 1
+
+
+def test_only_rational_points_count_digits():
+    assert OrbitPoint(0, GF(7), (GF(7).one,)).digits == 0
+    assert OrbitPoint(0, QQ, IntegerPoint.from_rationals((fmpq(10**50),))).digits == 51
+
+
+def test_a_point_prints_its_step_and_coordinates():
+    assert repr(next(iter(henon_heiles()))) == "OrbitPoint(0: 1/5,1/7,0,1/3)"
+
+
+# Completed.
+
+
+@over_all_fields
+def test_an_orbit_that_takes_all_its_steps_is_completed(field):
+    end = ended(Orbit(KahanMap(FALL, 3, field), [1, 0], 2))
+    assert (end.status in ("completed", "periodic"), end.steps, end.is_whole) == (True, 2, True)
+
+
+def test_a_completed_orbit_says_how_many_steps():
+    assert ended(henon_heiles(steps=3)) == OrbitEnd("completed", 3, "3 steps")
+
+
+# Singular: x' = x^2 with eps = 1/2 is x~ = x/(1 - x), and 1/5, 1/4, 1/3, 1/2, 1 has no successor.
+
+
+@pytest.mark.parametrize(
+    ("start", "last"), [("1", 0), ("1/2", 1), ("1/3", 2), ("1/5", 4), ("1/20", 19)], ids=lambda value: str(value)
+)
+def test_an_orbit_that_meets_the_singular_set_ends_there(start, last):
+    orbit = Orbit(KahanMap(RICCATI, "1/2"), [start], 100)
+    points = [point.x for point in orbit]
+    assert (orbit.end.status, orbit.end.steps, orbit.end.is_whole) == ("singular", last, False)
+    assert points[-1] == (1,)
+    assert len(points) == last + 1
+
+
+def test_the_end_at_a_singular_point_names_the_step():
+    assert ended(Orbit(KahanMap(RICCATI, "1/2"), ["1/5"], 9)).message == (
+        "det(I - eps f'(x)) = 0 at step 4: the map has no value there"
+    )
+
+
+def test_backward_the_end_at_a_singular_point_names_the_other_sign():
+    assert ended(Orbit(KahanMap(RICCATI, "1/2"), ["-1/5"], 9, backward=True)).message == (
+        "det(I + eps f'(x)) = 0 at step 4: the map has no value there"
+    )
+
+
+@pytest.mark.parametrize("field", [GF(11), GF(2**89 - 1), RR(64)], ids=repr)
+def test_the_singular_set_is_met_over_other_fields_too(field):
+    # 1/2 and 1 are exact also as balls
+    end = ended(Orbit(KahanMap(RICCATI, "1/2", field), ["1/2"], 9))
+    assert (end.status, end.steps) == ("singular", 1)
+
+
+def test_in_dimension_four_the_singular_set_is_met_after_two_steps():
+    # Two Riccati equations beside a rotation: the first, from 1/3, reaches 1 after two steps.
+    system = QuadraticSystem.from_text(["x", "y", "u", "v"], ["x^2", "y^2", "v", "-u"])
+    orbit = Orbit(KahanMap(system, "1/2"), ["1/3", "1/50", 1, 2], 9)
+    assert [point.step for point in orbit] == [0, 1, 2]
+    assert orbit.end.status == "singular"
+
+
+# Periodic.
+
+# q'' = -w^2 q + Q(q) with Q homogeneous of degree 2 and eps^2 w^2 = 1: there Phi^4 is the identity.
+FOUR_CYCLES = [
+    (HENON_HEILES, 1, (1, 2, "1/3", -1)),
+    (QuadraticSystem.from_text(["q", "p"], ["p", "-4*q + 7*q^2"]), "1/2", ("2/3", 5)),
+    (QuadraticSystem.from_text(["q", "p"], ["p", "-q/9 - q^2"]), 3, (1, "1/7")),
+]
+
+
+@pytest.mark.parametrize(("system", "eps", "start"), FOUR_CYCLES, ids=["henon_heiles", "w = 2", "w = 1/3"])
+def test_at_eps_times_w_equal_to_one_every_orbit_has_period_four(system, eps, start):
+    end = ended(Orbit(KahanMap(system, eps), start, 10))
+    assert (end.status, end.period, end.steps, end.is_whole) == ("periodic", 4, 10, True)
+
+
+def test_at_another_eps_the_same_orbit_is_not_periodic():
+    end = ended(Orbit(KahanMap(HENON_HEILES, "1/2"), (1, 2, "1/3", -1), 5))
+    assert (end.status, end.period) == ("completed", None)
+
+
+def test_a_periodic_orbit_delivers_all_the_steps_that_were_asked_for():
+    points = [point.x for point in Orbit(KahanMap(HENON_HEILES, 1), (1, 2, "1/3", -1), 9)]
+    assert points[:5] == points[4:9]
+    assert len(points) == 10
+
+
+def test_an_equilibrium_has_period_one():
+    assert ended(Orbit(KahanMap(OSCILLATOR, "1/3"), [0, 0], 3)).period == 1
+
+
+def test_the_end_of_a_periodic_orbit_says_when_the_start_came_back():
+    assert ended(Orbit(KahanMap(OSCILLATOR, 1), [1, 0], 8)).message == "the start came back after 4 steps"
+
+
+def test_an_orbit_that_stops_just_before_the_start_comes_back_is_completed():
+    assert ended(Orbit(KahanMap(OSCILLATOR, 1), [1, 0], 3)).status == "completed"
+
+
+@pytest.mark.parametrize("prime", [5, 7, 11, 13])
+@pytest.mark.parametrize("start", [(1, 2), (3, 1), (2, 2)], ids=str)
+def test_over_a_prime_field_the_period_is_the_first_return(prime, start):
+    phi = KahanMap(LOTKA_VOLTERRA, 3, GF(prime))
+    walked = [phi.point(start)]
+    while len(walked) <= prime**2 and (x := step_or_none(phi, walked[-1])) is not None:
+        walked.append(x)
+    period = walked.index(walked[0], 1) if walked[0] in walked[1:] else None
+    assert ended(Orbit(phi, start, prime**2)).period == period
+
+
+def test_over_a_prime_field_an_orbit_may_return_run_into_a_pole_or_enter_a_cycle_without_its_start():
+    # Phi is birational, not injective: where dPhi is singular, different points have one image.
+    phi = KahanMap(LOTKA_VOLTERRA, 3, GF(7))
+    ends = {start: ended(Orbit(phi, start, 49)).status for start in product(range(7), repeat=2)}
+    assert set(ends.values()) == {"periodic", "singular", "completed"}
+    start = next(start for start, status in ends.items() if status == "completed")
+    visited = [point.x for point in Orbit(phi, start, 49)]
+    assert visited[0] not in visited[1:]
+    assert len(set(map(str, visited))) < len(visited)
+
+
+# Budget.
+
+
+def test_an_orbit_ends_before_its_numbers_exceed_the_budget():
+    orbit = henon_heiles(steps=50, max_digits=500)
+    digits = [point.digits for point in orbit]
+    assert orbit.end.status == "budget"
+    assert orbit.end.steps == len(digits) - 1
+    assert max(digits) <= 500
+    beyond = list(henon_heiles(steps=len(digits)))[-1]
+    assert beyond.digits > 500
+
+
+def test_the_end_at_the_budget_says_how_many_digits_the_next_step_has():
+    end = ended(henon_heiles(steps=50, max_digits=500))
+    beyond = list(henon_heiles(steps=end.steps + 1))[-1]
+    assert f"step {end.steps + 1} has numbers of {beyond.digits} digits, more than the budget of 500" in end.message
+
+
+def test_a_start_beyond_the_budget_delivers_nothing():
+    orbit = Orbit(KahanMap(RICCATI, "1/2"), [fmpq(1, 10**30)], 5, max_digits=20)
+    assert list(orbit) == []
+    assert (orbit.end.status, orbit.end.steps) == ("budget", -1)
+
+
+def test_without_word_the_budget_protects_a_non_integrable_orbit():
+    end = ended(Orbit(KahanMap(LOTKA_VOLTERRA, "1/10"), ["1/2", "1/3"], 1000))
+    assert (end.status, end.steps < 30) == ("budget", True)
+    assert str(DEFAULT_MAX_DIGITS) in end.message
+
+
+def test_a_budget_of_none_lifts_the_limit():
+    start = [fmpq(1, 10 ** (DEFAULT_MAX_DIGITS + 10))]
+    assert ended(Orbit(KahanMap(RICCATI, "1/2"), start, 1)).status == "budget"
+    assert ended(Orbit(KahanMap(RICCATI, "1/2"), start, 1, max_digits=None)).status == "completed"
+
+
+def test_modulo_a_prime_there_is_nothing_to_budget():
+    phi = KahanMap(HENON_HEILES, "1/10", GF(2**89 - 1))
+    assert ended(Orbit(phi, [1, 2, 3, 4], 200, max_digits=1)).status == "completed"
+
+
+# Precision.
+
+
+def test_balls_that_have_grown_too_wide_end_the_orbit():
+    orbit = Orbit(KahanMap(HENON_HEILES, "1/10", RR(30)), ["1/5", "1/7", 0, "1/3"], 10_000)
+    delivered = sum(1 for _ in orbit)
+    assert (orbit.end.status, orbit.end.steps) == ("precision", delivered - 1)
+    assert "more bits" in orbit.end.message
+
+
+def test_more_bits_carry_an_orbit_of_balls_further():
+    phi = [KahanMap(HENON_HEILES, "1/10", RR(bits)) for bits in (30, 60)]
+    short, long = (ended(Orbit(kahan, ["1/5", "1/7", 0, "1/3"], 10_000)).steps for kahan in phi)
+    assert long > short
+
+
+# Interrupted.
+
+
+@over_all_fields
+def test_an_interrupted_orbit_ends_after_the_point_in_hand(field):
+    orbit = Orbit(KahanMap(FALL, 3, field), [1, 0], 100)
+    delivered = []
+    for point in orbit:
+        delivered.append(point.step)
+        if point.step == 2:
+            orbit.interrupt()
+    assert delivered == [0, 1, 2]
+    assert (orbit.end.status, orbit.end.steps, orbit.end.message) == ("interrupted", 2, "interrupted after step 2")
+
+
+def test_an_interruption_at_the_last_step_comes_too_late():
+    orbit = henon_heiles(steps=2)
+    for point in orbit:
+        if point.step == 2:
+            orbit.interrupt()
+    assert orbit.end.status == "completed"
+
+
+def test_an_orbit_interrupted_after_the_start_came_back_keeps_the_period():
+    orbit = Orbit(KahanMap(OSCILLATOR, 1), [1, 0], None)
+    for point in orbit:
+        if point.step == 6:
+            orbit.interrupt()
+    assert (orbit.end.status, orbit.end.period) == ("interrupted", 4)
+
+
+# What is refused.
+
+
+@pytest.mark.parametrize("steps", [-1, -100])
+def test_a_negative_number_of_steps_is_refused_with_the_way_back(steps):
+    with pytest.raises(InputError, match=f"found {steps} steps, expected 0 or more .* step backward"):
+        henon_heiles(steps=steps)
+
+
+@pytest.mark.parametrize("budget", [0, -5])
+def test_a_budget_without_digits_is_refused(budget):
+    with pytest.raises(InputError, match="expected at least 1"):
+        henon_heiles(max_digits=budget)
+
+
+def test_a_start_of_another_dimension_is_refused():
+    with pytest.raises(InputError, match="2 coordinates, expected 4: q1, q2, p1, p2"):
+        Orbit(KahanMap(HENON_HEILES, 1), [1, 2], 3)
+
+
+@over_all_fields
+def test_a_machine_number_in_the_start_is_refused(field):
+    with pytest.raises(InexactNumber):
+        Orbit(KahanMap(RICCATI, 3, field), [0.5], 3)
