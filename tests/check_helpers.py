@@ -282,6 +282,16 @@ def system_of(variables: str, *rhs: str, **parameters: Any) -> QuadraticSystem:
     return QuadraticSystem.from_text(variables.split(), rhs, parameters)
 
 
+def side_by_side(first: QuadraticSystem, second: QuadraticSystem) -> QuadraticSystem:
+    """x' = f(x), y' = g(y) in the variables x1, x2, ..."""
+    n = first.dim
+    context = ring([f"x{i + 1}" for i in range(n + second.dim)])
+    gens = context.gens()
+    rhs = [polynomial.compose(*gens[:n], ctx=context) for polynomial in first.rhs]
+    rhs += [polynomial.compose(*gens[n:], ctx=context) for polynomial in second.rhs]
+    return QuadraticSystem.from_polynomials(rhs)
+
+
 def file_of(system: QuadraticSystem, name: str = "f", **claims: str) -> SystemFile:
     """A system file with claimed integrals; `phi` is a claimed density."""
     phi = claims.pop("phi", None)

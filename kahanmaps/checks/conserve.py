@@ -16,7 +16,13 @@ from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings, run_orbit
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
-from kahanmaps.invariants.integrals import ClaimedIntegral, Integral, ModifiedHamiltonian, PaperIntegral
+from kahanmaps.invariants.integrals import (
+    ClaimedIntegral,
+    CommutantIntegral,
+    Integral,
+    ModifiedHamiltonian,
+    PaperIntegral,
+)
 from kahanmaps.invariants.sizes import VARIABLE, eps_size, step_size
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.files import SystemFile
@@ -119,4 +125,16 @@ def _family_integrals(member: FamilyMember) -> list[tuple[Integral, Evidence | N
     for associate in associates[1:]:
         integral = PaperIntegral(associate.hamiltonian, "K", f"_{associate.label}")
         found.append((integral, theorems.shared_integral(member, associate), "petrera-suris-2016, eq. (tK)"))
+    return [*found, *_commutant_integrals(member)]
+
+
+def _commutant_integrals(member: FamilyMember) -> list[tuple[Integral, Evidence | None, str]]:
+    """m - 1 further integrals that are rational also where the K~_s are not, chi having irrational roots."""
+    hamiltonian = member.chosen.hamiltonian
+    letter = "H" if all(sign > 0 for sign in member.signs) else "K"
+    found: list[tuple[Integral, Evidence | None, str]] = []
+    for k in range(1, member.m):
+        integral = CommutantIntegral(hamiltonian, member.A, k, letter)
+        name = "A^T" if k == 1 else f"(A^T)^{k}"
+        found.append((integral, theorems.commutant_integral(hamiltonian, integral, name), ""))
     return found

@@ -104,7 +104,7 @@ def run_orbit(kahan: KahanMap, settings: Settings, is_integrable: bool = False) 
     """The exact orbit of the given start, or of random small rational starts until one has no singular point."""
     # A claim that takes two more steps of a map without structure multiplies the digits by dim^2, and elimination
     # by dim once more; for the family numbers hardly grow from one step to the next.
-    by_dimension = 20_000 if is_integrable else max(100, 60_000 // kahan.dim**2)
+    by_dimension = 5_000 if is_integrable else max(100, 60_000 // kahan.dim**2)
     max_digits = by_dimension if settings.max_digits is None else settings.max_digits
     rng = random.Random(f"start {settings.seed}")
     attempt = 0

@@ -17,6 +17,7 @@ from kahanmaps.checks.claims import Evidence, Finding, Verdict
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.cubics import belongs
 from kahanmaps.family.skew_hamiltonian import defects, evaluate_at_matrix
+from kahanmaps.invariants.integrals import CommutantIntegral
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -124,6 +125,20 @@ def shared_integral(member: FamilyMember, associate: AssociatedSystem) -> Eviden
             *member_hypotheses(member),
             *associated_hypotheses(member, member.chosen),
             *associated_hypotheses(member, associate),
+        ],
+    )
+
+
+def commutant_integral(hamiltonian: CubicHamiltonian, integral: CommutantIntegral, name: str) -> Evidence | None:
+    """eps^{-1} x^T J C x~ is conserved for every constant C that commutes with f'(x) for all x."""
+    return evidence(
+        "the commutant lemma (docs/mathematics.md)",
+        [
+            (
+                "H is a homogeneous cubic and J = [[0, I], [-I, 0]]",
+                hamiltonian.is_homogeneous and hamiltonian.is_standard,
+            ),
+            (f"{name} f'(x) = f'(x) {name} for every x", _commutes(integral.matrix, hamiltonian.system)),
         ],
     )
 

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-from flint import fmpq
+from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
@@ -93,6 +93,34 @@ class PaperIntegral(Integral):
         image = step_size(self.hamiltonian.system, eps, point)
         dim = Size(0, float(self.hamiltonian.dim.bit_length()))
         return Fraction(dim * eps * point * image, eps * point * image)
+
+
+class CommutantIntegral(Integral):
+    """eps^{-1} x^T J C x~ with C = (A^T)^k, which commutes with f'(x): rational whatever the roots of chi are.
+
+    With C = I this is H~; for k < m these span the same space as the K~_s of all associated systems, over the
+    splitting field of chi. Proof in docs/mathematics.md.
+    """
+
+    def __init__(self, hamiltonian: CubicHamiltonian, A: fmpq_mat, power: int, letter: str = "H") -> None:
+        self.hamiltonian = hamiltonian
+        self.matrix = (A**power).transpose()
+        self.name = f"{letter}~_{power}"
+        self.formula = f"{self.name} = eps^(-1) x^T J {'A^T' if power == 1 else f'(A^T)^{power}'} x~"
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        image = KahanMap(self.hamiltonian.system, eps, field).step(point)
+        with field.working():
+            column = field.convert_matrix(self.hamiltonian.J * self.matrix) * field.column(image)
+            return (field.column(point).transpose() * column)[0, 0] / field.convert(eps)
+
+    def size(self, eps: Size, point: Size) -> Fraction:
+        entries = (self.hamiltonian.J * self.matrix).entries()
+        image = step_size(self.hamiltonian.system, eps, point)
+        # The sum of |numerators| over a common denominator, which is at most the product of all denominators.
+        below = sum(float(entry.q.bit_length()) for entry in entries if entry.q != 1)
+        above = max(float(entry.p.bit_length()) for entry in entries) + below + 2.0 * self.matrix.nrows().bit_length()
+        return Fraction(Size(0, above) * eps * point * image, Size(0, below) * eps * point * image)
 
 
 class ClaimedIntegral(Integral):

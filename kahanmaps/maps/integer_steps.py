@@ -86,17 +86,26 @@ class IntegerSteps:
 
     def step(self, point: IntegerPoint) -> IntegerPoint | None:
         """The image, or None where det(I - eps f'(x)) = 0."""
-        n, X, W = self._dim, point.numerators, point.denominator
-        column = fmpz_mat(n, 1, X)
-        matrix = fmpz_mat(n, n, (self._tensor * column).entries())
+        column = fmpz_mat(self._dim, 1, point.numerators)
         right = column * self._scale
         if self._linear is not None:
+            right = right + self._linear * column + self._constant * point.denominator
+        return _divide(self._matrix(point), right, point.denominator)
+
+    def determinant(self, point: IntegerPoint) -> fmpq:
+        """det(I - eps f'(x))."""
+        return fmpq(self._matrix(point).det(), (self._scale * point.denominator) ** self._dim)
+
+    def _matrix(self, point: IntegerPoint) -> fmpz_mat:
+        """q L W (I - eps f'(x))."""
+        n, W = self._dim, point.denominator
+        matrix = fmpz_mat(n, n, (self._tensor * fmpz_mat(n, 1, point.numerators)).entries())
+        if self._linear is not None:
             matrix = matrix - self._linear * W
-            right = right + self._linear * column + self._constant * W
         scaled = self._scale * W
         for i in range(n):
             matrix[i, i] += scaled
-        return _divide(matrix, right, W)
+        return matrix
 
 
 # Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact_steps.py).

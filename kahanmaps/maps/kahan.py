@@ -95,6 +95,8 @@ class KahanMap:
 
     def determinant(self, point: Sequence[Any]) -> Any:
         """det(I - eps f'(x)), the denominator of the map."""
+        if self.field is QQ:
+            return self.integer_steps.determinant(IntegerPoint.from_rationals(self.point(point)))
         with self.field.working():
             return det(self.denominator_matrix(point))
 

@@ -252,4 +252,4 @@ def test_progress_is_told_along_the_way():
     told: list[str] = []
     check_integrals(MEMBER, Settings(steps=2, progress=told.append))
     assert "orbit: step 2 of 2" in told
-    assert "integral 3 of 3" in told
+    assert "integral 4 of 4" in told  # modified H, H~, K~_+-, H~_1

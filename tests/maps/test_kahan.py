@@ -581,6 +581,13 @@ def test_the_determinant_is_that_of_one_minus_eps_times_the_jacobi_matrix(field,
     assert (phi.denominator_matrix(x), phi.determinant(x)) == (expected, det(expected))
 
 
+@given(pair=systems_with_points(), eps=steps)
+def test_the_rational_determinant_is_that_of_the_rational_matrix(pair, eps):
+    system, x = pair
+    phi = KahanMap(system, eps)
+    assert phi.determinant(x) == det(phi.denominator_matrix(x))
+
+
 def test_a_singular_step_names_the_point_and_eps():
     with pytest.raises(SingularStep, match=r"at the point 1,2 for eps = 1/2") as caught:
         KahanMap(QuadraticSystem.from_text(["x", "y"], ["x^2", "0"]), "1/2").step([1, 2])

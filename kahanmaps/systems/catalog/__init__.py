@@ -2,16 +2,18 @@
 
 >>> names()[:3]
 ('dressing_chain_3', 'euler_top', 'harmonic')
->>> top = load("euler_top", {"a1": 1, "a2": "1/2", "a3": -3})
+>>> top = load("euler_top", {"a1": 1, "a2": 2, "a3": "-3/2"})
 >>> print(top.system)
 x1' = x2*x3
-x2' = 1/2*x1*x3
-x3' = -3*x1*x2
+x2' = 2*x1*x3
+x3' = -3/2*x1*x2
 >>> top.catalog["title"]
 'Euler top'
 
-A file is data, in the format of every other system file; its name is that of the system. All claims of [integrals] and
-[density] are put to the test by tests/systems/test_catalog.py, for the default and for random values of the parameters.
+A file is data, in the format of every other system file; its name is that of the system. Each of its facts opens with
+its status: Proved (in the source named; where none is, by the argument given or by tests/systems/test_catalog.py, which
+expands claims with eps and the parameters as indeterminates), Refuted (at a point), Measured (a finite computation
+modulo a prime, which is no proof), Classical, or Origin (how the file was made).
 """
 
 from __future__ import annotations

@@ -1,0 +1,442 @@
+"""Are integrals conserved: I(x~) = I(x), proved for those that a theorem gives, decided for those that are claimed.
+
+Modified H of any cubic Hamiltonian with any constant skew J is proved; in the family H~ and every K~_s is. A claim that is
+wrong in its eps^2 term, in one digit far out, or at every eps but one is refuted, and every witness is computed a second
+time with Python's Fractions.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from check_helpers import (
+    QUICK,
+    claim,
+    exact,
+    file_of,
+    function_value,
+    hamiltonian_of,
+    hamiltonians,
+    kahan_step,
+    modified_value,
+    only,
+    system_of,
+    verdicts,
+    verify_witness,
+)
+from flint import fmpq, fmpq_poly
+from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
+from hypothesis import given, settings
+
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.text import format_rational_function, parse_rational_function
+from kahanmaps.checks import theorems
+from kahanmaps.checks.claims import Finding, Verdict
+from kahanmaps.checks.conserve import check_integrals, known_integrals
+from kahanmaps.checks.judge import Contradiction
+from kahanmaps.checks.settings import Settings
+from kahanmaps.errors import InputError
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.invariants.integrals import ModifiedHamiltonian, PaperIntegral
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+few = settings(max_examples=20)
+
+HENON = hamiltonian_of("q1 q2 p1 p2", "p1^2/2 + p2^2/2 + q1^2/2 + q2^2/2 + q1^2*q2 - q2^3/3")
+WEIERSTRASS = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
+# Rank 2 in dimension 3, an inhomogeneous H; (1, -2, 1) spans the kernel of J.
+ODD = hamiltonian_of("x y z", "x^3/3 - x*y*z + z^2/2 + y", [[0, 1, 2], [-1, 0, 1], [-2, -1, 0]])
+SINGULAR = hamiltonian_of("x y z w", "x^2*w - y^3 + z*x + w", [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]])
+
+
+def verify_claim_witness(found: Finding, system: QuadraticSystem, function: RationalFunction) -> None:
+    """I(x~) and I(x) recomputed for a claimed function of x and eps."""
+    assert found.verdict is REFUTED
+    x, (eps,) = exact(*found.witness.point), exact(found.witness.eps)
+    image = kahan_step(system, eps, x)
+    assert image is not None
+    verify_witness(found.witness, [function_value(function, image, eps)], [function_value(function, x, eps)])
+
+
+def check_claim(system: QuadraticSystem, text: str, how: Settings = QUICK) -> Finding:
+    """The finding on one claimed integral, its witness verified if it is refuted."""
+    found = only(check_integrals(file_of(system, I=text), how))
+    if found.verdict is REFUTED:
+        verify_claim_witness(found, system, claim(text, " ".join(system.variables)))
+    return found
+
+
+def proved(hamiltonian: CubicHamiltonian, how: Settings = QUICK) -> list[Verdict]:
+    return verdicts(check_integrals(SystemFile.from_hamiltonian(hamiltonian), how))
+
+
+# Hamiltonian systems
+
+
+@pytest.mark.parametrize("eps", [None, "1/3", "-2"])
+@pytest.mark.parametrize(
+    "hamiltonian", [HENON, WEIERSTRASS, ODD, SINGULAR], ids=["Henon", "cubic", "odd", "singular J"]
+)
+def test_modified_h_is_proved_for_every_constant_skew_j(hamiltonian, eps):
+    report = check_integrals(SystemFile.from_hamiltonian(hamiltonian), Settings(eps=eps, steps=2))
+    assert only(report).verdict is PROVED
+    assert only(report).claim == "modified H is conserved"
+
+
+@few
+@given(hamiltonians(dims=(1, 2, 3)))
+def test_modified_h_is_proved_and_no_point_contradicts_it(hamiltonian):
+    assert set(proved(hamiltonian)) == {PROVED}
+
+
+@pytest.mark.parametrize(
+    "hamiltonian", [HENON, WEIERSTRASS, ODD, SINGULAR], ids=["Henon", "cubic", "odd", "singular J"]
+)
+def test_without_the_theorem_modified_h_is_supported(hamiltonian, monkeypatch):
+    monkeypatch.setattr(theorems, "evidence", lambda theorem, hypotheses: None)
+    assert proved(hamiltonian) == [SUPPORTED]
+
+
+def test_homogeneous_h_with_the_standard_j_has_both_normalisations():
+    report = check_integrals(SystemFile.from_hamiltonian(hamiltonian_of("q p", "q^3 - q*p^2")), QUICK)
+    assert [found.claim for found in report.findings] == ["modified H is conserved", "H~ is conserved"]
+    assert verdicts(report) == [PROVED, PROVED]
+
+
+def test_a_linear_function_from_the_kernel_of_j_is_supported():
+    # k^T f = k^T J grad H = 0, and Kahan maps conserve linear integrals.
+    assert check_claim(ODD.system, "x - 2*y + z").verdict is SUPPORTED
+
+
+@pytest.mark.parametrize("text", ["x - 2*y + 2*z", "x", "x - 2*y + z + x/10^50"])
+def test_another_linear_function_is_refuted(text):
+    assert check_claim(ODD.system, text).verdict is REFUTED
+
+
+# H itself, and modified H written out
+
+
+def written_out(hamiltonian: CubicHamiltonian) -> str:
+    """H + (2 eps/3) grad H^T (I - eps f')^{-1} f for q' = p, p' = q^2 - 1, by hand.
+
+    f' = [[0, 1], [2q, 0]], det = 1 - 2 eps^2 q; grad H = (1 - q^2, p), f = (p, q^2 - 1):
+    grad H^T adj(I - eps f') f = (1 - q^2)(p + eps (q^2 - 1)) + p (2 eps q p + q^2 - 1) = 2 eps q p^2 - eps (q^2 - 1)^2.
+    """
+    assert hamiltonian is WEIERSTRASS
+    return "p^2/2 - q^3/3 + q + 2/3*eps^2*(2*q*p^2 - (q^2 - 1)^2)/(1 - 2*eps^2*q)"
+
+
+def test_h_itself_fails_in_the_term_of_order_eps_squared():
+    assert check_claim(WEIERSTRASS.system, "p^2/2 - q^3/3 + q").verdict is REFUTED
+
+
+def test_modified_h_written_out_is_supported():
+    found = check_claim(WEIERSTRASS.system, written_out(WEIERSTRASS))
+    assert found.verdict is SUPPORTED
+    assert int(found.evidence.data["error_bound"].split("^")[1]) <= -100
+
+
+@pytest.mark.parametrize("eps", ["1/10", "-3", "7/1000"])
+def test_modified_h_written_out_is_supported_at_one_eps(eps):
+    how = Settings(eps=eps, steps=2)
+    assert check_claim(WEIERSTRASS.system, written_out(WEIERSTRASS), how).verdict is SUPPORTED
+
+
+@pytest.mark.parametrize("power", [1, 10, 50, 300])
+@pytest.mark.parametrize("term", ["q", "eps^2*q^2", "eps^2/(1 - 2*eps^2*q)"])
+def test_modified_h_with_one_coefficient_wrong_in_a_far_digit_is_refuted(term, power):
+    text = f"{written_out(WEIERSTRASS)} + ({term})/10^{power}"
+    assert check_claim(WEIERSTRASS.system, text).verdict is REFUTED
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("+ 2/3*eps^2", "- 2/3*eps^2"),  # the sign of eps^2
+        ("+ 2/3*eps^2", "+ 1/3*eps^2"),  # eps for 2 eps
+        ("+ 2/3*eps^2", "+ 2/3*eps^4"),  # a power of eps
+        ("1 - 2*eps^2*q", "1 + 2*eps^2*q"),
+        ("1 - 2*eps^2*q", "1"),  # the leading term alone
+    ],
+)
+def test_modified_h_with_a_slip_in_it_is_refuted(right, wrong):
+    assert right in written_out(WEIERSTRASS)
+    assert check_claim(WEIERSTRASS.system, written_out(WEIERSTRASS).replace(right, wrong)).verdict is REFUTED
+
+
+def test_a_constant_added_does_no_harm():
+    assert check_claim(WEIERSTRASS.system, f"{written_out(WEIERSTRASS)} + 7*eps + 5").verdict is SUPPORTED
+
+
+# Known answers from the literature
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "(1 - eps^2*x2^2)/(1 + 2*eps^2*x3^2)",
+        "(1 + 2*eps^2*x3^2)/(1 + 2*eps^2*x1^2)",
+    ],
+)
+def test_the_integrals_of_the_discrete_euler_top_are_supported(text):
+    # petrera-suris-euler: (1 - eps^2 a_i a_j x_k^2)/(1 - eps^2 a_j a_k x_i^2), here a = (1, -2, 1).
+    assert check_claim(EULER_TOP, text).verdict is SUPPORTED
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "(1 + eps^2*x2^2)/(1 + 2*eps^2*x3^2)",
+        "(1 - eps^2*x2^2)/(1 + 2*eps^2*x1*x3)",
+        "(1 - 4*eps^2*x2^2)/(1 + 8*eps^2*x3^2)",  # the same with the time step for eps
+        "2*x1^2 + x2^2",  # the integral of the flow
+    ],
+)
+def test_wrong_integrals_of_the_discrete_euler_top_are_refuted(text):
+    assert check_claim(EULER_TOP, text).verdict is REFUTED
+
+
+def test_an_integral_at_another_scale_of_eps_is_supported_at_that_scale_only():
+    # Doubling the system is doubling eps.
+    text = "(1 - 4*eps^2*x2^2)/(1 + 8*eps^2*x3^2)"
+    assert check_claim(EULER_TOP.scaled(2), text).verdict is SUPPORTED
+
+
+# One eps, every eps
+
+# q'' = -q + q^2: Phi^4 = id at eps = 1, where q~ = p/(1 - q) and q~~ = -q; so q^2 + q~^2 is conserved there.
+PERIODIC = system_of("q p", "p", "-q + q^2")
+OF_PERIOD_FOUR = "q^2 + (p/(1 - q))^2"
+
+
+def test_an_integral_that_exists_at_one_eps_is_supported_there():
+    assert check_claim(PERIODIC, OF_PERIOD_FOUR, Settings(eps=1, steps=2)).verdict is SUPPORTED
+
+
+@pytest.mark.parametrize("eps", [None, "1/2", "1001/1000"])
+def test_an_integral_that_exists_at_one_eps_is_refuted_elsewhere(eps):
+    assert check_claim(PERIODIC, OF_PERIOD_FOUR, Settings(eps=eps, steps=2)).verdict is REFUTED
+
+
+# The family
+
+
+FAMILY = {
+    "m=1": (draw_with_eigenvalues([2], seed=3), 1),
+    "m=2": (draw_with_eigenvalues([1, -2], seed=3), 2),
+    "m=2, irreducible": (draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3), 1),
+    "m=3": (draw_with_eigenvalues([1, -2, 3], seed=3), 4),
+    "m=3, (t-1)(t^2-2)": (draw_with_chi(fmpq_poly([2, -2, -1, 1]), seed=3), 2),
+    "m=3, eigenvalue twice": (draw_with_eigenvalues([1, 1, 2], seed=3), 2),
+    "m=4": (draw_with_eigenvalues([1, -2, 3, 5], seed=3), 8),
+}
+over_family = pytest.mark.parametrize(("member", "classes"), FAMILY.values(), ids=FAMILY.keys())
+
+
+@over_family
+def test_modified_h_and_every_k_of_the_class_are_proved(member, classes):
+    report = check_integrals(SystemFile.from_member(member), QUICK)
+    assert len(report.findings) == 1 + classes
+    assert set(verdicts(report)) == {PROVED}
+
+
+@over_family
+def test_without_the_theorem_the_integrals_of_the_class_are_supported(member, classes, monkeypatch):
+    monkeypatch.setattr(theorems, "evidence", lambda theorem, hypotheses: None)
+    report = check_integrals(SystemFile.from_member(member), QUICK)
+    assert set(verdicts(report)) == {SUPPORTED}
+
+
+@over_family
+def test_every_map_of_a_class_conserves_the_integrals_of_the_whole_class(member, classes):
+    for associate in member.associated():
+        other = FamilyMember(member.A, member.H, associate.signs)
+        report = check_integrals(SystemFile.from_member(other), Settings(steps=1))
+        assert set(verdicts(report)) == {PROVED}
+
+
+@over_family
+def test_the_integrals_of_a_class_are_conserved_when_computed_without_the_library(member, classes):
+    x, eps = exact(*(fmpq((-1) ** k * (k + 2), k + 1) for k in range(member.dim))), Fraction(1, 7)
+    image = kahan_step(member.chosen.system, eps, x)
+    assert image is not None
+    for associate in member.associated():
+        assert modified_value(associate.hamiltonian, eps, image) == modified_value(associate.hamiltonian, eps, x)
+
+
+def test_h_of_a_member_is_refuted_as_an_integral_of_the_map():
+    member = FAMILY["m=2"][0]
+    report = check_integrals(
+        SystemFile.from_member(member),
+        QUICK,
+        {"H": RationalFunction(parse_rational_function(str(member.H), (*member.variables, "eps")).numerator, ONE4)},
+    )
+    *known, claimed = report.findings
+    assert {found.verdict for found in known} == {PROVED}
+    verify_claim_witness(claimed, member.chosen.system, claim(str(member.H), " ".join(member.variables)))
+    assert report.verdict is REFUTED
+
+
+ONE4 = claim("1", "x1 x2 x3 x4").numerator
+
+
+def test_the_map_of_h1_is_refuted_to_conserve_modified_h0(monkeypatch):
+    # The known integrals of one system put to the map of another.
+    first, second = FAMILY["m=2"][0], FamilyMember(FAMILY["m=2"][0].A, FAMILY["m=2"][0].chain[1])
+    integral = ModifiedHamiltonian(first.chosen.hamiltonian)
+    monkeypatch.setattr("kahanmaps.checks.conserve.known_integrals", lambda file: [(integral, None, "")])
+    found = only(check_integrals(SystemFile.from_member(second), QUICK))
+    assert found.verdict is REFUTED
+    x, (eps,) = exact(*found.witness.point), exact(found.witness.eps)
+    image = kahan_step(second.chosen.system, eps, x)
+    sides = [[modified_value(first.chosen.hamiltonian, eps, point)] for point in (image, x)]
+    verify_witness(found.witness, *sides)
+
+
+def test_a_class_of_many_systems_lists_the_single_minus_signs():
+    file = SystemFile.from_member(draw_with_eigenvalues(range(1, 10), seed=3))
+    assert len(known_integrals(file)) == 2 + 9
+
+
+# What is told
+
+
+def test_claims_of_the_file_and_of_the_caller_are_both_checked():
+    file = file_of(LOTKA_VOLTERRA, I="x", J="y")
+    report = check_integrals(file, QUICK, {"K": claim("x*y", "x y")})
+    assert [found.claim for found in report.findings] == [f"{name} is conserved" for name in "IJK"]
+    assert verdicts(report) == [REFUTED] * 3
+
+
+def test_a_claim_is_shown_by_its_formula():
+    function = claim("(x^2 + y)/(1 - eps)", "x y")
+    found = only(check_integrals(file_of(LOTKA_VOLTERRA, I="(x^2 + y)/(1 - eps)"), QUICK))
+    assert found.formula == format_rational_function(function)
+
+
+def test_a_constant_is_an_integral_of_everything():
+    assert check_claim(LORENZ, "3/7 + eps").verdict is SUPPORTED
+
+
+def test_the_names_of_parameters_may_be_used_in_claims():
+    text = 'variables = ["x", "y"]\n[parameters]\na = "3/2"\n[system]\nrhs = ["y", "0"]\n[integrals]\nI = "a*y"\n'
+    from kahanmaps.systems.files import parse_system
+
+    assert only(check_integrals(parse_system(text), QUICK)).verdict is SUPPORTED
+
+
+def test_a_claim_undefined_along_the_orbit_says_so():
+    # y stays 0 on this orbit, a pole of 1/y.
+    report = check_integrals(
+        file_of(system_of("x y", "x^2 + 1", "x*y"), I="x/y"), Settings(eps="1/10", start=(1, 0), steps=2)
+    )
+    assert "could not be tried at any point" in only(report).also[-1].summary
+    assert "undefined at 3" in only(report).also[-1].summary
+
+
+def test_a_claim_refuted_is_said_to_fail_along_the_orbit_as_well():
+    found = check_claim(LOTKA_VOLTERRA, "x")
+    assert found.also[-1].summary == "fails at step 0 of an exact orbit"
+
+
+def test_an_orbit_alone_never_makes_a_claim_proved_or_supported():
+    # x is constant along the orbit of a start with y = 0, and nowhere else.
+    found = check_claim(system_of("x y", "y", "x*y"), "x", Settings(eps="1/10", start=(2, 0), steps=5))
+    assert found.verdict is REFUTED
+    assert found.also[-1].summary.startswith("held exactly at 6 points")
+
+
+def test_an_orbit_can_refute_what_random_points_could_not_decide(monkeypatch):
+    # Degrees too large for primes of 63 bits: only the orbit speaks.
+    monkeypatch.setattr("kahanmaps.checks.decide.trial_bound", lambda identity: 0.0)
+    assert check_claim(LOTKA_VOLTERRA, "x").evidence.method == "exact orbit"
+    assert check_claim(LOTKA_VOLTERRA, "1").verdict is UNDECIDED
+
+
+def test_a_singular_start_is_told():
+    file = file_of(system_of("x", "x^2"), I="x")
+    report = check_integrals(file, Settings(eps="1/10", start=(5,), orbit_is_asked=True))
+    assert report.ended_early
+    assert report.to_json()["orbit"]["status"] == "singular"
+
+
+@pytest.mark.parametrize(("asked", "told"), [(True, True), (False, False)])
+def test_an_orbit_cut_short_counts_only_where_it_was_asked_for(asked, told):
+    how = Settings(steps=30, max_digits=100, orbit_is_asked=asked)
+    report = check_integrals(file_of(LORENZ, I="1"), how)
+    assert report.to_json()["orbit"]["status"] == "budget"
+    assert report.ended_early is told
+
+
+# Wrong use
+
+
+def test_a_system_without_any_integral_is_wrong_use():
+    with pytest.raises(InputError, match="no integral of f is known or claimed"):
+        check_integrals(file_of(LOTKA_VOLTERRA))
+
+
+@pytest.mark.parametrize("names", [("x", "y"), ("y", "x", "eps"), ("x", "y", "z", "eps"), ("eps", "x", "y")])
+def test_a_claim_in_other_variables_is_wrong_use(names):
+    function = parse_rational_function("x", names)
+    with pytest.raises(InputError, match="expected a rational function of x, y, eps"):
+        check_integrals(file_of(LOTKA_VOLTERRA), extra={"I": function})
+
+
+# Mutations
+
+
+ORIGINAL_STEP = KahanMap.step
+
+
+def half_step(self: KahanMap, point):
+    """x + eps (I - eps f')^{-1} f: eps where 2 eps belongs."""
+    x = self.point(point)
+    image = ORIGINAL_STEP(self, x)
+    return tuple(a + (b - a) / self.field.convert(2) for a, b in zip(x, image, strict=True))
+
+
+@pytest.mark.parametrize("file", [SystemFile.from_hamiltonian(HENON), SystemFile.from_member(FAMILY["m=2"][0])])
+def test_a_step_of_half_the_length_contradicts_the_theorems(file, monkeypatch):
+    monkeypatch.setattr(KahanMap, "step", half_step)
+    with pytest.raises(Contradiction):
+        check_integrals(file, QUICK)
+
+
+def test_a_step_of_half_the_length_refutes_a_claim(monkeypatch):
+    file = file_of(WEIERSTRASS.system, I=written_out(WEIERSTRASS))
+    assert only(check_integrals(file, QUICK)).verdict is SUPPORTED
+    monkeypatch.setattr(KahanMap, "step", half_step)
+    assert only(check_integrals(file, QUICK)).verdict is REFUTED
+
+
+def test_one_third_replaced_in_modified_h_contradicts_the_theorem(monkeypatch):
+    def wrong(self, field, eps, point):
+        image = KahanMap(self.hamiltonian.system, eps, field).step(point)
+        grad = [fmpq(0)] * 0 or list(self.hamiltonian.gradient)
+        from kahanmaps.algebra.polynomials import evaluate
+
+        along = sum(
+            (evaluate(g, field, point) * (b - a) for g, a, b in zip(grad, point, image, strict=True)), field.zero
+        )
+        return evaluate(self.hamiltonian.H, field, point) + along / field.convert(2)
+
+    monkeypatch.setattr(ModifiedHamiltonian, "value", wrong)
+    with pytest.raises(Contradiction, match="modified H is conserved"):
+        check_integrals(SystemFile.from_hamiltonian(HENON), QUICK)
+
+
+def test_x_in_place_of_its_image_in_the_papers_integral_contradicts_the_theorem(monkeypatch):
+    def wrong(self, field, eps, point):
+        m = len(point) // 2
+        return sum((point[i] * point[m + i] for i in range(m)), field.zero) / field.convert(eps)
+
+    monkeypatch.setattr(PaperIntegral, "value", wrong)
+    with pytest.raises(Contradiction, match="H~ is conserved"):
+        check_integrals(SystemFile.from_member(FAMILY["m=2"][0]), QUICK)
