@@ -6,12 +6,16 @@ undecided or stopped early; 70 an internal error; 130 interrupted.
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 
 import click
+
+from kahanmaps_cli.progress import say
 
 HOLDS, REFUTED, WRONG_USE, UNDECIDED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
@@ -78,33 +82,34 @@ def cli(ctx: click.Context, show_version: bool) -> None:
         from kahanmaps.version import __version__
 
         click.echo(f"kahanmaps {__version__}")
+        ctx.exit()
     elif ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
+    _have_standard_streams()
+    status = HOLDS
     try:
-        status = cli.main(args=None if argv is None else list(argv), prog_name="kahanmaps", standalone_mode=False)
+        result = cli.main(args=None if argv is None else list(argv), prog_name="kahanmaps", standalone_mode=False)
+        status = result if isinstance(result, int) else HOLDS
         sys.stdout.flush()
-        return status if isinstance(status, int) else HOLDS
     except click.exceptions.Exit as stop:
         return stop.exit_code
-    except click.UsageError as error:
-        error.show(sys.stderr)
-        return WRONG_USE
     except click.ClickException as error:
-        error.show(sys.stderr)
+        with suppress(OSError):
+            error.show(sys.stderr)
         return WRONG_USE
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted", err=True)
+        say("interrupted")
         return INTERRUPTED
-    except BrokenPipeError:
+    except (BrokenPipeError, SystemExit):  # click turns the one into the other
         # The reader (head, say) has what it wanted. Python would complain once more when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return HOLDS
     except Exception as error:
         return _report(error)
+    return status
 
 
 def _report(error: Exception) -> int:
@@ -115,20 +120,33 @@ def _report(error: Exception) -> int:
 
         traceback.print_exc()
     if isinstance(error, KahanmapsError):
-        click.echo(f"Error: {error}", err=True)
+        say(f"Error: {error}")
         return WRONG_USE if isinstance(error, InputError) else UNDECIDED
     if isinstance(error, OSError):
-        click.echo(f"Error: {error.strerror or error}{f': {error.filename}' if error.filename else ''}", err=True)
+        where = f": {error.filename or repr('')}" if error.filename is not None else ""
+        say(f"Error: {error.strerror or error}{where}")
         return WRONG_USE
     if isinstance(error, MemoryError):
-        click.echo("Error: out of memory: ask for fewer steps or a smaller --max-digits", err=True)
+        say("Error: out of memory: ask for fewer steps or a smaller --max-digits")
         return UNDECIDED
-    click.echo(
+    say(
         f"Internal error: {type(error).__name__}: {error}\n"
-        "This is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened.",
-        err=True,
+        "This is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened."
     )
     return INTERNAL
+
+
+def _have_standard_streams() -> None:
+    """Put the null device where a standard stream is closed (`>&-`), or the next file opened would take its place.
+
+    Where the encoding of a stream lacks a character, the character is spelt out.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115 (open for as long as the process lives)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 if __name__ == "__main__":

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -81,27 +82,40 @@ def load_system(
     """The system that a command line names: a path, a catalogue name, `-` for standard input, or an inline system."""
     from kahanmaps.errors import InputError
     from kahanmaps.systems.catalog import load
-    from kahanmaps.systems.files import MAX_FILE_BYTES, SystemFile, parse_system
-    from kahanmaps.systems.quadratic import QuadraticSystem
+    from kahanmaps.systems.files import MAX_FILE_BYTES, parse_system
 
     given = dict(parameters)
+    if len(given) < len(parameters):
+        twice = next(name for k, (name, _) in enumerate(parameters) if name in dict(parameters[:k]))
+        raise click.UsageError(f"found -p {twice}=... twice, expected one value for each parameter")
     if variables is not None or rhs:
         if reference is not None:
             raise click.UsageError(f"give a SYSTEM ({reference}) or an inline one (--vars and --rhs), not both")
         if variables is None or not rhs:
             raise click.UsageError("an inline system needs both --vars X,Y,... and one --rhs EXPR for each variable")
-        names = [name.strip() for name in variables.split(",")]
-        if len(rhs) != len(names):
-            raise InputError(f"found {len(rhs)} times --rhs for the {len(names)} variables {', '.join(names)}")
-        return SystemFile.from_system(QuadraticSystem.from_text(names, rhs, dict(given)), "inline")
+        return parse_system(_inline_file(variables.split(","), rhs, given), "inline")
     if reference is None:
         raise click.UsageError(
             "missing SYSTEM: a file, a catalogue name ('kahanmaps systems' lists them), - for standard input, "
             "or an inline system: --vars x,y --rhs 'x*y' --rhs '-x^2'"
         )
     if reference == "-":
-        return parse_system(sys.stdin.buffer.read(MAX_FILE_BYTES + 1), "standard input", given)
+        text = sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
+        if not text.strip():
+            raise InputError("found nothing on standard input, expected a system file")
+        return parse_system(text, "standard input", given)
     return load(reference, given)
+
+
+def _inline_file(variables: Sequence[str], rhs: Sequence[str], parameters: Mapping[str, str]) -> str:
+    """The system file that an inline system abbreviates, so that the same rules hold for it."""
+
+    def quoted(texts: Sequence[str]) -> str:  # JSON strings are TOML strings
+        return json.dumps([text.strip() for text in texts], ensure_ascii=False)
+
+    lines = [f"variables = {quoted(variables)}", "[system]", f"rhs = {quoted(rhs)}", "[parameters]"]
+    lines += [f"{quoted([name])[1:-1]} = {quoted([value])[1:-1]}" for name, value in parameters.items()]
+    return "\n".join(lines)
 
 
 def settings_from(options: dict[str, Any], progress: Callable[[str], None]) -> Settings:

@@ -11,10 +11,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import IO, Any
 
-from kahanmaps.errors import InputError
-
 # An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
 MAX_PADDED_BYTES = 512_000_000
+
+
+class OutputFull(Exception):
+    """A format cannot hold the next point. Attribute: `steps`, the last step that it holds."""
+
+    def __init__(self, message: str, steps: int) -> None:
+        self.steps = steps
+        super().__init__(message)
 
 
 class Writer(ABC):
@@ -51,7 +57,7 @@ class JsonLines(Writer):
     """One JSON object a line, with "record" header, point or end."""
 
     def header(self, header: dict[str, Any]) -> None:
-        self._line(json.dumps({"record": "header", **header}, ensure_ascii=False))
+        self._line(json.dumps({"record": "header", **header}))
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         record: dict[str, Any] = {"record": "point", "step": step, "x": list(x)}
@@ -60,7 +66,7 @@ class JsonLines(Writer):
         self._line(json.dumps(record))
 
     def end(self, end: dict[str, Any]) -> None:
-        self._line(json.dumps({"record": "end", **end}, ensure_ascii=False))
+        self._line(json.dumps({"record": "end", **end}))
         self.stream.flush()
 
 
@@ -68,14 +74,14 @@ class Csv(Writer):
     """Comma-separated values below a row of names; header and end are comment lines that start with #."""
 
     def header(self, header: dict[str, Any]) -> None:
-        self._line("# " + json.dumps(header, ensure_ascii=False))
+        self._line("# " + json.dumps(header))
         self._line(",".join(["step", *self.columns, *map(_quoted, self.integrals)]))
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line(",".join([str(step), *x, *("" if value is None else value for value in values)]))
 
     def end(self, end: dict[str, Any]) -> None:
-        self._line("# " + json.dumps(end, ensure_ascii=False))
+        self._line("# " + json.dumps(end))
         self.stream.flush()
 
 
@@ -129,9 +135,10 @@ class Npz(Writer):
         if self.kind == "text":
             self._longest = max(self._longest, *(len(cell) for cell in row))
             if self._longest * len(row) * (len(self._rows) + 1) > MAX_PADDED_BYTES:
-                raise InputError(
-                    f"step {step}: an npz file of exact numbers would exceed {MAX_PADDED_BYTES} bytes: "
-                    "take --format jsonl, fewer steps or --every"
+                raise OutputFull(
+                    f"with step {step} an npz file of exact numbers would exceed {MAX_PADDED_BYTES} bytes: "
+                    "take --format jsonl, fewer steps or --every",
+                    self._steps[-1] if self._steps else 0,
                 )
         self._steps.append(step)
         self._rows.append(row)
@@ -140,17 +147,18 @@ class Npz(Writer):
         import numpy as np
 
         n = len(self.columns)
-        kinds: dict[str, Any] = {"float": np.float64, "int": np.int64, "text": f"S{self._longest}"}
+        dtypes: dict[str, Any] = {"float": np.float64, "int": np.int64, "text": np.bytes_}
 
-        def array(part: list[list[str]]) -> Any:
-            if self.kind == "int" and any(cell == "" for row in part for cell in row):
-                return np.array([[cell.encode() for cell in row] for row in part])
-            convert: Any = {"float": float, "int": int, "text": str.encode}[self.kind]
-            return np.array([[convert(cell) for cell in row] for row in part], dtype=kinds[self.kind])
+        def array(part: list[list[str]], width: int) -> Any:
+            pole = any(cell == "" for row in part for cell in row)
+            kind = "text" if pole else self.kind
+            convert: Any = {"float": float, "int": int, "text": str.encode}[kind]
+            cells = [[convert(cell) for cell in row] for row in part]
+            return np.array(cells, dtype=dtypes[kind]).reshape(len(part), width)
 
-        arrays = {"step": np.array(self._steps, dtype=np.int64), "x": array([row[:n] for row in self._rows])}
+        arrays = {"step": np.array(self._steps, dtype=np.int64), "x": array([row[:n] for row in self._rows], n)}
         if self.integrals:
-            arrays["integrals"] = array([row[n:] for row in self._rows])
+            arrays["integrals"] = array([row[n:] for row in self._rows], len(self.integrals))
         meta = {"header": self._header, "columns": self.columns, "integrals": self.integrals, "end": end}
         np.savez_compressed(self.stream, allow_pickle=False, meta=np.array(json.dumps(meta)), **arrays)
         self.stream.flush()

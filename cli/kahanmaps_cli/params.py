@@ -57,12 +57,12 @@ class NameValue(_ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if not isinstance(value, str):
             return value
-        left, equals, right = value.partition("=")
-        if equals and left.strip() and right.strip():
-            return left.strip(), right.strip()
-        if self.name_is_optional and not equals and value.strip():
-            return "", value.strip()
-        self.fail(f"found {value!r}, expected NAME=VALUE", param, ctx)
+        left, equals, right = (piece.strip() for piece in value.partition("="))
+        if equals and left and right and left.isprintable():
+            return left, right
+        if self.name_is_optional and not equals and left:
+            return "", left
+        self.fail(f"found {_shorten(value)}, expected NAME=VALUE", param, ctx)
 
 
 class Arithmetic(_ParamType):
@@ -76,9 +76,9 @@ class Arithmetic(_ParamType):
         kind, colon, number = value.partition(":")
         if kind in ("exact", "float") and not colon:
             return kind, 0
-        if kind in ("mod", "ball") and number.isascii() and number.isdigit() and len(number) <= 400:
+        if kind in ("mod", "ball") and number.isascii() and number.isdigit() and len(number) <= 4000:
             return kind, int(number)
-        self.fail(f"found {value!r}, expected exact, float, mod:P with a prime P, or ball:BITS", param, ctx)
+        self.fail(f"found {_shorten(value)}, expected exact, float, mod:P with a prime P, or ball:BITS", param, ctx)
 
 
 class Steps(_ParamType):
@@ -93,6 +93,13 @@ class Steps(_ParamType):
         for piece in value.split(","):
             piece = piece.strip()
             if not (piece.isascii() and piece.isdigit()) or len(piece) > 18:
-                self.fail(f"found {piece!r}, expected step numbers 0, 1, 2, ... separated by commas", param, ctx)
+                self.fail(
+                    f"found {_shorten(piece)}, expected step numbers 0, 1, 2, ... separated by commas", param, ctx
+                )
             steps.append(int(piece))
         return sorted(set(steps))
+
+
+def _shorten(text: str) -> str:
+    """The text in quotes, cut where it is long."""
+    return repr(text if len(text) <= 60 else text[:60] + "...")

@@ -1,14 +1,27 @@
-"""Progress of long work on standard error: nothing for the first second, one line redrawn on a terminal, a line now and
-then elsewhere."""
+"""Talk on standard error: messages, and the progress of long work.
+
+Progress is nothing for the first second, then one line redrawn on a terminal, a line now and then elsewhere. Nobody
+has to listen: a standard error that cannot be written to changes neither the work nor its exit status.
+"""
 
 from __future__ import annotations
 
 import sys
 import time
+from contextlib import suppress
+from types import TracebackType
+
+import click
+
+
+def say(message: str) -> None:
+    """Print a message, with nothing in it that a terminal would obey."""
+    with suppress(OSError):
+        click.echo("".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in message), err=True)
 
 
 class Progress:
-    """Call it with a sentence as often as you like; `done` clears the line."""
+    """Call it with a sentence as often as you like inside a `with` block, whose end clears the line."""
 
     def __init__(self, quiet: bool = False) -> None:
         self._quiet = quiet
@@ -23,15 +36,22 @@ class Progress:
         self._last = now
         text = f"{sentence} ({now - self._start:.0f} s)"
         if self._terminal:
-            sys.stderr.write("\r" + text[:79].ljust(self._shown))
+            _write("\r" + text[:79].ljust(self._shown))
             self._shown = len(text[:79])
         else:
-            sys.stderr.write(text + "\n")
-        sys.stderr.flush()
+            _write(text + "\n")
 
-    def done(self) -> None:
-        """Remove the line from the terminal."""
-        if self._terminal and self._shown:
-            sys.stderr.write("\r" + " " * self._shown + "\r")
-            sys.stderr.flush()
-            self._shown = 0
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._shown:
+            _write("\r" + " " * self._shown + "\r")
+
+
+def _write(text: str) -> None:
+    with suppress(OSError):
+        sys.stderr.write(text)
+        sys.stderr.flush()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -25,7 +26,7 @@ def on_terminal() -> bool:
 
 def print_json(data: Mapping[str, Any]) -> None:
     """One JSON object on a line of its own."""
-    click.echo(json.dumps(data, ensure_ascii=False))
+    click.echo(json.dumps(data))
 
 
 def shorten(text: str, width: int = NUMBER_WIDTH) -> str:
@@ -38,12 +39,13 @@ def shorten(text: str, width: int = NUMBER_WIDTH) -> str:
 
 def print_report(report: Report, as_json: bool, verbose: bool = False) -> int:
     """Print a report and return the exit status that its verdict stands for; in a pipe everything is printed."""
-    if as_json:
-        print_json(report.to_json())
-    elif on_terminal():
-        _print_table(report, verbose)
-    else:
-        _print_plain(report)
+    with suppress(BrokenPipeError):  # a reader that has seen enough changes no verdict
+        if as_json:
+            print_json(report.to_json())
+        elif on_terminal():
+            _print_table(report, verbose)
+        else:
+            _print_plain(report)
     return exit_status(report)
 
 

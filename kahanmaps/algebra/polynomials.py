@@ -102,7 +102,7 @@ def evaluate(polynomial: fmpq_mpoly, field: Any, point: Sequence[Any]) -> Any:
 
     Raises `BadPrime` where the field is GF(p) and p divides the denominator of a coefficient.
     """
-    if field.exact and field.characteristic == 0:
+    if all(isinstance(entry, fmpq) for entry in point):
         return _evaluate_rational(polynomial, point)
     powers: list[list[Any]] = [[field.one, entry] for entry in point]
     total = field.zero

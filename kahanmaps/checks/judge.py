@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from kahanmaps.checks.claims import Evidence, Finding, Verdict
 from kahanmaps.checks.decide import Identity, decide
+from kahanmaps.checks.expand import NotEqual, expansion
 from kahanmaps.checks.settings import OrbitRun, Settings, along
 
 
@@ -26,7 +27,7 @@ def judge(
     source: str = "",
     control: bool = False,
 ) -> Finding:
-    """The finding on one claim: proved by `proof`, or decided at random points; tried along `orbit` as well."""
+    """The finding on one claim: proved by `proof` or by expansion, or decided at random points; tried along `orbit`."""
     decision = decide(identity, settings.seed, settings.error_bits if proof is None else 1)
     also: list[Evidence] = []
     verdict, evidence, witness = decision.verdict, decision.evidence, decision.witness
@@ -35,6 +36,14 @@ def judge(
             raise Contradiction(f"{claim}: {proof.summary}, but it {decision.evidence.summary} {decision.witness}")
         verdict, evidence, witness = Verdict.PROVED, proof, None
         if decision.verdict is Verdict.SUPPORTED:
+            also.append(decision.evidence)
+    elif decision.verdict is Verdict.SUPPORTED and not control:
+        try:
+            expanded = expansion(identity)
+        except NotEqual as error:
+            raise Contradiction(f"{claim}: {decision.evidence.summary}, but {error}") from error
+        if expanded is not None:
+            verdict, evidence = Verdict.PROVED, expanded
             also.append(decision.evidence)
     if orbit is not None:
         experience, failure = along(identity, orbit)

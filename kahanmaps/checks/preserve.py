@@ -6,12 +6,12 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.decide import Identity, Sides
-from kahanmaps.checks.judge import judge
+from kahanmaps.checks.judge import Contradiction, judge
 from kahanmaps.checks.settings import Settings, run_orbit
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.measures import (
@@ -33,7 +33,7 @@ def density_identity(system: QuadraticSystem, density: Density, eps: fmpq | None
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
         kahan = KahanMap(system, eps_value, field)
-        image = kahan.step(point)
+        image = _image(kahan, point)
         after, before = density.value(field, eps_value, image), density.value(field, eps_value, point)
         if after is None or before is None:
             return None
@@ -49,6 +49,24 @@ def density_identity(system: QuadraticSystem, density: Density, eps: fmpq | None
     poles = image.degree + left.below.degree + right.below.degree
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
     return Identity(system.dim, sides, left.equation(right), poles, eps, *labels)
+
+
+def _image(kahan: KahanMap, point: tuple[Any, ...]) -> tuple[Any, ...]:
+    """x~, put into the defining equation.
+
+    The formula for dPhi that both laws use comes from this equation; the laws themselves would not notice a wrong
+    x~: for phi = det(I - eps f') of a Hamiltonian f, and for Pi of the family, they hold at any two points x and x~.
+    """
+    image = kahan.step(point)
+    field = kahan.field
+    if field is not QQ and not field.characteristic:
+        return image  # expanding it would cost much and add nothing to what points have shown
+    factor = field.convert(2) * kahan.eps
+    means = kahan.system.over(field).polarised(point, image)
+    for x, after, mean in zip(point, image, means, strict=True):
+        if not field.equal(after - x, factor * mean):
+            raise Contradiction("the point computed for x~ does not satisfy the defining equation of the Kahan map")
+    return image
 
 
 def check_measure(file: SystemFile, settings: Settings | None = None, extra: RationalFunction | None = None) -> Report:
@@ -95,7 +113,8 @@ def transformation_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> 
     n = hamiltonian.dim
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
-        left, right = transformation_sides(KahanMap(hamiltonian.system, eps_value, field), hamiltonian, point)
+        kahan = KahanMap(hamiltonian.system, eps_value, field)
+        left, right = transformation_sides(kahan, hamiltonian, point, _image(kahan, point))
         return left.entries(), right.entries()
 
     size = eps_size(eps)

@@ -164,7 +164,7 @@ def random_skew_hamiltonian(m: int, rng: random.Random, bound: int = 3) -> fmpq_
 def random_symplectic(m: int, rng: random.Random, rounds: int = 2) -> fmpq_mat:
     """A random integer matrix S with S^T J S = J and small entries: a product of elementary symplectic matrices.
 
-    Every variable is mixed with every kind of partner, but each factor adds only a few entries, so that what is
+    Variables are mixed round by round, but each factor adds only a few entries, so that what is
     hidden by S keeps small coefficients.
     """
     n = 2 * m

@@ -26,10 +26,11 @@ def poisson_tensor(hamiltonian: CubicHamiltonian, field: Field, eps: Any, point:
         return J - jacobian * jacobian * J * (eps * eps)
 
 
-def transformation_sides(kahan: KahanMap, hamiltonian: CubicHamiltonian, point: Sequence[Any]) -> tuple[Any, Any]:
-    """Both sides of the transformation law above, at x = `point`. Raises SingularStep."""
+def transformation_sides(
+    kahan: KahanMap, hamiltonian: CubicHamiltonian, point: Sequence[Any], image: Sequence[Any]
+) -> tuple[Any, Any]:
+    """Both sides of the transformation law above, at x = `point` and x~ = `image`."""
     field, eps = kahan.field, kahan.eps
-    image = kahan.step(point)
     forward, backward = kahan.inverse.denominator_matrix(image), kahan.denominator_matrix(point)
     with field.working():
         left = forward * poisson_tensor(hamiltonian, field, eps, point) * forward.transpose()

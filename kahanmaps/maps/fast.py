@@ -52,9 +52,12 @@ class FloatKahanMap:
         if self.eps == 0.0:
             raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
         forms = [2 * entry for form in system.Q for entry in form.entries()]
-        self._tensor = to_floats(forms).reshape(n, n, n) * self.eps
-        self._linear = to_floats(system.B.entries()).reshape(n, n) * self.eps
-        self._constant = to_floats(system.c) * (2 * self.eps)
+        with np.errstate(over="ignore"):
+            self._tensor = to_floats(forms).reshape(n, n, n) * self.eps
+            self._linear = to_floats(system.B.entries()).reshape(n, n) * self.eps
+            self._constant = to_floats(system.c) * (2 * self.eps)
+        if not all(np.isfinite(part).all() for part in (self._tensor, self._linear, self._constant)):
+            raise InputError("eps times a coefficient leaves the range of machine floats: use exact arithmetic")
         self._identity = np.eye(n)
 
     @property
@@ -88,6 +91,7 @@ class FloatOrbit:
         self.map = forward.inverse if backward else forward
         self.start = to_floats(start)
         self.steps = steps
+        self.backward = backward
         self.end: OrbitEnd | None = None
         self._interrupted = False
 
@@ -106,7 +110,9 @@ class FloatOrbit:
             with np.errstate(all="ignore"):
                 image = self.map.step(x)
             if image is None:
-                self.end = OrbitEnd("singular", step, f"I - eps f'(x) is singular in machine numbers at step {step}")
+                sign = "+" if self.backward else "-"
+                message = f"I {sign} eps f'(x) is singular in machine numbers at step {step}"
+                self.end = OrbitEnd("singular", step, message)
                 return
             if not np.isfinite(image).all():
                 self.end = OrbitEnd("overflow", step, f"step {step + 1} leaves the range of machine floats")

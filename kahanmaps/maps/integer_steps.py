@@ -41,36 +41,19 @@ class IntegerPoint:
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
         """Numerator and denominator of each coordinate, reduced; one gcd of large numbers in all.
 
-        A prime that a numerator shares with W divides the product of all numerators modulo W.
+        What a numerator shares with W it shares with the product of all numerators modulo W.
         """
         W = self.denominator
         product = fmpz(1)
         for entry in self.numerators:
             product = product * entry % W
         common = W.gcd(product)
-        return [(entry // g, W // g) for entry in self.numerators for g in [_gcd_within(entry, W, common)]]
+        return [(entry // g, W // g) for entry in self.numerators for g in [common.gcd(entry % common)]]
 
     @property
     def bits(self) -> int:
         """The bit length of the largest of the integers."""
         return max(self.denominator.bit_length(), *(entry.bit_length() for entry in self.numerators))
-
-
-def _gcd_within(left: fmpz, right: fmpz, primes: fmpz) -> fmpz:
-    """gcd(left, right), known to have no other primes than those of `primes`, by residues modulo a power of it."""
-    if primes == 1:
-        return primes
-    power = primes**2
-    while power.bit_length() < right.bit_length():
-        found = power.gcd(left % power).gcd(right % power)
-        # The answer is final when no prime occurs in it to the full power of the modulus.
-        left_over, spare = primes, power // found
-        while (common := left_over.gcd(spare)) != 1:
-            left_over = left_over // common
-        if left_over == 1:
-            return found
-        power = power**2
-    return left.gcd(right)
 
 
 class IntegerSteps:
@@ -132,7 +115,7 @@ def _divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | N
         column, denominator = solution.numer_denom()
     except ZeroDivisionError:
         return None
-    return _lowest_terms(column.entries(), denominator, denominator)
+    return IntegerPoint(tuple(column.entries()), denominator)
 
 
 def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
@@ -159,7 +142,7 @@ def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint 
             quotients = previous.into(pivots + second)
             pivots, second = quotients[: len(pivots)], quotients[len(pivots) :]
         pivot, count = pivots[0], len(below)
-        if pivot == 0 or a[k] == 0:
+        if pivot == 0:
             return None
         block = [
             rows[i][j] * pivot + b[j] * pivots[1 + i - k - 2] + a[j] * pivots[1 + count + i - k - 2]
@@ -188,7 +171,6 @@ def _substitute_back(rows: list[list[fmpz]]) -> IntegerPoint | None:
     content = numerator.gcd(denominator)
     solution = [numerator // content]
     denominator = denominator // content
-    added = fmpz(1)
     for i in range(n - 2, -1, -1):
         value = denominator * rows[i][n]
         for j, known in enumerate(solution, start=i + 1):
@@ -198,11 +180,12 @@ def _substitute_back(rows: list[list[fmpz]]) -> IntegerPoint | None:
             content = remainder.gcd(rows[i][i])
             missing = rows[i][i] // content
             solution = [known * missing for known in solution]
-            denominator, added = denominator * missing, added * missing
+            denominator = denominator * missing
             quotient = value // content
         solution.insert(0, quotient)
-    # The last coordinate was in lowest terms, so what all share now divides what was added since.
-    return _lowest_terms(solution, denominator, added)
+    # In lowest terms already: each new numerator is coprime to the factor that all others have just received.
+    sign = 1 if denominator > 0 else -1
+    return IntegerPoint(tuple(numerator * sign for numerator in solution), denominator * sign)
 
 
 def _shared(likely: fmpz, block: list[fmpz]) -> _ExactDivisor | None:
@@ -274,15 +257,3 @@ def _trailing_zeros(value: fmpz) -> int:
     if low:
         return (low & -low).bit_length() - 1
     return int((value & -value).bit_length()) - 1
-
-
-def _lowest_terms(numerators: Sequence[fmpz], denominator: fmpz, content: fmpz) -> IntegerPoint:
-    """The point numerators / denominator, given a multiple `content` of all that they share."""
-    content = content.gcd(denominator)
-    for numerator in numerators:
-        if content == 1:
-            break
-        content = content.gcd(numerator % content)
-    if denominator < 0:
-        content = -content
-    return IntegerPoint(tuple(numerator // content for numerator in numerators), denominator // content)

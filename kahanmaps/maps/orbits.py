@@ -27,7 +27,8 @@ class OrbitEnd:
 
     `status` is "completed", "periodic" (completed, and the start came back), "singular", "budget", "precision"
     (balls too wide), "overflow" (machine floats) or "interrupted"; `steps` is the index of the last point
-    delivered.
+    delivered. Modulo p a birational map need not be injective: an orbit may run into a cycle that its start is not on,
+    and is then "completed".
     """
 
     status: str
@@ -73,8 +74,9 @@ class OrbitPoint:
 class Orbit:
     """The orbit of `start` under a Kahan map: iterate over it once, then look at `end`.
 
-    `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit), `backward` steps by the
-    inverse map. `max_digits` bounds the decimal digits of the integers over one common denominator (over Q).
+    `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit, even after the start came
+    back), `backward` steps by the inverse map. `max_digits` bounds the decimal digits of the integers over one
+    common denominator (over Q).
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> orbit = Orbit(KahanMap(QuadraticSystem.from_text(["x"], ["x^2"]), "1/2"), ["1/5"], 3)

@@ -74,7 +74,9 @@ def test_the_refusal_of_a_machine_number_is_an_error_of_the_builtin_kinds(kind):
         rational(0.1)
 
 
-@pytest.mark.parametrize("value", [True, False, None, [1], (1, 2), {}, b"1", pytest.param(object(), id="an object")], ids=repr)
+@pytest.mark.parametrize(
+    "value", [True, False, None, [1], (1, 2), {}, b"1", pytest.param(object(), id="an object")], ids=repr
+)
 @over_all_fields
 def test_what_is_no_number_is_refused_by_every_field(field, value):
     with pytest.raises(InputError, match="expected"):

@@ -221,7 +221,6 @@ def test_the_kahan_map_of_the_opposite_system_is_the_inverse():
     assert psi.step(phi.step(x)) == x
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("m", [5, 6])
 def test_the_kahan_maps_of_associated_systems_commute_also_for_larger_m(m):
     member = split(m)

@@ -15,7 +15,7 @@ from kahanmaps.algebra.polynomials import gradient
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.errors import InexactNumber, InputError
 from kahanmaps.family.cubics import belongs, cubic_space
-from kahanmaps.family.draw import MAX_M, draw_generic, draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.draw import MAX_M, draw_generic, draw_with_chi, draw_with_eigenvalues, random_eigenvalues
 from kahanmaps.family.skew_hamiltonian import chi, defects, diagnosis, is_generic
 
 t = fmpq_poly([0, 1])
@@ -157,6 +157,18 @@ def test_a_member_in_dimension_sixteen_is_drawn_in_a_moment(draw):
     start = time.perf_counter()
     draw()
     assert time.perf_counter() - start < 5  # measured: 0.03 s; solving for the space of cubics would take minutes
+
+
+@pytest.mark.parametrize("m", [1, 2, 5, MAX_M])
+def test_random_eigenvalues_are_distinct_nonzero_integers_of_small_size(m):
+    drawn = [random_eigenvalues(m, seed) for seed in range(50)]
+    assert {len(set(values)) for values in drawn} == {m}
+    assert {abs(value) for values in drawn for value in values} <= set(range(1, m + 2))
+
+
+def test_random_eigenvalues_are_determined_by_the_seed():
+    assert random_eigenvalues(5, 3) == random_eigenvalues(5, 3)
+    assert random_eigenvalues(5, 3) != random_eigenvalues(5, 4)
 
 
 # What is refused.

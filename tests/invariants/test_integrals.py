@@ -10,9 +10,11 @@ from fractions import Fraction
 
 import pytest
 from check_helpers import (
+    Dual,
     claim,
     combined_rows,
     determinant,
+    dot,
     exact,
     function_value,
     hamiltonian_of,
@@ -20,21 +22,26 @@ from check_helpers import (
     kahan_step,
     modified_value,
     polynomial_value,
+    rank_by_elimination,
+    rows_of,
     slope,
     solve_by_elimination,
+    times,
+    transposed,
     unit,
 )
-from flint import fmpq
+from flint import fmpq, fmpq_poly
 from helpers import fraction, over_exact_fields, points, rationals
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.errors import BadPrime, InputError, SingularStep
-from kahanmaps.family.draw import draw_with_eigenvalues
-from kahanmaps.invariants.integrals import ClaimedIntegral, ModifiedHamiltonian, PaperIntegral
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.hamiltonian import CubicHamiltonian
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 some = settings(max_examples=40)
 nonzero = rationals(6).filter(lambda eps: eps != 0)
@@ -218,6 +225,56 @@ def test_the_map_of_h1_does_not_conserve_the_papers_integral_of_h0():
     x, eps = tuple(fmpq(k, 3) for k in (1, -2, 4, 1)), fmpq(1, 7)
     integral, image = PaperIntegral(first), KahanMap(second.system, eps).step(x)
     assert integral.value(QQ, eps, image) != integral.value(QQ, eps, x)
+
+
+def gradients(member: FamilyMember, x: tuple[Fraction, ...], eps: Fraction) -> list[list[Fraction]]:
+    """The gradients of x^T J (A^T)^k x~ for k < m, x~ the image of x, from dual numbers."""
+    rows: list[list[Fraction]] = [[] for _ in range(member.m)]
+    for j in range(member.dim):
+        moved = [Dual(entry, Fraction(int(i == j))) for i, entry in enumerate(x)]
+        image = kahan_step(member.chosen.system, eps, moved)
+        assert image is not None
+        matrix = rows_of(standard_structure(member.dim))
+        for row in rows:
+            row.append(dot(moved, [dot(line, image) for line in matrix]).b)
+            matrix = times(matrix, transposed(rows_of(member.A)))
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("member", "rank"),
+    [
+        (draw_with_eigenvalues([1, -2, 3], seed=3), 3),
+        (draw_with_chi(fmpq_poly([1, 1, 0, 1]), seed=3), 3),  # irreducible
+        (draw_with_chi(fmpq_poly([2, -2, -1, 1]), seed=3), 3),  # (t - 1)(t^2 - 2)
+        (draw_with_eigenvalues([1, 1, 3], seed=3), 2),  # A satisfies an equation of degree 2
+    ],
+    ids=["split", "irreducible", "partly split", "eigenvalue twice"],
+)
+def test_a_generic_member_has_m_independent_integrals_from_the_commutant(member, rank):
+    x = exact("1/2", "-1/3", 1, 2, "2/5", -1)
+    assert rank_by_elimination(gradients(member, x, Fraction(1, 7))) == rank
+
+
+@pytest.mark.parametrize("power", [1, 2])
+def test_an_integral_of_the_commutant_is_what_its_formula_says(power):
+    member, eps = draw_with_chi(fmpq_poly([1, 1, 0, 1]), seed=3), fmpq(1, 7)
+    x = tuple(fmpq(k, 3) for k in (1, -2, 4, 1, 5, -1))
+    image = kahan_step(member.chosen.system, fraction(eps), exact(*x))
+    assert image is not None
+    matrix = rows_of(standard_structure(6))
+    for _ in range(power):
+        matrix = times(matrix, transposed(rows_of(member.A)))
+    expected = dot(exact(*x), [dot(line, image) for line in matrix]) / fraction(eps)
+    assert fraction(CommutantIntegral(member.chosen.hamiltonian, member.A, power).value(QQ, eps, x)) == expected
+
+
+@pytest.mark.parametrize(("power", "matrix"), [(1, "A^T"), (2, "(A^T)^2")])
+def test_an_integral_of_the_commutant_is_called_after_the_power(power, matrix):
+    member = draw_with_eigenvalues([1, -2, 3], seed=3)
+    integral = CommutantIntegral(member.chosen.hamiltonian, member.A, power)
+    assert integral.name == f"H~_{power}"
+    assert integral.formula == f"H~_{power} = eps^(-1) x^T J {matrix} x~"
 
 
 # Claimed functions

@@ -75,6 +75,18 @@ def test_hamiltonian_maps_preserve_the_determinant_density(drawn, eps):
     assert after == fraction(phi.value(QQ, eps, x)) * determinant(jacobian)
 
 
+@some
+@given(hamiltonian_with_point(), nonzero, st.data())
+def test_for_hamiltonian_maps_the_determinants_agree_at_any_two_points(drawn, eps, data):
+    # det(I - eps f') is even in eps: the law, with dPhi multiplied out, holds for any two points x and y in place of
+    # x and x~. The map enters through the formula for dPhi alone.
+    hamiltonian, x = drawn
+    y = data.draw(points(hamiltonian.dim, rationals(9)))
+    above, below = jacobian_determinant_sides(KahanMap(hamiltonian.system, eps), x, y)
+    phi = DeterminantDensity(hamiltonian.system)
+    assert phi.value(QQ, eps, y) * below == phi.value(QQ, eps, x) * above
+
+
 @pytest.mark.parametrize(
     ("system", "phi"),
     [

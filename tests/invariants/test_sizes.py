@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from check_helpers import claim, hamiltonian_of, hamiltonians, system_of
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
-from helpers import HENON_HEILES, LOTKA_VOLTERRA, rationals, systems
+from helpers import HENON_HEILES, LOTKA_VOLTERRA, matrices, rationals, systems
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -24,9 +24,18 @@ from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, 
 from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.preserve import density_identity, jacobi_identity, transformation_identity
-from kahanmaps.invariants.integrals import ClaimedIntegral, ModifiedHamiltonian, PaperIntegral
+from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity
-from kahanmaps.invariants.sizes import ONE, VARIABLE, Size, determinant_size, eps_size, polynomial_size, step_size
+from kahanmaps.invariants.sizes import (
+    ONE,
+    VARIABLE,
+    Size,
+    determinant_size,
+    eps_size,
+    polynomial_size,
+    step_size,
+)
+from kahanmaps.invariants.sizes import Fraction as SizeFraction
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -270,6 +279,46 @@ def test_a_generic_system_attains_the_degree_of_two_steps_at_a_fixed_eps():
     assert degree(below) == step_size(GENERIC, size, step_size(GENERIC, size, VARIABLE)).degree
 
 
+# One large row, one large part of a row, large denominators: nothing makes up for a row that is left out.
+LOPSIDED = [
+    system_of("x y", "10^30*x^2", "x + y"),
+    system_of("x y", "x + y", "10^30*x*y"),
+    system_of("x y z", "x", "10^30*(y^2 + x*z)", "z"),
+    system_of("x y z", "x", "y", "10^30*(z^2 - x*y)"),
+    system_of("x y", "10^30*(x - y)", "y^2"),
+    system_of("x y", "y^2", "10^30*(x - y)"),
+    system_of("x y", "10^30", "1"),
+    system_of("x y", "1", "10^30"),
+    system_of("x y", "x^2/(10^30 + 57)", "y^2/(10^30 + 57)"),
+    system_of("x y", "x/(10^30 + 57)", "y/(10^15 + 37)"),
+    system_of("x y", "1/(10^30 + 57)", "0"),
+]
+
+
+@pytest.mark.parametrize("eps", [None, fmpq(2, 3), fmpq(10**20, 3), fmpq(3, 10**20)])
+@pytest.mark.parametrize("system", LOPSIDED)
+def test_a_system_with_one_large_part_is_bounded(system, eps):
+    written = Written(system, eps)
+    size, X, W = eps_size(eps), written.x, written.one
+    for at in (VARIABLE, step_size(system, eps_size(eps), VARIABLE)):
+        bound = determinant_size(system, size, at)
+        for sign in (1, -1):
+            within(leibniz(written.matrix(X, W, sign)), bound.above)
+        within((written.q * written.L * W) ** written.n, bound.below)
+        X, W = written.step(X, W)
+        for polynomial in (*X, W):
+            within(polynomial, step_size(system, size, at))
+
+
+def test_the_equation_of_two_fractions_is_the_larger_of_the_cross_products():
+    # By hand: a/b = c/d is a d - c b = 0.
+    small, large = Size(1, 2.0), Size(10, 50.0)
+    assert SizeFraction(large, small).equation(SizeFraction(small, large)).degree == 20
+    assert SizeFraction(small, large).equation(SizeFraction(large, small)).degree == 20
+    assert SizeFraction(large, small).equation(SizeFraction(small, large)).bits == pytest.approx(100, abs=ROUNDING)
+    assert SizeFraction(small, small).equation(SizeFraction(small, small)) == Size(2, 5.0)
+
+
 def test_a_smaller_size_would_not_bound_the_step():
     written = Written(HENON_HEILES, None)
     _, below = written.step(written.x, written.one)
@@ -326,7 +375,12 @@ def test_conservation_of_modified_h_is_bounded(hamiltonian, eps):
     written = Written(hamiltonian.system, eps)
     image = written.step(written.x, written.one)
     after, before = modified(written, hamiltonian, *image), modified(written, hamiltonian, written.x, written.one)
-    identity = conservation(hamiltonian.system, ModifiedHamiltonian(hamiltonian), eps)
+    size, integral = eps_size(eps), ModifiedHamiltonian(hamiltonian)
+    at_image = integral.size(size, step_size(hamiltonian.system, size, VARIABLE))
+    for values, bound in ((before, integral.size(size, VARIABLE)), (after, at_image)):
+        within(values[0], bound.above)
+        within(values[1], bound.below)
+    identity = conservation(hamiltonian.system, integral, eps)
     within(after[0] * before[1], identity.equation)
     within(before[0] * after[1], identity.equation)
     assert degree(image[1] * after[1] * before[1]) <= identity.poles
@@ -365,7 +419,29 @@ def test_conservation_of_the_papers_integral_is_bounded(hamiltonian, system, eps
         return written.q * (X[0] * image[1] - X[1] * image[0]), written.p * W * below
 
     after, before = paper(*written.step(written.x, written.one)), paper(written.x, written.one)
+    bound = PaperIntegral(hamiltonian).size(eps_size(eps), VARIABLE)
+    within(before[0], bound.above)
+    within(before[1], bound.below)
     identity = conservation(system, PaperIntegral(hamiltonian), eps)
+    within(after[0] * before[1] - before[0] * after[1], identity.equation)
+
+
+@few
+@given(hamiltonians(dims=(2,), homogeneous=True, standard=True), matrices(2, 2), systems(dims=(2,)), some_eps)
+def test_conservation_of_an_integral_of_the_commutant_is_bounded(hamiltonian, A, system, eps):
+    written, foreign = Written(system, eps), Written(hamiltonian.system, eps)
+    numerators, d = (hamiltonian.J * (A * A).transpose()).numer_denom()
+
+    def value(X, W):
+        image, below = foreign.step(X, W)
+        above = sum((numerators[i, j] * X[i] * image[j] for i in range(2) for j in range(2)), 0 * W)
+        return written.q * above, written.p * d * W * below
+
+    after, before = value(*written.step(written.x, written.one)), value(written.x, written.one)
+    bound = CommutantIntegral(hamiltonian, A, 2).size(eps_size(eps), VARIABLE)
+    within(before[0], bound.above)
+    within(before[1], bound.below)
+    identity = conservation(system, CommutantIntegral(hamiltonian, A, 2), eps)
     within(after[0] * before[1] - before[0] * after[1], identity.equation)
 
 
@@ -399,13 +475,19 @@ CLAIMS = [
 ]
 
 
-@pytest.mark.parametrize("eps", [None, fmpq(-3, 7)])
+@pytest.mark.parametrize("eps", [None, fmpq(-3, 7), fmpq(10**9 + 7, 998244353)])
 @pytest.mark.parametrize("text", CLAIMS)
 def test_conservation_of_a_claimed_function_is_bounded(text, eps):
     function = claim(text, "x y")
     written = Written(LOTKA_VOLTERRA, eps)
     image = written.step(written.x, written.one)
     after, before = claimed(written, function, *image), claimed(written, function, written.x, written.one)
+    size = eps_size(eps)
+    for claimed_as in (ClaimedIntegral("I", function), ClaimedDensity(function)):
+        at_image = claimed_as.size(size, step_size(LOTKA_VOLTERRA, size, VARIABLE))
+        for values, bound in ((before, claimed_as.size(size, VARIABLE)), (after, at_image)):
+            within(values[0], bound.above)
+            within(values[1], bound.below)
     identity = conservation(LOTKA_VOLTERRA, ClaimedIntegral("I", function), eps)
     within(after[0] * before[1] - before[0] * after[1], identity.equation)
     assert degree(image[1] * after[1] * before[1]) <= identity.poles

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from itertools import count
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,6 +12,9 @@ from kahanmaps_cli.options import check_options, load_system, settings_from, sys
 from kahanmaps_cli.params import NameValue
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
+
+if TYPE_CHECKING:
+    from kahanmaps.systems.files import SystemFile
 
 
 @click.command("check-integrals")
@@ -41,13 +46,20 @@ def command(system: str | None, integrals: tuple[tuple[str, str], ...], **option
     from kahanmaps.algebra.text import parse_rational_function
     from kahanmaps.checks.conserve import check_integrals
 
-    progress = Progress(options["quiet"])
-    settings = settings_from(options, progress)
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
-    extra = {
-        name or f"I{k}": parse_rational_function(text, (*file.variables, "eps"), file.parameters)
-        for k, (name, text) in enumerate(integrals, start=1)
-    }
-    report = check_integrals(file, settings, extra)
-    progress.done()
+    with Progress(options["quiet"]) as progress:
+        settings = settings_from(options, progress)
+        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        names = (*file.variables, "eps")
+        extra = {name: parse_rational_function(text, names, file.parameters) for name, text in _named(integrals, file)}
+        report = check_integrals(file, settings, extra)
     return print_report(report, options["as_json"], options["verbose"])
+
+
+def _named(integrals: Sequence[tuple[str, str]], file: SystemFile) -> list[tuple[str, str]]:
+    """The claims with their names; those without one are called I1, I2, ..., as far as these are free."""
+    taken = [*file.integrals, *(name for name, _ in integrals if name)]
+    for name in taken:
+        if taken.count(name) > 1:
+            raise click.UsageError(f"found two integrals of the name {name}, expected a name of its own for each")
+    free = (f"I{k}" for k in count(1) if f"I{k}" not in taken)
+    return [(name or next(free), text) for name, text in integrals]

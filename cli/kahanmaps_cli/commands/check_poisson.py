@@ -28,9 +28,8 @@ def command(system: str | None, **options: Any) -> int:
     """
     from kahanmaps.checks.preserve import check_poisson
 
-    progress = Progress(options["quiet"])
-    settings = settings_from(options, progress)
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
-    report = check_poisson(file, settings)
-    progress.done()
+    with Progress(options["quiet"]) as progress:
+        settings = settings_from(options, progress)
+        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        report = check_poisson(file, settings)
     return print_report(report, options["as_json"], options["verbose"])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.options import load_system
+from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import on_terminal, print_json, shorten
 
 if TYPE_CHECKING:
@@ -57,12 +58,15 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
     from kahanmaps.family.skew_hamiltonian import diagnosis
     from kahanmaps.systems.files import SystemFile
 
+    output = None if output == "-" else output
+    if name is not None and not name.isprintable():
+        raise click.UsageError(f"found --name {name!r}, expected printable text")
     member = _with_signs(_draw(**options), signs)
-    file = SystemFile.from_member(member, name or (Path(output).stem if output else "member"))
+    file = SystemFile.from_member(member, name or (_file_name(Path(output).stem) if output else "member"))
     _write(file, output)
     if not quiet:
         where = f"{output}: " if output else ""
-        click.echo(f"{where}dimension {member.dim}; {diagnosis(member.A)}", err=True)
+        say(f"{where}dimension {member.dim}; {diagnosis(member.A)}")
 
 
 @command.command("show")
@@ -177,7 +181,7 @@ def associated(system: str, write_to: str | None, as_json: bool) -> None:
         if write_to is not None:
             Path(write_to).mkdir(parents=True, exist_ok=True)
             text = "".join("p" if sign > 0 else "m" for sign in associate.signs)
-            path = Path(write_to) / f"{file.name}-{text}.toml"
+            path = Path(write_to) / f"{_file_name(file.name)}-{text}.toml"
             one = FamilyMember(member.A, member.H, associate.signs)
             _write(SystemFile.from_member(one, path.stem), str(path))
             row["file"] = str(path)
@@ -273,6 +277,11 @@ def _write(file: SystemFile, output: str | None) -> None:
         return
     with open(output, "w", encoding="utf-8") as stream:
         stream.write(file.to_toml())
+
+
+def _file_name(name: str) -> str:
+    """The name with everything replaced that might lead out of a folder, or that no file should be called."""
+    return "".join(c if c.isalnum() or c in "._+-" else "_" for c in name)
 
 
 def _rows(matrix: fmpq_mat) -> list[list[str]]:

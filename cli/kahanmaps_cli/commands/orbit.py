@@ -13,11 +13,12 @@ from typing import IO, TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
-from kahanmaps_cli.orbit_formats import Csv, JsonLines, Npz, Text, Writer
+from kahanmaps_cli.orbit_formats import Csv, JsonLines, Npz, OutputFull, Text, Writer
 from kahanmaps_cli.params import Arithmetic, NameValue, PointText, Steps
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
+    from kahanmaps.algebra.polynomials import RationalFunction
     from kahanmaps.maps.orbits import OrbitEnd
     from kahanmaps.systems.files import SystemFile
 
@@ -70,28 +71,34 @@ def command(system: str | None, form: str | None, output: str | None, quiet: boo
         raise click.UsageError("give --steps N or --at N1,N2,..., one of the two")
     if steps is not None and steps < 0:
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
+    if at is not None and every != 1:
+        raise click.UsageError("give --at N1,N2,... or --every K, not both")
     if every < 1:
         raise click.UsageError(f"found --every {every}, expected at least 1")
     if options["max_digits"] is not None and options["max_digits"] < 1:
         raise click.UsageError(f"found --max-digits {options['max_digits']}, expected at least 1")
+    from kahanmaps.maps.orbits import OrbitEnd
+
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     run = _Run(file, eps, options)
+    output = None if output == "-" else output
     form = form or _form_from_name(output)
     wanted = set(at) if at is not None else None
-    progress = Progress(quiet)
-    with _opened(output, form) as stream, _ctrl_c(run.interrupt):
+    with _opened(output, form) as stream, _signals(run.interrupt), Progress(quiet) as progress:
         writer = _writer(form, stream, run, to_file=output is not None)
         writer.header(run.header())
-        for step, texts, values in run.points(lambda k: k in wanted if wanted is not None else k % every == 0):
-            progress(f"step {step} of {run.steps}")
-            if texts is not None:
-                writer.point(step, texts, values)
-        end = run.end
-        progress.done()
+        try:
+            for step, texts, values in run.points(lambda k: k in wanted if wanted is not None else k % every == 0):
+                progress(f"step {step} of {run.steps}")
+                if texts is not None:
+                    writer.point(step, texts, values)
+            end = run.end
+        except OutputFull as full:
+            end = OrbitEnd("budget", full.steps, str(full))
         writer.end(_end_record(end))
     if not quiet and (output is not None or end.status not in _STATUS):
         where = f"{output}: " if output is not None else ""
-        click.echo(f"{where}{end.status}: {end.message}", err=True)
+        say(f"{where}{end.status}: {end.message}")
     return _STATUS.get(end.status, 3)
 
 
@@ -125,6 +132,10 @@ class _Run:
             self.storage = "int" if self.kind == "mod" and number < 2**63 else "text"
             self.field = field
         self._add_integrals(options["integrals"])
+        names = ["step", *file.variables, *(name for name, _ in self.columns)]
+        for name in names:
+            if names.count(name) > 1:
+                raise click.UsageError(f"found two columns of the name {name}: write --integral NAME=EXPR")
 
     def interrupt(self) -> None:
         self.orbit.interrupt()
@@ -171,7 +182,6 @@ class _Run:
 
     def _add_integrals(self, requests: Sequence[tuple[str, str]]) -> None:
         from kahanmaps.algebra.text import parse_rational_function
-        from kahanmaps.invariants.integrals import ClaimedIntegral
 
         for k, (name, text) in enumerate(requests, start=1):
             if text == "known" and not name:
@@ -182,28 +192,33 @@ class _Run:
             else:
                 name = name or (text if len(text) <= 30 else f"I{k}")
                 function = parse_rational_function(text, (*self.file.variables, "eps"), self.file.parameters)
-            if self.kind == "float":
-                from kahanmaps.maps.fast import float_function
-
-                self.columns.append((name, _float_column(float_function(function), float(self.orbit.map.eps))))
-            else:
-                self.columns.append((name, self._exact_column(ClaimedIntegral(name, function))))
+            self._add_function(name, function)
 
     def _add_known(self) -> None:
         from kahanmaps.checks.conserve import known_integrals
         from kahanmaps.errors import InputError
-        from kahanmaps.invariants.integrals import ClaimedIntegral
 
         known = [integral for integral, _, _ in known_integrals(self.file)]
-        claimed = [ClaimedIntegral(name, function) for name, function in self.file.integrals.items()]
-        if not known and not claimed:
+        if not known and not self.file.integrals:
             raise InputError(f"--integral known: no integral of {self.file.name} is known or claimed")
-        if self.kind == "float":
+        if known and self.kind == "float":
             raise InputError(
                 "--integral known needs exact, mod:P or ball:BITS arithmetic; give an expression for float"
             )
-        for integral in [*known, *claimed]:
+        for integral in known:
             self.columns.append((integral.name, self._exact_column(integral)))
+        for name, function in self.file.integrals.items():
+            self._add_function(name, function)
+
+    def _add_function(self, name: str, function: RationalFunction) -> None:
+        from kahanmaps.invariants.integrals import ClaimedIntegral
+
+        if self.kind == "float":
+            from kahanmaps.maps.fast import float_function
+
+            self.columns.append((name, _float_column(float_function(function), float(self.orbit.map.eps))))
+        else:
+            self.columns.append((name, self._exact_column(ClaimedIntegral(name, function))))
 
     def _exact_column(self, integral: Any) -> Callable[[Sequence[Any]], str | None]:
         from kahanmaps.errors import KahanmapsError
@@ -253,8 +268,14 @@ def _form_from_name(output: str | None) -> str:
 @contextmanager
 def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
     if output is not None:
-        with open(output, "wb" if form == "npz" else "w", encoding=None if form == "npz" else "utf-8") as stream:
-            yield stream
+        binary = form == "npz"
+        encoding, errors = (None, None) if binary else ("utf-8", "backslashreplace")
+        try:
+            with open(output, "wb" if binary else "w", encoding=encoding, errors=errors) as stream:
+                yield stream
+        except OSError as error:  # a full disk comes without a name
+            error.filename = error.filename or output
+            raise
     elif form != "npz":
         yield sys.stdout
     elif sys.stdout.isatty():
@@ -268,15 +289,16 @@ def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
 
 
 @contextmanager
-def _ctrl_c(interrupt: Callable[[], None]) -> Iterator[None]:
-    """The first Ctrl-C ends the orbit after the step in flight, the second one at once."""
+def _signals(interrupt: Callable[[], None]) -> Iterator[None]:
+    """The first Ctrl-C or SIGTERM ends the orbit after the step in flight, the second one at once."""
 
     def handler(signum: int, frame: Any) -> None:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signum, signal.default_int_handler)
         interrupt()
 
-    previous = signal.signal(signal.SIGINT, handler)
+    previous = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for number, action in previous.items():
+            signal.signal(number, action)

@@ -25,12 +25,14 @@ def command(name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: 
     """
     from kahanmaps.systems.catalog import load, names
 
+    if as_toml and as_json:
+        raise click.UsageError("give --toml or --json, one of the two")
     if name is None:
         if as_toml or parameters:
             raise click.UsageError("--toml and -p need the NAME of a system")
         rows = [(key, load(key)) for key in names()]
         if as_json:
-            print_json({"systems": [_summary(key, file) for key, file in rows]})
+            print_json({"systems": [_summary(file) for _, file in rows]})
             return
         width = max(len(key) for key, _ in rows)
         for key, file in rows:
@@ -40,14 +42,14 @@ def command(name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: 
     if as_toml:
         click.echo(file.to_toml(), nl=False)
     elif as_json:
-        print_json({**_summary(name, file), **_equations(file), "document": file.document})
+        print_json({**_summary(file), **_equations(file), "document": file.document})
     else:
         _show(file)
 
 
-def _summary(key: str, file: Any) -> dict[str, Any]:
+def _summary(file: Any) -> dict[str, Any]:
     return {
-        "name": key,
+        "name": file.name,
         "dim": file.system.dim,
         "kind": file.kind,
         "title": file.catalog.get("title", ""),

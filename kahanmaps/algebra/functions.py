@@ -1,0 +1,251 @@
+"""The field of rational functions Q(x1, ..., xn): where an identity can be expanded, and so be proved.
+
+FLINT has no fraction field of polynomials. Elements here are quotients that are never reduced by a gcd: sums look for a
+common denominator only where one divides the other, and equality is that of the cross products. That is right
+for expanding an identity once, and for nothing else. Work is counted beforehand and bounded by a budget.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly
+from flint.utils.flint_exceptions import DomainError
+
+from kahanmaps.algebra.fields import Field, rational
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.errors import KahanmapsError
+
+DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words
+
+
+class BudgetExceeded(KahanmapsError):
+    """Expanding would take more products of terms than the budget allows."""
+
+
+class FunctionField(Field):
+    """Q(names). Elements are `Function`, matrices `FunctionMatrix`; `budget` bounds the products of terms in all.
+
+    >>> K = FunctionField(["x", "y"])
+    >>> x, y = K.variables
+    >>> K.equal((x * x - y * y) / (x - y), x + y)
+    True
+    """
+
+    characteristic = 0
+
+    def __init__(self, names: Sequence[str], budget: int = DEFAULT_BUDGET) -> None:
+        self.name = f"QQ({', '.join(names)})"
+        self.context = ring(names)
+        self.budget = budget
+        self._one = self.context.constant(1)
+        self.variables = tuple(Function(self, generator, self._one) for generator in self.context.gens())
+
+    @property
+    def zero(self) -> Function:
+        return Function(self, self.context.constant(0), self._one)
+
+    @property
+    def one(self) -> Function:
+        return Function(self, self._one, self._one)
+
+    def convert(self, value: Any) -> Function:
+        if isinstance(value, Function):
+            return value
+        return Function(self, self.context.constant(rational(value)), self._one)
+
+    def random(self, rng: random.Random, height: int = 10) -> Function:
+        return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
+
+    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> FunctionMatrix:
+        return FunctionMatrix(self, rows, columns, [self.convert(entry) for entry in entries])
+
+    def is_zero(self, element: Function) -> bool:
+        return bool(element.above.is_zero())
+
+    def equal(self, left: Function, right: Function) -> bool:
+        return bool(self.times(left.above, right.below) == self.times(right.above, left.below))
+
+    def times(self, left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
+        """A product of polynomials, paid from the budget before it is computed. Raises BudgetExceeded."""
+        self.budget -= len(left) * len(right) + 1
+        if self.budget < 0:
+            raise BudgetExceeded("expanding the identity would take too many products of terms")
+        return left * right
+
+    def quotient(self, large: fmpq_mpoly, small: fmpq_mpoly) -> fmpq_mpoly | None:
+        """large / small where that is a polynomial, else None; paid for like a product."""
+        if small.is_constant():
+            return large / small.leading_coefficient()
+        if large.total_degree() < small.total_degree():
+            return None
+        self.budget -= len(large) * len(small)
+        if self.budget < 0:
+            raise BudgetExceeded("expanding the identity would take too many products of terms")
+        try:
+            return large / small
+        except DomainError:
+            return None
+
+
+class Function:
+    """A quotient of two polynomials in a `FunctionField`, not reduced."""
+
+    __slots__ = ("above", "below", "field")
+
+    def __init__(self, field: FunctionField, above: fmpq_mpoly, below: fmpq_mpoly) -> None:
+        self.field = field
+        self.above = above
+        self.below = below
+
+    def __add__(self, other: Function) -> Function:
+        if self.above.is_zero():
+            return other
+        if other.above.is_zero():
+            return self
+        if self.below == other.below:
+            return Function(self.field, self.above + other.above, self.below)
+        times = self.field.times
+        for small, large in ((self, other), (other, self)):
+            quotient = self.field.quotient(large.below, small.below)
+            if quotient is not None:
+                return Function(self.field, large.above + times(small.above, quotient), large.below)
+        above = times(self.above, other.below) + times(other.above, self.below)
+        return Function(self.field, above, times(self.below, other.below))
+
+    def __neg__(self) -> Function:
+        return Function(self.field, -self.above, self.below)
+
+    def __sub__(self, other: Function) -> Function:
+        return self + (-other)
+
+    def __mul__(self, other: Function) -> Function:
+        if self.above.is_zero() or other.above.is_zero():
+            return self.field.zero
+        times = self.field.times
+        return Function(self.field, times(self.above, other.above), times(self.below, other.below))
+
+    def __truediv__(self, other: Function) -> Function:
+        if other.above.is_zero():
+            raise ZeroDivisionError("division by the zero function")
+        return self * Function(self.field, other.below, other.above)
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, int) and other == 0:
+            return bool(self.above.is_zero())
+        return isinstance(other, Function) and self.field.equal(self, other)
+
+    __hash__ = None  # type: ignore[assignment]  # equal quotients may be written differently
+
+
+class FunctionMatrix:
+    """A matrix over a `FunctionField`, with the operations that the Kahan map needs."""
+
+    def __init__(self, field: FunctionField, rows: int, columns: int, entries: Sequence[Function]) -> None:
+        self.field = field
+        self._rows = rows
+        self._columns = columns
+        self._entries = list(entries)
+
+    def nrows(self) -> int:
+        return self._rows
+
+    def ncols(self) -> int:
+        return self._columns
+
+    def entries(self) -> list[Function]:
+        return list(self._entries)
+
+    def __getitem__(self, place: tuple[int, int]) -> Function:
+        return self._entries[place[0] * self._columns + place[1]]
+
+    def transpose(self) -> FunctionMatrix:
+        flipped = [self[i, j] for j in range(self._columns) for i in range(self._rows)]
+        return FunctionMatrix(self.field, self._columns, self._rows, flipped)
+
+    def __add__(self, other: FunctionMatrix) -> FunctionMatrix:
+        entries = [a + b for a, b in zip(self._entries, other._entries, strict=True)]
+        return FunctionMatrix(self.field, self._rows, self._columns, entries)
+
+    def __neg__(self) -> FunctionMatrix:
+        return FunctionMatrix(self.field, self._rows, self._columns, [-entry for entry in self._entries])
+
+    def __sub__(self, other: FunctionMatrix) -> FunctionMatrix:
+        return self + (-other)
+
+    def __mul__(self, other: Any) -> FunctionMatrix:
+        if not isinstance(other, FunctionMatrix):
+            factor = self.field.convert(other)
+            return FunctionMatrix(self.field, self._rows, self._columns, [entry * factor for entry in self._entries])
+        entries = []
+        for i in range(self._rows):
+            for j in range(other._columns):
+                total = self.field.zero
+                for k in range(self._columns):
+                    total = total + self[i, k] * other[k, j]
+                entries.append(total)
+        return FunctionMatrix(self.field, self._rows, other._columns, entries)
+
+    def det(self) -> Function:
+        """The determinant, by Bareiss' fraction-free elimination on rows cleared of denominators."""
+        rows, cleared = self._polynomial_rows()
+        value = _bareiss(self.field, rows)
+        return Function(self.field, value, cleared)
+
+    def solve(self, right: FunctionMatrix) -> FunctionMatrix:
+        """The solution X of self X = right (one column), by Cramer's rule. Raises ZeroDivisionError if singular."""
+        n = self._rows
+        wide = [self[i, j] if j < n else right[i, 0] for i in range(n) for j in range(n + 1)]
+        rows, _ = FunctionMatrix(self.field, n, n + 1, wide)._polynomial_rows()
+        below = _bareiss(self.field, [row[:n] for row in rows])
+        if below.is_zero():
+            raise ZeroDivisionError("singular matrix in solve()")
+        solution = []
+        for k in range(n):
+            replaced = [[*row[:k], row[n], *row[k + 1 : n]] for row in rows]
+            solution.append(Function(self.field, _bareiss(self.field, replaced), below))
+        return FunctionMatrix(self.field, n, 1, solution)
+
+    def _polynomial_rows(self) -> tuple[list[list[fmpq_mpoly]], fmpq_mpoly]:
+        """Each row times a common denominator of its entries, and the product of these denominators."""
+        rows, product = [], self.field.context.constant(1)
+        for i in range(self._rows):
+            row = [self[i, j] for j in range(self._columns)]
+            total = self.field.zero
+            for entry in row:  # the sum finds a common denominator where one divides the other
+                total = total + Function(self.field, self.field.context.constant(1), entry.below)
+            below = total.below
+            cleared = []
+            for entry in row:
+                quotient = self.field.quotient(below, entry.below)
+                if quotient is None:
+                    raise BudgetExceeded("the denominators of a row have no simple common multiple")
+                cleared.append(self.field.times(entry.above, quotient))
+            rows.append(cleared)
+            product = self.field.times(product, below)
+        return rows, product
+
+
+def _bareiss(field: FunctionField, matrix: list[list[fmpq_mpoly]]) -> fmpq_mpoly:
+    """The determinant of a square matrix of polynomials."""
+    rows = [list(row) for row in matrix]
+    n = len(rows)
+    previous = field.context.constant(1)
+    sign = 1
+    for k in range(n - 1):
+        pivot_row = min(
+            (i for i in range(k, n) if not rows[i][k].is_zero()), key=lambda i: len(rows[i][k]), default=None
+        )
+        if pivot_row is None:
+            return field.context.constant(0)
+        if pivot_row != k:
+            rows[k], rows[pivot_row] = rows[pivot_row], rows[k]
+            sign = -sign
+        for i in range(k + 1, n):
+            for j in range(k + 1, n):
+                value = field.times(rows[i][j], rows[k][k]) - field.times(rows[i][k], rows[k][j])
+                rows[i][j] = value if k == 0 else value / previous
+        previous = rows[k][k]
+    return rows[n - 1][n - 1] * sign

@@ -1,0 +1,101 @@
+"""The field Q(x, y, eps) in which identities are expanded: its laws, its matrices, its budget.
+
+A quotient is never reduced; what has to hold is that its value at rational points is right.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flint import fmpq, fmpq_mat
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
+from kahanmaps.algebra.polynomials import evaluate
+
+NAMES = ["x", "y"]
+small = st.integers(-4, 4)
+
+
+def value(function: Function, point: tuple[fmpq, ...]) -> fmpq | None:
+    below = evaluate(function.below, None, point)
+    return None if below == 0 else evaluate(function.above, None, point) / below
+
+
+def linear(field: FunctionField, a: int, b: int, c: int) -> Function:
+    x, y = field.variables
+    return x * field.convert(a) + y * field.convert(b) + field.convert(c)
+
+
+@st.composite
+def functions(draw, field: FunctionField) -> Function:
+    above = linear(field, draw(small), draw(small), draw(small)) * linear(field, draw(small), draw(small), draw(small))
+    below = linear(field, draw(small), draw(small), draw(st.integers(1, 4)))
+    return above / below
+
+
+FIELD = FunctionField(NAMES, budget=10**12)
+POINT = (fmpq(17, 5), fmpq(-23, 7))
+
+
+@given(functions(FIELD), functions(FIELD))
+def test_sums_differences_and_products_have_the_values_of_numbers(f, g):
+    a, b = value(f, POINT), value(g, POINT)
+    assert value(f + g, POINT) == a + b
+    assert value(f - g, POINT) == a - b
+    assert value(f * g, POINT) == a * b
+
+
+@given(functions(FIELD), functions(FIELD))
+def test_quotients_have_the_values_of_numbers(f, g):
+    if FIELD.is_zero(g):
+        with pytest.raises(ZeroDivisionError):
+            f / g
+    elif value(g, POINT) != 0:
+        assert value(f / g, POINT) == value(f, POINT) / value(g, POINT)
+
+
+@given(functions(FIELD), functions(FIELD))
+def test_equality_is_that_of_cross_products(f, g):
+    assert FIELD.equal(f * g, g * f)
+    assert FIELD.equal(f + g - g, f)
+    assert not FIELD.equal(f + FIELD.one, f)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_determinant_and_solution_agree_with_numbers(n):
+    x, y = FIELD.variables
+    entries = [
+        linear(FIELD, (3 * i + j) % 5 - 2, (i * j) % 3 - 1, 1 + i + 2 * j) / (x + FIELD.convert(1 + (i + j) % 2))
+        for i in range(n)
+        for j in range(n)
+    ]
+    matrix, right = FIELD.matrix(n, n, entries), FIELD.column([y + FIELD.convert(i) for i in range(n)])
+    numbers = fmpq_mat(n, n, [value(entry, POINT) for entry in entries])
+    assert numbers.det() != 0
+    assert value(matrix.det(), POINT) == numbers.det()
+    expected = numbers.solve(fmpq_mat(n, 1, [POINT[1] + i for i in range(n)])).entries()
+    assert [value(entry, POINT) for entry in matrix.solve(right).entries()] == expected
+
+
+def test_a_singular_matrix_is_refused():
+    x, y = FIELD.variables
+    with pytest.raises(ZeroDivisionError):
+        FIELD.matrix(2, 2, [x, y, x * x, x * y]).solve(FIELD.column([x, y]))
+    assert FIELD.is_zero(FIELD.matrix(2, 2, [x, y, x * x, x * y]).det())
+
+
+def test_a_pivot_that_vanishes_is_exchanged():
+    x, y = FIELD.variables
+    zero = FIELD.zero
+    assert FIELD.equal(FIELD.matrix(2, 2, [zero, x, y, zero]).det(), -(x * y))
+
+
+def test_the_budget_is_spent_before_the_work_is_done():
+    field = FunctionField(NAMES, budget=1000)
+    x, y = field.variables
+    power = x + y + field.one
+    while len(power.above) ** 2 + 100 < field.budget:
+        power = power * power
+    with pytest.raises(BudgetExceeded):
+        _ = power * power * power * power

@@ -1,0 +1,81 @@
+"""Proof by expansion: it proves what is true, refuses what is false, and gives up where its budget ends."""
+
+from __future__ import annotations
+
+import pytest
+from flint import fmpq
+
+from kahanmaps import QuadraticSystem, check_integrals, check_measure, load, parse_rational_function
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.checks import judge
+from kahanmaps.checks.commute import commutativity
+from kahanmaps.checks.conserve import conservation
+from kahanmaps.checks.expand import NotEqual, expansion
+from kahanmaps.checks.settings import Settings
+from kahanmaps.invariants.integrals import ClaimedIntegral
+
+TOP = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
+CONSERVED = "(1 - eps^2*y^2)/(1 + 2*eps^2*z^2)"
+AT_ONE_TENTH = "(1 - y^2/100)/(1 + 2*z^2/100)"
+
+
+def identity(claim: str, eps: fmpq | None):
+    function = parse_rational_function(claim, ["x", "y", "z", "eps"])
+    return conservation(TOP, ClaimedIntegral("I", function), eps)
+
+
+def test_a_conserved_quantity_is_proved_for_every_eps():
+    evidence = expansion(identity(CONSERVED, None))
+    assert evidence is not None
+    assert evidence.data["eps"] == "every"
+
+
+def test_a_quantity_conserved_at_one_eps_is_proved_there_and_nowhere_else():
+    assert expansion(identity(AT_ONE_TENTH, fmpq(1, 10))) is not None
+    with pytest.raises(NotEqual):
+        expansion(identity(AT_ONE_TENTH, None))
+    with pytest.raises(NotEqual):
+        expansion(identity(AT_ONE_TENTH, fmpq(1, 9)))
+
+
+@pytest.mark.parametrize(
+    "claim",
+    ["2*x^2 + y^2", "(1 - eps^2*y^2)/(1 + 2*eps^2*z^2) + eps^9*x", "(1 - eps^2*y^2)/(1 + 2*eps^2*z^2 + 1/10^40*x^2)"],
+)
+def test_a_quantity_that_is_not_conserved_is_never_proved(claim):
+    with pytest.raises(NotEqual):
+        expansion(identity(claim, None))
+
+
+def test_a_small_budget_ends_without_an_answer():
+    assert expansion(identity(CONSERVED, None), budget=100) is None
+
+
+def test_expansion_agrees_with_the_value_at_a_point():
+    left, right = identity(CONSERVED, None).at(QQ, (fmpq(1, 2), fmpq(-1, 3), fmpq(2)), fmpq(1, 7))
+    assert left == right
+
+
+def test_a_map_commutes_with_its_inverse_and_not_with_another():
+    names = ("f", "g")
+    assert expansion(commutativity(TOP, TOP.scaled(-1), None, names)) is not None
+    other = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "z*x", "x*y"])
+    with pytest.raises(NotEqual):
+        expansion(commutativity(TOP, other, None, names))
+
+
+def test_claims_of_the_catalogue_are_proved_by_expansion():
+    (first, second) = check_integrals(load("euler_top"), Settings(steps=2)).findings
+    assert (first.verdict, first.evidence.method) == ("proved", "expansion")
+    assert (second.verdict, second.evidence.method) == ("proved", "expansion")
+    (finding,) = check_measure(load("lotka_volterra"), Settings(steps=2)).findings
+    assert (finding.verdict, finding.evidence.method) == ("proved", "expansion")
+
+
+def test_an_expansion_that_contradicts_the_points_is_an_error_of_ours(monkeypatch):
+    def different(identity):
+        raise NotEqual("made up")
+
+    monkeypatch.setattr(judge, "expansion", different)
+    with pytest.raises(judge.Contradiction, match="made up"):
+        check_integrals(load("euler_top"), Settings(steps=2))

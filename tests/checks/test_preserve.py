@@ -1,0 +1,428 @@
+"""Invariant measures dx/phi and the Poisson tensor Pi(x) = J - eps^2 f'(x)^2 J.
+
+phi = det(I - eps f') is proved for every cubic Hamiltonian and every constant skew J; claimed densities are decided.
+Pi is proved for generic members of the family and in dimension 2, decided where A has repeated roots, and refuted for a
+generic Hamiltonian in dimension 4. Witnesses are computed a second time, det dPhi and dPhi from dual numbers.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from check_helpers import (
+    QUICK,
+    claim,
+    combined_rows,
+    determinant,
+    exact,
+    file_of,
+    function_value,
+    hamiltonian_of,
+    hamiltonians,
+    kahan_jacobian,
+    kahan_step,
+    member_of,
+    only,
+    slope,
+    system_of,
+    tensor,
+    times,
+    transposed,
+    unit,
+    verdicts,
+    verify_witness,
+)
+from flint import fmpq, fmpq_mat, fmpq_poly
+from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA
+from hypothesis import given, settings
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.checks import judge, preserve, theorems
+from kahanmaps.checks.claims import Finding, Verdict
+from kahanmaps.checks.judge import Contradiction
+from kahanmaps.checks.preserve import check_measure, check_poisson
+from kahanmaps.checks.settings import Settings
+from kahanmaps.errors import InputError
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.invariants import poisson
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+PROVED, REFUTED, SUPPORTED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED
+few = settings(max_examples=15)
+
+PLANE = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
+ODD = hamiltonian_of("x y z", "x^3/3 - x*y*z + z^2/2 + y", [[0, 1, 2], [-1, 0, 1], [-2, -1, 0]])
+GENERIC = hamiltonian_of("x y z w", "x^3 + y^2*w - 2*x*z*w + z^3 + x*y*z + w^3/3")
+SINGULAR = hamiltonian_of("x y z w", "x^2*w - y^3 + z*x + w", [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]])
+HAMILTONIANS = {"plane": PLANE, "odd": ODD, "generic": GENERIC, "singular J": SINGULAR}
+over_hamiltonians = pytest.mark.parametrize("hamiltonian", HAMILTONIANS.values(), ids=HAMILTONIANS.keys())
+
+MEMBERS = {
+    "m=1": draw_with_eigenvalues([2], seed=3),
+    "m=2": draw_with_eigenvalues([1, -2], seed=3),
+    "m=2, irreducible": draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3),
+    "m=3": draw_with_eigenvalues([1, -2, 3], seed=3),
+    "m=3, (t-1)(t^2-2)": draw_with_chi(fmpq_poly([2, -2, -1, 1]), seed=3),
+    "m=4": draw_with_eigenvalues([1, -2, 3, 5], seed=3),
+    "m=4, irreducible": draw_with_chi(fmpq_poly([1, 1, 0, 0, 1]), seed=3),
+}
+over_members = pytest.mark.parametrize("member", MEMBERS.values(), ids=MEMBERS.keys())
+
+
+@pytest.fixture(autouse=True, scope="module")
+def claims_are_decided_at_points_alone():
+    """Proof by expansion, which makes many a supported claim a proved one, has its own tests in test_expand.py."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge, "expansion", lambda identity: None)
+        yield
+
+
+def file(hamiltonian: CubicHamiltonian) -> SystemFile:
+    return SystemFile.from_hamiltonian(hamiltonian)
+
+
+def at_witness(found: Finding, system: QuadraticSystem):
+    """x, eps, x~ of a witness, x~ computed anew."""
+    assert found.verdict is REFUTED
+    x, (eps,) = exact(*found.witness.point), exact(found.witness.eps)
+    image = kahan_step(system, eps, x)
+    assert image is not None
+    return x, eps, image
+
+
+# Densities
+
+
+@over_hamiltonians
+@pytest.mark.parametrize("eps", [None, "1/3", "-2"])
+def test_the_determinant_density_is_proved_for_every_constant_skew_j(hamiltonian, eps):
+    report = check_measure(file(hamiltonian), Settings(eps=eps, steps=2))
+    assert only(report).verdict is PROVED
+    assert only(report).formula == "phi = det(I - eps f'(x))"
+
+
+@few
+@given(hamiltonians(dims=(1, 2, 3)))
+def test_the_determinant_density_is_proved_and_no_point_contradicts_it(hamiltonian):
+    assert only(check_measure(file(hamiltonian), QUICK)).verdict is PROVED
+
+
+@over_members
+def test_the_determinant_density_of_every_member_is_proved(member):
+    assert only(check_measure(SystemFile.from_member(member), QUICK)).verdict is PROVED
+
+
+@over_hamiltonians
+def test_without_the_theorem_the_determinant_density_is_supported(hamiltonian, monkeypatch):
+    monkeypatch.setattr(theorems, "evidence", lambda theorem, hypotheses: None)
+    assert only(check_measure(file(hamiltonian), QUICK)).verdict is SUPPORTED
+
+
+def check_density(system: QuadraticSystem, phi: str, how: Settings = QUICK) -> Finding:
+    """The finding on a claimed density; a witness is verified with det dPhi from dual numbers."""
+    found = only(check_measure(file_of(system, phi=phi), how))
+    if found.verdict is REFUTED:
+        x, eps, image = at_witness(found, system)
+        function = claim(phi, " ".join(system.variables))
+        here = determinant(combined_rows(unit(system.dim), -eps, slope(system, x)))
+        there = determinant(combined_rows(unit(system.dim), eps, slope(system, image)))
+        after, before = function_value(function, image, eps), function_value(function, x, eps)
+        verify_witness(found.witness, [after * here], [before * there])
+        jacobian = kahan_jacobian(system, eps, x)
+        assert after != before * determinant(jacobian)
+    return found
+
+
+# (system, a density, why)
+DENSITIES = {
+    "Lotka-Volterra, Sanz-Serna": (LOTKA_VOLTERRA, "x*y"),
+    "its multiple": (LOTKA_VOLTERRA, "-3/7*eps*x*y"),
+    "a plane Hamiltonian, written out": (PLANE.system, "1 - 2*eps^2*q"),
+    "times a function of the integral of x' = 0": (system_of("x y", "0", "1"), "x^3 - 2"),
+    # phi_ij = (1 - eps^2 a_i a_j x_k^2) times another such factor: petrera-suris-euler
+    "Euler top": (EULER_TOP, "(1 - eps^2*x2^2)*(1 - eps^2*x2^2)"),
+    "Euler top, two factors": (EULER_TOP, "(1 - eps^2*x2^2)*(1 + 2*eps^2*x3^2)"),
+}
+
+
+@pytest.mark.parametrize(("system", "phi"), DENSITIES.values(), ids=DENSITIES.keys())
+def test_a_right_density_is_supported(system, phi):
+    found = check_density(system, phi)
+    assert found.verdict is SUPPORTED
+    assert int(found.evidence.data["error_bound"].split("^")[1]) <= -100
+
+
+@pytest.mark.parametrize(
+    ("system", "phi"),
+    [
+        (LOTKA_VOLTERRA, "1"),
+        (LOTKA_VOLTERRA, "x"),
+        (LOTKA_VOLTERRA, "1/(x*y)"),  # the density of dx dy / phi upside down
+        (LOTKA_VOLTERRA, "x*y + 1/10^50"),
+        (LOTKA_VOLTERRA, "x*y*(1 + eps^2/10^40*x)"),
+        (PLANE.system, "1"),  # the flow preserves dq dp
+        (PLANE.system, "1 - 4*eps^2*q"),
+        (PLANE.system, "1 + 2*eps^2*q"),
+        (FORCED_PLANE, "x*y"),
+        (LORENZ, "1"),
+        (EULER_TOP, "1 - eps^2*x2^2"),
+        (EULER_TOP, "(1 + eps^2*x2^2)*(1 + 2*eps^2*x3^2)"),
+    ],
+)
+def test_a_wrong_density_is_refuted(system, phi):
+    assert check_density(system, phi).verdict is REFUTED
+
+
+@pytest.mark.parametrize(("eps", "verdict"), [("1", SUPPORTED), ("1/2", REFUTED), (None, REFUTED)])
+def test_a_density_that_is_right_at_one_eps_is_supported_there_only(eps, verdict):
+    assert check_density(PLANE.system, "1 - 2*eps*q", Settings(eps=eps, steps=2)).verdict is verdict
+
+
+def test_the_density_of_the_file_and_that_of_the_caller_are_both_checked():
+    own = file_of(LOTKA_VOLTERRA, phi="x*y")
+    report = check_measure(own, QUICK, claim("x", "x y"))
+    assert verdicts(report) == [SUPPORTED, REFUTED]
+    assert report.verdict is REFUTED
+
+
+def test_a_system_without_any_density_is_wrong_use():
+    with pytest.raises(InputError, match="no density of f is known or claimed"):
+        check_measure(file_of(LORENZ))
+
+
+def test_the_density_zero_is_wrong_use():
+    with pytest.raises(InputError, match="found the density 0"):
+        check_measure(file_of(LORENZ), extra=claim("x - x", "x y z"))
+
+
+@pytest.mark.parametrize("names", [("x", "y"), ("y", "x", "eps")])
+def test_a_density_in_other_variables_is_wrong_use(names):
+    with pytest.raises(InputError, match="expected a rational function of x, y, eps"):
+        check_measure(file_of(LOTKA_VOLTERRA), extra=parse_rational_function("x", names))
+
+
+# The Poisson tensor
+
+
+def verify_law(found: Finding, hamiltonian: CubicHamiltonian) -> None:
+    """The law fails at the witness: the entry shown, and dPhi Pi(x) dPhi^T is not Pi(x~)."""
+    x, eps, image = at_witness(found, hamiltonian.system)
+    n = hamiltonian.dim
+    forward = combined_rows(unit(n), eps, slope(hamiltonian.system, image))
+    backward = combined_rows(unit(n), -eps, slope(hamiltonian.system, x))
+    left = times(forward, tensor(hamiltonian, eps, x), transposed(forward))
+    right = times(backward, tensor(hamiltonian, eps, image), transposed(backward))
+    i, j = (int(k) - 1 for k in found.witness.left_label.split("(", 1)[1].split(")", 1)[0].split(","))
+    verify_witness(found.witness, [left[i][j]], [right[i][j]])
+    jacobian = kahan_jacobian(hamiltonian.system, eps, x)
+    moved = times(jacobian, tensor(hamiltonian, eps, x), transposed(jacobian))
+    assert moved != tensor(hamiltonian, eps, image)
+
+
+def verify_jacobi(found: Finding, hamiltonian: CubicHamiltonian) -> None:
+    """The cyclic sum of the triple shown, with the derivatives of Pi from dual numbers."""
+    x, (eps,) = exact(*found.witness.point), exact(found.witness.eps)
+    n, Pi = hamiltonian.dim, tensor(hamiltonian, eps, x)
+    # Pi is of degree 2 in x: the central difference is the derivative.
+    moved = [[tuple(a + (i == l) * s for i, a in enumerate(x)) for s in (1, -1)] for l in range(n)]
+    up, down = ([tensor(hamiltonian, eps, points[k]) for points in moved] for k in (0, 1))
+    i, j, k = (int(a) - 1 for a in found.witness.left_label.split("(", 1)[1].split(")", 1)[0].split(","))
+
+    def along(a, b, c):
+        return sum((Pi[a][l] * (up[l][b][c] - down[l][b][c]) / 2 for l in range(n)), Fraction(0))
+
+    verify_witness(found.witness, [along(i, j, k) + along(j, k, i) + along(k, i, j)], [Fraction(0)])
+
+
+@over_members
+def test_the_tensor_of_a_generic_member_is_proved(member):
+    assert verdicts(check_poisson(SystemFile.from_member(member), QUICK)) == [PROVED, PROVED]
+
+
+@over_members
+def test_without_the_theorem_the_tensor_of_a_generic_member_is_supported(member, monkeypatch):
+    monkeypatch.setattr(theorems, "evidence", lambda theorem, hypotheses: None)
+    assert verdicts(check_poisson(SystemFile.from_member(member), QUICK)) == [SUPPORTED, SUPPORTED]
+
+
+@few
+@given(hamiltonians(dims=(2,)))
+def test_in_dimension_two_the_tensor_is_proved_for_every_h(hamiltonian):
+    assert verdicts(check_poisson(file(hamiltonian), QUICK)) == [PROVED, PROVED]
+
+
+def test_in_dimension_two_the_proof_is_the_invariant_measure():
+    found = check_poisson(file(PLANE), QUICK).findings[0]
+    assert found.evidence.data["theorem"] == "the invariant measure in dimension 2"
+
+
+@pytest.mark.parametrize("eps", [None, "1/3"])
+def test_the_tensor_of_a_generic_hamiltonian_in_dimension_four_is_refuted(eps):
+    law, jacobi = check_poisson(file(GENERIC), Settings(eps=eps, steps=2)).findings
+    verify_law(law, GENERIC)
+    assert jacobi.verdict is REFUTED
+    verify_jacobi(jacobi, GENERIC)
+
+
+def test_the_tensor_of_a_member_disturbed_in_a_far_digit_is_refuted():
+    H = MEMBERS["m=2"].H
+    x = H.context().gens()
+    disturbed = CubicHamiltonian(H + fmpq(1, 10**40) * x[0] * x[1] ** 2, MEMBERS["m=2"].chosen.hamiltonian.J)
+    law, jacobi = check_poisson(file(disturbed), Settings(steps=1)).findings
+    verify_law(law, disturbed)
+    verify_jacobi(jacobi, disturbed)
+
+
+@few
+@given(hamiltonians(dims=(3,)))
+def test_in_dimension_three_the_tensor_is_supported_without_a_theorem(hamiltonian):
+    # J has rank 2: the phase space is made of planes, on each of which dimension 2 applies.
+    assert verdicts(check_poisson(file(hamiltonian), QUICK)) == [SUPPORTED, SUPPORTED]
+
+
+def test_for_a_j_of_rank_two_in_dimension_four_the_tensor_is_supported_without_a_theorem():
+    assert verdicts(check_poisson(file(SINGULAR), QUICK)) == [SUPPORTED, SUPPORTED]
+
+
+# A = I: every cubic belongs to the space, and the roots of chi are as repeated as can be.
+EVERY_CUBIC = member_of(QQ.identity(4), [1, -2, 0, 3, 1, 1, -1, 2])
+
+
+@pytest.mark.parametrize(
+    "member",
+    [
+        draw_with_eigenvalues([1, 1], seed=3),
+        draw_with_eigenvalues([1, 1, 2], seed=3),
+        draw_with_chi(fmpq_poly([1, -2, 1]), seed=3),  # (t - 1)^2, not diagonalisable
+    ],
+    ids=["1, 1", "1, 1, 2", "(t-1)^2"],
+)
+def test_where_roots_are_repeated_the_tensor_is_not_proved_but_decided(member):
+    # These H are sums of planar ones, or a limit of such: the tensor is Poisson although the theorem does not say so.
+    assert not member.is_generic
+    assert verdicts(check_poisson(SystemFile.from_member(member), QUICK)) == [SUPPORTED, SUPPORTED]
+
+
+def test_where_roots_are_repeated_another_h_of_the_space_is_refuted():
+    law, jacobi = check_poisson(SystemFile.from_member(EVERY_CUBIC), QUICK).findings
+    verify_law(law, EVERY_CUBIC.chosen.hamiltonian)
+    verify_jacobi(jacobi, EVERY_CUBIC.chosen.hamiltonian)
+
+
+def test_where_roots_are_repeated_the_density_is_proved_all_the_same():
+    assert only(check_measure(SystemFile.from_member(EVERY_CUBIC), QUICK)).verdict is PROVED
+
+
+def test_a_system_without_a_hamiltonian_is_wrong_use():
+    with pytest.raises(InputError, match=r"of kind \[system\]"):
+        check_poisson(file_of(LORENZ))
+
+
+# Orbits
+
+
+def test_a_singular_start_is_told():
+    # x' = x^2, y' = -2 x y for H = x^2 y: det(I - eps f') = (1 - 2 eps x)(1 + 2 eps x), singular at x = 5.
+    how = Settings(eps="1/10", start=(5, 1), steps=3, orbit_is_asked=True)
+    for report in (check_measure(file(hamiltonian_of("x y", "x^2*y")), how), check_poisson(file(PLANE), QUICK)):
+        assert report.verdict is PROVED
+    report = check_measure(file(hamiltonian_of("x y", "x^2*y")), how)
+    assert report.ended_early
+    assert report.to_json()["orbit"]["status"] == "singular"
+    assert "could not be tried at any point" in only(report).also[-1].summary
+
+
+def test_an_orbit_that_runs_out_of_digits_is_told():
+    how = Settings(eps="1/10", steps=20, max_digits=60, orbit_is_asked=True)
+    for report in (check_measure(file(GENERIC), how), check_poisson(file(GENERIC), how)):
+        assert report.ended_early
+        assert report.to_json()["orbit"]["status"] == "budget"
+
+
+# Mutations
+
+
+ORIGINAL_STEP = KahanMap.step
+
+
+def half_step(self: KahanMap, point):
+    """x + eps (I - eps f')^{-1} f: eps where 2 eps belongs."""
+    x = self.point(point)
+    image = ORIGINAL_STEP(self, x)
+    return tuple(a + (b - a) / self.field.convert(2) for a, b in zip(x, image, strict=True))
+
+
+@pytest.mark.parametrize("check", [check_measure, check_poisson])
+@pytest.mark.parametrize("member", [MEMBERS["m=1"], MEMBERS["m=2"]], ids=["m=1", "m=2"])
+def test_a_step_of_half_the_length_contradicts_the_theorems(check, member, monkeypatch):
+    monkeypatch.setattr(KahanMap, "step", half_step)
+    with pytest.raises(Contradiction, match="defining equation of the Kahan map"):
+        check(SystemFile.from_member(member), QUICK)
+
+
+def wrong_sign(hamiltonian, field, eps, point):
+    """J + eps^2 f'(x)^2 J."""
+    J = field.convert_matrix(hamiltonian.J)
+    return J + J - ORIGINAL_TENSOR(hamiltonian, field, eps, point)
+
+
+ORIGINAL_TENSOR = poisson.poisson_tensor
+
+
+def wrong_scale(hamiltonian, field, eps, point):
+    """J - 4 eps^2 f'(x)^2 J: the time step for eps."""
+    return ORIGINAL_TENSOR(hamiltonian, field, eps + eps, point)
+
+
+@pytest.mark.parametrize("wrong", [wrong_sign, wrong_scale], ids=["sign", "scale"])
+@pytest.mark.parametrize("name", ["m=1", "m=2", "m=3"])
+def test_a_wrong_tensor_contradicts_the_theorem(wrong, name, monkeypatch):
+    monkeypatch.setattr(poisson, "poisson_tensor", wrong)
+    with pytest.raises(Contradiction, match="Poisson for Pi"):
+        check_poisson(SystemFile.from_member(MEMBERS[name]), QUICK)
+
+
+@pytest.mark.parametrize("wrong", [wrong_sign, wrong_scale], ids=["sign", "scale"])
+def test_a_wrong_tensor_is_refuted_where_no_theorem_applies(wrong, monkeypatch):
+    member = draw_with_eigenvalues([1, 1, 2], seed=3)
+    assert check_poisson(SystemFile.from_member(member), QUICK).findings[0].verdict is SUPPORTED
+    monkeypatch.setattr(poisson, "poisson_tensor", wrong)
+    assert check_poisson(SystemFile.from_member(member), QUICK).findings[0].verdict is REFUTED
+
+
+def test_a_wrong_sign_of_eps_in_det_dphi_refutes_a_right_density(monkeypatch):
+    own = file_of(LOTKA_VOLTERRA, phi="x*y")
+    assert only(check_measure(own, QUICK)).verdict is SUPPORTED
+    monkeypatch.setattr(
+        preserve, "jacobian_determinant_sides", lambda kahan, x, image: (kahan.determinant(image), kahan.determinant(x))
+    )
+    assert only(check_measure(own, QUICK)).verdict is REFUTED
+
+
+def test_a_wrong_determinant_contradicts_the_theorem(monkeypatch):
+    # The determinant at 2 eps, and of x~ twice.
+    monkeypatch.setattr(
+        preserve, "jacobian_determinant_sides", lambda kahan, x, image: (kahan.determinant(x), kahan.determinant(x))
+    )
+    with pytest.raises(Contradiction, match="measure"):
+        check_measure(file(ODD), QUICK)
+
+
+def test_a_proof_of_something_false_is_contradicted_by_the_computation(monkeypatch):
+    false = theorems.evidence("a theorem that does not apply", [("nothing", True)])
+    monkeypatch.setattr(preserve.theorems, "poisson_tensor_invariant", lambda hamiltonian, member: false)
+    with pytest.raises(Contradiction, match="a theorem that does not apply"):
+        check_poisson(file(GENERIC), QUICK)
+
+
+def test_j_with_a_wrong_sign_in_it_cannot_be_built_and_another_j_is_another_system():
+    with pytest.raises(InputError, match="J is not skew"):
+        hamiltonian_of("q p", "q^3", [[0, 1], [1, 0]])
+    reversed_J = CubicHamiltonian(PLANE.H, PLANE.J * fmpq(-1))
+    assert isinstance(reversed_J.J, fmpq_mat)
+    assert reversed_J.system == PLANE.system.scaled(-1)

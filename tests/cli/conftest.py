@@ -1,0 +1,44 @@
+"""The command line in the process of the tests, and a member of the family to try it on."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from cli_helpers import Outcome
+
+from kahanmaps_cli.main import main
+
+
+@pytest.fixture
+def kahanmaps(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
+    """Run a command: texts are split as a shell would, paths are taken as they are."""
+
+    def run(*pieces: str | Path) -> Outcome:
+        arguments: list[str] = []
+        for piece in pieces:
+            arguments += [str(piece)] if isinstance(piece, Path) else shlex.split(piece)
+        capsys.readouterr()
+        status = main(arguments)
+        return Outcome(status, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of kind [family]: m = 2, A with the eigenvalues 1 and -2."""
+    path = tmp_path_factory.mktemp("family") / "pair.toml"
+    assert main(["family", "new", "--eigenvalues", "1,-2", "--seed", "7", "-q", "-o", str(path)]) == 0
+    return path
+
+
+@pytest.fixture
+def slow_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ten seconds pass between any two looks that progress takes at the clock."""
+    ticks = count(0, 10)
+    monkeypatch.setattr("kahanmaps_cli.progress.time", SimpleNamespace(monotonic=lambda: next(ticks)))

@@ -1,0 +1,365 @@
+"""kahanmaps check-commute, check-integrals, check-measure, check-poisson: reports for people and for scripts.
+
+With --json a check prints one object with the verdict, everything that is needed to do the check again, and a verdict
+with evidence for each claim; a refuted claim has a witness that anybody can verify, here by `kahanmaps orbit`.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from fractions import Fraction
+
+import pytest
+from cli_helpers import environment, shell, terminal
+
+from kahanmaps.version import __version__
+
+COMMON = ["check", "verdict", "holds", "version", "system", "eps", "time_step", "convention", "arithmetic", "seed"]
+COMMON += ["error_bits", "orbit", "claims", "notes"]
+CLAIM = {"claim", "verdict", "evidence", "witness"}
+OPTIONAL = {"also", "formula", "source", "control", "expected"}
+
+CHECKS = [
+    ("check-commute euler_top lorenz", {"other"}),
+    ("check-commute euler_top lorenz --eps 1/10 --eps2 1/7", {"other", "eps2"}),
+    ("check-commute paper_m2", {"m", "factors"}),
+    ("check-integrals euler_top --integral x1", set()),
+    ("check-measure henon_heiles --density 1", set()),
+    ("check-poisson henon_heiles --eps 1/3", set()),
+]
+over_checks = pytest.mark.parametrize("command", [command for command, _ in CHECKS])
+
+
+def claims(report):
+    """Claim -> the rest, without the control."""
+    return {found["claim"]: found for found in report["claims"] if "control" not in found}
+
+
+def image(kahanmaps, system, point, eps, steps=1):
+    """The image of a point under a Kahan map, by `kahanmaps orbit`."""
+    command = f"orbit {system} --start={','.join(point)} --eps {eps} --steps {steps} --format jsonl"
+    return kahanmaps(command).records[-2]["x"]
+
+
+# JSON
+
+
+@pytest.mark.parametrize(("command", "more"), CHECKS)
+def test_a_report_has_the_documented_shape(kahanmaps, command, more):
+    report = kahanmaps(f"{command} --json").json
+    assert set(report) == {*COMMON, *more}
+    assert list(report)[:3] == ["check", "verdict", "holds"]
+    assert report["version"] == __version__
+    assert report["convention"] == "eps is the paper's epsilon, the time step is 2 eps"
+    assert report["arithmetic"] == "exact"
+
+
+@over_checks
+def test_a_claim_has_the_documented_shape(kahanmaps, command):
+    for claim in kahanmaps(f"{command} --json").json["claims"]:
+        assert set(claim) >= CLAIM
+        assert set(claim) <= CLAIM | OPTIONAL
+        assert claim["verdict"] in ("proved", "refuted", "supported", "undecided")
+        assert {"method", "summary"} <= set(claim["evidence"])
+        assert all({"method", "summary"} <= set(evidence) for evidence in claim.get("also", []))
+
+
+@over_checks
+def test_a_witness_has_the_documented_shape(kahanmaps, command):
+    for claim in kahanmaps(f"{command} --json").json["claims"]:
+        if claim["verdict"] != "refuted":
+            assert claim["witness"] is None
+            continue
+        witness = claim["witness"]
+        assert set(witness) == {"point", "eps", "field", "left", "right"}
+        assert set(witness["left"]) == set(witness["right"]) == {"is", "value"}
+        assert witness["left"]["value"] != witness["right"]["value"]
+
+
+@over_checks
+def test_the_orbit_that_was_tried_is_told(kahanmaps, command):
+    orbit = kahanmaps(f"{command} --json").json["orbit"]
+    assert set(orbit) == {"start", "eps", "steps", "status", "message"}
+
+
+def test_the_start_and_the_steps_are_those_asked_for(kahanmaps):
+    orbit = kahanmaps("check-integrals euler_top --start 1,1/2,-3 --steps 4 --eps 1/7 --json").json["orbit"]
+    assert (orbit["start"], orbit["steps"], orbit["eps"], orbit["status"]) == (
+        ["1", "1/2", "-3"],
+        4,
+        "1/7",
+        "completed",
+    )
+
+
+@over_checks
+def test_one_object_is_printed_on_one_line(kahanmaps, command):
+    assert kahanmaps(f"{command} --json").out.count("\n") == 1
+
+
+def test_without_eps_the_question_is_asked_for_every_eps(kahanmaps):
+    report = kahanmaps("check-integrals euler_top --json").json
+    assert (report["eps"], report["time_step"]) == ("every", "every")
+
+
+@pytest.mark.parametrize("option", ["--eps 1/14", "--time-step 1/7"])
+def test_eps_and_time_step_are_both_told(kahanmaps, option):
+    report = kahanmaps(f"check-integrals euler_top {option} --json").json
+    assert (report["eps"], report["time_step"]) == ("1/14", "1/7")
+
+
+@pytest.mark.parametrize(
+    ("command", "verdicts", "holds"),
+    [
+        ("check-commute euler_top lorenz", {"refuted"}, False),
+        ("check-integrals henon_heiles", {"proved", "supported"}, True),
+        ("check-commute paper_m2", {"proved"}, True),
+    ],
+)
+def test_holds_is_the_verdict_for_machines(kahanmaps, command, verdicts, holds):
+    report = kahanmaps(f"{command} --json").json
+    assert report["verdict"] in verdicts
+    assert report["holds"] is holds
+
+
+# Doing it again
+
+
+@over_checks
+def test_a_check_done_again_says_the_same(kahanmaps, command):
+    assert kahanmaps(command) == kahanmaps(command)
+
+
+def test_the_seed_draws_the_start(kahanmaps):
+    first, second, third = (
+        kahanmaps(f"check-integrals euler_top --seed {seed} --json").json["orbit"]["start"] for seed in (1, 2, 1)
+    )
+    assert first == third != second
+
+
+def test_a_witness_of_an_integral_is_verified_by_an_orbit(kahanmaps):
+    claim = claims(kahanmaps("check-integrals euler_top --integral s=x1-x2/3 --json").json)["s is conserved"]
+    witness = claim["witness"]
+    assert witness["field"] == "QQ"
+    before = [Fraction(entry) for entry in witness["point"]]
+    after = [Fraction(entry) for entry in image(kahanmaps, "euler_top", witness["point"], witness["eps"])]
+    assert [Fraction(text) for text in witness["right"]["value"]] == [before[0] - before[1] / 3]
+    assert [Fraction(text) for text in witness["left"]["value"]] == [after[0] - after[1] / 3]
+
+
+def test_a_witness_of_maps_that_do_not_commute_is_verified_by_orbits(kahanmaps):
+    (claim,) = kahanmaps("check-commute euler_top lorenz --json").json["claims"]
+    x, eps = claim["witness"]["point"], claim["witness"]["eps"]
+    f_first = image(kahanmaps, "lorenz", image(kahanmaps, "euler_top", x, eps), eps)
+    g_first = image(kahanmaps, "euler_top", image(kahanmaps, "lorenz", x, eps), eps)
+    assert claim["witness"]["left"] == {"is": "Phi_g(Phi_f(x))", "value": f_first}
+    assert claim["witness"]["right"] == {"is": "Phi_f(Phi_g(x))", "value": g_first}
+
+
+# check-commute
+
+
+def test_one_member_of_the_family_has_all_its_associated_maps_compared_and_a_control(kahanmaps, pair):
+    report = kahanmaps("check-commute", pair, "--json").json
+    verdicts = [(claim["claim"], claim["verdict"]) for claim in report["claims"] if "control" not in claim]
+    assert verdicts == [("the Kahan maps of f_++ and f_+- commute", "proved")]
+    assert [claim["control"] for claim in report["claims"] if "control" in claim] == [True]
+
+
+def test_three_eigenvalues_give_six_pairs(kahanmaps):
+    report = kahanmaps("check-commute paper_m3 --steps 2 --json").json
+    assert [claim["verdict"] for claim in claims(report).values()] == ["proved"] * 6
+
+
+def test_the_control_is_expected_to_be_refuted_and_does_not_count(kahanmaps, pair):
+    outcome = kahanmaps("check-commute", pair, "--json")
+    (control,) = [claim for claim in outcome.json["claims"] if "control" in claim]
+    assert (control["verdict"], control["expected"]) == ("refuted", "refuted")
+    assert (outcome.json["verdict"], outcome.status) == ("proved", 0)
+
+
+def test_the_expected_refutation_is_told_as_such(kahanmaps, pair):
+    lines = kahanmaps("check-commute", pair).out.splitlines()
+    assert [line.split("\t")[0] for line in lines if "control" in line] == ["refuted (as expected)"]
+    assert lines[-1] == "verdict\tproved"
+
+
+def test_a_control_that_is_not_refuted_is_noted_and_does_not_count(kahanmaps, tmp_path):
+    # f = (0, -3 x1^2): all multiples of it have commuting maps
+    path = tmp_path / "shear.toml"
+    path.write_text('[family]\nA = [["1", "0"], ["0", "1"]]\nH = "x1^3"\n')
+    outcome = kahanmaps("check-commute", path, "--json")
+    assert outcome.status == 0
+    assert "the control was not refuted" in " ".join(outcome.json["notes"])
+
+
+def test_two_associated_systems_written_as_files_commute(kahanmaps, pair, tmp_path):
+    kahanmaps("family associated", pair, "--write-to", tmp_path)
+    first, second = sorted(tmp_path.iterdir())
+    assert kahanmaps("check-commute", first, second, "--json").json["verdict"] == "proved"
+
+
+def test_the_second_map_may_have_another_step(kahanmaps):
+    # Rotations by different angles commute.
+    report = kahanmaps("check-commute harmonic harmonic --eps 1/10 --eps2 1/7 --json").json
+    assert (report["eps"], report["eps2"], report["holds"]) == ("1/10", "1/7", True)
+
+
+def test_an_inline_system_may_be_compared_with_another(kahanmaps):
+    report = kahanmaps("check-commute --vars x,y --rhs y --rhs=-x harmonic --json").json
+    assert (report["system"], report["other"], report["holds"]) == ("inline", "harmonic", True)
+
+
+def test_one_of_two_systems_may_come_from_standard_input(kahanmaps, pair, tmp_path):
+    outcome = shell(f"kahanmaps check-commute - {pair} --json", tmp_path, stdin=pair.read_bytes())
+    assert (outcome.status, outcome.json["verdict"]) == (0, "proved")
+
+
+def test_variables_are_matched_by_position_and_this_is_noted(kahanmaps):
+    notes = kahanmaps("check-commute --vars u,v --rhs v --rhs=-u harmonic --json").json["notes"]
+    assert any("matched by position" in note for note in notes)
+
+
+# check-integrals
+
+
+def test_integrals_of_the_file_and_of_the_command_line_are_checked(kahanmaps):
+    report = kahanmaps("check-integrals euler_top --integral G=x1 --integral x2 --integral 1/x3 --json").json
+    verdicts = {claim: found["verdict"] for claim, found in claims(report).items()}
+    assert set(verdicts) == {f"{name} is conserved" for name in ("F1", "F2", "G", "I1", "I2")}
+    assert [name for name in ("G", "I1", "I2") if verdicts[f"{name} is conserved"] != "refuted"] == []
+    assert "refuted" not in (verdicts["F1 is conserved"], verdicts["F2 is conserved"])
+
+
+def test_an_integral_without_a_name_does_not_take_one_of_the_file(kahanmaps, tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text('variables = ["x"]\n[system]\nrhs = ["0"]\n[integrals]\nI1 = "x"\nI3 = "2*x"\n')
+    report = kahanmaps("check-integrals", path, "--integral x^2 --integral x^3 --integral E=1/x --json").json
+    formulas = {claim: found["formula"] for claim, found in claims(report).items()}
+    assert formulas == {
+        "I1 is conserved": "x",
+        "I3 is conserved": "2*x",
+        "I2 is conserved": "x^2",
+        "I4 is conserved": "x^3",
+        "E is conserved": "1/x",
+    }
+
+
+def test_a_claim_may_contain_eps_and_parameters(kahanmaps):
+    # x^2 + a y^2 is conserved for x' = a y, y' = -x
+    command = "check-integrals --vars x,y --rhs a*y --rhs=-x -p a=5 --integral x^2+a*y^2+eps"
+    assert kahanmaps(command).status == 0
+
+
+def test_an_integral_of_the_flow_alone_is_refuted(kahanmaps):
+    assert kahanmaps("check-integrals euler_top --integral 2*x1^2+x2^2").status == 1
+
+
+def test_the_modified_hamiltonian_needs_no_homogeneity_nor_an_invertible_structure(kahanmaps, tmp_path):
+    path = tmp_path / "odd.toml"
+    path.write_text(
+        'variables = ["x", "y", "z"]\n[hamiltonian]\nH = "x^3 + x*y*z + z + y^2"\n'
+        'J = [["0", "1", "2"], ["-1", "0", "3"], ["-2", "-3", "0"]]\n'
+    )
+    assert kahanmaps("check-integrals", path, "--json").json["verdict"] == "proved"
+
+
+# check-measure, check-poisson
+
+
+def test_a_density_may_be_claimed(kahanmaps):
+    command = "check-measure --vars x,y --rhs x*(1-y) --rhs y*(x-1) --density"
+    assert kahanmaps(f"{command} x*y").status == 0
+    assert kahanmaps(f"{command} x").status == 1
+
+
+def test_both_laws_of_a_poisson_map_are_checked(kahanmaps, pair):
+    report = kahanmaps("check-poisson", pair, "--json").json
+    assert [claim["verdict"] for claim in report["claims"]] == ["proved", "proved"]
+
+
+# For people
+
+
+@over_checks
+def test_a_pipe_gets_plain_lines(kahanmaps, command):
+    lines = kahanmaps(command).out.splitlines()
+    report = kahanmaps(f"{command} --json").json
+    assert lines[0].startswith(f"{report['check']}: {report['system']}")
+    told = [line.split("\t")[1] for line in lines[1:-1] if not line.startswith(("\t", "note\t"))]
+    assert told == [claim["claim"] for claim in report["claims"]]
+    assert lines[-1] == f"verdict\t{report['verdict']}"
+
+
+def test_a_pipe_gets_numbers_in_full(kahanmaps, pair):
+    lines = kahanmaps("check-commute", pair).out
+    (control,) = [claim for claim in kahanmaps("check-commute", pair, "--json").json["claims"] if "control" in claim]
+    assert ", ".join(control["witness"]["left"]["value"]) in lines
+
+
+@pytest.fixture(scope="module")
+def shown(pair):
+    """A check on a terminal 80 columns wide."""
+    return terminal("check-commute", str(pair))
+
+
+def test_a_terminal_gets_a_table_in_colour(shown):
+    assert shown.status == 0
+    assert "\x1b[32mproved" in shown.out
+    assert "│" in shown.out
+
+
+def test_long_numbers_are_shortened_on_a_terminal(kahanmaps):
+    command = "check-commute euler_top lorenz --eps 1e-30"
+    assert re.search(r"\.\.\.\d+ \(\d+\s+chars\)", terminal(*shlex.split(command)).out)
+    assert " chars)" not in kahanmaps(command).out
+
+
+def test_no_color_switches_colours_off(pair):
+    outcome = terminal("check-commute", str(pair), NO_COLOR="1")
+    assert "proved" in outcome.out
+    assert re.findall(r"\x1b\[[\d;]*3\dm", outcome.out) == []
+
+
+def test_all_evidence_is_shown_on_a_terminal_when_asked_for(kahanmaps):
+    command = "check-integrals henon_heiles"
+    shown = " ".join(terminal(*shlex.split(f"{command} -v"), columns=5000).out.replace("│", " ").split())
+    for line in kahanmaps(command).out.splitlines()[1:-1]:
+        assert " ".join(line.split("\t")[-1].split()) in shown
+
+
+def test_json_is_complete_and_plain_on_a_terminal(kahanmaps):
+    command = "check-commute euler_top lorenz --json"
+    assert terminal(*shlex.split(command)).json == kahanmaps(command).json
+
+
+@pytest.mark.parametrize("columns", [10, 40])
+def test_a_narrow_terminal_is_no_reason_to_fail(columns):
+    outcome = terminal(*shlex.split("check-integrals euler_top"), columns=columns)
+    assert (outcome.status, outcome.err) == (0, "")
+
+
+def test_an_environment_with_odd_columns_is_no_reason_to_fail(tmp_path):
+    for odd in ("0", "-3", "many"):
+        assert shell("kahanmaps check-integrals euler_top", tmp_path, **environment(COLUMNS=odd)).status == 0
+
+
+@pytest.mark.parametrize("command", [command for command, _ in CHECKS if "commute" in command or "poisson" in command])
+def test_quick_checks_are_silent_on_standard_error(kahanmaps, command):
+    assert kahanmaps(command).err == ""
+
+
+CHECKS_OF_A_MEMBER = pytest.mark.parametrize("check", ["commute", "integrals", "measure", "poisson"])
+
+
+@CHECKS_OF_A_MEMBER
+def test_progress_goes_to_standard_error_only(kahanmaps, pair, slow_clock, check):
+    outcome = kahanmaps(f"check-{check}", pair, "--steps 2 --json")
+    assert outcome.err.startswith("orbit: step ") or outcome.err.startswith("associated system ")
+    assert outcome.out.count("\n") == 1
+
+
+@CHECKS_OF_A_MEMBER
+def test_quiet_is_silent(kahanmaps, pair, slow_clock, check):
+    assert kahanmaps(f"check-{check}", pair, "--steps 2 -q").err == ""

@@ -1,0 +1,227 @@
+"""kahanmaps family: members of the commuting family, drawn and written as system files, shown and taken apart.
+
+What a seed draws is the same everywhere. Files that are written are read by every other command.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from cli_helpers import shell, terminal
+
+DRAWN = [
+    ("--m 1", 1),
+    ("--m 3", 3),
+    ("--eigenvalues 1,-2,3", 3),
+    ("--eigenvalues 1/2,-0.75", 2),
+    ("--eigenvalues 0,5", 2),
+    ("--eigenvalues 2,2,5", 3),
+    ("--eigenvalues 1e300,-7", 2),
+    ("--m 3 --generic", 3),
+    ("--chi t^2-2", 2),
+    ("--chi 2*t^2-3", 2),
+    ("--chi (t-1)*(t^2-2)", 3),
+    ("--chi (t-1)^2", 2),
+    ("--m 2 --size 1000000", 2),
+    ("--m 2 --signs 1,-1", 2),
+    ("--chi (t-1)*(t^2+1) --signs=-1,1", 3),
+    ("--m 2 --seed -5", 2),
+    (f"--m 2 --seed {10**40}", 2),
+]
+
+
+# new
+
+
+@pytest.mark.parametrize(("options", "m"), DRAWN)
+def test_what_is_drawn_is_a_system_file(kahanmaps, tmp_path, options, m):
+    path = tmp_path / "drawn.toml"
+    assert kahanmaps(f"family new {options} -o", path).status == 0
+    shown = kahanmaps("family show", path, "--json").json
+    assert (shown["system"], shown["m"], shown["dim"]) == ("drawn", m, 2 * m)
+
+
+@pytest.mark.parametrize(("options", "_"), DRAWN)
+def test_a_seed_draws_the_same_again(kahanmaps, options, _):
+    assert kahanmaps(f"family new {options}") == kahanmaps(f"family new {options}")
+
+
+@pytest.mark.parametrize("options", ["--m 2", "--eigenvalues 1,2", "--generic --m 2", "--chi t^2-2"])
+def test_another_seed_draws_another_member(kahanmaps, options):
+    assert kahanmaps(f"family new {options} --seed 1").out != kahanmaps(f"family new {options} --seed 2").out
+
+
+def test_the_eigenvalues_are_those_asked_for(kahanmaps, tmp_path):
+    kahanmaps("family new --eigenvalues 3,-1/2 -o", tmp_path / "a.toml")
+    shown = kahanmaps("family show", tmp_path / "a.toml", "--json").json
+    assert [(factor["factor"], factor["multiplicity"]) for factor in shown["factors"]] == [("t + 1/2", 1), ("t - 3", 1)]
+
+
+def test_chi_is_the_one_asked_for_made_monic(kahanmaps, tmp_path):
+    kahanmaps("family new --chi '2*(t - 1)*(t^2 - 2)' -o", tmp_path / "a.toml")
+    shown = kahanmaps("family show", tmp_path / "a.toml", "--json").json
+    assert shown["chi"] == "t^3 - t^2 - 2*t + 2"
+
+
+def test_a_generic_member_has_a_chi_without_repeated_roots(kahanmaps, tmp_path):
+    kahanmaps("family new --m 4 --generic --seed 3 -o", tmp_path / "a.toml")
+    assert kahanmaps("family show", tmp_path / "a.toml", "--json").json["generic"] is True
+
+
+def test_repeated_eigenvalues_are_said_not_to_be_generic(kahanmaps):
+    outcome = kahanmaps("family new --eigenvalues 1,1")
+    assert outcome.status == 0
+    assert "A is not generic: chi = (t - 1)^2 has repeated roots" in outcome.err
+
+
+def test_signs_pick_an_associated_system(kahanmaps, tmp_path):
+    kahanmaps("family new --eigenvalues 1,2 --seed 4 --signs 1,-1 -o", tmp_path / "a.toml")
+    assert tomllib.loads((tmp_path / "a.toml").read_text())["family"]["signs"] == [1, -1]
+    shown = kahanmaps("family show", tmp_path / "a.toml")
+    assert "signs = 1,-1: K = " in shown.out
+
+
+def test_a_file_gets_what_standard_output_would(kahanmaps, tmp_path):
+    printed = kahanmaps("family new --m 2 --seed 5 --name a").out
+    kahanmaps("family new --m 2 --seed 5 -o", tmp_path / "a.toml")
+    assert (tmp_path / "a.toml").read_text() == printed
+    assert kahanmaps("family new --m 2 --seed 5 --name a -o -").out == printed
+
+
+def test_what_was_drawn_is_told_on_standard_error(kahanmaps, tmp_path):
+    outcome = kahanmaps("family new --eigenvalues 1,-2 -o", tmp_path / "a.toml")
+    assert outcome.out == ""
+    expected = "dimension 4; A is generic: chi = (t + 2) (t - 1), without repeated roots, all roots rational"
+    assert outcome.err == f"{tmp_path / 'a.toml'}: {expected}\n"
+
+
+def test_quiet_is_silent(kahanmaps):
+    assert kahanmaps("family new --m 2 -q").err == ""
+
+
+# show
+
+
+def test_a_member_is_shown_for_scripts(kahanmaps, pair):
+    shown = kahanmaps("family show", pair, "--json").json
+    assert set(shown) == {
+        "system",
+        "m",
+        "dim",
+        "variables",
+        "A",
+        "chi",
+        "factors",
+        "generic",
+        "diagnosis",
+        "signs",
+        "hamiltonians",
+    }
+    assert (shown["system"], shown["m"], shown["dim"], shown["variables"]) == ("pair", 2, 4, ["x1", "x2", "x3", "x4"])
+    assert (shown["chi"], shown["generic"], shown["signs"]) == ("t^2 + t - 2", True, [1, 1])
+
+
+def test_the_file_holds_what_is_shown(kahanmaps, pair):
+    shown = kahanmaps("family show", pair, "--json").json
+    family = tomllib.loads(pair.read_text())["family"]
+    assert shown["A"] == family["A"]
+    assert shown["hamiltonians"][0] == family["H"]
+    assert len(shown["hamiltonians"]) == shown["m"]
+
+
+def test_a_member_is_shown_to_people(kahanmaps, pair):
+    lines = kahanmaps("family show", pair).out.splitlines()
+    assert lines[0] == "pair: m = 2, dimension 4, variables x1, x2, x3, x4"
+    assert [line.partition(" = ")[0] for line in lines[-2:]] == ["H_0", "H_1"]
+
+
+def test_a_member_may_come_from_the_catalogue_or_standard_input(kahanmaps, tmp_path):
+    from_catalogue = kahanmaps("family show paper_m2 --json").json
+    script = "kahanmaps systems paper_m2 --toml | kahanmaps family show - --json"
+    assert shell(script, tmp_path).json == from_catalogue
+
+
+def test_long_formulas_are_shortened_on_a_terminal_only(kahanmaps):
+    assert " chars)" in terminal("family", "show", "paper_m3").out
+    assert " chars)" not in kahanmaps("family show paper_m3").out
+
+
+# space
+
+
+def test_the_space_of_a_generic_member_has_dimension_4m(kahanmaps, pair):
+    space = kahanmaps("family space", pair, "--json").json
+    assert set(space) == {"dim", "dimension", "expected_for_generic_A", "unknowns", "rank", "diagnosis", "basis"}
+    assert (space["dim"], space["dimension"], space["expected_for_generic_A"]) == (4, 8, 8)
+    assert len(space["basis"]) == 8
+
+
+def test_the_unknowns_are_the_cubic_monomials(kahanmaps, pair):
+    space = kahanmaps("family space", pair, "--json").json
+    assert (space["unknowns"], space["unknowns"] - space["rank"]) == (20, space["dimension"])  # 4*5*6/6
+
+
+@pytest.mark.parametrize("matrix", ["1,0;0,1", " 1, 0 ; 0, 1 ", "1/2,0;0,0.5"])
+def test_the_matrix_may_stand_on_the_command_line(kahanmaps, matrix):
+    # m = 1: every cubic in two variables
+    assert kahanmaps(f"family space --matrix '{matrix}' --json").json["basis"] == ["x1^3", "x1^2*x2", "x1*x2^2", "x2^3"]
+
+
+def test_people_see_a_line_for_each_element_of_the_basis(kahanmaps, pair):
+    lines = kahanmaps("family space", pair).out.splitlines()
+    basis = kahanmaps("family space", pair, "--json").json["basis"]
+    assert lines[0] == "dimension 8 (generic A: 4m = 8); the linear system has 20 unknowns and rank 12"
+    assert lines[2:] == [f"{k}\t{text}" for k, text in enumerate(basis, start=1)]
+
+
+# associated
+
+
+def test_the_associated_systems_are_listed_for_scripts(kahanmaps, pair):
+    listed = kahanmaps("family associated", pair, "--json").json
+    assert set(listed) == {"system", "factors", "associated"}
+    assert listed["factors"] == ["t + 2", "t - 1"]
+    assert [row["label"] for row in listed["associated"]] == ["++", "+-"]
+    assert all(set(row) == {"label", "signs", "B_in_powers_of_A", "B", "K"} for row in listed["associated"])
+
+
+def test_b_has_the_square_one(kahanmaps, pair):
+    for row in kahanmaps("family associated", pair, "--json").json["associated"]:
+        b = [[Fraction(entry) for entry in line] for line in row["B"]]
+        square = [[sum(b[i][k] * b[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
+        assert square == [[int(i == j) for j in range(4)] for i in range(4)]
+
+
+def test_an_irreducible_chi_has_the_system_itself_alone(kahanmaps):
+    assert [row["label"] for row in kahanmaps("family associated paper_m3_irreducible --json").json["associated"]] == [
+        "+"
+    ]
+
+
+def test_the_associated_systems_are_written_as_files(kahanmaps, pair, tmp_path):
+    listed = kahanmaps("family associated", pair, "--json --write-to", tmp_path / "new" / "folder").json["associated"]
+    for row, signs in zip(listed, ("pp", "pm"), strict=True):
+        path = Path(row["file"])
+        assert path == tmp_path / "new" / "folder" / f"pair-{signs}.toml"
+        shown = kahanmaps("systems", path, "--json").json
+        assert shown["name"] == f"pair-{signs}"
+        assert shown["document"]["family"].get("signs", [1, 1]) == row["signs"]
+
+
+@pytest.mark.parametrize("name", ["../escape", "/escape", "a/b", "..", "a b\\c", "n\u00e4me", "x" * 40])
+def test_files_stay_in_their_folder_whatever_the_name_of_the_system(kahanmaps, tmp_path, name):
+    kahanmaps(f"family new --eigenvalues 1,2 --name '{name}' -o", tmp_path / "a.toml")
+    folder = tmp_path / "sub" / "folder"
+    assert kahanmaps("family associated", tmp_path / "a.toml", "--write-to", folder).status == 0
+    assert len(list(folder.iterdir())) == 2
+    assert sorted(path.name for path in tmp_path.rglob("*.toml") if path.parent != folder) == ["a.toml"]
+
+
+def test_people_see_a_line_for_each_associated_system(kahanmaps, pair):
+    lines = kahanmaps("family associated", pair).out.splitlines()
+    assert lines[0] == "pair: signs belong to the factors (t + 2), (t - 1); 2 associated up to sign, f_0 first"
+    assert [line.split("\t")[0] for line in lines[1:]] == ["++", "+-"]
+    assert lines[1].split("\t")[1] == "B = [1, 0] in 1, A, A^2, ..."

@@ -1,0 +1,272 @@
+"""The entry point: help with examples, suggestions, errors as messages, and standard streams in any state.
+
+Data goes to standard output, talk to standard error. Whatever happens to these streams, or inside, a user sees
+a sentence and an exit status, never a traceback.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import click
+import pytest
+from cli_helpers import environment, shell
+
+from kahanmaps.errors import InputError, SingularStep
+from kahanmaps.version import __version__
+from kahanmaps_cli.main import COMMANDS, cli, main
+
+needs_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+
+
+def all_commands() -> list[list[str]]:
+    """Every command and subcommand, as the words that call it."""
+    context = click.Context(cli)
+    found: list[list[str]] = [[]]
+    for name in cli.list_commands(context):
+        command = cli.get_command(context, name)
+        found.append([name])
+        if isinstance(command, click.Group):
+            found += [[name, below] for below in command.list_commands(context)]
+    return found
+
+
+def failing_with(monkeypatch, error):
+    """Let `kahanmaps version` end in an error."""
+
+    def fail(_):
+        raise error
+
+    monkeypatch.setattr("kahanmaps_cli.commands.version.version_of", fail)
+
+
+# Help
+
+
+@pytest.mark.parametrize("words", all_commands(), ids=lambda words: " ".join(words) or "kahanmaps")
+def test_every_command_has_help_with_an_example_to_copy(kahanmaps, words):
+    shown = kahanmaps(*words, "--help")
+    examples = [line for line in shown.out.splitlines() if re.match(r" +kahanmaps( |$)", line)]
+    assert shown.status == 0
+    assert examples
+    assert all(line.split()[: 1 + len(words)] == ["kahanmaps", *words] for line in examples if words)
+
+
+@pytest.mark.parametrize("words", all_commands(), ids=lambda words: " ".join(words) or "kahanmaps")
+def test_every_option_is_explained(kahanmaps, words):
+    command = cli
+    for word in words:
+        command = command.get_command(click.Context(command), word)
+    silent = [option.name for option in command.params if isinstance(option, click.Option) and not option.help]
+    assert silent == []
+
+
+def test_h_is_short_for_help(kahanmaps):
+    assert kahanmaps("orbit -h").out == kahanmaps("orbit --help").out
+
+
+def test_without_arguments_the_help_is_shown(kahanmaps):
+    assert kahanmaps("") == kahanmaps("--help")
+
+
+def test_the_help_lists_every_command_with_a_line(kahanmaps):
+    out = " ".join(kahanmaps("--help").out.split())
+    assert [name for name, (_, line) in COMMANDS.items() if f"{name} {line}" not in out] == []
+
+
+def test_help_fits_a_narrow_terminal(tmp_path):
+    shown = shell("kahanmaps --help", tmp_path, COLUMNS="40").out
+    # Examples are kept on one line, to be copied.
+    assert max(len(line) for line in shown.splitlines() if "kahanmaps " not in line) <= 50
+
+
+# Versions
+
+
+def test_version_is_one_line(kahanmaps):
+    assert kahanmaps("--version").out == f"kahanmaps {__version__}\n"
+
+
+def test_version_does_nothing_else(kahanmaps):
+    assert kahanmaps("--version systems").out == f"kahanmaps {__version__}\n"
+
+
+def test_the_version_command_names_what_is_computed_with(kahanmaps):
+    expected = {"kahanmaps", "python", "python-flint", "flint", "numpy", "click", "rich", "lark"}
+    assert set(kahanmaps("version --json").json) == expected
+
+
+def test_the_version_command_prints_a_line_for_each(kahanmaps):
+    assert dict(kahanmaps("version").rows) == kahanmaps("version --json").json
+
+
+# Suggestions
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("orbt", "orbit"),
+        ("check", "check-commute"),
+        ("check_integrals", "check-integrals"),
+        ("commute", "check-commute"),
+        ("familly", "family"),
+        ("system", "systems"),
+    ],
+)
+def test_a_misspelt_command_is_recognised(kahanmaps, written, meant):
+    outcome = kahanmaps(written)
+    assert outcome.status == 2
+    assert meant in outcome.err.partition("Did you mean")[2]
+
+
+def test_a_command_like_no_other_is_not_guessed(kahanmaps):
+    outcome = kahanmaps("xyzzy")
+    assert outcome.status == 2
+    assert "There is no command 'xyzzy'.\n" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"), [("eulr_top", "euler_top"), ("volterra", "volterra_periodic_3"), ("Lorenz", "lorenz")]
+)
+@pytest.mark.parametrize("command", ["orbit {} --start 1,2,3 --eps 1/10 --steps 1", "check-measure {}", "systems {}"])
+def test_a_misspelt_system_is_recognised(kahanmaps, command, written, meant):
+    outcome = kahanmaps(command.format(written))
+    assert outcome.status == 2
+    assert meant in outcome.err.partition("did you mean")[2]
+
+
+# Errors become messages
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "words"),
+    [
+        (InputError("found 1, expected 2"), 2, "Error: found 1, expected 2"),
+        (click.UsageError("found 1, expected 2"), 2, "Error: found 1, expected 2"),
+        (OSError(28, "No space left on device", "x.csv"), 2, "Error: No space left on device: x.csv"),
+        (OSError(2, "No such file or directory", ""), 2, "Error: No such file or directory: ''"),
+        (SingularStep("det(I - eps f'(x)) = 0"), 3, "Error: det(I - eps f'(x)) = 0"),
+        (MemoryError(), 3, "out of memory"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (RuntimeError("all wrong"), 70, "Internal error: RuntimeError: all wrong"),
+        (RecursionError("too deep"), 70, "Internal error: RecursionError"),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else None,
+)
+def test_an_error_becomes_a_message_and_an_exit_status(kahanmaps, monkeypatch, error, status, words):
+    failing_with(monkeypatch, error)
+    outcome = kahanmaps("version")
+    assert outcome.status == status
+    assert words in outcome.err
+    assert "Traceback" not in outcome.err
+
+
+def test_an_internal_error_says_that_it_is_a_bug_and_how_to_see_more(kahanmaps, monkeypatch):
+    failing_with(monkeypatch, RuntimeError("all wrong"))
+    outcome = kahanmaps("version")
+    assert "This is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened." in outcome.err
+
+
+def test_debugging_shows_where_an_error_happened(kahanmaps, monkeypatch):
+    failing_with(monkeypatch, RuntimeError("all wrong"))
+    monkeypatch.setenv("KAHANMAPS_DEBUG", "1")
+    outcome = kahanmaps("version")
+    assert outcome.status == 70
+    assert "Traceback" in outcome.err
+
+
+def test_nothing_in_a_message_can_steer_a_terminal(kahanmaps):
+    outcome = kahanmaps("systems", Path("\x1b[31mred\x07.toml"))
+    assert outcome.status == 2
+    assert r"\x1b[31mred\x07.toml" in outcome.err
+    assert outcome.err.replace("\n", "").isprintable()
+
+
+def test_main_takes_its_arguments_from_the_command_line_when_given_none(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["kahanmaps", "--version"])
+    assert main() == 0
+    assert capsys.readouterr().out == f"kahanmaps {__version__}\n"
+
+
+# Standard streams
+
+
+def test_a_reader_that_has_seen_enough_ends_the_command_quietly(tmp_path):
+    script = """
+    kahanmaps orbit lotka_volterra --start 1,2 --eps 1/10 --steps 20000 --arithmetic float | head -n 2
+    echo "${PIPESTATUS[0]}"
+    """
+    outcome = shell(script, tmp_path)
+    assert outcome.out.splitlines()[1:] == ["step\tx\ty", "0"]
+    assert outcome.err == ""
+
+
+@pytest.mark.parametrize("form", ["", "--json"])
+def test_a_reader_that_has_seen_enough_changes_no_verdict(tmp_path, form):
+    # More claims than a pipe can hold, so that the reader is gone before the end.
+    claims = "".join(f'I{k} = "x + {k}"\n' for k in range(400))
+    (tmp_path / "a.toml").write_text(f'variables = ["x"]\n[system]\nrhs = ["x"]\n[integrals]\n{claims}')
+    script = f'kahanmaps check-integrals a.toml {form} | head -c 10; echo "${{PIPESTATUS[0]}}"'
+    outcome = shell(script, tmp_path)
+    assert outcome.out[10:] == "1\n"
+    assert outcome.err == ""
+
+
+def test_a_closed_standard_output_loses_the_output_and_nothing_else(tmp_path):
+    outcome = shell("kahanmaps check-integrals euler_top --integral x1 --json >&-", tmp_path)
+    assert (outcome.status, outcome.err) == (1, "")
+
+
+def test_a_file_is_written_whatever_streams_are_closed(tmp_path):
+    script = "kahanmaps orbit euler_top --start 1,2,3 --eps 1/10 --steps 2 -o x.csv <&- >&- 2>&-"
+    assert shell(script, tmp_path).status == 0
+    assert (tmp_path / "x.csv").read_text().splitlines()[-1] == (
+        '# {"status": "completed", "steps": 2, "message": "2 steps"}'
+    )
+
+
+def test_wrong_use_is_wrong_use_when_standard_error_is_closed(tmp_path):
+    outcome = shell("kahanmaps nonsense 2>&-", tmp_path)
+    assert (outcome.status, outcome.out) == (2, "")
+
+
+def test_a_closed_standard_input_holds_no_system(tmp_path):
+    outcome = shell("kahanmaps check-integrals - <&-", tmp_path)
+    assert outcome.status == 2
+    assert "found nothing on standard input" in outcome.err
+
+
+@needs_full_device
+@pytest.mark.parametrize(
+    "command",
+    [
+        "systems",
+        "--help",
+        "check-integrals euler_top",
+        "orbit euler_top --start 1,2,3 --eps 1/10 --steps 2",
+        "orbit euler_top --start 1,2,3 --eps 1/10 --steps 2 --format npz",
+    ],
+)
+def test_a_full_disk_below_standard_output_is_told(tmp_path, command):
+    outcome = shell(f"kahanmaps {command} > /dev/full", tmp_path)
+    assert (outcome.status, outcome.err) == (2, "Error: No space left on device\n")
+
+
+@needs_full_device
+def test_talk_that_cannot_be_written_does_not_change_the_exit_status(tmp_path):
+    script = "kahanmaps orbit euler_top --start 1,2,3 --eps 1/10 --steps 2 -o x.csv 2> /dev/full"
+    assert shell(script, tmp_path).status == 0
+    assert shell("kahanmaps orbit nonsense --start 1 --eps 1 --steps 1 2> /dev/full", tmp_path).status == 2
+
+
+def test_a_character_that_the_output_cannot_encode_is_spelt_out(tmp_path):
+    (tmp_path / "a.toml").write_text('name = "ξ"\nvariables = ["x"]\n[system]\nrhs = ["x"]', encoding="utf-8")
+    outcome = shell("kahanmaps systems a.toml", tmp_path, PYTHONIOENCODING="latin-1")
+    assert (outcome.status, outcome.out) == (0, "\\u03be\nx' = x\n")
+
+
+def test_the_plain_locale_is_good_enough(tmp_path):
+    plain = environment(LC_ALL="C", PYTHONCOERCECLOCALE="0", PYTHONUTF8="0")
+    assert shell("kahanmaps systems --json", tmp_path, **plain) == shell("kahanmaps systems --json", tmp_path)

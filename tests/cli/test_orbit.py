@@ -1,0 +1,575 @@
+"""kahanmaps orbit: exact iterates in four kinds of arithmetic and four formats, complete and valid whatever happens.
+
+The JSON lines are an interface: a header from which the orbit can be made again, points, and an end that says
+what happened. Arithmetics agree with each other: residues are the exact orbit reduced, balls contain it, floats are
+near it.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import shlex
+import signal
+import subprocess
+import time
+from fractions import Fraction
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from cli_helpers import COMMAND, Outcome, shell, terminal
+
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import Orbit
+from kahanmaps.systems.catalog import load
+from kahanmaps.version import __version__
+from kahanmaps_cli.progress import Progress
+
+TOP = "orbit euler_top --start 1,1/2,-1/3 --eps 1/10"
+LORENZ = "orbit lorenz --start 1,-1/2,2 --eps 1/20"
+LOTKA_VOLTERRA = "orbit lotka_volterra --start 1/2,2/3 --eps 1/10"
+PRIMES = [10007, 2**61 - 1, 2**63 - 25, 2**63 + 29, 2**89 - 1]
+
+over_systems = pytest.mark.parametrize("orbit", [TOP, LORENZ, LOTKA_VOLTERRA], ids=lambda text: text.split()[1])
+
+
+def fractions(outcome: Outcome) -> list[list[Fraction]]:
+    """The points of an orbit that was printed as JSON lines."""
+    assert outcome.status == 0, outcome.err
+    return outcome.points
+
+
+def ball(text: str) -> tuple[Fraction, Fraction]:
+    """Midpoint and radius of a ball such as [0.333 +/- 1.0e-3], or of an exact number."""
+    middle, _, radius = text.strip("[]").rpartition("+/- ") if "+/-" in text else (text, "", "0")
+    return Fraction(middle.strip() or 0), Fraction(radius)
+
+
+# JSON lines
+
+
+def test_the_records_are_a_header_the_points_and_an_end(kahanmaps):
+    kinds = [record["record"] for record in kahanmaps(f"{TOP} --steps 3 --format jsonl").records]
+    assert kinds == ["header", "point", "point", "point", "point", "end"]
+
+
+def test_the_header_has_the_documented_shape(kahanmaps):
+    assert kahanmaps(f"{TOP} --steps 3 --format jsonl").records[0] == {
+        "record": "header",
+        "system": "euler_top",
+        "variables": ["x1", "x2", "x3"],
+        "rhs": ["x2*x3", "-2*x1*x3", "x1*x2"],
+        "eps": "1/10",
+        "time_step": "1/5",
+        "convention": "eps is the paper's epsilon, the time step is 2 eps",
+        "arithmetic": "exact",
+        "start": ["1", "1/2", "-1/3"],
+        "direction": "forward",
+        "steps": 3,
+        "seed": None,
+        "version": __version__,
+    }
+
+
+def test_a_point_is_its_step_and_its_coordinates_as_exact_text(kahanmaps):
+    records = kahanmaps(f"{TOP} --steps 3 --format jsonl").records
+    assert records[1] == {"record": "point", "step": 0, "x": ["1", "1/2", "-1/3"]}
+
+
+def test_a_point_has_the_integrals_that_were_asked_for(kahanmaps):
+    records = kahanmaps(f"{TOP} --steps 0 --integral F1 --integral s=x1+x2 --format jsonl").records
+    # by hand: F1 = (1 - eps^2 x2^2)/(1 + 2 eps^2 x3^2) = (399/400)/(902/900)
+    assert records[1]["integrals"] == {"F1": "3591/3608", "s": "3/2"}
+
+
+def test_the_end_has_the_documented_shape(kahanmaps):
+    records = kahanmaps(f"{TOP} --steps 3 --format jsonl").records
+    assert records[-1] == {"record": "end", "status": "completed", "steps": 3, "message": "3 steps"}
+
+
+def test_the_end_of_a_periodic_orbit_has_the_period(kahanmaps):
+    # x~ = -y, y~ = x at eps = 1: a quarter turn
+    end = kahanmaps("orbit harmonic --start 1,0 --eps 1 --steps 10 --format jsonl").records[-1]
+    assert (end["status"], end["steps"], end["period"]) == ("periodic", 10, 4)
+
+
+@pytest.mark.parametrize(
+    ("command", "status", "steps"),
+    [
+        ("orbit --vars x --rhs x^2 --start 1/3 --eps 1/2 --steps 9", "singular", 2),  # 1/3, 1/2, 1, pole
+        (f"{LOTKA_VOLTERRA} --steps 90 --max-digits 100", "budget", 5),
+        (f"{TOP} --steps 9 --arithmetic ball:2", "precision", 1),
+    ],
+)
+def test_the_end_of_an_orbit_stopped_early_says_why_and_where(kahanmaps, command, status, steps):
+    outcome = kahanmaps(f"{command} --format jsonl")
+    end = outcome.records[-1]
+    assert outcome.status == 3
+    assert (end["status"], end["steps"]) == (status, steps)
+    assert [record["step"] for record in outcome.records[1:-1]] == list(range(steps + 1))
+    assert end["message"]
+
+
+@pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007", "ball:100"])
+def test_an_orbit_can_be_made_again_from_its_header(kahanmaps, arithmetic):
+    first = kahanmaps(f"{LORENZ} --steps 4 --arithmetic {arithmetic} --format jsonl --backward")
+    header = first.records[0]
+    assert header["arithmetic"] == arithmetic
+    words = ["orbit", "--vars", ",".join(header["variables"]), *(f"--rhs={text}" for text in header["rhs"])]
+    words += ["--start", ",".join(header["start"]), "--eps", header["eps"], "--steps", str(header["steps"])]
+    words += ["--arithmetic", header["arithmetic"], f"--{header['direction']}", "--format", "jsonl"]
+    again = kahanmaps(shlex.join(words))
+    assert again.records[1:] == first.records[1:]
+
+
+# Points
+
+
+@over_systems
+def test_the_points_are_those_of_the_library(kahanmaps, orbit):
+    outcome = kahanmaps(f"{orbit} --steps 4 --format jsonl")
+    header = outcome.records[0]
+    walked = Orbit(KahanMap(load(header["system"]).system, header["eps"]), header["start"], 4)
+    assert [record["x"] for record in outcome.records[1:-1]] == [point.text for point in walked]
+
+
+def test_the_time_step_is_two_eps(kahanmaps):
+    with_eps = kahanmaps("orbit lorenz --start 1,2,3 --eps 1/20 --steps 3")
+    assert kahanmaps("orbit lorenz --start 1,2,3 --time-step 1/10 --steps 3") == with_eps
+
+
+def test_decimals_are_exact(kahanmaps):
+    assert kahanmaps("orbit lorenz --start 1,0.5,3 --eps 0.05 --steps 3") == kahanmaps(
+        "orbit lorenz --start 1,1/2,3 --eps 1/20 --steps 3"
+    )
+
+
+@over_systems
+def test_steps_backward_undo_steps_forward(kahanmaps, orbit):
+    there = fractions(kahanmaps(f"{orbit} --steps 3 --format jsonl"))
+    start = ",".join(map(str, there[-1]))
+    back = kahanmaps(
+        f"orbit {orbit.split()[1]} --start={start} --eps {orbit.split()[-1]} --steps 3 --format jsonl --backward"
+    )
+    assert fractions(back) == there[::-1]
+
+
+def test_backward_is_told(kahanmaps):
+    outcome = kahanmaps(f"{TOP} --steps 1 --backward")
+    assert outcome.out.startswith("# euler_top, eps = 1/10 (time step 2 eps = 1/5), exact arithmetic, backward\n")
+
+
+def test_at_picks_iterates(kahanmaps):
+    every = kahanmaps(f"{TOP} --steps 6 --format jsonl").records
+    picked = kahanmaps(f"{TOP} --at 6,0,4,4 --format jsonl").records
+    assert picked[1:-1] == [every[1 + step] for step in (0, 4, 6)]
+
+
+def test_every_picks_multiples(kahanmaps):
+    every = kahanmaps(f"{TOP} --steps 8 --format jsonl").records
+    picked = kahanmaps(f"{TOP} --steps 8 --every 3 --format jsonl").records
+    assert picked[1:-1] == [every[1 + step] for step in (0, 3, 6)]
+    assert picked[-1] == every[-1]
+
+
+# Where the system comes from
+
+
+def test_a_system_comes_from_a_file_or_the_catalogue_or_standard_input_or_the_command_line(kahanmaps, tmp_path):
+    toml = kahanmaps("systems euler_top --toml").out
+    (tmp_path / "top.toml").write_text(toml)
+    rest = "--start 1,2,3 --eps 1/10 --steps 2 --format jsonl"
+    from_catalogue = kahanmaps(f"orbit euler_top {rest}").records[1:]
+    assert kahanmaps("orbit", tmp_path / "top.toml", rest).records[1:] == from_catalogue
+    inline = "--vars x1,x2,x3 --rhs x2*x3 --rhs -2*x3*x1 --rhs=x1*x2"
+    assert kahanmaps(f"orbit {inline} {rest}").records[1:] == from_catalogue
+    piped = shell(f"kahanmaps orbit - {rest}", tmp_path, stdin=toml.encode())
+    assert piped.records[1:] == from_catalogue
+
+
+def test_commands_can_be_piped_into_each_other(tmp_path):
+    script = "kahanmaps family new --m 1 --seed 1 -q | kahanmaps orbit - --start 1,1 --eps 1/100 --steps 1"
+    assert shell(script, tmp_path).status == 0
+
+
+def test_parameters_are_set_with_p(kahanmaps):
+    assert kahanmaps(f"{TOP} -p a1=5/2 -p a3=0.5 --steps 1 --format jsonl").records[0]["rhs"] == [
+        "5/2*x2*x3",
+        "-2*x1*x3",
+        "x1*x2/2",
+    ]
+
+
+def test_parameters_of_an_inline_system_may_stand_in_integrals(kahanmaps):
+    command = "orbit --vars x,y --rhs y --rhs=-a*x -p a=4 --start 1,0 --eps 1/10 --steps 2 --integral E=a*x^2+y^2"
+    assert [row[-1] for row in kahanmaps(command).rows] == ["E", "4", "4", "4"]
+
+
+def test_names_and_numbers_may_be_surrounded_by_blanks(kahanmaps):
+    command = "orbit --vars 'x, y' --rhs ' y' --rhs='-x ' --start ' 1, 0' --eps ' 1/10 ' --steps 1"
+    assert kahanmaps(command).rows == [["step", "x", "y"], ["0", "1", "0"], ["1", "99/101", "-20/101"]]
+
+
+# Kinds of arithmetic
+
+
+@over_systems
+@pytest.mark.parametrize("prime", PRIMES)
+def test_residues_are_the_exact_orbit_modulo_the_prime(kahanmaps, orbit, prime):
+    exact = fractions(kahanmaps(f"{orbit} --steps 5 --format jsonl"))
+    modular = fractions(kahanmaps(f"{orbit} --steps 5 --format jsonl --arithmetic mod:{prime}"))
+    reduced = [[x.numerator * pow(x.denominator, -1, prime) % prime for x in point] for point in exact]
+    assert modular == reduced
+
+
+def test_there_is_arithmetic_modulo_two(kahanmaps):
+    # x = (1, 0, 1): only x2' = -2 x3 x1 could move anything, and it is 0
+    rows = kahanmaps("orbit euler_top --start 1,2,3 --eps 1/3 --steps 3 --arithmetic mod:2").rows
+    assert [row[1:] for row in rows[1:]] == [["1", "0", "1"]] * 4
+
+
+@over_systems
+@pytest.mark.parametrize("bits", [64, 300])
+def test_balls_contain_the_exact_orbit(kahanmaps, orbit, bits):
+    exact = fractions(kahanmaps(f"{orbit} --steps 5 --format jsonl"))
+    outcome = kahanmaps(f"{orbit} --steps 5 --format jsonl --arithmetic ball:{bits}")
+    for point, record in zip(exact, outcome.records[1:-1], strict=True):
+        for x, text in zip(point, record["x"], strict=True):
+            middle, radius = ball(text)
+            assert abs(x - middle) <= radius
+
+
+@over_systems
+def test_more_bits_give_smaller_balls(kahanmaps, orbit):
+    def widest(bits):
+        records = kahanmaps(f"{orbit} --steps 5 --format jsonl --arithmetic ball:{bits}").records
+        return max(ball(text)[1] for text in records[-2]["x"])
+
+    # 200 bits more, of which all but a few are gained
+    assert widest(264) < widest(64) / 2**190
+
+
+@over_systems
+def test_floats_are_near_the_exact_orbit(kahanmaps, orbit):
+    exact = fractions(kahanmaps(f"{orbit} --steps 5 --format jsonl"))
+    floats = fractions(kahanmaps(f"{orbit} --steps 5 --format jsonl --arithmetic float"))
+    for point, near in zip(exact, floats, strict=True):
+        # A step solves one linear system of condition below 100 with 53 bits; five steps lose at most three digits.
+        bound = Fraction(max(map(abs, point))) * Fraction(1, 10**12)
+        assert all(abs(x - y) <= bound for x, y in zip(point, near, strict=True))
+
+
+def test_floats_are_printed_so_that_they_read_back_equal(kahanmaps):
+    record = kahanmaps("orbit lorenz --start 1,2,1/3 --eps 1/10 --steps 1 --arithmetic float --format jsonl").records[1]
+    assert record["x"] == ["1.0", "2.0", repr(1 / 3)]
+
+
+# Integrals
+
+
+@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007"])
+def test_a_conserved_integral_keeps_its_value(kahanmaps, arithmetic):
+    outcome = kahanmaps(f"{TOP} --steps 5 --integral F1 --arithmetic {arithmetic} --format jsonl")
+    assert len({record["integrals"]["F1"] for record in outcome.records[1:-1]}) == 1
+
+
+def test_an_integral_is_named_by_its_expression_or_as_one_likes(kahanmaps):
+    long = "+".join(["x1"] * 20)
+    requests = f"--integral F1 --integral Q=F2 --integral x1^2 --integral r=x1/x2 --integral {long}"
+    assert kahanmaps(f"{TOP} --steps 1 {requests}").rows[0] == ["step", "x1", "x2", "x3", "F1", "Q", "x1^2", "r", "I5"]
+
+
+def test_known_integrals_are_those_of_theorems_and_of_the_file(kahanmaps, pair):
+    assert kahanmaps(f"{TOP} --steps 1 --integral known").rows[0][4:] == ["F1", "F2"]
+    names = kahanmaps("orbit", pair, "--start 1,2,3,4 --eps 1/10 --steps 1 --integral known").rows[0][5:]
+    assert {"modified H", "H~", "K~_+-"} <= set(names)
+
+
+def test_known_integrals_of_a_member_of_the_family_are_conserved(kahanmaps, pair):
+    rows = kahanmaps("orbit", pair, "--start 1,2,3,4 --eps 1/1000 --steps 3 --integral known").rows
+    assert len({tuple(row[5:]) for row in rows[1:]}) == 1
+
+
+def test_integrals_of_the_file_are_known_in_floats_too(kahanmaps):
+    rows = kahanmaps(f"{TOP} --steps 1 --integral known --arithmetic float").rows
+    # The values by hand; some ten roundings of numbers near 1.
+    assert [float(cell) for cell in rows[1][4:]] == pytest.approx([3591 / 3608, 451 / 459], rel=1e-15, abs=0)
+
+
+def test_integrals_of_theorems_are_refused_in_floats(kahanmaps, pair):
+    outcome = kahanmaps("orbit", pair, "--start 1,2,3,4 --eps 1/10 --steps 1 --integral known --arithmetic float")
+    assert outcome.status == 2
+    assert "needs exact, mod:P or ball:BITS arithmetic" in outcome.err
+
+
+@pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007", "ball:64"])
+def test_an_integral_has_no_value_at_a_pole(kahanmaps, arithmetic):
+    outcome = kahanmaps(f"{TOP} --steps 1 --integral p=1/(x1-1) --arithmetic {arithmetic} --format jsonl")
+    assert outcome.status == 0
+    assert [record["integrals"]["p"] is None for record in outcome.records[1:-1]] == [True, False]
+
+
+# Formats
+
+
+def test_text_is_tab_separated_between_comments(kahanmaps):
+    # by hand: x~ = x (1 + eps)/(1 - eps) for x' = x
+    assert kahanmaps("orbit --vars x --rhs x --start 1 --eps 1/10 --steps 2 --integral p=1/(x-1)").out == (
+        "# inline, eps = 1/10 (time step 2 eps = 1/5), exact arithmetic\n"
+        "step\tx\tp\n"
+        "0\t1\tpole\n"
+        "1\t11/9\t9/2\n"
+        "2\t121/81\t81/40\n"
+        "# completed: 2 steps\n"
+    )
+
+
+def test_csv_is_read_by_the_csv_module(kahanmaps):
+    command = f"{TOP} --steps 2 --integral 'a, \"b\"=x1*x2' --integral p=1/(x1-1)"
+    lines = kahanmaps(f"{command} --format csv").out.splitlines()
+    records = kahanmaps(f"{command} --format jsonl").records
+    table = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    for row, record in zip(table, records[1:-1], strict=True):
+        assert [row["step"], row["x1"], row["x2"], row["x3"]] == [str(record["step"]), *record["x"]]
+        assert row['a, "b"'] == record["integrals"]['a, "b"']
+        assert row["p"] == (record["integrals"]["p"] or "")
+
+
+def test_csv_has_the_header_and_the_end_as_comments(kahanmaps):
+    lines = kahanmaps(f"{TOP} --steps 2 --format csv").out.splitlines()
+    records = kahanmaps(f"{TOP} --steps 2 --format jsonl").records
+    for line, record in ((lines[0], records[0]), (lines[-1], records[-1])):
+        assert json.loads(line.removeprefix("# ")) == {key: record[key] for key in record if key != "record"}
+
+
+@pytest.fixture
+def npz(kahanmaps, tmp_path):
+    """Run an orbit into an npz file and load it."""
+
+    def run(command: str) -> SimpleNamespace:
+        status = kahanmaps(command, "-q -o", tmp_path / "orbit.npz").status
+        with np.load(tmp_path / "orbit.npz", allow_pickle=False) as arrays:
+            found = {name: arrays[name] for name in arrays.files}
+        found["meta"] = json.loads(str(found["meta"]))
+        return SimpleNamespace(status=status, **found)
+
+    return run
+
+
+def test_npz_holds_exact_numbers_exactly(npz, kahanmaps):
+    exact = fractions(kahanmaps(f"{TOP} --steps 6 --format jsonl"))
+    assert [[Fraction(x.decode()) for x in row] for row in npz(f"{TOP} --steps 6").x] == exact
+
+
+@pytest.mark.parametrize("prime", [p for p in PRIMES if p < 2**63])
+def test_npz_holds_residues_as_integers(npz, kahanmaps, prime):
+    command = f"{TOP} --steps 3 --arithmetic mod:{prime}"
+    found = npz(command)
+    assert found.x.dtype == np.int64
+    assert found.x.tolist() == fractions(kahanmaps(f"{command} --format jsonl"))
+
+
+def test_npz_holds_large_residues_as_text(npz, kahanmaps):
+    command = f"{TOP} --steps 3 --arithmetic mod:{2**89 - 1}"
+    assert [[int(x) for x in row] for row in npz(command).x] == fractions(kahanmaps(f"{command} --format jsonl"))
+
+
+def test_npz_holds_floats_as_they_are(npz, kahanmaps):
+    command = f"{TOP} --steps 3 --arithmetic float"
+    found = npz(command)
+    assert found.x.dtype == np.float64
+    records = kahanmaps(f"{command} --format jsonl").records
+    assert found.x.tolist() == [[float(entry) for entry in record["x"]] for record in records[1:-1]]
+
+
+def test_npz_holds_the_steps(npz):
+    assert npz(f"{TOP} --steps 7 --every 3").step.tolist() == [0, 3, 6]
+
+
+def test_npz_holds_header_and_end(npz, kahanmaps):
+    command = f"{TOP} --steps 3 --integral F1"
+    found = npz(command)
+    records = kahanmaps(f"{command} --format jsonl").records
+    assert found.meta == {
+        "header": {key: value for key, value in records[0].items() if key != "record"},
+        "columns": ["x1", "x2", "x3"],
+        "integrals": ["F1"],
+        "end": {key: value for key, value in records[-1].items() if key != "record"},
+    }
+
+
+@pytest.mark.parametrize(
+    ("arithmetic", "first"), [("exact", b""), ("mod:10007", b""), ("float", np.nan), ("ball:64", b"")]
+)
+def test_npz_holds_integrals_with_a_mark_for_poles(npz, arithmetic, first):
+    found = npz(f"{TOP} --steps 2 --integral p=1/(x1-1) --integral x1+x2 --arithmetic {arithmetic}")
+    assert found.integrals.shape == (3, 2)
+    np.testing.assert_equal(found.integrals[0, 0], first)
+
+
+def test_npz_without_points_has_the_right_shape(npz):
+    found = npz("orbit --vars x,y --rhs x^2 --rhs y --start 1,1 --eps 1/2 --at 5 --integral x*y")
+    assert (found.status, found.step.shape, found.x.shape, found.integrals.shape) == (3, (0,), (0, 2), (0, 1))
+
+
+def test_npz_goes_into_a_pipe(tmp_path):
+    done = subprocess.run([*COMMAND, *shlex.split(f"{TOP} --steps 2 --format npz")], capture_output=True, check=True)
+    with np.load(io.BytesIO(done.stdout)) as arrays:
+        assert arrays["x"][0].tolist() == [b"1", b"1/2", b"-1/3"]
+
+
+def test_npz_that_would_grow_too_large_keeps_what_it_holds(npz, kahanmaps, monkeypatch):
+    monkeypatch.setattr("kahanmaps_cli.orbit_formats.MAX_PADDED_BYTES", 1000)
+    found = npz(f"{TOP} --steps 20")
+    assert (found.status, found.meta["end"]["status"]) == (3, "budget")
+    assert found.step.tolist() == list(range(found.meta["end"]["steps"] + 1))
+    assert 1 < len(found.x) < 20
+
+
+# Files
+
+
+@pytest.mark.parametrize("form", ["jsonl", "csv"])
+def test_the_name_of_the_file_says_the_format(kahanmaps, tmp_path, form):
+    kahanmaps(f"{TOP} --steps 2 -o", tmp_path / f"orbit.{form}")
+    assert (tmp_path / f"orbit.{form}").read_text() == kahanmaps(f"{TOP} --steps 2 --format {form}").out
+
+
+def test_the_format_asked_for_outweighs_the_name_of_the_file(kahanmaps, tmp_path):
+    kahanmaps(f"{TOP} --steps 2 --format jsonl -o", tmp_path / "orbit.csv")
+    assert (tmp_path / "orbit.csv").read_text() == kahanmaps(f"{TOP} --steps 2 --format jsonl").out
+
+
+def test_a_file_of_any_other_name_is_text(kahanmaps, tmp_path):
+    kahanmaps(f"{TOP} --steps 2 -o", tmp_path / "orbit.txt")
+    assert (tmp_path / "orbit.txt").read_text() == kahanmaps(f"{TOP} --steps 2").out
+
+
+def test_what_was_written_is_told_on_standard_error(kahanmaps, tmp_path):
+    outcome = kahanmaps(f"{TOP} --steps 2 -o", tmp_path / "orbit.csv")
+    assert outcome == Outcome(0, "", f"{tmp_path / 'orbit.csv'}: completed: 2 steps\n")
+
+
+def test_a_dash_stands_for_standard_output(kahanmaps):
+    assert kahanmaps(f"{TOP} --steps 2 -o -") == kahanmaps(f"{TOP} --steps 2")
+
+
+# Talk
+
+
+@pytest.mark.parametrize("rest", ["--steps 2 -o {}", "--steps 90 --max-digits 20", "--steps 2"])
+def test_quiet_is_silent(kahanmaps, tmp_path, rest):
+    assert kahanmaps(f"{TOP} -q", rest.format(tmp_path / "orbit.csv")).err == ""
+
+
+def test_progress_goes_to_standard_error_only(kahanmaps, slow_clock):
+    outcome = kahanmaps(f"{TOP} --steps 3")
+    assert outcome.err.splitlines()[0] == "step 0 of 3 (10 s)"
+    assert outcome.err.splitlines()[-1].startswith("step 3 of 3 (")
+    assert "step 3 of 3" not in outcome.out
+
+
+def test_quiet_work_shows_no_progress(kahanmaps, slow_clock):
+    assert kahanmaps(f"{TOP} --steps 3 -q").err == ""
+
+
+def test_quick_work_shows_no_progress(kahanmaps):
+    assert kahanmaps(f"{TOP} --steps 3").err == ""
+
+
+def test_progress_on_a_terminal_is_one_line_that_goes_away(monkeypatch, slow_clock):
+    screen = io.StringIO()
+    screen.isatty = lambda: True
+    monkeypatch.setattr("sys.stderr", screen)
+    with Progress() as progress:
+        progress("step 9 of 10")
+        progress("step 10 of 10")
+    blank = " " * len("step 10 of 10 (20 s)")
+    assert screen.getvalue() == f"\rstep 9 of 10 (10 s)\rstep 10 of 10 (20 s)\r{blank}\r"
+
+
+# Terminals
+
+
+@pytest.fixture(scope="module")
+def on_terminal():
+    """An orbit with long numbers, printed on a terminal 100 columns wide."""
+    return terminal(*shlex.split(f"{TOP} --steps 5"), columns=100)
+
+
+def test_long_numbers_are_shortened_on_a_terminal(on_terminal):
+    assert "..." in on_terminal.out
+    assert max(len(line) for line in on_terminal.out.splitlines()) <= 100
+
+
+def test_nothing_is_shortened_in_a_pipe(kahanmaps):
+    outcome = kahanmaps(f"{TOP} --steps 5")
+    assert "..." not in outcome.out
+    assert max(len(line) for line in outcome.out.splitlines()) > 100
+
+
+def test_nothing_is_shortened_in_a_file_written_from_a_terminal(tmp_path, kahanmaps):
+    terminal(*shlex.split(f"{TOP} --steps 5 -o {tmp_path / 'orbit.txt'}"))
+    assert (tmp_path / "orbit.txt").read_text() == kahanmaps(f"{TOP} --steps 5").out
+
+
+def test_columns_are_aligned_on_a_terminal(on_terminal):
+    table = [line for line in on_terminal.out.splitlines() if not line.startswith("#")]
+    assert len({len(line) for line in table}) == 1
+
+
+def test_npz_is_refused_on_a_terminal():
+    outcome = terminal(*shlex.split(f"{TOP} --steps 5 --format npz"))
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "npz is not for a terminal: add -o FILE" in outcome.err
+
+
+# Interrupts
+
+
+@pytest.fixture(scope="module", params=[signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+def interrupted(request, tmp_path_factory):
+    """An endless orbit, written to a file, that got a signal: exit status, standard error, lines of the file."""
+    path = tmp_path_factory.mktemp("interrupted") / "orbit.jsonl"
+    words = f"{TOP} --steps {10**12} --arithmetic mod:10007 --every 100 -o {path}"
+    process = subprocess.Popen([*COMMAND, *shlex.split(words)], stderr=subprocess.PIPE, text=True)
+    while not path.exists() or not path.stat().st_size:  # the first records are in the file
+        time.sleep(0.02)
+    process.send_signal(request.param)
+    err = process.communicate(timeout=30)[1]
+    return SimpleNamespace(status=process.returncode, err=err, lines=path.read_text().splitlines())
+
+
+def test_an_interrupt_gives_130(interrupted):
+    assert interrupted.status == 130
+
+
+def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(interrupted):
+    records = [json.loads(line) for line in interrupted.lines]
+    steps = [record["step"] for record in records[1:-1]]
+    end = records[-1]
+    assert (end["record"], end["status"]) == ("end", "interrupted")
+    assert steps == list(range(0, end["steps"] + 1, 100))
+    assert len(steps) > 1
+
+
+def test_an_interrupt_is_told_without_a_traceback(interrupted):
+    assert "orbit.jsonl: interrupted: interrupted after step " in interrupted.err
+    assert "Traceback" not in interrupted.err
+
+
+def test_an_interrupted_npz_file_can_be_read(kahanmaps, npz, monkeypatch):
+    class Interrupted(Orbit):
+        """An orbit during whose third step Ctrl-C is pressed."""
+
+        def _next(self, value):
+            if value.bits > 15:
+                signal.raise_signal(signal.SIGINT)
+            return super()._next(value)
+
+    monkeypatch.setattr("kahanmaps.maps.orbits.Orbit", Interrupted)
+    found = npz(f"{TOP} --steps 100")
+    assert (found.status, found.meta["end"]["status"]) == (130, "interrupted")
+    assert found.step.tolist() == list(range(found.meta["end"]["steps"] + 1))

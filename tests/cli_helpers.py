@@ -1,0 +1,85 @@
+"""What the tests of the command line share: the outcome of a command, a shell and a terminal to run it in."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import pty
+import struct
+import subprocess
+import sys
+import termios
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+COMMAND = [sys.executable, "-m", "kahanmaps_cli.main"]
+
+# In a shell `kahanmaps` is the one of the interpreter that runs the tests, installed or not.
+_PRELUDE = 'kahanmaps() { "$KAHANMAPS_PYTHON" -m kahanmaps_cli.main "$@"; }\n'
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The exit status of a command, what it printed, and what it said on standard error."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> Any:
+        """Standard output as one JSON object."""
+        return json.loads(self.out)
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """Standard output as JSON lines."""
+        return [json.loads(line) for line in self.out.splitlines()]
+
+    @property
+    def points(self) -> list[list[Fraction]]:
+        """The coordinates of the points of an orbit in JSON lines."""
+        return [[Fraction(entry) for entry in record["x"]] for record in self.records if record["record"] == "point"]
+
+    @property
+    def rows(self) -> list[list[str]]:
+        """The cells of tab-separated lines, comments left out."""
+        return [line.split("\t") for line in self.out.splitlines() if not line.startswith("#")]
+
+
+def environment(**more: str) -> dict[str, str]:
+    """The environment of the tests without what changes output, and with `more`."""
+    kept = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "COLUMNS", "LINES")}
+    return {**kept, "KAHANMAPS_PYTHON": sys.executable, **more}
+
+
+def shell(script: str, folder: Path, stdin: bytes = b"", **more: str) -> Outcome:
+    """Run a script in bash, where `kahanmaps` is the command; `more` are environment variables."""
+    done = subprocess.run(
+        ["bash", "-c", _PRELUDE + script], cwd=folder, input=stdin, capture_output=True, env=environment(**more)
+    )
+    return Outcome(done.returncode, done.stdout.decode(), done.stderr.decode())
+
+
+def terminal(*arguments: str, columns: int = 80, **more: str) -> Outcome:
+    """Run a command with a terminal of that width as its standard output; standard error is not one."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    env = environment(TERM="xterm-256color", **more)
+    process = subprocess.Popen([*COMMAND, *arguments], stdin=theirs, stdout=theirs, stderr=subprocess.PIPE, env=env)
+    os.close(theirs)
+    pieces = []
+    while True:
+        try:
+            piece = os.read(ours, 65536)
+        except OSError:  # what Linux says when the other end is closed
+            break
+        if not piece:
+            break
+        pieces.append(piece)
+    os.close(ours)
+    err = process.communicate()[1]
+    return Outcome(process.returncode, b"".join(pieces).decode().replace("\r\n", "\n"), err.decode())

@@ -1,0 +1,57 @@
+"""The examples do what stands beside them: every script prints its .out file, and the demo runs through."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+SCRIPTS = sorted(EXAMPLES.glob("*.py"))
+
+
+def test_there_are_examples():
+    assert SCRIPTS
+
+
+def test_every_output_belongs_to_an_example():
+    assert {path.stem for path in EXAMPLES.glob("*.out")} == {path.stem for path in SCRIPTS}
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_an_example_prints_what_stands_beside_it(script, tmp_path):
+    done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == script.with_suffix(".out").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    """The demo run in a folder of its own (it writes beside the folder it is in): the outcome and that folder."""
+    home = tmp_path_factory.mktemp("demo")
+    (home / "examples").mkdir()
+    (home / "bin").mkdir()
+    shutil.copy(EXAMPLES / "demo.sh", home / "examples")
+    command = home / "bin" / "kahanmaps"
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m kahanmaps_cli.main "$@"\n')
+    command.chmod(0o755)
+    path = f"{home / 'bin'}{os.pathsep}{os.environ['PATH']}"
+    script = ["bash", str(home / "examples" / "demo.sh")]
+    return subprocess.run(script, env={**os.environ, "PATH": path}, capture_output=True, text=True), home
+
+
+def test_the_demo_runs_through(demo):
+    assert demo[0].returncode == 0, demo[0].stderr
+
+
+def test_the_demo_proves_what_it_promises(demo):
+    assert "verdict\tproved" in demo[0].stdout
+    assert "refuted (as expected)" in demo[0].stdout
+
+
+def test_the_demo_leaves_files_to_play_with(demo):
+    assert {"pair.toml", "pair-ppp.toml", "pair-pmm.toml"} <= {path.name for path in (demo[1] / ".demo").iterdir()}
