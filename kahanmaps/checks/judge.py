@@ -49,7 +49,7 @@ def judge(
         experience, failure = along(identity, orbit)
         also.append(experience)
         if failure is not None and verdict is not Verdict.REFUTED:
-            if proof is not None:
-                raise Contradiction(f"{claim}: {proof.summary}, but it {experience.summary} {failure}")
+            if verdict is Verdict.PROVED:
+                raise Contradiction(f"{claim}: {evidence.summary}, but it {experience.summary} {failure}")
             verdict, evidence, witness = Verdict.REFUTED, experience, failure
     return Finding(claim, verdict, evidence, tuple(also), witness, formula, source, control)

@@ -223,6 +223,13 @@ def test_settings_take_every_exact_number():
     assert settings.start == (fmpq(1), fmpq(1, 2), fmpq(1, 3))
 
 
+def test_settings_are_for_every_eps_and_an_error_of_two_to_the_minus_one_hundred_unless_said_otherwise():
+    settings = Settings()
+    assert (settings.eps, settings.start, settings.seed, settings.error_bits) == (None, None, 0, 100)
+    assert not settings.orbit_is_asked
+    assert settings.orbit_eps == fmpq(1, 10)
+
+
 def test_settings_refuse_a_machine_float():
     with pytest.raises(InexactNumber):
         Settings(eps=0.1)

@@ -123,6 +123,16 @@ def test_the_sentence_of_the_evidence_says_what_the_data_say():
     )
 
 
+def test_one_point_is_said_to_be_one():
+    assert decide(TRUE, 0, 1).evidence.summary.startswith("held at 1 random point over GF(p)")
+
+
+def test_the_evidence_says_for_which_eps_it_stands():
+    every, one = decide(TRUE, 0).evidence, decide(identity_of(square_left, square_right, eps=fmpq(-1, 3)), 0).evidence
+    assert (every.data["eps"], one.data["eps"]) == ("every", "-1/3")
+    assert "for eps = -1/3;" in one.summary
+
+
 def test_a_larger_degree_asks_for_more_points():
     data = decide(identity_of(square_left, square_right, degree=2**60), 0).evidence.data
     assert data["points"] >= 50
@@ -269,6 +279,13 @@ def test_an_identity_that_holds_at_one_eps_is_refuted_elsewhere(eps):
     (x,), (at,) = exact(*decision.witness.point), exact(decision.witness.eps)
     assert eps is None or at == fraction(eps)
     verify_witness(decision.witness, [x * at], [x / 3])
+
+
+def test_a_witness_against_every_eps_is_looked_for_at_more_than_one_eps():
+    decision = decide(identity_of(lambda x, e, K: x * e, lambda x, e, K: x), 0)
+    (x,), (eps,) = exact(*decision.witness.point), exact(decision.witness.eps)
+    assert eps != 1
+    verify_witness(decision.witness, [x * eps], [x])
 
 
 def fourth_power(w: fmpq | int, eps: fmpq | None) -> Identity:

@@ -549,6 +549,26 @@ def test_the_transformation_law_is_bounded_in_dimension_three(hamiltonian):
     check_tensor(hamiltonian, fmpq(2, 3))
 
 
+LOPSIDED_HAMILTONIANS = [
+    hamiltonian_of("q p", "10^30*q^3 + p"),
+    hamiltonian_of("q p", "q^2*p/(10^30 + 57) + p^2"),
+    hamiltonian_of("q p", "10^30*q*p"),
+    hamiltonian_of("q p", "q^3 + p^3", [[0, 10**30], [-(10**30), 0]]),
+    hamiltonian_of("q p", "q^3 + p^3", [[0, fmpq(1, 10**30)], [fmpq(-1, 10**30), 0]]),
+    hamiltonian_of("x y z", "x^2*z", [[0, 10**30, 0], [-(10**30), 0, 1], [0, -1, 0]]),
+    hamiltonian_of("x y z", "10^30*z^3 + x*y*z", [[0, 1, fmpq(1, 10**9)], [-1, 0, 1], [fmpq(-1, 10**9), -1, 0]]),
+]
+
+
+@pytest.mark.parametrize("eps", [fmpq(2, 3), fmpq(10**20, 3), fmpq(3, 10**20)])
+@pytest.mark.parametrize("hamiltonian", LOPSIDED_HAMILTONIANS)
+def test_the_poisson_identities_of_a_system_with_one_large_part_are_bounded(hamiltonian, eps):
+    check_tensor(hamiltonian, eps)
+    written = Written(hamiltonian.system, eps)
+    for defect in jacobi_sums(written, hamiltonian.J):
+        within(defect, jacobi_identity(hamiltonian, eps).equation)
+
+
 def jacobi_sums(written: Written, J: fmpq_mat) -> list[Any]:
     """The cyclic sums of (q L)^2 d Pi, by differentiating polynomials."""
     n, Pi = written.n, tensor(written, J, written.x, written.one)

@@ -1,0 +1,57 @@
+"""Plain data as TOML text, as far as system files need it: text, integers, lists, tables one level deep.
+
+Python reads TOML and does not write it; a dependency for forty lines would be one too many.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from flint import fmpz
+
+
+def to_toml(document: Mapping[str, Any], top: Sequence[str], sections: Sequence[str]) -> str:
+    """The document as text: the keys `top` first, then the tables `sections`, in this order; others are left out.
+
+    >>> print(to_toml({"name": "a", "system": {"rhs": ["x^2"]}}, ["name"], ["system"]), end="")
+    name = "a"
+    <BLANKLINE>
+    [system]
+    rhs = ["x^2"]
+    """
+    lines = []
+    for key in top:
+        if key in document:
+            lines.append(f"{key} = {_toml_value(document[key])}")
+    for section in sections:
+        if section in document and document[section] is not None:
+            lines += ["", f"[{section}]"]
+            lines += [f"{_toml_key(key)} = {_toml_value(value)}" for key, value in document[section].items()]
+    return "\n".join(lines) + "\n"
+
+
+def _toml_key(key: str) -> str:
+    bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    return key if bare else _toml_string(key)
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool) or not isinstance(value, str | int | Sequence):
+        return _toml_string(str(value))
+    if isinstance(value, str):
+        return _toml_string(value)
+    if isinstance(value, int):
+        # TOML readers written in Python refuse long decimals without quotes.
+        return str(value) if value.bit_length() <= 10_000 else _toml_string(str(fmpz(value)))
+    parts = [_toml_value(item) for item in value]
+    line = f"[{', '.join(parts)}]"
+    if len(line) <= 100 and not any(isinstance(item, list) for item in value):
+        return line
+    return "[\n" + "".join(f"  {part},\n" for part in parts) + "]"
+
+
+def _toml_string(text: str) -> str:
+    # A JSON string is a TOML basic string, but for DEL, which TOML wants escaped.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

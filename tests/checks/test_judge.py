@@ -1,0 +1,159 @@
+"""One claim from start to end: what decides where proof, random points and an orbit all have their say.
+
+Proof comes first, and is tried all the same: a proved claim that fails at a random point or on an orbit is an error of
+the library, and is raised as one. Without proof random points decide, and an orbit can refute what they let pass.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.checks import judge as judge_module
+from kahanmaps.checks import theorems
+from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.decide import Decision, Identity
+from kahanmaps.checks.judge import Contradiction, judge
+from kahanmaps.checks.settings import OrbitRun, Settings
+from kahanmaps.errors import SingularStep
+from kahanmaps.invariants.sizes import Size
+from kahanmaps.maps.orbits import OrbitEnd
+
+PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+PROOF = theorems.evidence("Theorem 1", [("a hypothesis", True)])
+
+
+def identity_of(right) -> Identity:
+    """x = right(x, field)."""
+    return Identity(1, lambda field, point, eps: ([point[0]], [right(point[0], field)]), Size(40, 200.0), 0, None)
+
+
+TRUE = identity_of(lambda x, field: x)
+FALSE = identity_of(lambda x, field: x + field.one)
+# True at 1 and 2, on an orbit that random points do not meet.
+FALSE_BUT_ON_AN_ORBIT = identity_of(lambda x, field: x + (x - field.one) * (x - field.convert(2)))
+POLE_FIRST = Identity(
+    1,
+    lambda field, point, eps: None if point[0] == field.one else ([point[0]], [field.convert(2)]),
+    Size(1, 10.0),
+    1,
+    None,
+)
+
+
+def orbit(*points: int) -> OrbitRun:
+    run = tuple((fmpq(x),) for x in points)
+    return OrbitRun(run[0], run, fmpq(1, 10), OrbitEnd("completed", len(points) - 1, f"{len(points) - 1} steps"))
+
+
+def undefined(field, point, eps):
+    raise SingularStep("no value")
+
+
+NOWHERE = Identity(1, undefined, Size(1, 1.0), 1, None)
+
+
+@pytest.fixture
+def blind(monkeypatch):
+    """Random points that let everything pass."""
+    held = Decision(SUPPORTED, Evidence("random points over GF(p)", "held"))
+    monkeypatch.setattr(judge_module, "decide", lambda *arguments: held)
+    monkeypatch.setattr(judge_module, "expansion", lambda identity: None)
+
+
+@pytest.fixture
+def at_points_only(monkeypatch):
+    monkeypatch.setattr(judge_module, "expansion", lambda identity: None)
+
+
+def test_a_proof_decides_and_the_points_stand_beside_it():
+    found = judge("c", TRUE, Settings(), PROOF, orbit(1, 2))
+    assert (found.verdict, found.evidence) == (PROVED, PROOF)
+    assert [evidence.method for evidence in found.also] == ["random points over GF(p)", "exact orbit"]
+
+
+def test_beside_a_proof_one_random_point_is_enough():
+    found = judge("c", TRUE, Settings(error_bits=5000), PROOF)
+    assert found.also[0].data["points"] == 1
+
+
+def test_without_proof_there_are_as_many_points_as_the_error_asks_for(at_points_only):
+    found = judge("c", TRUE, Settings(error_bits=500))
+    assert found.verdict is SUPPORTED
+    assert found.evidence.data["points"] >= 9
+
+
+def test_a_proved_claim_that_fails_at_a_random_point_is_a_contradiction():
+    with pytest.raises(Contradiction, match="c: Theorem 1 applies: a hypothesis, but it fails at a rational point"):
+        judge("c", FALSE, Settings(), PROOF)
+
+
+def test_a_proved_claim_that_holds_on_the_orbit_and_fails_at_a_random_point_is_a_contradiction():
+    with pytest.raises(Contradiction):
+        judge("c", FALSE_BUT_ON_AN_ORBIT, Settings(), PROOF, orbit(1, 2))
+
+
+def test_a_proved_claim_that_fails_on_the_orbit_is_a_contradiction(blind):
+    with pytest.raises(Contradiction, match="but it fails at step 0 of an exact orbit"):
+        judge("c", FALSE, Settings(), PROOF, orbit(1, 2))
+
+
+def test_a_claim_proved_by_expansion_that_fails_on_the_orbit_is_a_contradiction(blind, monkeypatch):
+    expanded = Evidence("expansion", "both sides are the same")
+    monkeypatch.setattr(judge_module, "expansion", lambda identity: expanded)
+    assert judge("c", TRUE, Settings(), None, orbit(1, 2)).evidence == expanded
+    with pytest.raises(Contradiction, match="both sides are the same, but it fails at step 0"):
+        judge("c", FALSE, Settings(), None, orbit(1, 2))
+
+
+def test_a_proved_claim_that_is_defined_nowhere_stays_proved_by_its_theorem():
+    found = judge("c", NOWHERE, Settings(), PROOF)
+    assert (found.verdict, found.also) == (PROVED, ())
+
+
+def test_a_claim_that_fails_at_random_points_is_refuted_whatever_the_orbit_says():
+    found = judge("c", FALSE_BUT_ON_AN_ORBIT, Settings(), None, orbit(1, 2, 1))
+    assert found.verdict is REFUTED
+    assert found.evidence.method == "exact rational point"
+    assert found.also[0].summary == "held exactly at 3 points of an orbit, eps = 1/10"
+    (x,) = found.witness.point
+    assert x not in ("1", "2")
+
+
+def test_an_orbit_refutes_what_random_points_let_pass(blind):
+    found = judge("c", FALSE, Settings(), None, orbit(1, 2))
+    assert found.verdict is REFUTED
+    assert found.evidence.summary == "fails at step 0 of an exact orbit"
+    assert (found.witness.point, found.witness.left, found.witness.right) == (("1",), ("1",), ("2",))
+    assert found.witness.eps == "1/10"
+
+
+def test_an_orbit_counts_the_points_without_value_as_steps(blind):
+    found = judge("c", POLE_FIRST, Settings(), None, orbit(1, 2, 3))
+    assert found.evidence.summary == "fails at step 2 of an exact orbit"
+    assert found.evidence.data["points"] == 2
+    assert found.evidence.data["undefined_at"] == 1
+
+
+@pytest.mark.parametrize(
+    ("points", "summary"),
+    [
+        ((2,), "held exactly at 1 point of an orbit, eps = 1/10"),
+        ((2, 2), "held exactly at 2 points of an orbit, eps = 1/10"),
+        ((1, 2), "held exactly at 1 point of an orbit, eps = 1/10, undefined at 1"),
+        ((1,), "could not be tried at any point of an orbit, eps = 1/10, undefined at 1"),
+    ],
+)
+def test_an_orbit_says_at_how_many_points_a_claim_held(points, summary, blind):
+    assert judge("c", POLE_FIRST, Settings(), None, orbit(*points)).also[-1].summary == summary
+
+
+def test_an_orbit_makes_nothing_supported_that_random_points_left_undecided():
+    found = judge("c", NOWHERE, Settings(), None, orbit(1, 2))
+    assert found.verdict is UNDECIDED
+    assert "could not be tried" in found.also[0].summary
+
+
+def test_a_finding_carries_formula_source_and_whether_it_is_a_control():
+    found = judge("c", TRUE, Settings(), PROOF, formula="x = x", source="somebody", control=True)
+    assert (found.claim, found.formula, found.source, found.control) == ("c", "x = x", "somebody", True)
