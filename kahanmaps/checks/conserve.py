@@ -19,10 +19,10 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.invariants.integrals import (
     ClaimedIntegral,
     CommutantIntegral,
-    Integral,
     ModifiedHamiltonian,
     PaperIntegral,
 )
+from kahanmaps.invariants.phase_functions import PhaseFunction
 from kahanmaps.invariants.sizes import VARIABLE, eps_size, step_size
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.files import SystemFile
@@ -35,7 +35,7 @@ MAX_FACTORS = 8
 _TRIED = 32
 
 
-def conservation(system: QuadraticSystem, integral: Integral, eps: fmpq | None) -> Identity:
+def conservation(system: QuadraticSystem, integral: PhaseFunction, eps: fmpq | None) -> Identity:
     """I(x~) = I(x) as an identity, for an integral and the Kahan map of a system."""
 
     last: list[Any] = []  # along an orbit I(x~) at one point is I(x) at the next
@@ -55,9 +55,9 @@ def conservation(system: QuadraticSystem, integral: Integral, eps: fmpq | None) 
     return Identity(system.dim, sides, after.equation(before), poles, eps, "I(x~)", "I(x)")
 
 
-def known_integrals(file: SystemFile) -> list[tuple[Integral, Evidence | None, str]]:
+def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:
     """The integrals that a theorem gives for the system: each with its proof and source."""
-    found: list[tuple[Integral, Evidence | None, str]] = []
+    found: list[tuple[PhaseFunction, Evidence | None, str]] = []
     if file.member is not None:
         return _family_integrals(file.member)
     if file.hamiltonian is not None:
@@ -108,7 +108,7 @@ def check_integrals(
     return Report("integrals", tuple(findings), context, notes, ended_early=settings.cut_short(orbit))
 
 
-def _family_integrals(member: FamilyMember) -> list[tuple[Integral, Evidence | None, str]]:
+def _family_integrals(member: FamilyMember) -> list[tuple[PhaseFunction, Evidence | None, str]]:
     """Modified H in both normalisations, and K~_s for every rational associated system: the whole class shares them."""
     count = len(member.factors)
     if count > MAX_FACTORS:
@@ -118,7 +118,7 @@ def _family_integrals(member: FamilyMember) -> list[tuple[Integral, Evidence | N
         associates = list(member.associated())
     base = associates[0]
     proof = theorems.shared_integral(member, base)
-    found: list[tuple[Integral, Evidence | None, str]] = [
+    found: list[tuple[PhaseFunction, Evidence | None, str]] = [
         (ModifiedHamiltonian(base.hamiltonian), proof, "petrera-suris-2016, eq. (eq: CMOQ integral)"),
         (PaperIntegral(base.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"),
     ]
@@ -128,11 +128,11 @@ def _family_integrals(member: FamilyMember) -> list[tuple[Integral, Evidence | N
     return [*found, *_commutant_integrals(member)]
 
 
-def _commutant_integrals(member: FamilyMember) -> list[tuple[Integral, Evidence | None, str]]:
+def _commutant_integrals(member: FamilyMember) -> list[tuple[PhaseFunction, Evidence | None, str]]:
     """m - 1 further integrals that are rational also where the K~_s are not, chi having irrational roots."""
     hamiltonian = member.chosen.hamiltonian
     letter = "H" if all(sign > 0 for sign in member.signs) else "K"
-    found: list[tuple[Integral, Evidence | None, str]] = []
+    found: list[tuple[PhaseFunction, Evidence | None, str]] = []
     for k in range(1, member.m):
         integral = CommutantIntegral(hamiltonian, member.A, k, letter)
         name = "A^T" if k == 1 else f"(A^T)^{k}"

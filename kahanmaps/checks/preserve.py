@@ -16,10 +16,10 @@ from kahanmaps.checks.settings import Settings, run_orbit
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.measures import (
     ClaimedDensity,
-    Density,
     DeterminantDensity,
     jacobian_determinant_sides,
 )
+from kahanmaps.invariants.phase_functions import PhaseFunction
 from kahanmaps.invariants.poisson import jacobi_defects, jacobi_size, transformation_sides, transformation_size
 from kahanmaps.invariants.sizes import VARIABLE, Fraction, determinant_size, eps_size, step_size
 from kahanmaps.maps.kahan import KahanMap
@@ -28,7 +28,7 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
-def density_identity(system: QuadraticSystem, density: Density, eps: fmpq | None) -> Identity:
+def density_identity(system: QuadraticSystem, density: PhaseFunction, eps: fmpq | None) -> Identity:
     """phi(x~) det(I - eps f'(x)) = phi(x) det(I + eps f'(x~)): the measure dx/phi is invariant."""
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
@@ -75,7 +75,7 @@ def check_measure(file: SystemFile, settings: Settings | None = None, extra: Rat
     Raises InputError where no density is known or claimed.
     """
     settings = settings or Settings()
-    candidates: list[tuple[Density, Evidence | None, str]] = []
+    candidates: list[tuple[PhaseFunction, Evidence | None, str]] = []
     if file.hamiltonian is not None:
         proof = theorems.determinant_density_invariant(file.hamiltonian)
         candidates.append((DeterminantDensity(file.system), proof, "petrera-suris-2016, eq. (eq: CMOQ measure)"))

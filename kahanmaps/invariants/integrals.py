@@ -10,38 +10,21 @@ Sources: cmoq-2013; petrera-suris-2016, eqs. (eq: CMOQ integral), (tH).
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import Field
-from kahanmaps.algebra.polynomials import RationalFunction, evaluate
-from kahanmaps.algebra.text import format_rational_function
+from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.sizes import Fraction, Size, function_size, polynomial_size, step_size
+from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction
+from kahanmaps.invariants.sizes import Fraction, Size, polynomial_size, step_size
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
 
-class Integral(ABC):
-    """A function of x and eps that some Kahan map may conserve."""
-
-    name: str
-    formula: str
-
-    @abstractmethod
-    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        """The value at a point over `field`; None at a pole. Raises SingularStep where a map in it has no value."""
-
-    @abstractmethod
-    def size(self, eps: Size, point: Size) -> Fraction:
-        """Bounds for numerator and denominator of the value at a point of this size."""
-
-
-class ModifiedHamiltonian(Integral):
+class ModifiedHamiltonian(PhaseFunction):
     """H + grad H . (x~ - x)/3, which tends to H as eps -> 0; x~ is the image under the Kahan map of J grad H."""
 
     def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H") -> None:
@@ -66,7 +49,7 @@ class ModifiedHamiltonian(Integral):
         return Fraction(factor * point**3 * image, Size(0, below.bit_length() + 1.59) * point**3 * image)
 
 
-class PaperIntegral(Integral):
+class PaperIntegral(PhaseFunction):
     """The paper's H~ = eps^{-1} x^T J x~ = -6 H + O(eps^2), for homogeneous H and J = [[0, I], [-I, 0]]."""
 
     def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H", index: str = "") -> None:
@@ -95,7 +78,7 @@ class PaperIntegral(Integral):
         return Fraction(dim * eps * point * image, eps * point * image)
 
 
-class CommutantIntegral(Integral):
+class CommutantIntegral(PhaseFunction):
     """eps^{-1} x^T J C x~ with C = (A^T)^k, which commutes with f'(x): rational whatever the roots of chi are.
 
     With C = I this is H~; for k < m these span the same space as the K~_s of all associated systems, over the
@@ -123,21 +106,5 @@ class CommutantIntegral(Integral):
         return Fraction(Size(0, above) * eps * point * image, Size(0, below) * eps * point * image)
 
 
-class ClaimedIntegral(Integral):
+class ClaimedIntegral(ClaimedFunction):
     """A rational function of the variables and eps that somebody claims is conserved."""
-
-    def __init__(self, name: str, function: RationalFunction) -> None:
-        self.name = name
-        self.function = function
-
-    @cached_property
-    def formula(self) -> str:  # type: ignore[override]
-        """The function as text."""
-        return format_rational_function(self.function)
-
-    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        with field.working():
-            return self.function.value(field, (*point, field.convert(eps)))
-
-    def size(self, eps: Size, point: Size) -> Fraction:
-        return function_size(self.function, len(self.function.names) - 1, eps, point)

@@ -6,34 +6,18 @@ For Hamiltonian f with constant J the density is phi = det(I - eps f'(x)). Sourc
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import format_rational_function
-from kahanmaps.invariants.sizes import Fraction, Size, determinant_size, function_size
+from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction
+from kahanmaps.invariants.sizes import Fraction, Size, determinant_size
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
-class Density(ABC):
-    """A function phi of x and eps such that dx/phi may be invariant."""
-
-    name: str
-    formula: str
-
-    @abstractmethod
-    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        """The value at a point over `field`, None at a pole."""
-
-    @abstractmethod
-    def size(self, eps: Size, point: Size) -> Fraction:
-        """Bounds for numerator and denominator of the value at a point of this size."""
-
-
-class DeterminantDensity(Density):
+class DeterminantDensity(PhaseFunction):
     """phi = det(I - eps f'(x))."""
 
     name = "phi"
@@ -49,21 +33,12 @@ class DeterminantDensity(Density):
         return determinant_size(self.system, eps, point)
 
 
-class ClaimedDensity(Density):
+class ClaimedDensity(ClaimedFunction):
     """A rational function of the variables and eps that somebody claims is a density."""
 
-    name = "phi"
-
     def __init__(self, function: RationalFunction) -> None:
-        self.function = function
-        self.formula = f"phi = {format_rational_function(function)}"
-
-    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
-        with field.working():
-            return self.function.value(field, (*point, field.convert(eps)))
-
-    def size(self, eps: Size, point: Size) -> Fraction:
-        return function_size(self.function, len(self.function.names) - 1, eps, point)
+        super().__init__("phi", function)
+        self.formula = f"phi = {self.formula}"
 
 
 def jacobian_determinant_sides(kahan: KahanMap, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
