@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+_MISTAKES_SHOWN = 50
+
 
 class KahanmapsError(Exception):
     """The root of all errors that kahanmaps raises on purpose."""
@@ -47,7 +49,9 @@ class SystemFileError(InputError):
         self.where = where
         self.mistakes = tuple(mistakes)
         lines = [f"{where}: {_plural(len(self.mistakes), 'mistake')}"]
-        lines += [f"  {key}: {_indent(what)}" for key, what in self.mistakes]
+        lines += [f"  {key}: {_indent(what)}" for key, what in self.mistakes[:_MISTAKES_SHOWN]]
+        if len(self.mistakes) > _MISTAKES_SHOWN:
+            lines.append(f"  and {len(self.mistakes) - _MISTAKES_SHOWN} more")
         super().__init__("\n".join(lines))
 
 

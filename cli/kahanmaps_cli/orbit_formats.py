@@ -90,7 +90,7 @@ class Text(Writer):
 
     def __init__(self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str], width: int | None) -> None:
         super().__init__(stream, columns, integrals)
-        self._cell = None if width is None else max(14, (width - 8) // max(1, len(columns) + len(integrals)) - 2)
+        self._cell = None if width is None else max(9, (width - 8) // max(1, len(columns) + len(integrals)) - 2)
 
     def header(self, header: dict[str, Any]) -> None:
         self._line(

@@ -482,7 +482,7 @@ class _Arithmetic:
             meant = next(products, meant)
         hint = f"did you mean {meant}? " if meant else ""
         listed = ", ".join(known[:30]) + (", ..." if len(known) > 30 else "")
-        return ExpressionError(f"found the unknown name {shorten(name)}: {hint}Known are {listed}", self.text, column)
+        return ExpressionError(f"found the unknown name {shorten(name)}: {hint}known are {listed}", self.text, column)
 
 
 def _total(values: list[_T], add: Callable[[_T, _T], _T]) -> _T:

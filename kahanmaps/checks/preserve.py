@@ -104,7 +104,7 @@ def check_measure(file: SystemFile, settings: Settings | None = None, extra: Rat
         )
         for density, proof, source in candidates
     )
-    context = settings.context([file.name], orbit=orbit.to_json())
+    context = settings.context([file], orbit=orbit.to_json())
     return Report("measure", findings, context, ended_early=settings.cut_short(orbit))
 
 
@@ -173,5 +173,5 @@ def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:
         formula="sum_l Pi_il d_l Pi_jk + cyclic = 0, Pi skew",
         source=source,
     )
-    context = settings.context([file.name], orbit=orbit.to_json())
+    context = settings.context([file], orbit=orbit.to_json())
     return Report("poisson", (law, jacobi), context, ended_early=settings.cut_short(orbit))

@@ -16,6 +16,7 @@ from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
 from kahanmaps.errors import InputError
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit, OrbitEnd
+from kahanmaps.systems.files import SystemFile
 from kahanmaps.version import __version__
 
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
@@ -65,12 +66,12 @@ class Settings:
         """The eps of the exact orbit, 1/10 where the claims are for every eps."""
         return self.eps if self.eps is not None else DEFAULT_ORBIT_EPS
 
-    def context(self, names: Sequence[str], **more: Any) -> dict[str, Any]:
-        """What is needed to redo the check, as plain data."""
+    def context(self, files: Sequence[SystemFile], **more: Any) -> dict[str, Any]:
+        """What is needed to redo the check, as plain data: the systems themselves among it."""
         return {
             "version": __version__,
-            "system": names[0],
-            **({"other": names[1]} if len(names) > 1 else {}),
+            "system": files[0].name,
+            **({"other": files[1].name} if len(files) > 1 else {}),
             "eps": "every" if self.eps is None else format_number(self.eps),
             "time_step": "every" if self.eps is None else format_number(2 * self.eps),
             "convention": CONVENTION,
@@ -78,6 +79,8 @@ class Settings:
             "seed": self.seed,
             "error_bits": self.error_bits,
             **more,
+            "document": files[0].document,
+            **({"other_document": files[1].document} if len(files) > 1 else {}),
         }
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.errors import InputError
-from kahanmaps.maps.orbits import OrbitEnd, require_steps
+from kahanmaps.maps.orbits import OrbitEnd, counted, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 FloatArray = NDArray[np.float64]
@@ -119,7 +119,7 @@ class FloatOrbit:
                 return
             x, step = image, step + 1
             yield step, x
-        self.end = OrbitEnd("completed", step, f"{step} steps")
+        self.end = OrbitEnd("completed", step, counted(step, "step"))
 
 
 class _Floats:

@@ -114,10 +114,10 @@ class Orbit:
         field = self.map.field
         value: Any = IntegerPoint.from_rationals(self.start) if field is QQ else self.start
         start, step, period = value, 0, None
+        yield OrbitPoint(0, field, value)  # the budget is for what is computed
         if self._too_large(value):
             self.end = self._over_budget(value, 0)
             return
-        yield OrbitPoint(0, field, value)
         while self.steps is None or step < self.steps:
             if self._interrupted:
                 self.end = OrbitEnd("interrupted", step, f"interrupted after step {step}", period)
@@ -138,9 +138,9 @@ class Orbit:
                 period = step
             yield OrbitPoint(step, field, value)
         if period is not None:
-            self.end = OrbitEnd("periodic", step, f"the start came back after {period} steps", period)
+            self.end = OrbitEnd("periodic", step, f"the start came back after {counted(period, 'step')}", period)
         else:
-            self.end = OrbitEnd("completed", step, f"{step} steps")
+            self.end = OrbitEnd("completed", step, counted(step, "step"))
 
     def _next(self, value: Any) -> Any:
         if isinstance(value, IntegerPoint):
@@ -156,9 +156,9 @@ class Orbit:
     def _over_budget(self, value: IntegerPoint, step: int) -> OrbitEnd:
         return OrbitEnd(
             "budget",
-            step - 1,
-            f"step {step} has numbers of {digits_of(value)} digits, more than the budget of {self.max_digits} digits "
-            "(--max-digits)",
+            max(0, step - 1),
+            f"step {step} has numbers of {counted(digits_of(value), 'digit')}, "
+            f"more than the budget of {self.max_digits} (--max-digits)",
         )
 
     def _singular_message(self, step: int) -> str:
@@ -169,6 +169,11 @@ class Orbit:
 def digits_of(point: IntegerPoint) -> int:
     """About how many decimal digits the largest of the integers has."""
     return int(point.bits * _DIGITS_PER_BIT) + 1
+
+
+def counted(number: int, word: str) -> str:
+    """1 step, 2 steps."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
 def require_steps(steps: int | None) -> None:

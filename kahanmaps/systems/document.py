@@ -76,8 +76,9 @@ class DocumentReader:
             )
         self._read_parameters()
         name = self.document.get("name", self._default_name())
-        if not isinstance(name, str):
-            self._mistake("name", f"found {_show(name)}, expected text")
+        if not isinstance(name, str) or not name.isprintable():
+            # It stands in the first line of many outputs, where nothing may break the line or colour the terminal.
+            self._mistake("name", f"found {_show(name)}, expected printable text on one line")
         kind = kinds[0] if len(kinds) == 1 else ""
         self._read_variables(kind)
         system, hamiltonian, member = None, None, None
@@ -121,7 +122,8 @@ class DocumentReader:
         return None
 
     def _default_name(self) -> str:
-        return Path(self.where).stem if self.where.endswith(".toml") else self.where
+        name = Path(self.where).stem if self.where.endswith(".toml") else self.where
+        return "".join(c if c.isprintable() else "_" for c in name)
 
     def _read_parameters(self) -> None:
         for name, value in (self._table("parameters") or {}).items():
@@ -307,6 +309,9 @@ class DocumentReader:
     def _read_integrals(self) -> dict[str, RationalFunction]:
         claims = {}
         for name, value in (self._table("integrals") or {}).items():
+            if not name.isprintable():
+                self._mistake(f"integrals.{name!r}", "expected a printable name")
+                continue
             claim = self._claim(f"integrals.{name}", value)
             if claim is not None:
                 claims[name] = claim
@@ -344,12 +349,22 @@ class DocumentReader:
                         self._mistake("catalog.sources", f"unknown source {item!r}, expected a key of sources.py")
 
     def _normalised(self) -> dict[str, Any]:
-        """The document with its name and the parameters that hold."""
-        document = {key: value for key, value in self.document.items() if key not in ("name", "parameters")}
+        """The document with its name and the parameters that hold, long integers as text (JSON needs them so)."""
+        document = {key: _json_like(value) for key, value in self.document.items() if key not in ("name", "parameters")}
         document = {"name": self.document.get("name", self._default_name()), **document}
         if self.parameters:
             document["parameters"] = {name: format_number(value) for name, value in self.parameters.items()}
         return document
+
+
+def _json_like(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _json_like(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_json_like(item) for item in value]
+    if isinstance(value, int) and value.bit_length() > 1000:
+        return format_number(fmpq(value))
+    return value
 
 
 def _plain_number(value: Any) -> Any:

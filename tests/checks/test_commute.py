@@ -383,13 +383,19 @@ def test_an_orbit_that_runs_out_of_digits_is_told():
     assert report.ended_early
     orbit = report.to_json()["orbit"]
     assert orbit["status"] == "budget"
-    assert "50 digits" in orbit["message"]
+    assert "the budget of 50 " in orbit["message"]
     assert orbit["message"] in only(report).also[-1].summary
 
 
-def test_an_orbit_without_a_single_point_within_the_budget_still_names_its_start():
+def test_a_start_beyond_the_budget_is_tried_all_the_same():
     report = pair(LORENZ, LORENZ, Settings(start=("1/" + "3" * 100, 1, 1), max_digits=20))
     assert report.to_json()["orbit"]["start"][0] == "1/" + "3" * 100
+    assert "held exactly at 1 point of an orbit" in only(report).also[-1].summary
+
+
+def test_an_orbit_that_could_not_be_tried_at_all_says_so():
+    # x' = x^2 has no image at x = 1/(2 eps).
+    report = pair(system_of("x", "x^2"), system_of("x", "x^2"), Settings(eps="1/10", start=("5",)))
     assert "could not be tried at any point" in only(report).also[-1].summary
 
 

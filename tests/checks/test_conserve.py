@@ -337,6 +337,34 @@ def test_the_map_of_h1_is_refuted_to_conserve_modified_h0(monkeypatch):
     verify_witness(found.witness, *sides)
 
 
+def test_the_integrals_of_the_commutant_belong_to_the_system_that_the_signs_pick():
+    member = FAMILY["m=3"][0]
+    file = SystemFile.from_member(FamilyMember(member.A, member.H, (1, -1, 1)))
+    found = [
+        (integral, proof) for integral, proof, _ in known_integrals(file) if isinstance(integral, CommutantIntegral)
+    ]
+    assert [integral.name for integral, _ in found] == ["K~_1", "K~_2"]
+    assert all(integral.hamiltonian == file.hamiltonian for integral, _ in found)
+    assert [proof.data["hypotheses"][1] for _, proof in found] == [
+        "A^T f'(x) = f'(x) A^T for every x",
+        "(A^T)^2 f'(x) = f'(x) (A^T)^2 for every x",
+    ]
+
+
+def test_of_many_proved_integrals_the_first_ones_are_tried_along_the_orbit():
+    report = check_integrals(
+        SystemFile.from_member(draw_with_eigenvalues([1, -2, 3, 5, 7, -4], seed=3)), Settings(steps=1)
+    )
+    assert set(verdicts(report)) == {PROVED}
+    tried = [any(evidence.method == "exact orbit" for evidence in found.also) for found in report.findings]
+    assert tried == [True] * 32 + [False] * 6
+    assert report.notes == ["of the proved integrals the first 32 were also tried along an orbit"]
+
+
+def test_of_few_integrals_all_are_tried_along_the_orbit_and_nothing_is_noted():
+    assert check_integrals(SystemFile.from_member(FAMILY["m=3"][0]), Settings(steps=1)).notes == []
+
+
 def test_a_class_of_many_systems_lists_the_single_minus_signs():
     file = SystemFile.from_member(draw_with_eigenvalues(range(1, 10), seed=3))
     labels = [integral.name for integral, _, _ in known_integrals(file) if integral.name.startswith("K~")]

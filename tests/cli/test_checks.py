@@ -16,13 +16,13 @@ from cli_helpers import environment, shell, terminal
 from kahanmaps.version import __version__
 
 COMMON = ["check", "verdict", "holds", "version", "system", "eps", "time_step", "convention", "arithmetic", "seed"]
-COMMON += ["error_bits", "orbit", "claims", "notes"]
+COMMON += ["error_bits", "orbit", "document", "claims", "notes"]
 CLAIM = {"claim", "verdict", "evidence", "witness"}
 OPTIONAL = {"also", "formula", "source", "control", "expected"}
 
 CHECKS = [
-    ("check-commute euler_top lorenz", {"other"}),
-    ("check-commute euler_top lorenz --eps 1/10 --eps2 1/7", {"other", "eps2"}),
+    ("check-commute euler_top lorenz", {"other", "other_document"}),
+    ("check-commute euler_top lorenz --eps 1/10 --eps2 1/7", {"other", "other_document", "eps2"}),
     ("check-commute paper_m2", {"m", "factors"}),
     ("check-integrals euler_top --integral x1", set()),
     ("check-measure henon_heiles --density 1", set()),

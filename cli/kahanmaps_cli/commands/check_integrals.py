@@ -56,7 +56,11 @@ def command(system: str | None, integrals: tuple[tuple[str, str], ...], **option
 
 
 def _named(integrals: Sequence[tuple[str, str]], file: SystemFile) -> list[tuple[str, str]]:
-    """The claims with their names; those without one are called I1, I2, ..., as far as these are free."""
+    """The claims with their names; those without one are called I1, I2, ..., as far as these are free.
+
+    The bare name of an integral of the file adds nothing: all of these are checked anyway.
+    """
+    integrals = [(name, text) for name, text in integrals if name or text not in file.integrals]
     taken = [*file.integrals, *(name for name, _ in integrals if name)]
     for name in taken:
         if taken.count(name) > 1:

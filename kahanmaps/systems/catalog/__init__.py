@@ -80,7 +80,7 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None) -> 
 
 def _is_path(text: str) -> bool:
     separators = [mark for mark in (os.sep, os.altsep) if mark]
-    return text.endswith(_ENDING) or any(mark in text for mark in separators) or os.path.isfile(text)
+    return text.endswith(_ENDING) or any(mark in text for mark in separators) or os.path.exists(text)
 
 
 def _unknown(name: str) -> InputError:
