@@ -3,9 +3,9 @@
 The identity is a polynomial equation P(x, eps) = 0 over the integers once denominators are cleared. For each trial
 a prime p is drawn at random from [2^62, 2^63) and then a point over GF(p). If P is not the zero polynomial, the
 trial passes only if p divides all its coefficients (at most bits/62 of more than 2^55 primes do) or the point is a
-root (probability at most degree/p, given that no denominator vanishes: (degree/p) / (1 - poles/p)). Trials are
-independent, so the bounds multiply. Sources: schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes
-from N to 2N).
+root (probability at most degree/p). Points where a denominator vanishes are drawn again; since that happens less
+than half of the time, the sum of both is doubled. Trials are independent, so the bounds multiply. Sources:
+schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from N to 2N).
 
 A trial that fails refutes the identity; a small rational point is then found at which both sides differ.
 """
@@ -136,13 +136,13 @@ def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) 
 
 def trial_bound(identity: Identity) -> float:
     """log2 of the probability that one trial passes although the identity is false."""
-    if max(identity.equation.degree, identity.poles) >= 1 << (_PRIME_BITS - 1):
-        return 0.0  # no bound: half of all points may be roots, or have no value
+    if max(identity.equation.degree, identity.poles) >= 1 << (_PRIME_BITS - 2):
+        return 0.0  # no bound: too many points may be roots, or have no value
     bad_primes = 2 ** (math.log2(max(1.0, identity.equation.bits / _PRIME_BITS)) - _PRIMES_LOG2)
     scale = 2.0**_PRIME_BITS
-    # eps = 0 is left out of the draw as well, like one more pole.
-    roots = (identity.equation.degree / scale) / (1 - (identity.poles + 1) / scale)
-    return math.log2(bad_primes + roots)
+    # The factor 2 is for the condition that all denominators are defined and not zero at the point: that holds with
+    # probability at least 1/2, since their degree is below 2^60 and their coefficients fit into a computer's memory.
+    return math.log2(2 * (bad_primes + identity.equation.degree / scale))
 
 
 def random_prime_field(rng: random.Random) -> PrimeField:

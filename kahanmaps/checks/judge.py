@@ -34,6 +34,9 @@ def judge(
     if proof is not None:
         if decision.verdict is Verdict.REFUTED:
             raise Contradiction(f"{claim}: {proof.summary}, but it {decision.evidence.summary} {decision.witness}")
+        if decision.evidence.data.get("poles_met") and decision.verdict is Verdict.UNDECIDED:
+            # A theorem on a map that has no value anywhere, det(I - eps f') being zero for all x, says nothing.
+            return Finding(claim, decision.verdict, decision.evidence, (), None, formula, source, control)
         verdict, evidence, witness = Verdict.PROVED, proof, None
         if decision.verdict is Verdict.SUPPORTED:
             also.append(decision.evidence)

@@ -170,7 +170,7 @@ def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:
         jacobi_identity(hamiltonian, settings.eps),  # of x alone: an orbit would add nothing
         settings,
         proof,
-        formula="sum_l Pi_il d_l Pi_jk + cyclic = 0, Pi skew",
+        formula="sum_l Pi_il d_l Pi_jk + cyclic = 0",
         source=source,
     )
     context = settings.context([file], orbit=orbit.to_json())

@@ -30,7 +30,7 @@ class ModifiedHamiltonian(PhaseFunction):
     def __init__(self, hamiltonian: CubicHamiltonian, letter: str = "H") -> None:
         self.hamiltonian = hamiltonian
         self.name = f"modified {letter}"
-        self.formula = f"{letter} + (2 eps/3) grad {letter}^T (I - eps f')^(-1) f"
+        self.formula = f"{letter} + (2 eps/3) grad {letter}^T (I - eps f')^(-1) f, f = J grad {letter}"
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         image = KahanMap(self.hamiltonian.system, eps, field).step(point)
@@ -57,11 +57,11 @@ class PaperIntegral(PhaseFunction):
             raise InputError("H~ = eps^(-1) x^T J x~ is an integral for homogeneous H and the standard J only")
         self.hamiltonian = hamiltonian
         self.name = f"{letter}~{index}"
-        if index:  # not the map whose integral this is: the paper writes x^ for its image
-            image = f"x^, where x^ is the image of x under the Kahan map of J grad {letter}{index}"
-        else:
-            image = f"x~ = -6 (modified {letter})"
-        self.formula = f"{self.name} = eps^(-1) x^T J {image}"
+        # x^, as in the paper: the map need not be the one whose integral this is, but another of its class.
+        self.formula = (
+            f"{self.name} = eps^(-1) x^T J x^ = -6 (modified {letter}{index}), "
+            f"x^ the image of x under the Kahan map of J grad {letter}{index}"
+        )
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         image = KahanMap(self.hamiltonian.system, eps, field).step(point)

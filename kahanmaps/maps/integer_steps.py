@@ -93,6 +93,7 @@ class IntegerSteps:
 
 # Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact_steps.py).
 _ELIMINATION_BITS = 4000
+_ELIMINATION_DIMENSION = 16  # and above this dimension as well
 # A common divisor shorter than this is not worth a division of every entry.
 _USEFUL_BITS = 64
 _PRIME = 2**61 - 1
@@ -100,7 +101,7 @@ _PRIME = 2**61 - 1
 
 def _divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
     """The solution of matrix x = right in lowest terms; `likely` is an integer whose powers may divide the minors."""
-    if matrix.nrows() > 2 and likely.bit_length() >= _ELIMINATION_BITS:
+    if 2 < matrix.nrows() <= _ELIMINATION_DIMENSION and likely.bit_length() >= _ELIMINATION_BITS:
         found = _eliminate(matrix, right, likely)
         # The elimination assumes that certain divisions are exact. What makes the result certain is this: it is a
         # solution, and there is no other, since the determinant does not vanish modulo a prime.

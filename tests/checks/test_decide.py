@@ -134,8 +134,8 @@ def test_the_evidence_says_for_which_eps_it_stands():
 
 
 def test_a_larger_degree_asks_for_more_points():
-    data = decide(identity_of(square_left, square_right, degree=2**60), 0).evidence.data
-    assert data["points"] >= 50
+    data = decide(identity_of(square_left, square_right, degree=2**58), 0).evidence.data
+    assert data["points"] >= 30
     assert int(data["error_bound"].split("^")[1]) <= -100
 
 
@@ -147,19 +147,25 @@ def test_the_error_of_a_trial_covers_bad_primes_and_roots(degree, bits, poles):
     N = Fraction(2**62)
     primes = Fraction(3, 5) * N / Fraction(math.log(2**62))
     bad = Fraction(max(1, math.ceil(bits / 62)), 1) / primes
-    roots = Fraction(degree) / N / (1 - Fraction(poles) / N)
+    roots = Fraction(degree) / N
     found = trial_bound(Identity(1, TRUE.sides, Size(degree, float(bits)), poles, None))
     # At most floor(bits/62) primes divide a coefficient; ceil is one more at the most.
-    assert found <= math.log2(bad + roots) + 1e-9
-    assert found >= math.log2(max(1, bits // 62) / primes + roots) - 1e-9
+    # Doubled: given that no denominator vanishes, which is more likely than not.
+    assert found <= math.log2(2 * (bad + roots)) + 1e-9
+    assert found >= math.log2(2 * (max(1, bits // 62) / primes + roots)) - 1e-9
 
 
-@pytest.mark.parametrize("larger", [(2**41, 1e3, 2**59), (2**40, 1e9, 2**59), (2**40, 1e3, 2**60)])
-def test_more_degree_coefficients_or_poles_mean_a_larger_error(larger):
-    def error(degree, bits, poles):
-        return trial_bound(Identity(1, TRUE.sides, Size(degree, bits), poles, None))
+@pytest.mark.parametrize("larger", [(2**41, 1e3), (2**40, 1e9)])
+def test_more_degree_or_coefficients_mean_a_larger_error(larger):
+    def error(degree, bits):
+        return trial_bound(Identity(1, TRUE.sides, Size(degree, bits), 9, None))
 
-    assert error(2**40, 1e3, 2**59) < error(*larger) < -1
+    assert error(2**40, 1e3) < error(*larger) < -1
+
+
+@pytest.mark.parametrize(("degree", "poles"), [(1, 2**60), (2**60, 1)])
+def test_beyond_degree_2_to_the_60_there_is_no_bound(degree, poles):
+    assert trial_bound(Identity(1, TRUE.sides, Size(degree, 1e3), poles, None)) == 0.0
 
 
 # False identities

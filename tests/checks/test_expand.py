@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from flint import fmpq
 
@@ -10,9 +12,11 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.checks import judge
 from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.conserve import conservation
+from kahanmaps.checks.decide import Identity
 from kahanmaps.checks.expand import NotEqual, expansion
 from kahanmaps.checks.settings import Settings
 from kahanmaps.invariants.integrals import ClaimedIntegral
+from kahanmaps.invariants.sizes import Size
 
 TOP = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
 CONSERVED = "(1 - eps^2*y^2)/(1 + 2*eps^2*z^2)"
@@ -45,6 +49,18 @@ def test_a_quantity_conserved_at_one_eps_is_proved_there_and_nowhere_else():
 def test_a_quantity_that_is_not_conserved_is_never_proved(claim):
     with pytest.raises(NotEqual):
         expansion(identity(claim, None))
+
+
+@pytest.mark.parametrize("wrong", [(0,), (1,), (2,), (0, 1), (1, 2)])
+def test_all_components_have_to_agree(wrong):
+    right = Identity(3, lambda field, x, eps: (list(x), list(x)), Size(1, 0.0), 0, None)
+
+    def sides(field, x, eps):
+        return list(x), [x[k] + field.one if k in wrong else x[k] for k in range(3)]
+
+    assert expansion(right) is not None
+    with pytest.raises(NotEqual):
+        expansion(replace(right, sides=sides))
 
 
 def test_a_small_budget_ends_without_an_answer():

@@ -106,9 +106,10 @@ def test_a_claim_proved_by_expansion_that_fails_on_the_orbit_is_a_contradiction(
         judge("c", FALSE, Settings(), None, orbit(1, 2))
 
 
-def test_a_proved_claim_that_is_defined_nowhere_stays_proved_by_its_theorem():
+def test_a_theorem_proves_nothing_of_what_is_defined_nowhere():
     found = judge("c", NOWHERE, Settings(), PROOF)
-    assert (found.verdict, found.also) == (PROVED, ())
+    assert (found.verdict, found.also) == (UNDECIDED, ())
+    assert "not defined at any" in found.evidence.summary
 
 
 def test_a_claim_that_fails_at_random_points_is_refuted_whatever_the_orbit_says():

@@ -333,6 +333,6 @@ def test_a_prime_that_divides_a_coefficient_is_refused():
 def test_names_and_formulas_tell_the_two_normalisations_apart():
     modified, paper = ModifiedHamiltonian(PLANE_CUBIC), PaperIntegral(PLANE_CUBIC, "K")
     assert modified.name == "modified H"
-    assert modified.formula == "H + (2 eps/3) grad H^T (I - eps f')^(-1) f"
+    assert modified.formula == "H + (2 eps/3) grad H^T (I - eps f')^(-1) f, f = J grad H"
     assert paper.name == "K~"
-    assert paper.formula == "K~ = eps^(-1) x^T J x~ = -6 (modified K)"
+    assert paper.formula.startswith("K~ = eps^(-1) x^T J x^ = -6 (modified K), x^ the image")

@@ -214,6 +214,10 @@ def test_a_sum_of_sizes_far_apart_is_still_a_bound():
     assert fmpz(2) ** 300 + 1 <= fmpz(math.ceil(2 ** (total.bits - 300) * 2**60)) * fmpz(2) ** 240
 
 
+def test_the_sum_of_two_large_sizes_is_twice_as_large():
+    assert Size(0, 300.0) + Size(0, 300.0) == Size(0, 301.0)
+
+
 @pytest.mark.parametrize(
     ("eps", "size"),
     [
@@ -281,6 +285,9 @@ def test_a_generic_system_attains_the_degree_of_two_steps_at_a_fixed_eps():
 
 # One large row, one large part of a row, large denominators: nothing makes up for a row that is left out.
 LOPSIDED = [
+    system_of("x", "10^30*x^2"),
+    system_of("x", "10^30*x"),
+    system_of("x", "10^30"),
     system_of("x y", "10^30*x^2", "x + y"),
     system_of("x y", "x + y", "10^30*x*y"),
     system_of("x y z", "x", "10^30*(y^2 + x*z)", "z"),

@@ -24,8 +24,10 @@ from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.systems.files import MAX_FILE_BYTES, SystemFile, parse_system, read_system
+from kahanmaps.systems import files
+from kahanmaps.systems.files import SystemFile, parse_system, read_system
 from kahanmaps.systems.hamiltonian import standard_structure
+from kahanmaps.systems.toml_text import to_toml
 
 SYSTEM = """
 name = "rotor"
@@ -214,8 +216,9 @@ def test_files_that_say_different_things_are_not_equal():
         FAMILY,
         FAMILY.replace("signs = [1, -1]", ""),
     ]
-    files = [parse_system(text) for text in different]
-    assert all((files[i] == files[j]) == (i == j) for i in range(len(files)) for j in range(len(files)))
+    read = [parse_system(text) for text in different]
+    assert all((read[i] == read[j]) == (i == j) for i in range(len(read)) for j in range(len(read)))
+    assert read[0] != SYSTEM
 
 
 # Round trips
@@ -302,6 +305,16 @@ def test_hostile_names_read_back_equal(name, claims, value):
     file = SystemFile(name, "system", {"a": value}, model.system, None, None, functions, None, document)
     assert parse_system(file.to_toml()) == file
     assert tomllib.loads(file.to_toml())["name"] == name
+
+
+plain = st.one_of(st.text(), st.integers())
+
+
+@given(st.text(), st.dictionaries(st.text(), st.one_of(plain, st.lists(plain), st.lists(st.lists(plain)))))
+@example('"""', {"\n[system]\n": "\x7f\x00\u2028", "": "'\\'\r\t\b\f\x1f\x80\U0010ffff", "\x7f": -(10**3000), "-_": []})
+def test_whatever_is_written_as_toml_reads_back_equal(name, table):
+    document = {"name": name, "integrals": table}
+    assert tomllib.loads(to_toml(document, ["name"], ["integrals"])) == document
 
 
 @pytest.mark.parametrize("name", ["a\nb", "a\x1b[31m", "\x7f", "\u2028"])
@@ -578,9 +591,25 @@ def test_a_path_with_a_nul_character_is_wrong_input():
         read_system("a\0b")
 
 
-def test_a_file_beyond_the_size_limit_is_wrong_input():
-    with pytest.raises(InputError, match="larger than"):
-        parse_system("#" * (MAX_FILE_BYTES + 1))
+@pytest.mark.parametrize(("spare", "fits"), [(0, True), (-1, False)])
+def test_a_file_beyond_the_size_limit_is_wrong_input(spare, fits, tmp_path, monkeypatch):
+    path = tmp_path / "large.toml"
+    path.write_text(SYSTEM, encoding="utf-8")
+    monkeypatch.setattr(files, "MAX_FILE_BYTES", len(SYSTEM) + spare)
+    for read in (lambda: read_system(path), lambda: parse_system(SYSTEM), lambda: parse_system(SYSTEM.encode())):
+        if fits:
+            assert read().name == "rotor"
+        else:
+            with pytest.raises(InputError, match="larger than"):
+                read()
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [("name = " + "[" * 100_000, "nested too deeply"), (f"a = {'9' * 5000}", "write long numbers in quotes")],
+)
+def test_a_file_that_python_gives_up_on_says_what_to_change(text, hint):
+    assert hint in only_mistake(text)[1]
 
 
 # Anything at all
