@@ -171,5 +171,8 @@ def _quoted(name: str) -> str:
 def _elided(text: str, width: int) -> str:
     if len(text) <= width:
         return text
+    middle, plus_minus, radius = text.partition(" +/- ")
+    if plus_minus:
+        return f"{middle[: max(3, width - len(radius) - 6)]}.. +/-{radius}"
     keep = max(2, (width - 3) // 2)
     return f"{text[:keep]}...{text[-(width - 3 - keep) :]}"

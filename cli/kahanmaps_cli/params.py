@@ -68,7 +68,7 @@ class NameValue(_ParamType):
 class Arithmetic(_ParamType):
     """exact, float, mod:P (P a prime) or ball:BITS; gives the pair (kind, number)."""
 
-    name = "exact|float|mod:P|ball:BITS"
+    name = "kind"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if not isinstance(value, str):

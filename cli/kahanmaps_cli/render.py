@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps_cli.progress import say
+
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Evidence, Finding, Report, Witness
 
@@ -37,7 +39,7 @@ def shorten(text: str, width: int = NUMBER_WIDTH) -> str:
     return f"{text[:keep]}...{text[-keep:]} ({len(text)} chars)"
 
 
-def print_report(report: Report, as_json: bool, verbose: bool = False) -> int:
+def print_report(report: Report, as_json: bool, verbose: bool = False, quiet: bool = False) -> int:
     """Print a report and return the exit status that its verdict stands for; in a pipe everything is printed."""
     with suppress(BrokenPipeError):  # a reader that has seen enough changes no verdict
         if as_json:
@@ -46,7 +48,10 @@ def print_report(report: Report, as_json: bool, verbose: bool = False) -> int:
             _print_table(report, verbose)
         else:
             _print_plain(report)
-    return exit_status(report)
+    status = exit_status(report)
+    if status == 3 and report.ended_early and not quiet:
+        say(f"the orbit that was asked for ended early: {report.context['orbit']['message']}")
+    return status
 
 
 def exit_status(report: Report) -> int:

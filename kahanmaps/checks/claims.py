@@ -129,6 +129,7 @@ class Report:
             "verdict": str(self.verdict),
             "holds": self.holds,
             **self.context,
+            "ended_early": self.ended_early,
             "claims": [finding.to_json() for finding in self.findings],
             "notes": list(self.notes),
         }

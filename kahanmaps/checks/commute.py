@@ -86,6 +86,9 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
         # Phi_g at eps2 is the map of (eps2/eps) g at eps: the map depends on the product eps g only.
         same_step = eps2 == settings.eps
         g = g.scaled(eps2 / settings.eps)
+        notes.append(
+            f"the map of g at eps2 = {format_number(eps2)} is that of (eps2/eps) g at eps; the evidence names eps only"
+        )
     proof = None
     if same_step and file.member is not None and other.member is not None:
         proof = theorems.commuting_by_involution_of_members(file.member, other.member)
@@ -100,7 +103,7 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
         proof,
         orbit,
         formula="Phi_f o Phi_g = Phi_g o Phi_f",
-        source=SOURCE,
+        source=SOURCE if proof is not None and "Theorem 9" in proof.summary else "",
     )
     more = {"eps2": format_number(eps2)} if eps2 is not None else {}
     context = settings.context([file, other], orbit=orbit.to_json(), **more)
@@ -125,7 +128,8 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
     pairs = list(combinations(associates, 2))
     tried = _PAIRS_TRIED if member.dim <= 16 else _PAIRS_TRIED_IN_HIGH_DIMENSION
     for k, (first, second) in enumerate(pairs):
-        settings.progress(f"pair {k + 1} of {len(pairs)}")
+        if k < tried:
+            settings.progress(f"pair {k + 1} of {len(pairs)}, the first {tried} along an orbit as well")
         proof = theorems.evidence(
             "Theorem 9 of Petrera and Suris", [*base, *verified[first.label], *verified[second.label]]
         )

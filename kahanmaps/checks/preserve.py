@@ -155,7 +155,7 @@ def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:
     hamiltonian = file.hamiltonian
     proof = theorems.poisson_tensor_invariant(hamiltonian, file.member)
     orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings, file.member is not None)
-    source = "petrera-suris-2016, Theorem 12"
+    source = "petrera-suris-2016, Theorem 12" if file.member is not None else ""
     law = judge(
         "the Kahan map is Poisson for Pi",
         transformation_identity(hamiltonian, settings.eps),

@@ -115,7 +115,8 @@ def run_orbit(kahan: KahanMap, settings: Settings, is_integrable: bool = False) 
         if settings.start is not None:
             start = settings.start
         else:
-            start = tuple(fmpq(rng.randint(-5, 5), rng.randint(1, 5)) for _ in range(kahan.dim))
+            # No coordinate is 0: many systems leave x_i = 0 invariant, where a claim may hold for no good reason.
+            start = tuple(fmpq(rng.choice((-1, 1)) * rng.randint(1, 5), rng.randint(1, 5)) for _ in range(kahan.dim))
         orbit = Orbit(kahan, start, settings.steps, max_digits=max_digits)
         points = []
         for point in orbit:

@@ -21,7 +21,7 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.skew_hamiltonian import random_symplectic, symplectic_inverse
 
-MAX_M = 20
+MAX_M = 16  # beyond, H may be longer than the texts that system files allow
 
 
 def draw_with_eigenvalues(eigenvalues: Sequence[Any], seed: int, size: int = 2) -> FamilyMember:

@@ -60,6 +60,8 @@ class KahanMap:
 
     def point(self, values: Sequence[Any]) -> tuple[Any, ...]:
         """The values as a point over the map's field. Raises InputError for a wrong length or inexact numbers."""
+        if isinstance(values, str):
+            raise InputError(f"found the text {values[:60]!r}, expected a sequence: parse_point reads points from text")
         if len(values) != self.dim:
             raise InputError(
                 f"found a point with {len(values)} coordinates, expected {self.dim}: {', '.join(self.system.variables)}"

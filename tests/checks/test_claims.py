@@ -144,7 +144,7 @@ def test_the_json_of_a_refuted_control_shows_the_witness_and_what_was_expected()
 def test_the_json_of_a_report_has_the_documented_shape():
     report = Report("commute", (finding(P), finding(R, control=True)), {"seed": 7}, ["a note"])
     plain = report.to_json()
-    assert list(plain) == ["check", "verdict", "holds", "seed", "claims", "notes"]
+    assert list(plain) == ["check", "verdict", "holds", "seed", "ended_early", "claims", "notes"]
     assert (plain["check"], plain["verdict"], plain["holds"]) == ("commute", "proved", True)
     assert [claim["verdict"] for claim in plain["claims"]] == ["proved", "refuted"]
     assert plain["notes"] == ["a note"]

@@ -16,7 +16,7 @@ from cli_helpers import environment, shell, terminal
 from kahanmaps.version import __version__
 
 COMMON = ["check", "verdict", "holds", "version", "system", "eps", "time_step", "convention", "arithmetic", "seed"]
-COMMON += ["error_bits", "orbit", "document", "claims", "notes"]
+COMMON += ["error_bits", "orbit", "document", "ended_early", "claims", "notes"]
 CLAIM = {"claim", "verdict", "evidence", "witness"}
 OPTIONAL = {"also", "formula", "source", "control", "expected"}
 

@@ -266,7 +266,7 @@ def test_a_check_whose_orbit_nobody_asked_for_may_cut_it_short(kahanmaps):
         ("check-poisson euler_top", "needs a Hamiltonian system"),
         # the family
         ("family new", "missing --m M"),
-        ("family new --m 0", "found m = 0, expected 1 <= m <= 20"),
+        ("family new --m 0", "found m = 0, expected 1 <= m <= 16"),
         ("family new --m -1", "found m = -1"),
         ("family new --m 21", "found m = 21"),
         ("family new --eigenvalues ''", "found nothing"),

@@ -108,6 +108,7 @@ def test_quiet_is_silent(kahanmaps):
 def test_a_member_is_shown_for_scripts(kahanmaps, pair):
     shown = kahanmaps("family show", pair, "--json").json
     assert set(shown) == {
+        "version",
         "system",
         "m",
         "dim",
@@ -154,7 +155,17 @@ def test_long_formulas_are_shortened_on_a_terminal_only(kahanmaps):
 
 def test_the_space_of_a_generic_member_has_dimension_4m(kahanmaps, pair):
     space = kahanmaps("family space", pair, "--json").json
-    assert set(space) == {"dim", "dimension", "expected_for_generic_A", "unknowns", "rank", "diagnosis", "basis"}
+    assert set(space) == {
+        "version",
+        "A",
+        "dim",
+        "dimension",
+        "expected_for_generic_A",
+        "unknowns",
+        "rank",
+        "diagnosis",
+        "basis",
+    }
     assert (space["dim"], space["dimension"], space["expected_for_generic_A"]) == (4, 8, 8)
     assert len(space["basis"]) == 8
 
@@ -182,7 +193,7 @@ def test_people_see_a_line_for_each_element_of_the_basis(kahanmaps, pair):
 
 def test_the_associated_systems_are_listed_for_scripts(kahanmaps, pair):
     listed = kahanmaps("family associated", pair, "--json").json
-    assert set(listed) == {"system", "factors", "associated"}
+    assert set(listed) == {"version", "system", "factors", "associated"}
     assert listed["factors"] == ["t + 2", "t - 1"]
     assert [row["label"] for row in listed["associated"]] == ["++", "+-"]
     assert all(set(row) == {"label", "signs", "B_in_powers_of_A", "B", "K"} for row in listed["associated"])

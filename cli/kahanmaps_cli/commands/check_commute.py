@@ -46,4 +46,4 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
         file = load_system(system, options["variables"], options["rhs"], options["parameters"])
         second = load_system(other, None, (), ()) if other is not None else None
         report = check_commute(file, second, settings, eps2)
-    return print_report(report, options["as_json"], options["verbose"])
+    return print_report(report, options["as_json"], options["verbose"], options["quiet"])

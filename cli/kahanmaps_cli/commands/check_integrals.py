@@ -52,7 +52,7 @@ def command(system: str | None, integrals: tuple[tuple[str, str], ...], **option
         names = (*file.variables, "eps")
         extra = {name: parse_rational_function(text, names, file.parameters) for name, text in _named(integrals, file)}
         report = check_integrals(file, settings, extra)
-    return print_report(report, options["as_json"], options["verbose"])
+    return print_report(report, options["as_json"], options["verbose"], options["quiet"])
 
 
 def _named(integrals: Sequence[tuple[str, str]], file: SystemFile) -> list[tuple[str, str]]:

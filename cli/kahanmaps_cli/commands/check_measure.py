@@ -40,4 +40,4 @@ def command(system: str | None, density: str | None, **options: Any) -> int:
             if extra.numerator.is_zero():
                 raise InputError("found the density 0, expected a function that is not zero: the measure is dx/phi")
         report = check_measure(file, settings, extra)
-    return print_report(report, options["as_json"], options["verbose"])
+    return print_report(report, options["as_json"], options["verbose"], options["quiet"])

@@ -32,4 +32,4 @@ def command(system: str | None, **options: Any) -> int:
         settings = settings_from(options, progress)
         file = load_system(system, options["variables"], options["rhs"], options["parameters"])
         report = check_poisson(file, settings)
-    return print_report(report, options["as_json"], options["verbose"])
+    return print_report(report, options["as_json"], options["verbose"], options["quiet"])

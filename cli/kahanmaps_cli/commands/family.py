@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps.version import __version__
 from kahanmaps_cli.options import load_system
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import on_terminal, print_json, shorten
@@ -34,7 +35,7 @@ def command() -> None:
 
 
 @command.command("new")
-@click.option("--m", type=int, help="Half the dimension, 1 to 20.")
+@click.option("--m", type=int, help="Half the dimension, 1 to 16.")
 @click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them.")
 @click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q.")
 @click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'.")
@@ -84,6 +85,7 @@ def show(system: str, as_json: bool) -> None:
 
     file, member = _member(system)
     data: dict[str, Any] = {
+        "version": __version__,
         "system": file.name,
         "m": member.m,
         "dim": member.dim,
@@ -133,6 +135,8 @@ def space(system: str | None, matrix: str | None, as_json: bool) -> None:
         A, variables = member.A, member.variables
     found = cubic_space(A, variables)
     data: dict[str, Any] = {
+        "version": __version__,
+        "A": _rows(A),
         "dim": A.nrows(),
         "dimension": found.dimension,
         "expected_for_generic_A": found.expected,
@@ -187,7 +191,14 @@ def associated(system: str, write_to: str | None, as_json: bool) -> None:
             row["file"] = str(path)
         rows.append(row)
     if as_json:
-        print_json({"system": file.name, "factors": [str(f) for f in member.factors], "associated": rows})
+        print_json(
+            {
+                "version": __version__,
+                "system": file.name,
+                "factors": [str(f) for f in member.factors],
+                "associated": rows,
+            }
+        )
         return
     named = ", ".join(f"({factor})" for factor in member.factors)
     click.echo(f"{file.name}: signs belong to the factors {named}; {len(rows)} associated up to sign, f_0 first")
@@ -272,11 +283,15 @@ def _parse_matrix(text: str) -> fmpq_mat:
 
 
 def _write(file: SystemFile, output: str | None) -> None:
+    from kahanmaps.systems.files import parse_system
+
+    text = file.to_toml()
+    parse_system(text, f"{file.name}, as it would be written")  # nothing is written that could not be read
     if output is None:
-        click.echo(file.to_toml(), nl=False)
+        click.echo(text, nl=False)
         return
     with open(output, "w", encoding="utf-8") as stream:
-        stream.write(file.to_toml())
+        stream.write(text)
 
 
 def _file_name(name: str) -> str:

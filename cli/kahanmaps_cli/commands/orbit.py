@@ -35,7 +35,11 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 @click.option("--every", type=int, default=1, show_default=True, help="Only every K-th iterate.")
 @click.option("--backward", is_flag=True, help="Step by the inverse map, Phi(., -eps).")
 @click.option(
-    "--arithmetic", type=Arithmetic(), default="exact", show_default=True, help="The numbers to compute with."
+    "--arithmetic",
+    type=Arithmetic(),
+    default="exact",
+    show_default=True,
+    help="exact, float, mod:P or ball:BITS.",
 )
 @click.option(
     "--integral",
@@ -84,7 +88,8 @@ def command(system: str | None, form: str | None, output: str | None, quiet: boo
     output = None if output == "-" else output
     form = form or _form_from_name(output)
     wanted = set(at) if at is not None else None
-    with _opened(output, form) as stream, _signals(run.interrupt), Progress(quiet) as progress:
+    hidden = quiet or (output is None and sys.stdout.isatty())  # the points themselves show the progress
+    with _opened(output, form) as stream, _signals(run.interrupt), Progress(hidden) as progress:
         writer = _writer(form, stream, run, to_file=output is not None)
         writer.header(run.header())
         try:
@@ -96,7 +101,8 @@ def command(system: str | None, form: str | None, output: str | None, quiet: boo
         except OutputFull as full:
             end = OrbitEnd("budget", full.steps, str(full))
         writer.end(_end_record(end))
-    if not quiet and (output is not None or end.status not in _STATUS):
+    told = output is None and form == "text" and sys.stdout.isatty()  # the last line says how it ended
+    if not quiet and not told and (output is not None or end.status not in _STATUS):
         where = f"{output}: " if output is not None else ""
         say(f"{where}{end.status}: {end.message}")
     return _STATUS.get(end.status, 3)

@@ -6,8 +6,9 @@ from typing import Any
 
 import click
 
+from kahanmaps.version import __version__
 from kahanmaps_cli.params import NameValue
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import on_terminal, print_json, shorten
 
 
 @click.command("systems")
@@ -32,7 +33,7 @@ def command(name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: 
             raise click.UsageError("--toml and -p need the NAME of a system")
         rows = [(key, load(key)) for key in names()]
         if as_json:
-            print_json({"systems": [_summary(file) for _, file in rows]})
+            print_json({"version": __version__, "systems": [_summary(file) for _, file in rows]})
             return
         width = max(len(key) for key, _ in rows)
         for key, file in rows:
@@ -72,6 +73,11 @@ def _equations(file: Any) -> dict[str, Any]:
     }
 
 
+def _formula(text: str) -> str:
+    """A long formula is shortened on a terminal only."""
+    return shorten(text, 300) if on_terminal() else text
+
+
 def _show(file: Any) -> None:
     from kahanmaps.algebra.text import format_polynomial
 
@@ -79,13 +85,14 @@ def _show(file: Any) -> None:
     click.echo(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
     for name, value in file.parameters.items():
         click.echo(f"  {name} = {value}")
-    click.echo(str(file.system))
+    for name, text in zip(facts["variables"], facts["rhs"], strict=True):
+        click.echo(f"{name}' = {_formula(text)}")
     if file.hamiltonian is not None:
-        click.echo(f"H = {format_polynomial(file.hamiltonian.H)}")
+        click.echo(f"H = {_formula(format_polynomial(file.hamiltonian.H))}")
     for name, text in facts["integrals"].items():
-        click.echo(f"integral {name} = {text}")
+        click.echo(f"integral {name} = {_formula(text)}")
     if facts["density"]:
-        click.echo(f"density phi = {facts['density']}  (dx/phi is invariant)")
+        click.echo(f"density phi = {_formula(facts['density'])}  (dx/phi is invariant)")
     for fact in facts["facts"]:
         click.echo(f"* {fact}")
     if facts["convention"]:
