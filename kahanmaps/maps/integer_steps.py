@@ -10,9 +10,9 @@ No rational number is formed on the way: a rational constructor runs a gcd that 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 
@@ -142,18 +142,29 @@ def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint 
         if previous is not None:
             quotients = previous.into(pivots + second)
             pivots, second = quotients[: len(pivots)], quotients[len(pivots) :]
-        pivot, count = pivots[0], len(below)
+        pivot = pivots[0]
         if pivot == 0:
             return None
-        block = [
-            rows[i][j] * pivot + b[j] * pivots[1 + i - k - 2] + a[j] * pivots[1 + count + i - k - 2]
-            for i in below
-            for j in range(k + 2, n + 1)
-        ]
-        if block:
-            divisor = previous or _shared(likely, block)
-            if divisor is not None:
-                block = divisor.into(block)
+        places = [(i, j) for i in below for j in range(k + 2, n + 1)]
+
+        def bordered(weights: Sequence[fmpz], chosen: Sequence[tuple[int, int]], top: int = k) -> list[fmpz]:
+            """The minors of the two pivot rows and row i, column j, over the previous pivot: linear in `weights`."""
+            first, second = rows[top], rows[top + 1]
+            half = (len(weights) - 1) // 2
+            return [
+                rows[i][j] * weights[0] + second[j] * weights[i - top - 1] + first[j] * weights[i - top - 1 + half]
+                for i, j in chosen
+            ]
+
+        divisor = previous
+        if divisor is None and places:
+            # A few entries decide what all share; the result is verified in the end.
+            divisor = _shared(likely, bordered(pivots, places[:: max(1, len(places) // 3)]))
+        if divisor is None or not places:
+            block = bordered(pivots, places)
+        else:
+            size = 2 + max(entry.bit_length() for row in rows[k:] for entry in row[k + 2 :])
+            block = divisor.through(pivots, partial(bordered, chosen=places), size)
         b[k + 1 :] = [pivot, *second]
         width = n - 1 - k
         for i in below:
@@ -189,21 +200,20 @@ def _substitute_back(rows: list[list[fmpz]]) -> IntegerPoint | None:
     return IntegerPoint(tuple(numerator * sign for numerator in solution), denominator * sign)
 
 
-def _shared(likely: fmpz, block: list[fmpz]) -> _ExactDivisor | None:
-    """The part of `likely` without small primes that divides the entries, or None where it is not worth removing.
+def _shared(likely: fmpz, values: list[fmpz]) -> _ExactDivisor | None:
+    """The part of `likely` without small primes that divides the values, or None where it is not worth removing.
 
-    A few entries decide (the result is verified in the end). Small primes often divide minors of order 3 by
-    accident and then not, to the power needed, those of higher order.
+    Small primes often divide minors of order 3 by accident and then not, to the power needed, those of higher order.
     """
     common = likely
-    for value in block[:: max(1, len(block) // 3)]:
+    while (small := common.gcd(_small_primes())) != 1:  # first of all: what is left often divides as it stands
+        common = common // small
+    for value in values:
         remainder = value % common
         if remainder != 0:
             common = common.gcd(remainder)
             if common.bit_length() < _USEFUL_BITS:
                 return None
-    while (small := common.gcd(_small_primes())) != 1:
-        common = common // small
     return _ExactDivisor(common) if common.bit_length() >= _USEFUL_BITS else None
 
 
@@ -229,17 +239,39 @@ class _ExactDivisor:
         bits = max(value.bit_length() for value in values) - self._divisor.bit_length() + 2
         if bits <= 0 or (bits > self._bits and len(values) < 4):
             return [value // self._divisor for value in values]
+        mask = (fmpz(1) << bits) - 1
+        inverse = self._inverse_to(bits)
+        return _signed([((value >> self._zeros) & mask) * inverse & mask for value in values], bits)
+
+    def through(
+        self, weights: Sequence[fmpz], values_of: Callable[[Sequence[fmpz]], list[fmpz]], size: int
+    ) -> list[fmpz]:
+        """values_of(weights) / divisor for values linear in the weights, with coefficients below 2^size in sum.
+
+        The few weights are multiplied by the inverse, instead of the many values.
+        """
+        bits = size + max(weight.bit_length() for weight in weights) - self._divisor.bit_length() + 2
+        if bits <= 0:
+            return self.into(values_of(weights))
+        precision = bits + self._zeros
+        mask = (fmpz(1) << precision) - 1
+        inverse = self._inverse_to(precision)
+        values = values_of([weight * inverse & mask for weight in weights])
+        return _signed([(value & mask) >> self._zeros for value in values], bits)
+
+    def _inverse_to(self, bits: int) -> fmpz:
+        """The inverse of the odd part of the divisor modulo 2^bits."""
         if bits > self._bits:
             self._bits = bits
             self._inverse = _inverse_modulo_power_of_two(self._divisor >> self._zeros, bits)
-        modulus = fmpz(1) << bits
-        mask, half = modulus - 1, modulus >> 1
-        inverse = self._inverse & mask
-        quotients = []
-        for value in values:
-            quotient = (((value >> self._zeros) & mask) * inverse) & mask
-            quotients.append(quotient - modulus if quotient >= half else quotient)
-        return quotients
+        return self._inverse & ((fmpz(1) << bits) - 1)
+
+
+def _signed(residues: list[fmpz], bits: int) -> list[fmpz]:
+    """Residues modulo 2^bits as numbers between -2^(bits-1) and 2^(bits-1)."""
+    modulus = fmpz(1) << bits
+    half = modulus >> 1
+    return [residue - modulus if residue >= half else residue for residue in residues]
 
 
 def _inverse_modulo_power_of_two(odd: fmpz, bits: int) -> fmpz:
