@@ -1,9 +1,9 @@
-"""The fields of numbers: the rationals QQ, the prime fields GF(p), and real balls RR(bits).
+"""The fields of numbers: the rationals QQ, the prime fields GF(p), real balls RR(bits) and complex balls CC(bits).
 
-One protocol serves all three, so that the Kahan map is written once. Elements are FLINT's own numbers (`fmpq`,
-`nmod` for p < 2^63, `fmpz_mod` for larger p, `arb`) and use the ordinary operators; what FLINT does
+One protocol serves all four, so that the Kahan map is written once. Elements are FLINT's own numbers (`fmpq`,
+`nmod` for p < 2^63, `fmpz_mod` for larger p, `arb`, `acb`) and use the ordinary operators; what FLINT does
 not do under one name stands here. `convert` is the door to exactness: text, integers and fractions come in,
-machine floats do not.
+machine floats do not. `Element` gives the operators to elements that FLINT does not have.
 """
 
 from __future__ import annotations
@@ -15,10 +15,23 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any
+from typing import Any, Self
 
 import flint
-from flint import arb, arb_mat, fmpq, fmpq_mat, fmpz, fmpz_mod, fmpz_mod_ctx, fmpz_mod_mat, nmod, nmod_mat
+from flint import (
+    acb,
+    acb_mat,
+    arb,
+    arb_mat,
+    fmpq,
+    fmpq_mat,
+    fmpz,
+    fmpz_mod,
+    fmpz_mod_ctx,
+    fmpz_mod_mat,
+    nmod,
+    nmod_mat,
+)
 
 from kahanmaps.algebra.text import format_number, parse_number
 from kahanmaps.errors import BadPrime, InexactNumber, InputError, PrecisionLost
@@ -29,6 +42,7 @@ MAX_BALL_BITS = 1_000_000
 
 _DECIMAL = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]{1,8})?"
 _BALL = re.compile(rf"\[(?:{_DECIMAL} )?\+/- {_DECIMAL}\]")
+_COMPLEX = re.compile(r"(?:(.*) ([+-]) )?(.*)j")  # the sign between the parts; that inside a ball is +/-
 
 
 def rational(value: Any) -> fmpq:
@@ -127,6 +141,117 @@ class Field(ABC):
         return self.name
 
 
+def operand(field: Field, value: Any) -> Any:
+    """The element of `field` that one side of an operator stands for, or None if it is not one: text, a matrix, ...
+
+    Raises `InexactNumber` and `BadPrime` as `convert` does.
+    """
+    if isinstance(value, str):
+        return None
+    try:
+        return field.convert(value)
+    except (InexactNumber, BadPrime):
+        raise
+    except InputError:
+        return None
+
+
+class Element(ABC):
+    """An element of a field that FLINT does not have: all operators, from sum, product and quotient.
+
+    The other side of an operator may be any number or element that `field.convert` takes, but not text.
+    """
+
+    __slots__ = ("field",)
+
+    field: Any
+
+    @abstractmethod
+    def _plus(self, other: Self) -> Self:
+        """The sum of two elements of one field."""
+
+    @abstractmethod
+    def _times(self, other: Self) -> Self:
+        """The product of two elements of one field."""
+
+    @abstractmethod
+    def _over(self, other: Self) -> Self:
+        """The quotient of two elements of one field. Raises ZeroDivisionError."""
+
+    @abstractmethod
+    def _same(self, other: Self) -> bool:
+        """Whether two elements of one field are equal."""
+
+    @abstractmethod
+    def __neg__(self) -> Self: ...
+
+    def _pair(self, other: Any) -> tuple[Self, Self] | None:
+        """Both sides of an operator as elements of one field, that of either side; None if there is none."""
+        if isinstance(other, type(self)) and other.field is self.field:
+            return self, other
+        right = operand(self.field, other)
+        if right is not None:
+            return self, right
+        left = operand(other.field, self) if isinstance(other, type(self)) else None  # Python asks only one of a kind
+        return None if left is None else (left, other)
+
+    def __add__(self, other: Any) -> Self:
+        pair = self._pair(other)
+        return NotImplemented if pair is None else pair[0]._plus(pair[1])
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Self:
+        pair = self._pair(other)
+        return NotImplemented if pair is None else pair[0]._plus(-pair[1])
+
+    def __rsub__(self, other: Any) -> Self:
+        pair = self._pair(other)
+        return NotImplemented if pair is None else pair[1]._plus(-pair[0])
+
+    def __mul__(self, other: Any) -> Self:
+        pair = self._pair(other)
+        return NotImplemented if pair is None else pair[0]._times(pair[1])
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Self:
+        pair = self._pair(other)
+        return NotImplemented if pair is None else pair[0]._over(pair[1])
+
+    def __rtruediv__(self, other: Any) -> Self:
+        pair = self._pair(other)
+        return NotImplemented if pair is None else pair[1]._over(pair[0])
+
+    def __pow__(self, exponent: int) -> Self:
+        if isinstance(exponent, bool) or not isinstance(exponent, int):
+            return NotImplemented
+        one: Self = self.field.one
+        if exponent < 0:
+            return one._over(self) ** -exponent
+        power, square = one, self
+        while exponent:
+            if exponent % 2:
+                power = power._times(square)
+            exponent //= 2
+            if exponent:
+                square = square._times(square)
+        return power
+
+    def __eq__(self, other: object) -> bool:
+        try:
+            pair = self._pair(other)
+        except InputError:
+            return NotImplemented
+        return NotImplemented if pair is None else pair[0]._same(pair[1])
+
+    __hash__ = None  # type: ignore[assignment]  # elements are equal to numbers, whose hashes they do not know
+
+    def __repr__(self) -> str:
+        text: str = self.field.format(self)
+        return text
+
+
 class RationalField(Field):
     """The field of rational numbers; elements are fmpq.
 
@@ -223,19 +348,50 @@ class PrimeField(Field):
         return hash(("GF", self.prime))
 
 
-class BallField(Field):
-    """Real numbers enclosed in balls of `bits` bits of precision; elements are arb. Made by `RR`.
+class _Balls(Field):
+    """What real and complex balls have in common: every result encloses the true number.
 
-    Every result encloses the true number. A ball that contains zero without being zero is neither zero nor
-    invertible: dividing by it raises `PrecisionLost`.
+    A ball that contains zero without being zero is neither zero nor invertible: `is_zero` raises `PrecisionLost`.
     """
 
     exact = False
     characteristic = 0
+    _letters: str
 
     def __init__(self, bits: int) -> None:
         self.bits = bits
-        self.name = f"RR({bits})"
+        self.name = f"{self._letters}({bits})"
+
+    def format(self, element: Any) -> str:
+        """Midpoint and radius, `[0.333333 +/- 1.0e-6]`; `parse` reads exact numbers and this form."""
+        with self.working():
+            return str(element.str(max(1, int(self.bits * 0.30103))))
+
+    def is_zero(self, element: Any) -> bool:
+        if element.is_zero():
+            return True
+        if element.contains(0):
+            raise PrecisionLost(f"a number with {self.bits} bits cannot be told from zero any more: ask for more bits")
+        return False
+
+    def equal(self, left: Any, right: Any) -> bool:
+        return bool(left.overlaps(right))
+
+    def working(self) -> AbstractContextManager[Any]:
+        # flint.ctx.prec is global to the process, so it is set for the time of each computation only.
+        return flint.ctx.workprec(self.bits)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Balls) and (other._letters, other.bits) == (self._letters, self.bits)
+
+    def __hash__(self) -> int:
+        return hash((self._letters, self.bits))
+
+
+class BallField(_Balls):
+    """Real numbers enclosed in balls of `bits` bits of precision; elements are arb. Made by `RR`."""
+
+    _letters = "RR"
 
     @property
     def zero(self) -> arb:
@@ -250,11 +406,6 @@ class BallField(Field):
             return value
         with self.working():
             return arb(rational(value))
-
-    def format(self, element: arb) -> str:
-        """Midpoint and radius, `[0.333333 +/- 1.0e-6]`; `parse` reads exact numbers and this form."""
-        with self.working():
-            return str(element.str(max(1, int(self.bits * 0.30103))))
 
     def parse(self, text: str) -> arb:
         match = _BALL.fullmatch(text.strip())
@@ -271,25 +422,42 @@ class BallField(Field):
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> arb_mat:
         return arb_mat(rows, columns, [self.convert(entry) for entry in entries])
 
-    def is_zero(self, element: arb) -> bool:
-        if element.is_zero():
-            return True
-        if element.contains(0):
-            raise PrecisionLost(f"a number with {self.bits} bits cannot be told from zero any more: ask for more bits")
-        return False
 
-    def equal(self, left: arb, right: arb) -> bool:
-        return bool(left.overlaps(right))
+class ComplexBallField(_Balls):
+    """Complex numbers, each enclosed in a rectangle of two real balls; elements are acb. Made by `CC`."""
 
-    def working(self) -> AbstractContextManager[Any]:
-        # flint.ctx.prec is global to the process, so it is set for the time of each computation only.
-        return flint.ctx.workprec(self.bits)
+    _letters = "CC"
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, BallField) and other.bits == self.bits
+    @property
+    def zero(self) -> acb:
+        return acb(0)
 
-    def __hash__(self) -> int:
-        return hash(("RR", self.bits))
+    @property
+    def one(self) -> acb:
+        return acb(1)
+
+    def convert(self, value: Any) -> acb:
+        """The element that an exact number, a real ball or a complex one stands for."""
+        if isinstance(value, acb):
+            return value
+        return acb(RR(self.bits).convert(value))
+
+    def parse(self, text: str) -> acb:
+        """The element `a`, `bj`, `a + bj` or `a - bj`, where a and b are written as real balls are."""
+        real, found = RR(self.bits), _COMPLEX.fullmatch(text.strip())
+        if found is None:
+            return acb(real.parse(text))
+        left, sign, right = found.groups()
+        with self.working():
+            imaginary = real.parse(right)
+            return acb(real.zero if left is None else real.parse(left), -imaginary if sign == "-" else imaginary)
+
+    def random(self, rng: random.Random, height: int = 10) -> acb:
+        real = RR(self.bits)
+        return acb(real.random(rng, height), real.random(rng, height))
+
+    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> acb_mat:
+        return acb_mat(rows, columns, [self.convert(entry) for entry in entries])
 
 
 QQ = RationalField()
@@ -326,9 +494,24 @@ def RR(bits: int) -> BallField:
     >>> RR(64).convert("1/3") * 3 == 1, RR(64).equal(RR(64).convert("1/3") * 3, RR(64).one)
     (False, True)
     """
+    _check_bits(bits)
+    return BallField(bits)
+
+
+@lru_cache(maxsize=64)
+def CC(bits: int) -> ComplexBallField:
+    """Complex balls with `bits` bits of precision (2 to 1,000,000).
+
+    >>> CC(64).equal(CC(64).parse("1 + 2j") * CC(64).parse("1 - 2j"), CC(64).convert(5))
+    True
+    """
+    _check_bits(bits)
+    return ComplexBallField(bits)
+
+
+def _check_bits(bits: int) -> None:
     if isinstance(bits, bool) or not isinstance(bits, int) or not 2 <= bits <= MAX_BALL_BITS:
         raise InputError(f"found the precision {bits!r}, expected an integer from 2 to {MAX_BALL_BITS} bits")
-    return BallField(bits)
 
 
 def _example(text: str) -> str:

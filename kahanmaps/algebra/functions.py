@@ -14,8 +14,10 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 from flint.utils.flint_exceptions import DomainError
 
-from kahanmaps.algebra.fields import Field, rational
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.fields import Element, Field, rational
+from kahanmaps.algebra.matrices import EntryMatrix
+from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
+from kahanmaps.algebra.text import format_rational_function, parse_rational_function
 from kahanmaps.errors import KahanmapsError
 
 DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words
@@ -56,6 +58,14 @@ class FunctionField(Field):
             return value
         return Function(self, self.context.constant(rational(value)), self._one)
 
+    def format(self, element: Function) -> str:
+        return format_rational_function(RationalFunction(element.above, element.below))
+
+    def parse(self, text: str) -> Function:
+        """The element written as a quotient of polynomials."""
+        function = parse_rational_function(text, names_of(self._one))
+        return Function(self, function.numerator, function.denominator)
+
     def random(self, rng: random.Random, height: int = 10) -> Function:
         return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
 
@@ -90,17 +100,17 @@ class FunctionField(Field):
             return None
 
 
-class Function:
+class Function(Element):
     """A quotient of two polynomials in a `FunctionField`, not reduced."""
 
-    __slots__ = ("above", "below", "field")
+    __slots__ = ("above", "below")
 
     def __init__(self, field: FunctionField, above: fmpq_mpoly, below: fmpq_mpoly) -> None:
         self.field = field
         self.above = above
         self.below = below
 
-    def __add__(self, other: Function) -> Function:
+    def _plus(self, other: Function) -> Function:
         if self.above.is_zero():
             return other
         if other.above.is_zero():
@@ -118,75 +128,26 @@ class Function:
     def __neg__(self) -> Function:
         return Function(self.field, -self.above, self.below)
 
-    def __sub__(self, other: Function) -> Function:
-        return self + (-other)
-
-    def __mul__(self, other: Function) -> Function:
+    def _times(self, other: Function) -> Function:
         if self.above.is_zero() or other.above.is_zero():
-            return self.field.zero
+            zero: Function = self.field.zero
+            return zero
         times = self.field.times
         return Function(self.field, times(self.above, other.above), times(self.below, other.below))
 
-    def __truediv__(self, other: Function) -> Function:
+    def _over(self, other: Function) -> Function:
         if other.above.is_zero():
             raise ZeroDivisionError("division by the zero function")
-        return self * Function(self.field, other.below, other.above)
+        return self._times(Function(self.field, other.below, other.above))
 
-    def __eq__(self, other: object) -> bool:
-        if isinstance(other, int) and other == 0:
+    def _same(self, other: Function) -> bool:
+        if other.above.is_zero():
             return bool(self.above.is_zero())
-        return isinstance(other, Function) and self.field.equal(self, other)
-
-    __hash__ = None  # type: ignore[assignment]  # equal quotients may be written differently
+        return bool(self.field.equal(self, other))
 
 
-class FunctionMatrix:
+class FunctionMatrix(EntryMatrix):
     """A matrix over a `FunctionField`, with the operations that the Kahan map needs."""
-
-    def __init__(self, field: FunctionField, rows: int, columns: int, entries: Sequence[Function]) -> None:
-        self.field = field
-        self._rows = rows
-        self._columns = columns
-        self._entries = list(entries)
-
-    def nrows(self) -> int:
-        return self._rows
-
-    def ncols(self) -> int:
-        return self._columns
-
-    def entries(self) -> list[Function]:
-        return list(self._entries)
-
-    def __getitem__(self, place: tuple[int, int]) -> Function:
-        return self._entries[place[0] * self._columns + place[1]]
-
-    def transpose(self) -> FunctionMatrix:
-        flipped = [self[i, j] for j in range(self._columns) for i in range(self._rows)]
-        return FunctionMatrix(self.field, self._columns, self._rows, flipped)
-
-    def __add__(self, other: FunctionMatrix) -> FunctionMatrix:
-        entries = [a + b for a, b in zip(self._entries, other._entries, strict=True)]
-        return FunctionMatrix(self.field, self._rows, self._columns, entries)
-
-    def __neg__(self) -> FunctionMatrix:
-        return FunctionMatrix(self.field, self._rows, self._columns, [-entry for entry in self._entries])
-
-    def __sub__(self, other: FunctionMatrix) -> FunctionMatrix:
-        return self + (-other)
-
-    def __mul__(self, other: Any) -> FunctionMatrix:
-        if not isinstance(other, FunctionMatrix):
-            factor = self.field.convert(other)
-            return FunctionMatrix(self.field, self._rows, self._columns, [entry * factor for entry in self._entries])
-        entries = []
-        for i in range(self._rows):
-            for j in range(other._columns):
-                total = self.field.zero
-                for k in range(self._columns):
-                    total = total + self[i, k] * other[k, j]
-                entries.append(total)
-        return FunctionMatrix(self.field, self._rows, other._columns, entries)
 
     def det(self) -> Function:
         """The determinant, by Bareiss' fraction-free elimination on rows cleared of denominators."""
@@ -195,18 +156,19 @@ class FunctionMatrix:
         return Function(self.field, value, cleared)
 
     def solve(self, right: FunctionMatrix) -> FunctionMatrix:
-        """The solution X of self X = right (one column), by Cramer's rule. Raises ZeroDivisionError if singular."""
-        n = self._rows
-        wide = [self[i, j] if j < n else right[i, 0] for i in range(n) for j in range(n + 1)]
-        rows, _ = FunctionMatrix(self.field, n, n + 1, wide)._polynomial_rows()
+        """The solution X of self X = right, by Cramer's rule. Raises ZeroDivisionError if singular."""
+        n, columns = self._rows, right._columns
+        wide = [entry for mine, its in zip(self.tolist(), right.tolist(), strict=True) for entry in (*mine, *its)]
+        rows, _ = FunctionMatrix(self.field, n, n + columns, wide)._polynomial_rows()
         below = _bareiss(self.field, [row[:n] for row in rows])
         if below.is_zero():
             raise ZeroDivisionError("singular matrix in solve()")
         solution = []
         for k in range(n):
-            replaced = [[*row[:k], row[n], *row[k + 1 : n]] for row in rows]
-            solution.append(Function(self.field, _bareiss(self.field, replaced), below))
-        return FunctionMatrix(self.field, n, 1, solution)
+            for j in range(n, n + columns):
+                replaced = [[*row[:k], row[j], *row[k + 1 : n]] for row in rows]
+                solution.append(Function(self.field, _bareiss(self.field, replaced), below))
+        return FunctionMatrix(self.field, n, columns, solution)
 
     def _polynomial_rows(self) -> tuple[list[list[fmpq_mpoly]], fmpq_mpoly]:
         """Each row times a common denominator of its entries, and the product of these denominators."""

@@ -1,16 +1,19 @@
 """Linear algebra under one name over each field: solve, determinant, rank, null space.
 
 Matrices are FLINT's own (`Field.matrix` makes them); products, sums and transposes are their operators. This file
-gives the operations that FLINT spells differently, or lacks, from one kind of matrix to the next.
+gives the operations that FLINT spells differently, or lacks, from one kind of matrix to the next; and `EntryMatrix`
+for the rings over which FLINT has no matrices.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, Self
 
-from flint import arb_mat, fmpq, fmpq_mat, fmpz, fmpz_mat
+from flint import acb_mat, arb_mat, fmpq, fmpq_mat, fmpz, fmpz_mat
 
-from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.fields import Field, operand
 from kahanmaps.errors import PrecisionLost, SingularMatrix
 
 
@@ -26,7 +29,7 @@ def solve(matrix: Any, right: Any) -> Any:
     try:
         return matrix.solve(right)
     except ZeroDivisionError as error:
-        if isinstance(matrix, arb_mat) and not matrix.det().is_zero():
+        if isinstance(matrix, arb_mat | acb_mat) and not matrix.det().is_zero():
             raise PrecisionLost("the determinant cannot be told from zero: ask for more bits") from error
         raise SingularMatrix("the matrix is singular") from error
 
@@ -38,7 +41,7 @@ def det(matrix: Any) -> Any:
 
 def rank(field: Field, matrix: Any) -> int:
     """The rank. Over balls: certain, or `PrecisionLost`."""
-    if isinstance(matrix, arb_mat):
+    if isinstance(matrix, arb_mat | acb_mat):
         return len(_eliminate_balls(field, matrix)[1])
     if isinstance(matrix, fmpq_mat):
         return int(_integer_rows(matrix).rank())
@@ -92,6 +95,96 @@ def primitive_integers(vector: tuple[fmpq, ...]) -> tuple[fmpz, ...]:
     return tuple(integer // content for integer in integers)
 
 
+class EntryMatrix(ABC):
+    """A matrix kept as the list of its entries, row by row; determinant and solution are left to each kind."""
+
+    def __init__(self, field: Any, rows: int, columns: int, entries: Sequence[Any]) -> None:
+        self.field = field
+        self._rows = rows
+        self._columns = columns
+        self._entries = list(entries)
+        if len(self._entries) != rows * columns:
+            raise ValueError(f"found {len(self._entries)} entries for a {rows} x {columns} matrix")
+
+    @abstractmethod
+    def det(self) -> Any:
+        """The determinant."""
+
+    @abstractmethod
+    def solve(self, right: Self) -> Self:
+        """The solution X of self X = right, which may have several columns. Raises ZeroDivisionError if singular."""
+
+    def nrows(self) -> int:
+        return self._rows
+
+    def ncols(self) -> int:
+        return self._columns
+
+    def entries(self) -> list[Any]:
+        return list(self._entries)
+
+    def tolist(self) -> list[list[Any]]:
+        return [self._entries[i * self._columns : (i + 1) * self._columns] for i in range(self._rows)]
+
+    def __getitem__(self, place: tuple[int, int]) -> Any:
+        i, j = place
+        if not (0 <= i < self._rows and 0 <= j < self._columns):
+            raise IndexError(f"index {i},{j} exceeds matrix dimensions")
+        return self._entries[i * self._columns + j]
+
+    def transpose(self) -> Self:
+        flipped = [self[i, j] for j in range(self._columns) for i in range(self._rows)]
+        return type(self)(self.field, self._columns, self._rows, flipped)
+
+    def __add__(self, other: Self) -> Self:
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        if (self._rows, self._columns) != (other._rows, other._columns):
+            raise ValueError("incompatible shapes for matrix addition")
+        return self._like([a + b for a, b in zip(self._entries, other._entries, strict=True)])
+
+    def __neg__(self) -> Self:
+        return self._like([-entry for entry in self._entries])
+
+    def __sub__(self, other: Self) -> Self:
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        return self + (-other)
+
+    def __mul__(self, other: Any) -> Self:
+        if not isinstance(other, type(self)):
+            return self.__rmul__(other)
+        if self._columns != other._rows:
+            raise ValueError("incompatible shapes for matrix multiplication")
+        rows, columns = self.tolist(), other.transpose().tolist()
+        entries = [self._dot(row, column) for row in rows for column in columns]
+        return type(self)(self.field, self._rows, other._columns, entries)
+
+    def _dot(self, row: Sequence[Any], column: Sequence[Any]) -> Any:
+        """The entry of a product where a row and a column meet."""
+        total = self.field.zero
+        for a, b in zip(row, column, strict=True):
+            total = total + a * b
+        return total
+
+    def __rmul__(self, other: Any) -> Self:
+        factor = operand(self.field, other)
+        return NotImplemented if factor is None else self._like([entry * factor for entry in self._entries])
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        return (self._rows, self._columns, self._entries) == (other._rows, other._columns, other._entries)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return "\n".join(f"[{', '.join(self.field.format(entry) for entry in row)}]" for row in self.tolist())
+
+    def _like(self, entries: Sequence[Any]) -> Self:
+        return type(self)(self.field, self._rows, self._columns, entries)
+
+
 def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
     """The matrix with each row multiplied by its own denominator: same rank, same null space, smaller than by one."""
     rows = []
@@ -105,7 +198,7 @@ def _integer_rows(matrix: fmpq_mat) -> fmpz_mat:
 
 def _reduced_echelon(field: Field, matrix: Any) -> tuple[Any, list[int]]:
     """Entries (as a function of row and column) of the reduced echelon form, and its pivot columns."""
-    if isinstance(matrix, arb_mat):
+    if isinstance(matrix, arb_mat | acb_mat):
         rows, pivots = _eliminate_balls(field, matrix)
         return (lambda i, j: rows[i][j]), pivots
     below: Any = None
@@ -125,10 +218,10 @@ def _reduced_echelon(field: Field, matrix: Any) -> tuple[Any, list[int]]:
     return (lambda i, j: reduced[i, j]), pivots
 
 
-def _eliminate_balls(field: Field, matrix: arb_mat) -> tuple[list[list[Any]], list[int]]:
+def _eliminate_balls(field: Field, matrix: arb_mat | acb_mat) -> tuple[list[list[Any]], list[int]]:
     """Gauss-Jordan with the pivot farthest from zero; where no pivot is certain, all must be zero exactly."""
     with field.working():
-        rows = matrix.tolist()
+        rows: list[list[Any]] = [*matrix.tolist()]
         pivots: list[int] = []
         for column in range(matrix.ncols()):
             top = len(pivots)

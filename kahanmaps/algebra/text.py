@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly, fmpz
+from flint import fmpq, fmpq_mpoly, fmpq_poly, fmpz
 
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
 from kahanmaps.errors import ExpressionError, InexactNumber, InputError
@@ -202,6 +202,24 @@ def format_polynomial(polynomial: fmpq_mpoly) -> str:
             pieces.append(" + ")
         pieces.append(_term(coefficient, monomial, names))
     return "".join(pieces) or "0"
+
+
+def format_univariate(polynomial: fmpq_poly) -> str:
+    """A polynomial in t as people write it.
+
+    >>> format_univariate(fmpq_poly([-2, 0, 1]))
+    't^2 - 2'
+    """
+    text = ""
+    for power in range(polynomial.degree(), -1, -1):
+        coefficient = polynomial[power]
+        if coefficient == 0:
+            continue
+        size, sign = abs(coefficient), "-" if coefficient < 0 else "+"
+        letter = "" if power == 0 else "t" if power == 1 else f"t^{power}"
+        number = "" if size == 1 and letter else format_number(size) + ("*" if letter else "")
+        text += f" {sign} {number}{letter}" if text else f"{'-' if sign == '-' else ''}{number}{letter}"
+    return text or "0"
 
 
 def format_rational_function(function: RationalFunction) -> str:

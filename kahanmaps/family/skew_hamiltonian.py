@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from flint import fmpq, fmpq_mat, fmpq_poly
 
 from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.text import format_univariate as format_univariate
 from kahanmaps.errors import HypothesisError
 from kahanmaps.systems.hamiltonian import standard_structure
 
@@ -201,24 +202,6 @@ def symplectic_inverse(S: fmpq_mat) -> fmpq_mat:
     """S^{-1} = J^{-1} S^T J for symplectic S."""
     J = standard_structure(S.nrows())
     return -(J * S.transpose() * J)
-
-
-def format_univariate(polynomial: fmpq_poly) -> str:
-    """A polynomial in t as people write it.
-
-    >>> format_univariate(fmpq_poly([-2, 0, 1]))
-    't^2 - 2'
-    """
-    text = ""
-    for power in range(polynomial.degree(), -1, -1):
-        coefficient = polynomial[power]
-        if coefficient == 0:
-            continue
-        size, sign = abs(coefficient), "-" if coefficient < 0 else "+"
-        letter = "" if power == 0 else "t" if power == 1 else f"t^{power}"
-        number = "" if size == 1 and letter else format_number(size) + ("*" if letter else "")
-        text += f" {sign} {number}{letter}" if text else f"{'-' if sign == '-' else ''}{number}{letter}"
-    return text or "0"
 
 
 def _order(factor: Factor) -> tuple[int, tuple[fmpq, ...]]:

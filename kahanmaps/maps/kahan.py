@@ -22,60 +22,39 @@ from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.matrices import det, solve
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 
 
-class KahanMap:
-    """The map Phi(., eps) of a system over a field (the rationals unless another is given).
+class KahanMapOver:
+    """The map Phi(., eps) of a system that is given over any field, with eps an element of it; time step 2 eps."""
 
-    `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
-    Over QQ and GF(p) everything is exact, over RR(bits) it is enclosed.
-
-    >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
-    >>> phi = KahanMap(system, "1/2")
-    >>> phi.step(["1", "1/3"])
-    (7/8, -13/24)
-    >>> phi.inverse_step(phi.step(["1", "1/3"]))
-    (1, 1/3)
-    """
-
-    def __init__(self, system: QuadraticSystem, eps: Any, field: Field = QQ) -> None:
-        self.system = system
-        self.field = field
-        self.eps = field.convert(eps)
-        if self.eps == 0:
-            _refuse_zero_eps(eps, field)
-        self._local = system.over(field)
+    def __init__(self, local: SystemOver, eps: Any) -> None:
+        self.field = local.field
+        self.eps = eps
+        self._local = local
 
     @property
     def dim(self) -> int:
         """The dimension of the phase space."""
-        return self.system.dim
+        return self._local.dim
 
     @cached_property
-    def inverse(self) -> KahanMap:
+    def inverse(self) -> KahanMapOver:
         """The inverse map, Phi(., -eps)."""
         with self.field.working():  # or -eps would be a ball of FLINT's default precision
-            return KahanMap(self.system, -self.eps, self.field)
+            return KahanMapOver(self._local, -self.eps)
 
     def point(self, values: Sequence[Any]) -> tuple[Any, ...]:
         """The values as a point over the map's field. Raises InputError for a wrong length or inexact numbers."""
         if isinstance(values, str):
             raise InputError(f"found the text {values[:60]!r}, expected a sequence: parse_point reads points from text")
         if len(values) != self.dim:
-            raise InputError(
-                f"found a point with {len(values)} coordinates, expected {self.dim}: {', '.join(self.system.variables)}"
-            )
+            raise InputError(f"found a point with {len(values)} coordinates, expected {self.dim}{self._named()}")
         return tuple(self.field.convert(value) for value in values)
 
     def step(self, point: Sequence[Any]) -> tuple[Any, ...]:
         """The image x~ of a point. Raises SingularStep where det(I - eps f'(x)) = 0."""
         x = self.point(point)
-        if self.field is QQ:
-            image = self.integer_steps.step(IntegerPoint.from_rationals(x))
-            if image is None:
-                raise self._singular(x)
-            return image.rationals()
         with self.field.working():
             column = self.field.column(x)
             # (I - eps f'(x)) x~ = (I + eps B) x + 2 eps c: the defining equation, sorted.
@@ -97,8 +76,6 @@ class KahanMap:
 
     def determinant(self, point: Sequence[Any]) -> Any:
         """det(I - eps f'(x)), the denominator of the map."""
-        if self.field is QQ:
-            return self.integer_steps.determinant(IntegerPoint.from_rationals(self.point(point)))
         with self.field.working():
             return det(self.denominator_matrix(point))
 
@@ -119,10 +96,9 @@ class KahanMap:
         with self.field.working():
             return self._local.jacobian(self.point(point))
 
-    @cached_property
-    def integer_steps(self) -> IntegerSteps:
-        """The stepper on integer points, for maps over QQ."""
-        return IntegerSteps(self.system, rational(self.eps))
+    def _named(self) -> str:
+        """What an error message may add about the variables."""
+        return ""
 
     def _singular(self, point: tuple[Any, ...]) -> SingularStep:
         shown = ",".join(self.field.format(entry) for entry in point)
@@ -134,6 +110,58 @@ class KahanMap:
             point,
             self.eps,
         )
+
+
+class KahanMap(KahanMapOver):
+    """The map Phi(., eps) of a rational system over a field (the rationals unless another is given).
+
+    `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
+    Over QQ and GF(p) everything is exact, over RR(bits) it is enclosed.
+
+    >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
+    >>> phi = KahanMap(system, "1/2")
+    >>> phi.step(["1", "1/3"])
+    (7/8, -13/24)
+    >>> phi.inverse_step(phi.step(["1", "1/3"]))
+    (1, 1/3)
+    """
+
+    def __init__(self, system: QuadraticSystem, eps: Any, field: Field = QQ) -> None:
+        self.system = system
+        element = field.convert(eps)
+        if element == 0:
+            _refuse_zero_eps(eps, field)
+        super().__init__(system.over(field), element)
+
+    @cached_property
+    def inverse(self) -> KahanMap:
+        """The inverse map, Phi(., -eps)."""
+        with self.field.working():
+            return KahanMap(self.system, -self.eps, self.field)
+
+    def step(self, point: Sequence[Any]) -> tuple[Any, ...]:
+        """The image x~ of a point. Raises SingularStep where det(I - eps f'(x)) = 0."""
+        if self.field is not QQ:
+            return super().step(point)
+        x = self.point(point)
+        image = self.integer_steps.step(IntegerPoint.from_rationals(x))
+        if image is None:
+            raise self._singular(x)
+        return image.rationals()
+
+    def determinant(self, point: Sequence[Any]) -> Any:
+        """det(I - eps f'(x)), the denominator of the map."""
+        if self.field is not QQ:
+            return super().determinant(point)
+        return self.integer_steps.determinant(IntegerPoint.from_rationals(self.point(point)))
+
+    @cached_property
+    def integer_steps(self) -> IntegerSteps:
+        """The stepper on integer points, for maps over QQ."""
+        return IntegerSteps(self.system, rational(self.eps))
+
+    def _named(self) -> str:
+        return f": {', '.join(self.system.variables)}"
 
     def __repr__(self) -> str:
         return f"KahanMap({', '.join(self.system.variables)}; eps={self.field.format(self.eps)}, over {self.field})"

@@ -205,16 +205,45 @@ class QuadraticSystem:
 
 
 class SystemOver:
-    """A quadratic system with coefficients in `field`; points are sequences of its elements, matrices FLINT's."""
+    """A quadratic system with coefficients in `field`; points are sequences of its elements, matrices FLINT's.
+
+    Made from a rational system, or by `from_tensor` from coefficients that the rationals do not hold.
+    """
 
     def __init__(self, field: Field, system: QuadraticSystem) -> None:
         n = system.dim
         self.field = field
         self.dim = n
-        self._rhs = system.rhs
+        self._rhs: tuple[fmpq_mpoly, ...] | None = system.rhs
         self.B = field.convert_matrix(system.B)
         self.c = field.column([field.convert(entry) for entry in system.c])
         self._tensor = field.convert_matrix(fmpq_mat(n * n, n, _tensor(system)))
+
+    @classmethod
+    def from_tensor(cls, field: Field, tensor: Any, B: Any = None, c: Any = None) -> SystemOver:
+        """The system with f'' = `tensor`, an n^2 x n matrix over the field; row i n + j gives d f_i'/dx_j.
+
+        Without `B` and `c` it is homogeneous. The characteristic must not be 2.
+        """
+        system = cls.__new__(cls)
+        n = tensor.ncols()
+        system.field, system.dim, system._rhs, system._tensor = field, n, None, tensor
+        system.B = field.matrix(n, n, [field.zero] * (n * n)) if B is None else B
+        system.c = field.column([field.zero] * n) if c is None else c
+        return system
+
+    @property
+    def tensor(self) -> Any:
+        """f'' as an n^2 x n matrix: entry (i n + j, k) is the derivative of f_i by x_j and x_k."""
+        return self._tensor
+
+    def transformed(self, matrix: Any) -> SystemOver:
+        """The system x' = C f(x) for a constant matrix C = `matrix` over the field."""
+        n, field = self.dim, self.field
+        with field.working():
+            rows = matrix * field.matrix(n, n * n, self._tensor.entries())
+            tensor = field.matrix(n * n, n, rows.entries())
+            return SystemOver.from_tensor(field, tensor, matrix * self.B, matrix * self.c)
 
     def hessian_times(self, vector: Sequence[Any]) -> Any:
         """The matrix f''(v), with f'(x + v) = f'(x) + f''(v)."""
@@ -228,6 +257,8 @@ class SystemOver:
 
     def value(self, point: Sequence[Any]) -> tuple[Any, ...]:
         """f(x)."""
+        if self._rhs is None:
+            return self.polarised(point, point)
         return tuple(evaluate(polynomial, self.field, point) for polynomial in self._rhs)
 
     def polarised(self, x: Sequence[Any], y: Sequence[Any]) -> tuple[Any, ...]:

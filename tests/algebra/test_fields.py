@@ -1,4 +1,4 @@
-"""The fields of numbers: one protocol over QQ, GF(p) and RR(bits).
+"""The fields of numbers: one protocol over QQ, GF(p), RR(bits) and CC(bits).
 
 Specified here: what `convert` takes and what it refuses, that it respects sums and products, that text comes back,
 which moduli and precisions are allowed, and what a ball may be said to be.
@@ -12,12 +12,13 @@ from fractions import Fraction
 import flint
 import numpy as np
 import pytest
-from flint import arb, fmpq, fmpq_mat, fmpz, fmpz_mod, fmpz_mod_ctx, nmod
+from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mod, fmpz_mod_ctx, nmod
 from helpers import (
+    FIELDS,
     LARGEST_WORD_PRIME,
     SMALLEST_LARGE_PRIME,
     encloses,
-    over_all_fields,
+    matrices,
     over_exact_fields,
     rationals,
     some,
@@ -25,8 +26,12 @@ from helpers import (
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.fields import GF, QQ, RR, PrimeField, rational
-from kahanmaps.errors import BadPrime, ExpressionError, InexactNumber, InputError, PrecisionLost
+from kahanmaps.algebra.fields import CC, GF, QQ, RR, PrimeField, rational
+from kahanmaps.algebra.matrices import nullspace, rank, solve
+from kahanmaps.errors import BadPrime, ExpressionError, InexactNumber, InputError, PrecisionLost, SingularMatrix
+
+over_all_fields = pytest.mark.parametrize("field", [*FIELDS, CC(128)], ids=repr)
+over_balls = pytest.mark.parametrize("balls", [RR, CC], ids=["RR", "CC"])
 
 integers = st.integers(-(10**30), 10**30)
 
@@ -100,10 +105,22 @@ def test_an_element_of_another_field_is_refused(field, element):
         field.convert(element)
 
 
+@pytest.mark.parametrize("ball", [arb(1), acb(1)], ids=["arb", "acb"])
 @over_exact_fields
-def test_a_ball_is_refused_by_an_exact_field(field):
-    with pytest.raises(InputError, match="arb"):
-        field.convert(arb(1))
+def test_a_ball_is_refused_by_an_exact_field(field, ball):
+    with pytest.raises(InputError, match=type(ball).__name__):
+        field.convert(ball)
+
+
+def test_a_complex_ball_is_refused_by_real_balls():
+    with pytest.raises(InputError, match="acb"):
+        RR(64).convert(acb(1))
+
+
+def test_a_real_ball_is_a_complex_one_without_loss():
+    with RR(500).working():
+        third = arb(1) / 3
+    assert CC(500).convert(third).real.rel_accuracy_bits() == third.rel_accuracy_bits()
 
 
 # convert is a homomorphism.
@@ -212,6 +229,41 @@ def test_a_ball_of_more_digits_than_the_precision_can_hold_is_refused():
         RR(64).parse(f"[1.{'0' * 1000} +/- 1e-5]")
 
 
+COMPLEX = [  # text, real part, imaginary part
+    ("1/2", "1/2", "0"),
+    ("-3j", "0", "-3"),
+    ("1 + 2j", "1", "2"),
+    ("-1/2 - 3/4j", "-1/2", "-3/4"),
+    (" [+/- 1] + [2 +/- 0.5]j ", "-1", "5/2"),
+    ("[2 +/- 0.5] - [1 +/- 0.5]j", "3/2", "-3/2"),
+    ("[2 +/- 0.5]j", "0", "3/2"),
+]
+
+
+@pytest.mark.parametrize(("text", "real", "imaginary"), COMPLEX)
+def test_a_complex_ball_is_read_from_its_parts(text, real, imaginary):
+    ball = CC(64).parse(text)
+    assert encloses(ball.real, rational(real))
+    assert encloses(ball.imag, rational(imaginary))
+    assert not encloses(ball.imag, rational(imaginary) + 3)
+
+
+@pytest.mark.parametrize("bits", [8, 53, 128, 1000])
+@some
+@given(real=rationals(10**20), imaginary=rationals(10**20))
+def test_the_text_of_a_complex_ball_comes_back_as_a_ball_around_it(bits, real, imaginary):
+    ball = acb(RR(bits).convert(real), RR(bits).convert(imaginary))
+    assert CC(bits).parse(CC(bits).format(ball)).contains(ball)
+
+
+@pytest.mark.parametrize(
+    "text", ["j", "1 +j", "1 + j", "1j + 2", "(1 + 2j)", "[1 +/- x]j", "1 + 2i", "1 + 2 + 3j", "nanj"]
+)
+def test_a_complex_ball_that_is_not_spelled_out_is_refused(text):
+    with pytest.raises(InputError):
+        CC(64).parse(text)
+
+
 # Prime fields.
 
 
@@ -272,29 +324,113 @@ def test_fields_of_different_kind_or_prime_are_different(other):
 # Balls.
 
 
+@over_balls
 @given(number=rationals(10**10))
-def test_a_ball_contains_the_number_it_was_made_from(number):
-    assert encloses(RR(64).convert(number), number)
+def test_a_ball_contains_the_number_it_was_made_from(balls, number):
+    assert encloses(acb(balls(64).convert(number)).real, number)
 
 
-def test_a_ball_around_a_third_is_not_a_third_but_overlaps_it():
-    third = RR(64).convert("1/3")
+@over_balls
+def test_a_ball_around_a_third_is_not_a_third_but_overlaps_it(balls):
+    third = balls(64).convert("1/3")
     assert (third * 3 == 1) is False  # balls: `!=` means certainly different, which is not the opposite
-    assert RR(64).equal(third * 3, RR(64).one)
+    assert balls(64).equal(third * 3, balls(64).one)
 
 
-def test_disjoint_balls_are_not_equal():
-    assert not RR(64).equal(RR(64).convert("1/3"), RR(64).convert("1/3") + arb(2) ** -50)
+@over_balls
+def test_disjoint_balls_are_not_equal(balls):
+    assert not balls(64).equal(balls(64).convert("1/3"), balls(64).convert("1/3") + arb(2) ** -50)
 
 
-def test_the_ball_zero_is_zero_and_a_ball_around_one_is_not():
-    assert RR(64).is_zero(RR(64).zero)
-    assert not RR(64).is_zero(RR(64).convert("1/3"))
+def test_complex_balls_are_disjoint_if_their_imaginary_parts_are():
+    assert not CC(64).equal(CC(64).parse("1/3 + 1/3j"), CC(64).parse("1/3 - 1/3j"))
 
 
-def test_a_ball_that_contains_zero_and_more_cannot_be_told_from_zero():
+@over_balls
+def test_the_ball_zero_is_zero_and_a_ball_around_one_is_not(balls):
+    assert balls(64).is_zero(balls(64).zero)
+    assert not balls(64).is_zero(balls(64).convert("1/3"))
+
+
+def test_a_complex_ball_is_not_zero_if_one_part_is_not():
+    assert not CC(64).is_zero(acb(0, arb(1) / 3))
+    assert not CC(64).is_zero(acb(arb(0, 1), 1))
+
+
+@over_balls
+def test_a_ball_that_contains_zero_and_more_cannot_be_told_from_zero(balls):
     with pytest.raises(PrecisionLost, match="64 bits"):
-        RR(64).is_zero(RR(64).convert("1/3") * 3 - 1)
+        balls(64).is_zero(balls(64).convert("1/3") * 3 - 1)
+
+
+@given(a=rationals(), b=rationals(), c=rationals(), d=rationals())
+def test_products_and_quotients_of_complex_balls_enclose_those_of_the_numbers(a, b, c, d):
+    assume((c, d) != (0, 0))
+    with CC(64).working():
+        z, w = acb(RR(64).convert(a), RR(64).convert(b)), acb(RR(64).convert(c), RR(64).convert(d))
+        product, quotient = z * w, z / w
+    size = c * c + d * d
+    assert encloses(product.real, a * c - b * d)
+    assert encloses(product.imag, a * d + b * c)
+    assert encloses(quotient.real, (a * c + b * d) / size)
+    assert encloses(quotient.imag, (b * c - a * d) / size)
+
+
+def test_the_square_root_of_minus_two_encloses_i_times_that_of_two():
+    with CC(64).working():
+        root = CC(64).convert(-2).sqrt()
+        assert CC(64).equal(root * root, CC(64).convert(-2))
+    assert root.imag.rel_accuracy_bits() >= 60
+    approximation = fmpq(1)
+    for _ in range(6):  # Newton's iteration 1, 3/2, 17/12, 577/408, ...: within 1e-48 of the square root of 2
+        approximation = (approximation + 2 / approximation) / 2
+    assert encloses(root.real, fmpq(0))
+    assert encloses(root.imag, approximation)
+    assert not encloses(root.imag, fmpq(577, 408))
+
+
+def test_complex_roots_of_a_polynomial_are_zeros_of_it():
+    chi = fmpq_poly([1, -3, 0, 2, 1])
+    with CC(200).working():
+        for root, _ in chi.complex_roots():
+            value = sum((CC(200).convert(c) * root**k for k, c in enumerate(chi.coeffs())), CC(200).zero)
+            assert CC(200).equal(value, CC(200).zero)
+
+
+@some
+@given(matrix=matrices(3, 3), right=matrices(3, 2))
+def test_a_complex_system_is_solved_as_the_rational_one_it_encloses(matrix, right):
+    assume(matrix.det() != 0)
+    field, unit = CC(256), CC(256).parse("1j")
+    with field.working():
+        solution = solve(field.convert_matrix(matrix) * unit, field.convert_matrix(right))  # the solution times 1/i
+    for ball, number in zip(solution.entries(), matrix.solve(right).entries(), strict=True):
+        assert encloses(ball.imag, -number)
+
+
+@over_balls
+def test_a_system_that_may_be_singular_asks_for_more_bits(balls):
+    with balls(64).working(), pytest.raises(PrecisionLost, match="more bits"):
+        solve(balls(64).matrix(2, 2, ["1/3", "1/7", "1/3", "1/7"]), balls(64).column([1, 1]))
+
+
+@over_balls
+def test_a_system_that_is_singular_for_certain_is_called_so(balls):
+    with balls(64).working(), pytest.raises(SingularMatrix):
+        solve(balls(64).matrix(2, 2, [1, 2, 2, 4]), balls(64).column([1, 2]))
+
+
+def test_rank_and_null_space_of_a_complex_matrix_are_those_found_by_hand():
+    i = CC(64).parse("1j")
+    matrix = CC(64).matrix(2, 2, [1, i, 2 * i, -2])  # the second row is 2i times the first
+    assert nullspace(CC(64), CC(64).matrix(1, 2, [1, i])) == [(-i, 1)]
+    assert rank(CC(64), CC(64).matrix(2, 2, [1, i, i, 1])) == 2
+    assert rank(CC(64), matrix) == 1
+
+
+def test_balls_do_not_guess_the_rank_of_a_complex_matrix():
+    with pytest.raises(PrecisionLost, match="rank"):
+        rank(CC(64), CC(64).matrix(2, 2, ["1/3", "1/7", "1/3", "1/7"]))
 
 
 @over_exact_fields
@@ -302,9 +438,10 @@ def test_over_an_exact_field_zero_is_told_from_one(field):
     assert (field.is_zero(field.zero), field.is_zero(field.one)) == (True, False)
 
 
-def test_working_sets_the_precision_of_balls_for_the_block_only():
+@over_balls
+def test_working_sets_the_precision_of_balls_for_the_block_only(balls):
     before = flint.ctx.prec
-    with RR(777).working():
+    with balls(777).working():
         assert flint.ctx.prec == 777
     assert flint.ctx.prec == before
 
@@ -316,19 +453,27 @@ def test_working_restores_the_precision_after_an_error():
     assert flint.ctx.prec == before
 
 
-def test_converting_uses_the_precision_of_the_field_whatever_the_ambient_one():
-    assert RR(500).convert("1/3").rel_accuracy_bits() >= 498
+@over_balls
+def test_converting_uses_the_precision_of_the_field_whatever_the_ambient_one(balls):
+    assert balls(500).convert("1/3").rel_accuracy_bits() >= 498
 
 
 @pytest.mark.parametrize("bits", [1, 0, -5, 1_000_001, 64.0, True, "64", None], ids=repr)
-def test_a_precision_out_of_range_is_refused_even_after_its_equal_was_accepted(bits):
-    RR(64)
+@over_balls
+def test_a_precision_out_of_range_is_refused_even_after_its_equal_was_accepted(balls, bits):
+    balls(64)
     with pytest.raises(InputError, match="precision"):
-        RR(bits)
+        balls(bits)
 
 
-def test_balls_of_the_same_precision_are_the_same_field_and_of_another_precision_are_not():
-    assert (RR(64) == type(RR(64))(64), RR(64) == RR(65)) == (True, False)
+@over_balls
+def test_balls_of_the_same_precision_are_the_same_field_and_of_another_precision_are_not(balls):
+    field, again = balls(64), type(balls(64))(64)
+    assert (field == again, hash(field) == hash(again), field == balls(65)) == (True, True, False)
+
+
+def test_real_and_complex_balls_of_the_same_precision_are_different_fields():
+    assert RR(64) != CC(64)
 
 
 # Random elements and matrices.
@@ -378,8 +523,9 @@ def test_a_matrix_of_rationals_is_carried_over_entry_by_entry(field):
     assert list(field.convert_matrix(matrix).entries()) == expected
 
 
-def test_a_matrix_of_balls_keeps_the_precision_of_the_field():
-    entry = RR(300).convert_matrix(fmpq_mat(1, 1, [fmpq(1, 3)]))[0, 0]
+@over_balls
+def test_a_matrix_of_balls_keeps_the_precision_of_the_field(balls):
+    entry = balls(300).convert_matrix(fmpq_mat(1, 1, [fmpq(1, 3)]))[0, 0]
     assert entry.rel_accuracy_bits() >= 298
 
 
@@ -389,6 +535,8 @@ def test_a_matrix_refuses_a_machine_number(field):
         field.matrix(1, 1, [0.5])
 
 
-@pytest.mark.parametrize(("field", "name"), [(QQ, "QQ"), (GF(7), "GF(7)"), (RR(128), "RR(128)")], ids=repr)
+@pytest.mark.parametrize(
+    ("field", "name"), [(QQ, "QQ"), (GF(7), "GF(7)"), (RR(128), "RR(128)"), (CC(128), "CC(128)")], ids=repr
+)
 def test_a_field_prints_as_it_is_written(field, name):
     assert repr(field) == name

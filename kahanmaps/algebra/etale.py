@@ -1,0 +1,200 @@
+"""The algebra Q[t]/chi for a squarefree chi: all roots of chi at once, without a field that contains them.
+
+An identity that holds for the class of t holds for every root of chi in any field, and conversely. The algebra is a
+product of fields, one for each irreducible factor of chi; an element that vanishes in some of them and not in others is
+a zero divisor, and neither zero nor invertible.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_poly
+
+from kahanmaps.algebra.fields import Element, Field, rational
+from kahanmaps.algebra.matrices import EntryMatrix, trace
+from kahanmaps.algebra.text import format_univariate, parse_polynomial
+from kahanmaps.errors import InputError
+
+
+class EtaleAlgebra(Field):
+    """Q[t]/chi for a monic squarefree `chi`. Elements are `EtaleElement`, matrices `EtaleMatrix`.
+
+    It has the protocol of a field, but is one only for irreducible chi.
+
+    >>> K = EtaleAlgebra(fmpq_poly([-2, 0, 1]))
+    >>> t = K.generator
+    >>> 1 / (t + 1), K.norm(t + 1)
+    (t - 1, -1)
+    """
+
+    characteristic = 0
+
+    def __init__(self, chi: fmpq_poly) -> None:
+        if not isinstance(chi, fmpq_poly):
+            raise InputError(f"found {chi!r} of type {type(chi).__name__}, expected an fmpq_poly")
+        if chi.degree() < 1 or chi.leading_coefficient() != 1:
+            raise InputError(f"found chi = {format_univariate(chi)}, expected a monic polynomial, not constant")
+        if chi.gcd(chi.derivative()).degree() > 0:
+            raise InputError(f"found chi = {format_univariate(chi)}, expected a polynomial without repeated roots")
+        self.chi = chi
+        self.degree = int(chi.degree())
+        self.name = f"QQ[t]/({format_univariate(chi)})"
+
+    @property
+    def zero(self) -> EtaleElement:
+        return EtaleElement(self, fmpq_poly([0]))
+
+    @property
+    def one(self) -> EtaleElement:
+        return EtaleElement(self, fmpq_poly([1]))
+
+    @property
+    def generator(self) -> EtaleElement:
+        """The class of t, a root of chi."""
+        return self.convert(fmpq_poly([0, 1]))
+
+    def convert(self, value: Any) -> EtaleElement:
+        """The element that an exact number, a polynomial in t or an element stands for."""
+        if isinstance(value, EtaleElement):
+            if value.field == self:
+                return value
+            raise InputError(f"found an element of {value.field}, expected one of {self}")
+        if isinstance(value, fmpq_poly):
+            return EtaleElement(self, value % self.chi)
+        return EtaleElement(self, fmpq_poly([rational(value)]))
+
+    def parse(self, text: str) -> EtaleElement:
+        """The class of a polynomial in t."""
+        coefficients: dict[int, fmpq] = {}
+        for (exponent,), coefficient in parse_polynomial(text, ["t"]).terms():
+            coefficients[int(exponent)] = coefficient
+        top = max(coefficients, default=0)
+        return self.convert(fmpq_poly([coefficients.get(k, fmpq(0)) for k in range(top + 1)]))
+
+    def format(self, element: EtaleElement) -> str:
+        return format_univariate(element.polynomial)
+
+    def random(self, rng: random.Random, height: int = 10) -> EtaleElement:
+        coefficients = [fmpq(rng.randint(-height, height), rng.randint(1, height)) for _ in range(self.degree)]
+        return EtaleElement(self, fmpq_poly(coefficients))
+
+    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> EtaleMatrix:
+        return EtaleMatrix(self, rows, columns, [self.convert(entry) for entry in entries])
+
+    def is_zero(self, element: EtaleElement) -> bool:
+        return bool(element.polynomial.is_zero())
+
+    def trace(self, element: EtaleElement) -> fmpq:
+        """The sum of the element's values at the roots of chi."""
+        total = fmpq(0)
+        for coefficient, power_sum in zip(element.polynomial.coeffs(), self._power_sums, strict=False):
+            total += coefficient * power_sum
+        return total
+
+    def norm(self, element: EtaleElement) -> fmpq:
+        """The product of the element's values at the roots of chi."""
+        return self.chi.resultant(element.polynomial)
+
+    @cached_property
+    def _power_sums(self) -> tuple[fmpq, ...]:
+        """The traces of 1, t, ..., t^(degree - 1)."""
+        return tuple(trace((self.generator**k).matrix) for k in range(self.degree))
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (isinstance(other, EtaleAlgebra) and bool(other.chi == self.chi))
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
+
+class EtaleElement(Element):
+    """The class of `polynomial`, which is reduced modulo chi."""
+
+    __slots__ = ("polynomial",)
+
+    def __init__(self, field: EtaleAlgebra, polynomial: fmpq_poly) -> None:
+        self.field = field
+        self.polynomial = polynomial
+
+    @property
+    def coefficients(self) -> list[fmpq]:
+        """The coordinates in the basis 1, t, ..., t^(degree - 1)."""
+        return [self.polynomial[k] for k in range(self.field.degree)]
+
+    @property
+    def matrix(self) -> fmpq_mat:
+        """The matrix of the multiplication by this element, in the basis 1, t, ..., t^(degree - 1)."""
+        column, columns = self, []
+        for _ in range(self.field.degree):
+            columns.append(column.coefficients)
+            column = column * self.field.generator
+        return fmpq_mat(columns).transpose()
+
+    def _plus(self, other: EtaleElement) -> EtaleElement:
+        return EtaleElement(self.field, self.polynomial + other.polynomial)
+
+    def __neg__(self) -> EtaleElement:
+        return EtaleElement(self.field, -self.polynomial)
+
+    def _times(self, other: EtaleElement) -> EtaleElement:
+        return EtaleElement(self.field, self.polynomial * other.polynomial % self.field.chi)
+
+    def _over(self, other: EtaleElement) -> EtaleElement:
+        common, inverse, _ = other.polynomial.xgcd(self.field.chi)
+        if common.degree() != 0:
+            what = "zero" if self.field.is_zero(other) else f"{other}, a zero divisor in {self.field}"
+            raise ZeroDivisionError(f"division by {what}")
+        return EtaleElement(self.field, self.polynomial * inverse % self.field.chi)
+
+    def _same(self, other: EtaleElement) -> bool:
+        return bool(self.polynomial == other.polynomial)
+
+
+class EtaleMatrix(EntryMatrix):
+    """A matrix over an `EtaleAlgebra`. No elimination: a pivot that is not zero may be a zero divisor."""
+
+    def det(self) -> EtaleElement:
+        """The determinant, by Faddeev and LeVerrier's recursion, which divides by integers only."""
+        n = self._rows
+        if n != self._columns:
+            raise ValueError("matrix must be square")
+        if n == 0:
+            one: EtaleElement = self.field.one
+            return one
+        power: EtaleMatrix = self
+        coefficient: EtaleElement = trace(self)
+        for k in range(2, n + 1):
+            power = self * (power - self.field.identity(n) * coefficient)
+            coefficient = trace(power) / k
+        return coefficient if n % 2 else -coefficient
+
+    def solve(self, right: EtaleMatrix) -> EtaleMatrix:
+        """The solution X of self X = right: FLINT solves the linear system over Q that this is.
+
+        Raises ZeroDivisionError where the determinant is not a unit.
+        """
+        if self._rows != self._columns or self._rows != right._rows:
+            raise ValueError("matrix must be square, and the right side of the same height")
+        size, degree, columns = self._rows * self.field.degree, self.field.degree, right._columns
+        big: list[fmpq] = []
+        for row in self.tolist():
+            blocks = [entry.matrix.tolist() for entry in row]
+            big += [number for k in range(degree) for block in blocks for number in block[k]]
+        sides = [entry.polynomial[k] for row in right.tolist() for k in range(degree) for entry in row]
+        found = fmpq_mat(size, size, big).solve(fmpq_mat(size, columns, sides))
+        solution = [
+            EtaleElement(self.field, fmpq_poly([found[i * degree + k, j] for k in range(degree)]))
+            for i in range(self._rows)
+            for j in range(columns)
+        ]
+        return EtaleMatrix(self.field, self._rows, columns, solution)
+
+    def _dot(self, row: Sequence[EtaleElement], column: Sequence[EtaleElement]) -> EtaleElement:
+        total = fmpq_poly([0])
+        for a, b in zip(row, column, strict=True):
+            total += a.polynomial * b.polynomial
+        return EtaleElement(self.field, total % self.field.chi)

@@ -1,0 +1,340 @@
+"""The algebra Q[t]/chi of a squarefree chi: what holds for the class of t holds at every root of chi.
+
+Specified here by evaluation at the roots: where all of them are rational it is an isomorphism onto copies of Q, and
+FLINT computes there; where they are not, they are enclosed by complex balls. Zero divisors are refused as divisors.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+from flint import acb, fmpq, fmpq_mat, fmpq_poly
+from helpers import LOTKA_VOLTERRA, points, rationals, some, step_or_none
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.etale import EtaleAlgebra
+from kahanmaps.algebra.fields import CC, QQ
+from kahanmaps.algebra.matrices import det, solve
+from kahanmaps.errors import ExpressionError, InexactNumber, InputError, SingularMatrix
+from kahanmaps.maps.kahan import KahanMap
+
+polynomials = st.lists(rationals(6), max_size=5).map(fmpq_poly)
+root_sets = st.lists(rationals(6), min_size=1, max_size=4, unique_by=str)
+
+GOLDEN = EtaleAlgebra(fmpq_poly([-1, -1, 1]))
+CUBIC = EtaleAlgebra(fmpq_poly([-1, -1, 0, 1]))  # t^3 - t - 1: one real root, two complex ones
+SPLIT = EtaleAlgebra(fmpq_poly([-1, 0, 1]))  # roots 1 and -1
+
+
+def with_roots(roots) -> EtaleAlgebra:
+    chi = fmpq_poly([1])
+    for root in roots:
+        chi *= fmpq_poly([-root, 1])
+    return EtaleAlgebra(chi)
+
+
+def values(roots, element) -> list[fmpq]:
+    return [element.polynomial(root) for root in roots]
+
+
+def at_roots(roots, matrix) -> list[fmpq_mat]:
+    def at(root):
+        return fmpq_mat(matrix.nrows(), matrix.ncols(), [entry.polynomial(root) for entry in matrix.entries()])
+
+    return [at(root) for root in roots]
+
+
+@st.composite
+def square_matrices(draw, K):
+    n = draw(st.integers(1, 4))
+    coefficient = st.lists(st.integers(-2, 2), min_size=1, max_size=2).map(fmpq_poly)
+    return K.matrix(n, n, [draw(coefficient) for _ in range(n * n)])
+
+
+# Evaluation at rational roots is an isomorphism.
+
+
+@given(roots=root_sets, p=polynomials, q=polynomials)
+def test_sums_differences_and_products_are_taken_at_every_root(roots, p, q):
+    K = with_roots(roots)
+    a, b = K.convert(p), K.convert(q)
+    assert values(roots, a + b) == [p(root) + q(root) for root in roots]
+    assert values(roots, a - b) == [p(root) - q(root) for root in roots]
+    assert values(roots, a * b) == [p(root) * q(root) for root in roots]
+
+
+@given(roots=root_sets, p=polynomials, q=polynomials)
+def test_quotients_are_taken_at_every_root_or_refused_where_one_is_zero(roots, p, q):
+    K = with_roots(roots)
+    a, b = K.convert(p), K.convert(q)
+    if 0 in values(roots, b):
+        with pytest.raises(ZeroDivisionError):
+            a / b
+    else:
+        assert values(roots, a / b) == [p(root) / q(root) for root in roots]
+
+
+@given(roots=root_sets, p=polynomials, n=st.integers(-3, 5))
+def test_powers_are_taken_at_every_root(roots, p, n):
+    a = with_roots(roots).convert(p)
+    assume(0 not in values(roots, a))
+    assert values(roots, a**n) == [p(root) ** n for root in roots]
+
+
+@given(roots=root_sets, p=polynomials, q=polynomials)
+def test_elements_are_equal_if_they_agree_at_every_root(roots, p, q):
+    K = with_roots(roots)
+    assert (K.convert(p) == K.convert(q)) == all(p(root) == q(root) for root in roots)
+
+
+@given(roots=root_sets, p=polynomials)
+def test_trace_and_norm_are_sum_and_product_over_the_roots(roots, p):
+    K = with_roots(roots)
+    a = K.convert(p)
+    assert K.trace(a) == sum(values(roots, a), fmpq(0))
+    assert K.norm(a) == math.prod(values(roots, a), start=fmpq(1))
+
+
+# Where the roots are not rational.
+
+
+@pytest.mark.parametrize("K", [GOLDEN, CUBIC, SPLIT], ids=repr)
+def test_the_generator_is_a_root_of_chi(K):
+    t, total = K.generator, K.zero
+    for coefficient in reversed(K.chi.coeffs()):
+        total = total * t + coefficient
+    assert total == 0
+
+
+def test_powers_of_the_golden_ratio_have_fibonacci_numbers_as_coefficients():
+    assert [(GOLDEN.generator**n).coefficients for n in range(1, 7)] == [[0, 1], [1, 1], [1, 2], [2, 3], [3, 5], [5, 8]]
+
+
+def test_trace_and_norm_of_the_golden_ratio_are_read_off_its_equation():
+    assert (GOLDEN.trace(GOLDEN.generator), GOLDEN.norm(GOLDEN.generator)) == (1, -1)
+
+
+def test_the_inverse_of_one_plus_the_square_root_of_two_is_that_root_minus_one():
+    t = EtaleAlgebra(fmpq_poly([-2, 0, 1])).generator
+    assert 1 / (1 + t) == t - 1
+
+
+@given(p=polynomials, q=polynomials)
+def test_over_an_irreducible_chi_all_but_zero_divides(p, q):
+    a, b = CUBIC.convert(p), CUBIC.convert(q)
+    assume(b != 0)
+    assert a / b * b == a
+
+
+@given(p=polynomials)
+def test_trace_and_norm_agree_with_complex_roots(p):
+    a, field = CUBIC.convert(p), CC(128)
+    with field.working():
+        total, product = acb(0), acb(1)
+        for root, _ in CUBIC.chi.complex_roots():
+            value = sum((field.convert(c) * root**k for k, c in enumerate(a.coefficients)), acb(0))
+            total, product = total + value, product * value
+        assert field.equal(total, field.convert(CUBIC.trace(a)))
+        assert field.equal(product, field.convert(CUBIC.norm(a)))
+
+
+@given(p=polynomials, q=polynomials)
+def test_elements_multiply_as_their_matrices_do(p, q):
+    a, b = CUBIC.convert(p), CUBIC.convert(q)
+    assert (a * b).matrix == a.matrix * b.matrix
+
+
+# Zero divisors and other refusals.
+
+
+def test_a_zero_divisor_is_not_zero_and_divides_nothing():
+    left, right = SPLIT.generator - 1, SPLIT.generator + 1
+    assert (left == 0, right == 0, left * right == 0) == (False, False, True)
+    with pytest.raises(ZeroDivisionError, match=r"t - 1, a zero divisor in QQ\[t\]/\(t\^2 - 1\)"):
+        left / left
+
+
+def test_division_by_zero_is_refused():
+    with pytest.raises(ZeroDivisionError, match="by zero"):
+        SPLIT.one / 0
+
+
+WRONG = [
+    (fmpq_poly([1, 2, 1]), "repeated roots"),
+    (fmpq_poly([0, 0, -1, 1]), "repeated roots"),
+    (fmpq_poly([-1, 2]), "monic"),
+    (fmpq_poly([1]), "monic"),
+    (fmpq_poly([]), "monic"),
+    ("t^2 - 2", "fmpq_poly"),
+    (None, "fmpq_poly"),
+]
+
+
+@pytest.mark.parametrize(("chi", "sentence"), WRONG, ids=str)
+def test_a_chi_that_is_not_monic_and_squarefree_is_refused(chi, sentence):
+    with pytest.raises(InputError, match=sentence):
+        EtaleAlgebra(chi)
+
+
+def test_an_element_of_another_algebra_is_refused():
+    with pytest.raises(InputError, match="expected one of"):
+        SPLIT.convert(GOLDEN.one)
+    with pytest.raises(TypeError):
+        SPLIT.one + GOLDEN.one
+
+
+def test_a_machine_number_is_refused():
+    with pytest.raises(InexactNumber):
+        SPLIT.generator + 0.5
+
+
+t = SPLIT.generator
+MIXED = [  # result, its coefficients; t^2 = 1
+    (t + 1, [1, 1]),
+    (1 + t, [1, 1]),
+    (t - fmpq(1, 2), [fmpq(-1, 2), 1]),
+    (fmpq(1, 2) - t, [fmpq(1, 2), -1]),
+    (t * 3, [0, 3]),
+    (fmpq(1, 3) * t, [0, fmpq(1, 3)]),
+    (t / 2, [0, fmpq(1, 2)]),
+    (1 / t, [0, 1]),
+    (fmpq(3) / (t + 2), [2, -1]),
+    (-t, [0, -1]),
+    (t**2, [1, 0]),
+    (t**-3, [0, 1]),
+]
+
+
+@pytest.mark.parametrize(("result", "coefficients"), MIXED)
+def test_numbers_on_either_side_are_constants(result, coefficients):
+    assert result.coefficients == coefficients
+
+
+def test_an_element_may_equal_a_number():
+    assert (t * t == 1, 1 == t * t, t == 1, SPLIT.convert("1/2") == fmpq(1, 2)) == (True, True, False, True)
+
+
+# Matrices.
+
+
+@some
+@given(roots=root_sets, data=st.data())
+def test_a_determinant_is_taken_at_every_root(roots, data):
+    matrix = data.draw(square_matrices(with_roots(roots)))
+    assert values(roots, det(matrix)) == [here.det() for here in at_roots(roots, matrix)]
+
+
+@some
+@given(roots=root_sets, data=st.data())
+def test_a_system_is_solved_at_every_root_or_refused_where_one_is_singular(roots, data):
+    K = with_roots(roots)
+    matrix = data.draw(square_matrices(K))
+    right = K.matrix(matrix.nrows(), 2, [fmpq_poly([k, 1 - k]) for k in range(2 * matrix.nrows())])
+    if any(here.det() == 0 for here in at_roots(roots, matrix)):
+        with pytest.raises(SingularMatrix):
+            solve(matrix, right)
+    else:
+        solution = solve(matrix, right)
+        pairs = zip(at_roots(roots, matrix), at_roots(roots, right), strict=True)
+        assert at_roots(roots, solution) == [here.solve(side) for here, side in pairs]
+
+
+@some
+@given(data=st.data())
+def test_a_solution_over_an_irreducible_chi_solves_the_system(data):
+    matrix = data.draw(square_matrices(CUBIC))
+    right = CUBIC.column([CUBIC.generator**k for k in range(matrix.nrows())])
+    assume(matrix.det() != 0)
+    assert matrix * solve(matrix, right) == right
+
+
+def test_a_regular_matrix_may_consist_of_zero_divisors_alone():
+    left, right = (t - 1) / 2, (t + 1) / 2  # they add up to t, and their product is 0
+    matrix = SPLIT.matrix(2, 2, [left, right, right, left])
+    assert det(matrix) == -t  # left^2 - right^2 = -t
+    assert matrix * solve(matrix, SPLIT.column([1, t])) == SPLIT.column([1, t])
+
+
+def test_a_matrix_whose_determinant_is_a_zero_divisor_is_singular():
+    with pytest.raises(ZeroDivisionError):
+        SPLIT.matrix(2, 2, [t - 1, 0, 0, 1]).solve(SPLIT.column([0, 0]))
+
+
+@some
+@given(roots=root_sets, data=st.data())
+def test_sums_products_transposes_and_multiples_of_matrices_are_taken_at_every_root(roots, data):
+    K = with_roots(roots)
+    a = data.draw(square_matrices(K))
+    b = a.transpose() * K.generator - K.identity(a.nrows()) * fmpq(1, 2)
+    found = a * b + -a
+    half = QQ.identity(a.nrows()) * fmpq(1, 2)
+    expected = [
+        here * (here.transpose() * root - half) - here for root, here in zip(roots, at_roots(roots, a), strict=True)
+    ]
+    assert at_roots(roots, found) == expected
+
+
+@pytest.mark.parametrize("scalar", [3, fmpq(3), SPLIT.convert(3)], ids=["int", "fmpq", "element"])
+def test_a_scalar_multiplies_a_matrix_from_both_sides(scalar):
+    matrix, expected = SPLIT.matrix(1, 2, [t, 5]), SPLIT.matrix(1, 2, [t * 3, 15])
+    assert (matrix * scalar, scalar * matrix) == (expected, expected)
+
+
+def test_the_rows_of_a_matrix_are_listed_with_its_sizes():
+    matrix = SPLIT.matrix(2, 3, [t, 1, 2, 3, 4, 5])
+    assert (matrix.nrows(), matrix.ncols(), matrix[0, 0], matrix[1, 2]) == (2, 3, t, 5)
+    assert matrix.tolist() == [[t, 1, 2], [3, 4, 5]]
+
+
+@some
+@given(roots=root_sets, point=points(2), direction=points(2), eps=rationals(9))
+def test_the_kahan_map_over_the_algebra_is_the_one_at_every_root(roots, point, direction, eps):
+    assume(eps != 0)
+    K, phi = with_roots(roots), KahanMap(LOTKA_VOLTERRA, eps)
+    expected = [step_or_none(phi, [p + root * d for p, d in zip(point, direction, strict=True)]) for root in roots]
+    assume(None not in expected)
+    image = KahanMap(LOTKA_VOLTERRA, eps, K).step([K.generator * d + p for p, d in zip(point, direction, strict=True)])
+    assert [tuple(entry.polynomial(root) for entry in image) for root in roots] == expected
+
+
+# The algebra.
+
+
+def test_algebras_of_the_same_chi_are_equal_and_hash_alike():
+    again = EtaleAlgebra(fmpq_poly([-1, 0, 1]))
+    assert (again, hash(again)) == (SPLIT, hash(SPLIT))
+    assert again != GOLDEN
+    assert again.generator == SPLIT.generator
+
+
+TEXT = [("t^2 - 1/2", [fmpq(-1, 2), 0, 1]), ("-2*t + 1", [1, -2]), ("0", [0]), ("5/3", [fmpq(5, 3)])]
+
+
+@pytest.mark.parametrize(("text", "coefficients"), TEXT)
+def test_an_element_prints_as_a_polynomial_in_t(text, coefficients):
+    assert str(CUBIC.convert(fmpq_poly(coefficients))) == text
+
+
+@given(p=polynomials)
+def test_an_element_comes_back_from_its_text(p):
+    assert CUBIC.parse(CUBIC.format(CUBIC.convert(p))) == CUBIC.convert(p)
+
+
+def test_text_of_high_degree_is_reduced():
+    assert GOLDEN.parse("t^3") == 2 * GOLDEN.generator + 1
+
+
+@pytest.mark.parametrize("text", ["", "x", "1/t", "t +"])
+def test_text_that_spells_no_polynomial_in_t_is_refused(text):
+    with pytest.raises(ExpressionError):
+        CUBIC.parse(text)
+
+
+def test_random_elements_are_determined_by_the_seed_and_bounded_by_the_height():
+    drawn = [CUBIC.random(random.Random(seed), 4) for seed in (1, 1, *range(2, 50))]
+    assert drawn[0] == drawn[1] != drawn[2]
+    assert max(max(abs(c.p), c.q) for element in drawn for c in element.coefficients) == 4
+    assert all(element.polynomial.degree() <= 2 for element in drawn)
