@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import AssociatedSystem, FamilyMember
     from kahanmaps.family.cubics import cubic_space
     from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
+    from kahanmaps.family.planar import NormalForm, normal_form
     from kahanmaps.maps.fast import FloatOrbit, to_floats
     from kahanmaps.maps.kahan import KahanMap
     from kahanmaps.maps.orbits import Orbit
@@ -50,6 +51,7 @@ _HOME = {
     "family.associated": ("AssociatedSystem", "FamilyMember"),
     "family.cubics": ("cubic_space",),
     "family.draw": ("draw_generic", "draw_with_chi", "draw_with_eigenvalues"),
+    "family.planar": ("NormalForm", "normal_form"),
     "maps.kahan": ("KahanMap",),
     "maps.orbits": ("Orbit",),
     "maps.fast": ("FloatOrbit", "to_floats"),
@@ -83,6 +85,8 @@ __all__ = [
     "draw_generic",
     "draw_with_chi",
     "draw_with_eigenvalues",
+    "NormalForm",
+    "normal_form",
     "KahanMap",
     "Orbit",
     "FloatOrbit",

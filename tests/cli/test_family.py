@@ -150,6 +150,41 @@ def test_long_formulas_are_shortened_on_a_terminal_only(kahanmaps):
     assert " chars)" not in kahanmaps("family show paper_m3").out
 
 
+def test_the_normal_form_is_shown_for_scripts_that_ask_for_it(kahanmaps, pair):
+    shown = kahanmaps("family show", pair, "--normal-form --json").json
+    form = shown.pop("normal_form")
+    assert shown == kahanmaps("family show", pair, "--json").json
+    assert set(form) == {"chi", "h", "D", "S", "h_in_powers_of_t", "parts"}
+    assert (form["chi"], [len(c) for c in form["h_in_powers_of_t"]]) == (shown["chi"], [2, 2, 2, 2])
+    assert [(part["root"], part["weight"]) for part in form["parts"]] == [("-2", "-1/3"), ("1", "1/3")]
+
+
+def test_the_transpose_of_a_is_multiplication_by_t_in_the_columns_of_s(kahanmaps, pair):
+    shown = kahanmaps("family show", pair, "--normal-form --json").json
+    a, s = ([[Fraction(entry) for entry in row] for row in rows] for rows in (shown["A"], shown["normal_form"]["S"]))
+    image = [[sum(a[k][i] * s[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
+    # t^2 = 2 - t: the columns of S are e, t e for two vectors e
+    assert image == [[row[1], 2 * row[0] - row[1], row[3], 2 * row[2] - row[3]] for row in s]
+
+
+def test_people_see_the_normal_form_after_the_member(kahanmaps, pair):
+    lines = kahanmaps("family show", pair, "--normal-form").out.splitlines()
+    plain = kahanmaps("family show", pair).out.splitlines()
+    form = kahanmaps("family show", pair, "--normal-form --json").json["normal_form"]
+    assert lines[: len(plain) + 1] == [*plain, "normal form over Q[t]/chi, chi = t^2 + t - 2:"]
+    assert {f"h = {form['h']}", f"D = {form['D']}"} <= set(lines)
+    assert [line.split() for line in lines[-4:]] == form["S"]
+
+
+@pytest.mark.parametrize("options", ["--eigenvalues 1,1", "--chi (t-1)^2"])
+@pytest.mark.parametrize("json", ["", "--json"])
+def test_a_member_with_repeated_roots_has_no_normal_form(kahanmaps, tmp_path, options, json):
+    kahanmaps(f"family new {options} -o", tmp_path / "a.toml")
+    outcome = kahanmaps("family show", tmp_path / "a.toml", f"--normal-form {json}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "chi has the repeated factor (t - 1)" in outcome.err
+
+
 # space
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from flint import fmpq_mat
 
     from kahanmaps.family.associated import FamilyMember
+    from kahanmaps.family.planar import NormalForm
     from kahanmaps.systems.files import SystemFile
 
 _JSON = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
@@ -72,12 +73,14 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
 
 @command.command("show")
 @click.argument("system")
+@click.option("--normal-form", is_flag=True, help="Also the system as one planar cubic h(X, Y) over K = Q[t]/chi.")
 @_JSON
-def show(system: str, as_json: bool) -> None:
+def show(system: str, normal_form: bool, as_json: bool) -> None:
     """Show a member: A, how chi factors, and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.
 
     \b
       kahanmaps family show pair.toml
+      kahanmaps family show pair.toml --normal-form
       kahanmaps family show pair.toml --json | jq -r '.hamiltonians[1]'
     """
     from kahanmaps.algebra.text import format_polynomial
@@ -98,6 +101,9 @@ def show(system: str, as_json: bool) -> None:
         "signs": list(member.signs),
         "hamiltonians": [format_polynomial(H) for H in member.chain],
     }
+    form = _normal_form(member) if normal_form else None
+    if form is not None:
+        data["normal_form"] = _normal_form_data(form)
     if as_json:
         print_json(data)
         return
@@ -109,6 +115,8 @@ def show(system: str, as_json: bool) -> None:
         click.echo(f"H_{k} = {_formula(text)}")
     if any(sign < 0 for sign in member.signs):
         click.echo(f"signs = {','.join(map(str, member.signs))}: K = {_formula(format_polynomial(member.chosen.K))}")
+    if form is not None:
+        _print_normal_form(form)
 
 
 @command.command("space")
@@ -205,6 +213,46 @@ def associated(system: str, write_to: str | None, as_json: bool) -> None:
     for row in rows:
         powers = ", ".join(row["B_in_powers_of_A"])
         click.echo(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {_formula(row['K'])}")
+
+
+def _normal_form(member: FamilyMember) -> NormalForm:
+    from kahanmaps.family.planar import normal_form
+
+    return normal_form(member)
+
+
+def _normal_form_data(form: NormalForm) -> dict[str, Any]:
+    from kahanmaps.algebra.text import format_number
+
+    return {
+        "chi": form.chi_text,
+        "h": form.h_text,
+        "D": form.D_text,
+        "S": _rows(form.S),
+        "h_in_powers_of_t": [[format_number(c[k]) for k in range(form.m)] for c in form.coefficients],
+        "parts": [
+            {"root": format_number(part.root), "weight": format_number(part.weight), "h": part.text}
+            for part in form.parts
+        ],
+    }
+
+
+def _print_normal_form(form: NormalForm) -> None:
+    from kahanmaps.algebra.text import format_number
+
+    click.echo(f"normal form over Q[t]/chi, chi = {_formula(form.chi_text)}:")
+    click.echo("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
+    click.echo(f"h = {_formula(form.h_text)}")
+    click.echo(f"D = {_formula(form.D_text)}")
+    click.echo(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
+    if form.parts:
+        total = ", the Hamiltonian is the sum of weight * h" if len(form.parts) == form.m else ""
+        click.echo(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
+    for part in form.parts:
+        root, weight = _formula(format_number(part.root)), _formula(format_number(part.weight))
+        click.echo(f"t = {root}: h = {_formula(part.text)}, weight {weight}")
+    click.echo("x = S z with the coefficients z of 1, t, ... in X and in Y, S =")
+    _print_matrix(form.S)
 
 
 def _draw(

@@ -1,0 +1,388 @@
+"""The normal form of a member: one planar cubic over the algebra K = Q[t]/chi, for every chi without repeated roots.
+
+f' commutes with A^T, so Q^{2m} is a free K-module of rank 2, t acting as A^T. For a basis e1, e2 let S have the columns
+e1, A^T e1, ..., (A^T)^{m-1} e1, e2, A^T e2, ...; then x = S z, and z holds the coefficients of two elements X and Y of
+K. Let l(a) be the coefficient of t^(m-1) in a. Since A^T is self-adjoint for it, x^T J y = l(W(x, y)) with one
+K-bilinear alternating W; e1 and e2 are such that W(e1, e2) = 1. In the same way H(x) = l(h(X, Y)) with one binary cubic
+h = a X^3 + b X^2 Y + c X Y^2 + d Y^3 over K. The system x' = J grad H(x) becomes X' = dh/dY, Y' = -dh/dX, and its Kahan
+map, with the Hessian determinant D = h_XX h_YY - h_XY^2,
+
+    X~ = (X + 2 eps dh/dY) / (1 + eps^2 D(X, Y)),     Y~ = (Y - 2 eps dh/dX) / (1 + eps^2 D(X, Y)).
+
+At a rational root r of chi, X, Y and h take the values u, v and h_r, and u' = dh_r/dv, v' = -dh_r/du is a planar
+system over Q by itself. If chi splits there are m of them, and H = sum of h_r(u, v)/chi'(r), for l(a) = sum of
+a(r)/chi'(r) (Euler, Jacobi). Elements of K are polynomials of degree < m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz, fmpz_mat
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.matrices import primitive_integers
+from kahanmaps.algebra.polynomials import names_of, ring
+from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.errors import HypothesisError, InputError, SingularStep
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.cubics import third_derivatives
+from kahanmaps.family.skew_hamiltonian import chi as chi_of
+from kahanmaps.family.skew_hamiltonian import format_univariate
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+
+_CUBIC = ("X^3", "X^2*Y", "X*Y^2", "Y^3")
+_QUADRATIC = ("X^2", "X*Y", "Y^2")
+
+Quadruple = tuple[fmpq_poly, fmpq_poly, fmpq_poly, fmpq_poly]
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarPart:
+    """The planar system at a rational root of chi: u' = dh/dv, v' = -dh/du, with u = X(root) and v = Y(root).
+
+    `h` is h(root; u, v) in the variables u, v, without a factor; H contains it times the weight 1/chi'(root).
+    """
+
+    root: fmpq
+    weight: fmpq
+    h: fmpq_mpoly
+
+    @property
+    def hamiltonian(self) -> CubicHamiltonian:
+        """h with the standard structure of the plane."""
+        return CubicHamiltonian(self.h, standard_structure(2))
+
+    @property
+    def text(self) -> str:
+        """h as text."""
+        return format_polynomial(self.h)
+
+
+@dataclass(frozen=True, eq=False)
+class NormalForm:
+    """x' = J grad H(x) as one planar system over K = Q[t]/chi: x = S z, and H(x) = l(h(X, Y)); see the module.
+
+    Made by `normal_form`. That it is the system, exactly, is verified at construction.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> A = fmpq_mat(4, 4, [0, 1, 0, 0,  2, 0, 0, 0,  0, 0, 0, 2,  0, 0, 1, 0])
+    >>> H = parse_polynomial("x1^3 + 6*x1*x2^2", ["x1", "x2", "x3", "x4"])
+    >>> form = normal_form(FamilyMember(A, H))
+    >>> form.chi_text, form.h_text, form.D_text
+    ('t^2 - 2', 't*X^3', '0')
+    >>> X, Y = form.coordinates([1, 0, "1/2", 0])
+    >>> form.point(*form.step(X, Y, "1/10"))
+    (1, 0, -1/10, 0)
+    """
+
+    A: fmpq_mat
+    H: fmpq_mpoly
+    S: fmpq_mat
+    coefficients: Quadruple
+
+    def __post_init__(self) -> None:
+        self.verify()
+
+    @property
+    def dim(self) -> int:
+        """2m."""
+        return int(self.A.nrows())
+
+    @property
+    def m(self) -> int:
+        """Half the dimension, the degree of chi."""
+        return self.dim // 2
+
+    @cached_property
+    def chi(self) -> fmpq_poly:
+        """The monic polynomial chi of degree m with det(t - A) = chi(t)^2."""
+        return chi_of(self.A)
+
+    @cached_property
+    def S_inverse(self) -> fmpq_mat:
+        """S^{-1}, z = S^{-1} x."""
+        return self.S.inv()
+
+    @cached_property
+    def D_coefficients(self) -> tuple[fmpq_poly, fmpq_poly, fmpq_poly]:
+        """The elements p, q, r of K with D = p X^2 + q X Y + r Y^2."""
+        a, b, c, d = self.coefficients
+        p, q, r = self._reduced(12 * a * c - 4 * b * b, 36 * a * d - 4 * b * c, 12 * b * d - 4 * c * c)
+        return p, q, r
+
+    def coordinates(self, x: Sequence[Any]) -> tuple[fmpq_poly, fmpq_poly]:
+        """The elements X and Y of K that belong to a rational point x."""
+        if isinstance(x, str) or len(x) != self.dim:
+            raise InputError(f"found {x!r}, expected a sequence of {self.dim} numbers")
+        z = (self.S_inverse * fmpq_mat(self.dim, 1, [rational(entry) for entry in x])).entries()
+        return fmpq_poly(z[: self.m]), fmpq_poly(z[self.m :])
+
+    def point(self, X: Any, Y: Any) -> tuple[fmpq, ...]:
+        """The rational point x with these coordinates in K (polynomials in t, or numbers)."""
+        X, Y = self._elements(X, Y)
+        z = [element[k] for element in (X, Y) for k in range(self.m)]
+        return tuple((self.S * fmpq_mat(self.dim, 1, z)).entries())
+
+    def functional(self, element: Any) -> fmpq:
+        """l: the coefficient of t^(m-1)."""
+        return self._elements(element)[0][self.m - 1]
+
+    def h(self, X: Any, Y: Any) -> fmpq_poly:
+        """h(X, Y), an element of K."""
+        X, Y = self._elements(X, Y)
+        a, b, c, d = self.coefficients
+        XX, XY, YY = self._reduced(X * X, X * Y, Y * Y)
+        return self._reduced((a * X + b * Y) % self.chi * XX + (c * XY + d * YY) % self.chi * Y)[0]
+
+    def D(self, X: Any, Y: Any) -> fmpq_poly:
+        """The determinant of the planar f' at (X, Y), which is the Hessian determinant of h, an element of K."""
+        X, Y = self._elements(X, Y)
+        p, q, r = self.D_coefficients
+        XX, XY, YY = self._reduced(X * X, X * Y, Y * Y)
+        return self._reduced(p * XX + q * XY + r * YY)[0]
+
+    def vector_field(self, X: Any, Y: Any) -> tuple[fmpq_poly, fmpq_poly]:
+        """dh/dY and -dh/dX at (X, Y)."""
+        X, Y = self._elements(X, Y)
+        a, b, c, d = self.coefficients
+        XX, XY, YY = self._reduced(X * X, X * Y, Y * Y)
+        first, second = self._reduced(b * XX + 2 * c * XY + 3 * d * YY, -(3 * a * XX + 2 * b * XY + c * YY))
+        return first, second
+
+    def step(self, X: Any, Y: Any, eps: Any) -> tuple[fmpq_poly, fmpq_poly]:
+        """The Kahan map at (X, Y). Raises SingularStep where 1 + eps^2 D is not a unit of K."""
+        X, Y = self._elements(X, Y)
+        epsilon = rational(eps)
+        below = 1 + epsilon * epsilon * self.D(X, Y)
+        common, inverse, _ = below.xgcd(self.chi)
+        if not common.is_one():
+            raise SingularStep(
+                f"1 + eps^2 D and chi have the factor {format_univariate(common)} in common at this point for "
+                f"eps = {format_number(epsilon)}: the Kahan map has no value there",
+                (X, Y),
+                epsilon,
+            )
+        F, G = self.vector_field(X, Y)
+        image_X, image_Y = self._reduced((X + 2 * epsilon * F) * inverse, (Y + 2 * epsilon * G) * inverse)
+        return image_X, image_Y
+
+    @cached_property
+    def parts(self) -> tuple[PlanarPart, ...]:
+        """The planar systems at the rational roots of chi, by increasing root; m of them where chi splits over Q."""
+        u, v = ring(["u", "v"]).gens()
+        slope = self.chi.derivative()
+        found = []
+        for root in sorted(-factor[0] / factor[1] for factor, _ in self.chi.factor()[1] if factor.degree() == 1):
+            a, b, c, d = (coefficient(root) for coefficient in self.coefficients)
+            found.append(PlanarPart(root, 1 / slope(root), a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3))
+        return tuple(found)
+
+    @property
+    def chi_text(self) -> str:
+        """chi as text, `t^2 - 2`."""
+        return format_univariate(self.chi)
+
+    @property
+    def h_text(self) -> str:
+        """h as text, `X^3 + (t - 1)*X*Y^2`."""
+        return _format_form(self.coefficients, _CUBIC)
+
+    @property
+    def D_text(self) -> str:
+        """D as text, a quadratic form in X and Y over K."""
+        return _format_form(self.D_coefficients, _QUADRATIC)
+
+    def verify(self) -> None:
+        """Checks exactly that this is the system. Raises AssertionError otherwise: it would be a mistake of ours.
+
+        Checked are A^T S = S diag(C, C) with the companion matrix C of chi; that S^T J S is the Gram matrix of l(W),
+        which is invertible; and H(S z) = l(h), as symmetric trilinear forms.
+        """
+        n, m = self.dim, self.m
+        if (self.S.nrows(), self.S.ncols(), len(names_of(self.H))) != (n, n, n):
+            raise AssertionError("normal form: the sizes of A, H and S differ")
+        if any(coefficient.degree() >= m for coefficient in self.coefficients):
+            raise AssertionError("normal form: a coefficient of h is not reduced modulo chi")
+        if self.A.transpose() * self.S != self.S * _twice(_companion(self.chi)):
+            raise AssertionError("normal form: t does not act as A^T")
+        values = self._functional_of_powers(fmpq_poly([1]), 2 * m - 1)
+        gram = [[((i < m) - (j < m)) * values[i % m + j % m] for j in range(n)] for i in range(n)]
+        if self.S.transpose() * standard_structure(n) * self.S != fmpq_mat(gram):
+            raise AssertionError("normal form: S^T J S is not the Gram matrix of l")
+        a, b, c, d = self.coefficients
+        table = [self._functional_of_powers(third, 3 * m - 2) for third in (6 * a, 2 * b, 2 * c, 6 * d)]
+        for i, third in enumerate(_along_columns(third_derivatives(self.H), self.S)):
+            expected = [
+                table[(i >= m) + (j >= m) + (k >= m)][i % m + j % m + k % m] for j in range(n) for k in range(n)
+            ]
+            if third != fmpq_mat(n, n, expected):
+                raise AssertionError("normal form: H(S z) is not l(h)")
+
+    def _functional_of_powers(self, element: fmpq_poly, count: int) -> list[fmpq]:
+        """l(element t^k) for k < count."""
+        t, values = fmpq_poly([0, 1]), []
+        for _ in range(count):
+            values.append(element[self.m - 1])
+            element = element * t % self.chi
+        return values
+
+    def _elements(self, *values: Any) -> tuple[fmpq_poly, ...]:
+        return self._reduced(*(v if isinstance(v, fmpq_poly) else fmpq_poly([rational(v)]) for v in values))
+
+    def _reduced(self, *polynomials: fmpq_poly) -> tuple[fmpq_poly, ...]:
+        return tuple(polynomial % self.chi for polynomial in polynomials)
+
+
+def normal_form(member: FamilyMember) -> NormalForm:
+    """The normal form of the system that the signs of the member pick; `H` of the result is K for signs with a minus.
+
+    e1 is a unit vector, or a small combination of some, e2 the shortest of those with W(e1, e2) = 1 that LLL finds; of
+    the 2m choices so made the one with the shortest numbers is taken. Raises HypothesisError where chi has repeated
+    roots.
+    """
+    if not member.is_generic:
+        repeated = ", ".join(f"({factor})" for factor in member.factors if factor.multiplicity > 1)
+        raise HypothesisError(
+            f"chi has the repeated factor {repeated}, expected a member whose chi has no repeated roots: "
+            "the normal form over K = Q[t]/chi is for generic A"
+        )
+    H = member.H if all(sign > 0 for sign in member.signs) else member.chosen.K
+    modulus, tensors = chi_of(member.A), third_derivatives(H)
+    found: list[tuple[int, fmpq_mat, Quadruple]] = []
+    for e1 in _cyclic_vectors(member.A.transpose()):
+        S = _symplectic_basis(member.A.transpose(), e1)
+        coefficients = _coefficients(modulus, S, tensors)
+        size = sum(map(_bits, S.entries())) + sum(_bits(entry) for c in coefficients for entry in c.coeffs())
+        found.append((size, S, coefficients))
+    _, S, coefficients = min(found, key=lambda choice: choice[0])
+    return NormalForm(member.A, H, S, coefficients)
+
+
+def _cyclic_vectors(t: fmpq_mat) -> Iterator[fmpq_mat]:
+    """For each unit vector a sum of it with few small multiples of others that generates a free K-module.
+
+    A multiple c of another unit vector makes the module as large as the two allow for all but at most m values of c:
+    on the part of every factor of chi, where K is a field, at most one c is bad.
+    """
+    n = t.nrows()
+    m = n // 2
+    multiples = [(k + 2) // 2 * (-1) ** k for k in range(m + 1)]
+    for start in range(n):
+        v, rank = _unit(n, start), _krylov(t, _unit(n, start)).rank()
+        for j in range(start + 1, start + n):
+            if rank == m:
+                break
+            sums = [v + c * _unit(n, j % n) for c in multiples]
+            ranks = [_krylov(t, w).rank() for w in sums]
+            if max(ranks) > rank:
+                rank = max(ranks)
+                v = sums[ranks.index(rank)]
+        yield v
+
+
+def _symplectic_basis(t: fmpq_mat, e1: fmpq_mat) -> fmpq_mat:
+    """S for this e1 and an e2 with W(e1, e2) = 1, that is (t^k e1)^T J e2 = l(t^k) for k < m.
+
+    The integers (y, s) with (t^k e1)^T J y = s l(t^k) form a lattice of rank m + 1, those with s = 0 one of rank m.
+    With weights beyond the bounds of LLL for short vectors of either, the first m vectors of a reduced basis have
+    s = 0 and the next one the least s > 0, up to sign: then e2 = y/s.
+    """
+    n = t.nrows()
+    m = n // 2
+    powers = _krylov(t, e1)
+    equations = [
+        primitive_integers((*row, fmpq(-(k == m - 1))))
+        for k, row in enumerate((powers.transpose() * standard_structure(n)).tolist())
+    ]
+    bound = sum(max(abs(entry) for entry in row).bit_length() + n.bit_length() for row in equations) + n + 1
+    heavy, heaviest = fmpz(1) << bound, fmpz(1) << 2 * bound
+    lattice = [
+        [int(i == j) for i in range(n)] + [heavy * (j == n)] + [heaviest * row[j] for row in equations]
+        for j in range(n + 1)
+    ]
+    reduced = fmpz_mat(lattice).lll()
+    s = reduced[m, n] // heavy
+    e2 = fmpq_mat(n, 1, [fmpq(reduced[m, i], s) for i in range(n)])
+    columns = zip(powers.tolist(), _krylov(t, e2).tolist(), strict=True)
+    return fmpq_mat([[*left, *right] for left, right in columns])
+
+
+def _coefficients(chi: fmpq_poly, S: fmpq_mat, tensors: list[fmpq_mat]) -> Quadruple:
+    """h from the third derivatives of H along the columns of S: l(t^k 6a) = H'''(t^k e1, e1, e1), and so on."""
+    n, m = S.nrows(), chi.degree()
+    rows = S.transpose().tolist()
+    module = [fmpq_mat(rows[:m]), fmpq_mat(rows[m:])]
+    vectors = [fmpq_mat(n, 1, rows[0]), fmpq_mat(n, 1, rows[m])]
+    hessians = [_combination(tensors, rows[0]), _combination(tensors, rows[m])]
+    # The basis dual to 1, t, ..., t^(m-1) under l(a b).
+    dual = [fmpq_poly([chi[j] for j in range(k + 1, m + 1)]) for k in range(m)]
+
+    def third(i: int, j: int, k: int) -> fmpq_poly:
+        values = (module[i] * (hessians[j] * vectors[k])).entries()
+        return sum((value * element for value, element in zip(values, dual, strict=True)), fmpq_poly([0]))
+
+    return third(0, 0, 0) / 6, third(0, 0, 1) / 2, third(0, 1, 1) / 2, third(1, 1, 1) / 6
+
+
+def _along_columns(tensors: list[fmpq_mat], S: fmpq_mat) -> Iterator[fmpq_mat]:
+    """The trilinear form in the coordinates z: one matrix for each column of S."""
+    transposed = S.transpose()
+    for column in transposed.tolist():
+        yield transposed * _combination(tensors, column) * S
+
+
+def _combination(matrices: list[fmpq_mat], factors: Sequence[fmpq]) -> fmpq_mat:
+    total = fmpq_mat(matrices[0].nrows(), matrices[0].ncols())
+    for matrix, factor in zip(matrices, factors, strict=True):
+        if factor != 0:
+            total = total + matrix * factor
+    return total
+
+
+def _krylov(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:
+    """The columns v, t v, ..., t^{m-1} v."""
+    columns = [vector]
+    for _ in range(t.nrows() // 2 - 1):
+        columns.append(t * columns[-1])
+    return fmpq_mat([column.entries() for column in columns]).transpose()
+
+
+def _unit(n: int, i: int) -> fmpq_mat:
+    return fmpq_mat(n, 1, [int(i == j) for j in range(n)])
+
+
+def _companion(chi: fmpq_poly) -> fmpq_mat:
+    """Multiplication by t in the basis 1, t, ..., t^(m-1)."""
+    m = chi.degree()
+    return fmpq_mat([[-chi[i] if j == m - 1 else fmpq(i == j + 1) for j in range(m)] for i in range(m)])
+
+
+def _twice(block: fmpq_mat) -> fmpq_mat:
+    m = block.nrows()
+    zeros = [fmpq(0)] * m
+    return fmpq_mat([[*row, *zeros] for row in block.tolist()] + [[*zeros, *row] for row in block.tolist()])
+
+
+def _bits(number: fmpq) -> int:
+    """The length of a number: 0 for zero."""
+    return int(abs(number.p).bit_length() + number.q.bit_length()) - 1
+
+
+def _format_form(coefficients: Sequence[fmpq_poly], monomials: Sequence[str]) -> str:
+    """A form over K as people write it."""
+    text = ""
+    for coefficient, monomial in zip(coefficients, monomials, strict=True):
+        if coefficient.is_zero():
+            continue
+        # What has one term, or only negative ones, is written with its sign outside.
+        terms = [c for c in coefficient.coeffs() if c != 0]
+        negative = all(c < 0 for c in terms)
+        element = format_univariate(-coefficient if negative else coefficient)
+        factor = "" if element == "1" else (f"({element})" if len(terms) > 1 else element) + "*"
+        sign = "-" if negative else "+"
+        text += f" {sign} {factor}{monomial}" if text else f"{'-' if negative else ''}{factor}{monomial}"
+    return text or "0"
