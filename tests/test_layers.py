@@ -24,6 +24,7 @@ FLOORS = {
     "maps": 3,
     "invariants": 4,
     "checks": 5,
+    "paper": 5,
     "experiments": 6,
     "plots": 7,
 }

@@ -1,8 +1,9 @@
 """The field of rational functions Q(x1, ..., xn): where an identity can be expanded, and so be proved.
 
-FLINT has no fraction field of polynomials. Elements here are quotients that are never reduced by a gcd: sums look for a
-common denominator only where one divides the other, and equality is that of the cross products. That is right
-for expanding an identity once, and for nothing else. Work is counted beforehand and bounded by a budget.
+FLINT has no fraction field of polynomials. Elements here are quotients. By default they are never reduced by a gcd:
+sums look for a common denominator only where one divides the other, and equality is that of the cross products. That
+is right for expanding an identity of few terms once. A field that reduces cancels a gcd after every sum and product
+instead: dearer a step, but quotients of many factors stay small. Work is counted beforehand and bounded by a budget.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ class BudgetExceeded(KahanmapsError):
 class FunctionField(Field):
     """Q(names). Elements are `Function`, matrices `FunctionMatrix`; `budget` bounds the products of terms in all.
 
+    `reduces` says whether quotients are reduced to lowest terms.
+
     >>> K = FunctionField(["x", "y"])
     >>> x, y = K.variables
     >>> K.equal((x * x - y * y) / (x - y), x + y)
@@ -38,7 +41,8 @@ class FunctionField(Field):
 
     characteristic = 0
 
-    def __init__(self, names: Sequence[str], budget: int = DEFAULT_BUDGET) -> None:
+    def __init__(self, names: Sequence[str], budget: int = DEFAULT_BUDGET, reduces: bool = False) -> None:
+        self.reduces = reduces
         self.name = f"QQ({', '.join(names)})"
         self.context = ring(names)
         self.budget = budget
@@ -85,6 +89,16 @@ class FunctionField(Field):
             raise BudgetExceeded("expanding the identity would take too many products of terms")
         return left * right
 
+    def fraction(self, above: fmpq_mpoly, below: fmpq_mpoly) -> Function:
+        """above / below, in lowest terms if this field reduces."""
+        if self.reduces and not below.is_constant():
+            if above.is_zero():
+                return self.zero
+            common = above.gcd(below)
+            if not common.is_constant():
+                return Function(self, above / common, below / common)
+        return Function(self, above, below)
+
     def quotient(self, large: fmpq_mpoly, small: fmpq_mpoly) -> fmpq_mpoly | None:
         """large / small where that is a polynomial, else None; paid for like a product."""
         if small.is_constant():
@@ -116,14 +130,14 @@ class Function(Element):
         if other.above.is_zero():
             return self
         if self.below == other.below:
-            return Function(self.field, self.above + other.above, self.below)
+            return self.field.fraction(self.above + other.above, self.below)
         times = self.field.times
         for small, large in ((self, other), (other, self)):
             quotient = self.field.quotient(large.below, small.below)
             if quotient is not None:
-                return Function(self.field, large.above + times(small.above, quotient), large.below)
+                return self.field.fraction(large.above + times(small.above, quotient), large.below)
         above = times(self.above, other.below) + times(other.above, self.below)
-        return Function(self.field, above, times(self.below, other.below))
+        return self.field.fraction(above, times(self.below, other.below))
 
     def __neg__(self) -> Function:
         return Function(self.field, -self.above, self.below)
@@ -133,7 +147,7 @@ class Function(Element):
             zero: Function = self.field.zero
             return zero
         times = self.field.times
-        return Function(self.field, times(self.above, other.above), times(self.below, other.below))
+        return self.field.fraction(times(self.above, other.above), times(self.below, other.below))
 
     def _over(self, other: Function) -> Function:
         if other.above.is_zero():
@@ -150,13 +164,25 @@ class FunctionMatrix(EntryMatrix):
     """A matrix over a `FunctionField`, with the operations that the Kahan map needs."""
 
     def det(self) -> Function:
-        """The determinant, by Bareiss' fraction-free elimination on rows cleared of denominators."""
-        rows, cleared = self._polynomial_rows()
-        value = _bareiss(self.field, rows)
-        return Function(self.field, value, cleared)
+        """The determinant, by Bareiss' fraction-free elimination on rows cleared of denominators, block by block."""
+        total = self.field.one
+        for block in self._blocks():
+            rows, cleared = self._part(block, block)._polynomial_rows()
+            total = total * Function(self.field, _bareiss(self.field, rows), cleared)
+        return total
 
     def solve(self, right: FunctionMatrix) -> FunctionMatrix:
-        """The solution X of self X = right, by Cramer's rule. Raises ZeroDivisionError if singular."""
+        """The solution X of self X = right, by Cramer's rule, block by block. Raises ZeroDivisionError if singular."""
+        columns = range(right._columns)
+        solution = {}
+        for block in self._blocks():
+            rows = self._part(block, block)._solve_block(right._part(block, columns)).tolist()
+            solution.update(zip(block, rows, strict=True))
+        return FunctionMatrix(
+            self.field, self._rows, right._columns, [entry for i in range(self._rows) for entry in solution[i]]
+        )
+
+    def _solve_block(self, right: FunctionMatrix) -> FunctionMatrix:
         n, columns = self._rows, right._columns
         wide = [entry for mine, its in zip(self.tolist(), right.tolist(), strict=True) for entry in (*mine, *its)]
         rows, _ = FunctionMatrix(self.field, n, n + columns, wide)._polynomial_rows()
@@ -170,6 +196,22 @@ class FunctionMatrix(EntryMatrix):
                 solution.append(Function(self.field, _bareiss(self.field, replaced), below))
         return FunctionMatrix(self.field, n, columns, solution)
 
+    def _part(self, rows: Sequence[int], columns: Sequence[int]) -> FunctionMatrix:
+        return FunctionMatrix(self.field, len(rows), len(columns), [self[i, j] for i in rows for j in columns])
+
+    def _blocks(self) -> list[list[int]]:
+        """The finest partition of the indices into blocks that the matrix does not mix."""
+        waiting = set(range(self._rows))
+        blocks = []
+        while waiting:
+            block = [waiting.pop()]
+            for i in block:  # grows while it is walked
+                near = {j for j in waiting if not self[i, j].above.is_zero() or not self[j, i].above.is_zero()}
+                waiting -= near
+                block += sorted(near)
+            blocks.append(sorted(block))
+        return blocks
+
     def _polynomial_rows(self) -> tuple[list[list[fmpq_mpoly]], fmpq_mpoly]:
         """Each row times a common denominator of its entries, and the product of these denominators."""
         rows, product = [], self.field.context.constant(1)
@@ -177,10 +219,15 @@ class FunctionMatrix(EntryMatrix):
             row = [self[i, j] for j in range(self._columns)]
             total = self.field.zero
             for entry in row:  # the sum finds a common denominator where one divides the other
+                if entry.above.is_zero():
+                    continue
                 total = total + Function(self.field, self.field.context.constant(1), entry.below)
             below = total.below
             cleared = []
             for entry in row:
+                if entry.above.is_zero():
+                    cleared.append(entry.above)
+                    continue
                 quotient = self.field.quotient(below, entry.below)
                 if quotient is None:
                     raise BudgetExceeded("the denominators of a row have no simple common multiple")

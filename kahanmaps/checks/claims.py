@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from dataclasses import field as field_of
 from enum import StrEnum
 from typing import Any
 
@@ -50,6 +51,7 @@ class Witness:
     left_label: str
     right_label: str
     field: str = "QQ"
+    vectors: Mapping[str, tuple[str, ...]] = field_of(default_factory=dict)  # whatever else was chosen, by name
 
     def to_json(self) -> dict[str, Any]:
         return {
@@ -58,6 +60,7 @@ class Witness:
             "field": self.field,
             "left": {"is": self.left_label, "value": list(self.left)},
             "right": {"is": self.right_label, "value": list(self.right)},
+            **({"vectors": {name: list(v) for name, v in self.vectors.items()}} if self.vectors else {}),
         }
 
 
@@ -73,6 +76,7 @@ class Finding:
     formula: str = ""
     source: str = ""
     control: bool = False
+    place: Mapping[str, Any] = field(default_factory=dict)  # where the claim stands, as plain data
 
     def with_also(self, *more: Evidence) -> Finding:
         """The same finding with further evidence beside the one that decided."""
@@ -85,6 +89,7 @@ class Finding:
 
     def to_json(self) -> dict[str, Any]:
         plain: dict[str, Any] = {
+            **self.place,
             "claim": self.claim,
             "verdict": str(self.verdict),
             "evidence": self.evidence.to_json(),

@@ -136,13 +136,24 @@ def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) 
 
 def trial_bound(identity: Identity) -> float:
     """log2 of the probability that one trial passes although the identity is false."""
-    if max(identity.equation.degree, identity.poles) >= 1 << (_PRIME_BITS - 2):
+    return log2_error(identity.equation, identity.poles)
+
+
+def log2_error(equation: Size, poles: int, conjugates: int = 1) -> float:
+    """log2 of the probability that a random point over GF(p) passes although the polynomial equation is false.
+
+    `poles` is the degree of the product of all denominators. Coefficients may lie in a number field of degree at most
+    `conjugates`, and p be random among the primes that split there: of those there are at least half as many as
+    Chebotarev's density gives, is assumed, and a nonzero coefficient is divided by one only if its norm is.
+    """
+    if max(equation.degree, poles) >= 1 << (_PRIME_BITS - 2):
         return 0.0  # no bound: too many points may be roots, or have no value
-    bad_primes = 2 ** (math.log2(max(1.0, identity.equation.bits / _PRIME_BITS)) - _PRIMES_LOG2)
+    primes_log2 = _PRIMES_LOG2 - (math.log2(2 * conjugates) if conjugates > 1 else 0.0)
+    bad_primes = 2 ** (math.log2(max(1.0, conjugates * equation.bits / _PRIME_BITS)) - primes_log2)
     scale = 2.0**_PRIME_BITS
     # The factor 2 is for the condition that all denominators are defined and not zero at the point: that holds with
     # probability at least 1/2, since their degree is below 2^60 and their coefficients fit into a computer's memory.
-    return math.log2(2 * (bad_primes + identity.equation.degree / scale))
+    return math.log2(2 * (bad_primes + equation.degree / scale))
 
 
 def random_prime_field(rng: random.Random) -> PrimeField:

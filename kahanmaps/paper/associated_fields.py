@@ -1,0 +1,358 @@
+"""Section 5: the matrices B with B^2 = I, the associated vector fields, and f'^2 as a combination of I and the B_i."""
+
+from __future__ import annotations
+
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import Kind, Pairs, claim
+
+
+@claim("Def. 4", "def assoc", "B^T J = J B, B^2 = I", breaks=("J", "B"), blockwise=True)
+def matrices_of_associated_fields(o: PaperObjects) -> Pairs:
+    """B is skew-Hamiltonian and B^2 = I"""
+    for B in o.associates():
+        yield B.transpose() * o.J, o.J * B
+        yield B * B, o.I
+
+
+@claim("Def. 4", "def assoc", "g = J B nabla H_0 = B^T J nabla H_0 = B^T f_0", breaks=("J", "A", "f"), blockwise=True)
+def associated_field(o: PaperObjects) -> Pairs:
+    """The associated vector field in its three forms"""
+    for B in o.associates():
+        g = o.value(o.g(B), o.x)
+        yield g, o.J * (B * o.grad(o.x))
+        yield g, B.transpose() * (o.J * o.grad(o.x))
+        yield g, B.transpose() * o.fx
+
+
+@claim("Def. 4", "def assoc", "g = J nabla K, K = alpha H_0 + beta H_1 + gamma H_2", least_m=2, breaks=("H", "A"))
+def hamilton_function_of_the_associated_field(o: PaperObjects) -> Pairs:
+    """The associated field is Hamiltonian, with the combination K of the H_i"""
+    v = o.vector("v")
+    for i in o.free:
+        # J^T = J^{-1}, so v . g = v . J nabla K is the slope of K along J^T v.
+        slope = o.slope(lambda o, x, i=i: o.Kf(o.B(i), x), o.x, o.J.transpose() * v)
+        yield o.dot(v, o.value(o.g_(i), o.x)), slope
+        combination = o.sum([coefficient * o.H(o.x, k) for k, coefficient in enumerate(o.lagrange(i))])
+        yield o.Kf(o.B(i), o.x), combination
+
+
+@claim("Def. 4", "", "B_s^T g_s = f_0;  (B_s B_t)^2 = I", breaks=("B",), blockwise=True)
+def equivalence_relation(o: PaperObjects) -> Pairs:
+    """Being associated is symmetric and transitive"""
+    matrices = list(o.associates())
+    for k, B in enumerate(matrices):
+        yield B.transpose() * o.value(o.g(B), o.x), o.fx
+        for C in matrices[: k + 1]:
+            yield B * C * (B * C), o.I
+
+
+@claim("Lemma 5 (31)", "f'f=g'g", "g' g = f_0' f_0", breaks=("B", "H"), blockwise=True)
+def accelerations_agree(o: PaperObjects) -> Pairs:
+    """Associated fields have the same second derivative along the flow"""
+    for B in o.associates():
+        yield o.jac(o.g(B), o.x) * o.value(o.g(B), o.x), o.df * o.fx
+
+
+@claim("Lemma 5 (32)", "f'f'=g'g'", "(g')^2 = (f_0')^2", breaks=("B", "H"), blockwise=True)
+def squares_of_jacobians_agree(o: PaperObjects) -> Pairs:
+    """Associated fields have Jacobi matrices with the same square"""
+    for B in o.associates():
+        jacobian = o.jac(o.g(B), o.x)
+        yield jacobian * jacobian, o.df * o.df
+
+
+@claim("Cor. 6 (33)", "condet", "det(I - eps g') = det(I - eps f_0')", breaks=("B", "f"), blockwise=True)
+def determinants_agree(o: PaperObjects) -> Pairs:
+    """Maps of associated fields share the invariant measure"""
+    for B in o.associates():
+        yield o.det(o.minus_eps_jac(o.g(B), o.x)), o.det(o.minus_eps_jac(o.f, o.x))
+
+
+@claim("Cor. 6, proof", "", "tr f'^k = tr g'^k, both 0 for odd k", breaks=("B", "f"))
+def traces_agree(o: PaperObjects) -> Pairs:
+    """Traces of powers of the Jacobi matrices agree, and those of odd powers vanish"""
+    for i in o.free:
+        first, second = o.df, o.jac(o.g_(i), o.x)
+        a, b = first, second
+        for k in range(1, 5):
+            yield o.trace(a), o.trace(b)
+            if k % 2:
+                yield o.trace(a), o.K.zero
+            a, b = a * first, b * second
+
+
+@claim("Lemma 7, proof", "", "det(A - t I) = chi(t)^2, chi = prod (t - lambda_i)", breaks=("roots", "A"))
+def characteristic_polynomial_of_A(o: PaperObjects) -> Pairs:
+    """The characteristic polynomial of A is a square"""
+    t = o.scalar("t")
+    chi = o.K.one
+    for root in o.lam:
+        chi = chi * (t - root)
+    yield o.det(o.A - o.I * t), chi * chi
+
+
+@claim("Lemma 7, proof", "", "prod (A - lambda_i I) = 0", breaks=("roots", "A"), distinct_roots=True)
+def A_is_diagonalisable(o: PaperObjects) -> Pairs:
+    """For distinct roots A is diagonalisable: chi is its minimal polynomial"""
+    product = o.I
+    for root in o.lam:
+        product = product * (o.A - o.I * root)
+    yield product, o.zeros(o.n, o.n)
+
+
+@claim(
+    "Lemma 7, proof",
+    "",
+    "A = S diag(W, W^T) S^{-1}, S^T J S = J",
+    kind=Kind.ATTAINED,
+    breaks=("A",),
+    distinct_roots=True,
+    symplectic=False,
+)
+def symplectic_normal_form_of_A(o: PaperObjects) -> Pairs:
+    """A is symplectically similar to diag(W, W^T), here over the same field with W a companion matrix"""
+    S, W = o.symplectic_normal_form()
+    m, zero = o.m, o.K.zero
+    block = [[W[i, j] for j in range(m)] + [zero] * m for i in range(m)]
+    block += [[zero] * m + [W[j, i] for j in range(m)] for i in range(m)]
+    yield o.A * S, S * o.K.matrix(o.n, o.n, [entry for row in block for entry in row])
+    yield S.transpose() * o.J * S, o.J
+
+
+@claim("Lemma 7 (34)", "", "B_i = alpha_i I + beta_i A + gamma_i A^2", breaks=("roots",), distinct_roots=True)
+def matrices_as_polynomials_in_A(o: PaperObjects) -> Pairs:
+    """B_i is a polynomial in A of degree < m, with the coefficients of Lagrange interpolation"""
+    for i in o.free:
+        # Independent of Lagrange's formula: I - 2 E_i with the projector E_i onto the eigenspace of lambda_i.
+        E = o.projector(i)
+        yield o.B(i), o.I - E * o.number(2)
+        yield o.A * E, E * o.lam[i]
+
+
+@claim("Lemma 7", "", "B_1, ..., B_m linearly independent (m != 2)", kind=Kind.ATTAINED, least_m=2, breaks=("B=I",))
+def independent_matrices(o: PaperObjects) -> Pairs:
+    """The matrices B_i are linearly independent; for m = 2 they are opposite"""
+    rows = [o.B(i).entries() for i in o.each]
+    if o.m == 2:
+        yield o.rank(o.B(0) + o.B(1)), 0
+    else:
+        yield o.rank(o.K.matrix(o.m, o.n * o.n, [entry for row in rows for entry in row])), o.m
+
+
+@claim("Lemma 7 (35)", "B^2", "B_i^2 = I", breaks=("B", "roots"), distinct_roots=True)
+def involutions(o: PaperObjects) -> Pairs:
+    """The matrices B_i are involutions"""
+    for i in o.free:
+        yield o.B(i) * o.B(i), o.I
+
+
+@claim(
+    "Lemma 7 (36)",
+    "B char pol",
+    "det(B_i - t I) = (t - 1)^{2m-2} (t + 1)^2",
+    breaks=("B", "roots"),
+    distinct_roots=True,
+)
+def characteristic_polynomial_of_B(o: PaperObjects) -> Pairs:
+    """B_i has the eigenvalue -1 twice and 1 otherwise"""
+    t = o.scalar("t")
+    right = (t + o.K.one) * (t + o.K.one)
+    for _ in range(2 * o.m - 2):
+        right = right * (t - o.K.one)
+    for i in o.free:
+        yield o.det(o.B(i) - o.I * t), right
+
+
+@claim("Lemma 7 (37)", "B sum", "sum B_i = (m-2) I", breaks=("B",), distinct_roots=True)
+def sum_of_matrices(o: PaperObjects) -> Pairs:
+    """The sum of the B_i; I for m = 3"""
+    yield o.sum([o.B(i) for i in o.each]), o.I * o.number(o.m - 2)
+
+
+@claim("Lemma 7 (38)", "", "sum alpha_i = m-2, sum beta_i = sum gamma_i = 0", breaks=("B",), distinct_roots=True)
+def sums_of_coefficients(o: PaperObjects) -> Pairs:
+    """The same for the coefficients"""
+    for k in range(o.m):
+        yield o.sum([o.lagrange(i)[k] for i in o.each]), o.number(o.m - 2 if k == 0 else 0)
+
+
+@claim("(39)", "abc", "a, b, c elementary symmetric: chi = t^3 - a t^2 + b t - c", breaks=("A", "roots"))
+def symmetric_functions_of_the_roots(o: PaperObjects) -> Pairs:
+    """The coefficients of chi from traces of powers of A (Newton's identities; every eigenvalue counts half)"""
+    half = o.number(1, 2)
+    sums = [o.trace(o.A_to(k)) * half for k in range(1, o.m + 1)]
+    elementary = [o.K.one]
+    for k in range(1, o.m + 1):
+        total = o.K.zero
+        for j in range(1, k + 1):
+            total = total + elementary[k - j] * sums[j - 1] * o.number(1 if j % 2 else -1)
+        elementary.append(total * o.number(1, k))
+    for k in range(o.m + 1):
+        yield o.chi_of_roots[o.m - k], elementary[k] * o.number(1 if k % 2 == 0 else -1)
+
+
+@claim("(40)", "B constr", "B_i(lambda_i) = -1, B_i(lambda_j) = 1", breaks=("B",), distinct_roots=True)
+def interpolation(o: PaperObjects) -> Pairs:
+    """The values of the interpolation polynomials"""
+    for i in o.free:
+        for j in o.each:
+            value = o.K.zero
+            for coefficient in reversed(o.lagrange(i)):
+                value = value * o.lam[j] + coefficient
+            yield value, o.number(-1 if i == j else 1)
+
+
+@claim("(41)-(43)", "alpha", "alpha_i = (lambda_i^2 - b)/((l_i - l_j)(l_i - l_k)), ...", only_m=3, breaks=("B",))
+def lagrange_coefficients(o: PaperObjects) -> Pairs:
+    """The coefficients alpha, beta, gamma through the eigenvalues"""
+    b = o.chi[1]
+    for i in o.free:
+        j, k = (other for other in o.each if other != i)
+        li, lj, lk = o.lam[i], o.lam[j], o.lam[k]
+        below = (li - lj) * (li - lk)
+        alpha, beta, gamma = o.lagrange(i)
+        yield alpha, (li * li - b) / below
+        yield beta, o.number(2) * (lj + lk) / below
+        yield gamma, o.number(-2) / below
+
+
+@claim(
+    "(41)-(43)",
+    "alpha",
+    "coefficient k of B_i = delta_k0 - 2 C_k(lambda_i)/chi'(lambda_i)",
+    breaks=("B",),
+    distinct_roots=True,
+)
+def lagrange_coefficients_for_every_m(o: PaperObjects) -> Pairs:
+    """The general form, with Horner's polynomials C_k of chi"""
+    for i in o.free:
+        slope, C = o.K.zero, [o.K.zero] * o.m
+        for k in range(o.m - 1, -1, -1):  # C_{m-1} = 1, C_{k-1} = t C_k + c_k
+            C[k] = o.K.one if k == o.m - 1 else o.lam[i] * C[k + 1] + o.chi[k + 1]
+        for k in range(o.m, 0, -1):
+            slope = slope * o.lam[i] + o.chi[k] * o.number(k)
+        for k in range(o.m):
+            yield o.lagrange(i)[k], o.number(1 if k == 0 else 0) - o.number(2) * C[k] / slope
+
+
+@claim("(44)", "", "B_1 B_2 = B_2 B_1 = -B_3, and cyclic", only_m=3, breaks=("B",))
+def products_of_matrices(o: PaperObjects) -> Pairs:
+    """The products of the B_i for m = 3"""
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        yield o.B(i) * o.B(j), -o.B(k)
+        yield o.B(j) * o.B(i), -o.B(k)
+
+
+@claim("(44)", "", "B_i B_j = B_i + B_j - I (i != j)", least_m=2, breaks=("roots", "A"), distinct_roots=True)
+def products_of_matrices_for_every_m(o: PaperObjects) -> Pairs:
+    """The products of the B_i for every m; for m = 3 the right-hand side is -B_k by (37)"""
+    for i in o.free:
+        for j in o.each:
+            if i != j:
+                yield o.B(i) * o.B(j), o.B(i) + o.B(j) - o.I
+
+
+@claim("(45)", "assoc triple", "B_1^T g_1 = f_0, B_2^T g_1 = -g_3, B_3^T g_1 = -g_2", only_m=3, breaks=("B",))
+def fields_associated_to_an_associated_one(o: PaperObjects) -> Pairs:
+    """The triple of fields associated to g_i, for m = 3"""
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        g = o.value(o.g_(i), o.x)
+        yield o.B(i).transpose() * g, o.fx
+        yield o.B(j).transpose() * g, -o.value(o.g_(k), o.x)
+        yield o.B(k).transpose() * g, -o.value(o.g_(j), o.x)
+
+
+@claim("Lemma 8 (46)", "f'f' thru B", "f_0'^2 = p_0 I + sum q_i B_i^T", breaks=("H", "B"), distinct_roots=True)
+def square_of_the_jacobian(o: PaperObjects) -> Pairs:
+    """The square of the Jacobi matrix is a combination of I and the B_i^T"""
+    right = o.I * o.p0(o.x)
+    for i in o.each:
+        right = right + o.B(i).transpose() * o.q(i, o.x)
+    yield o.df * o.df, right
+
+
+@claim("(47)", "p0", "p_0 = (4-m)/8 tr f_0'^2", breaks=("H", "f"), distinct_roots=True)
+def trace_part(o: PaperObjects) -> Pairs:
+    """f_0'^2 is a multiple of the identity on each eigenspace of A^T; p_0 is (4-m)/4 times the sum of the factors"""
+    for i in o.free:
+        E = o.projector(i).transpose()
+        yield o.df * o.df * E, E * o.eigenvalue_of_square(i, o.x)
+    yield o.p0(o.x), o.sum([o.eigenvalue_of_square(i, o.x) for i in o.each]) * o.number(4 - o.m, 4)
+
+
+@claim("(48)", "qi", "q_i = 1/8 tr (B_i^T f_0'^2) = 1/8 tr (f_0' g_i')", breaks=("f",), distinct_roots=True)
+def mixed_traces(o: PaperObjects) -> Pairs:
+    """q_i in its two forms"""
+    for i in o.free:
+        yield o.q(i, o.x), o.trace(o.df * o.jac(o.g_(i), o.x)) * o.number(1, 8)
+
+
+@claim(
+    "Lemma 8 (49)",
+    "char pol f'-g'",
+    "det(t I - (f_0'-g_i')) = t^{2m} - 1/2 t^{2m-2} tr (f_0'-g_i')^2",
+    breaks=("f", "roots"),
+    distinct_roots=True,
+)
+def characteristic_polynomial_of_the_difference(o: PaperObjects) -> Pairs:
+    """f_0' - g_i' has rank 2"""
+    t = o.scalar("t")
+    for i in o.free:
+        difference = o.df - o.jac(o.g_(i), o.x)
+        high = o.K.one
+        for _ in range(2 * o.m - 2):
+            high = high * t
+        right = high * (t * t - o.trace(difference * difference) * o.number(1, 2))
+        yield o.det(o.I * t - difference), right
+        yield difference, (o.I - o.B(i).transpose()) * o.df
+
+
+@claim(
+    "Lemma 8 (50)",
+    "pol f'-g'",
+    "(f_0'-g_i')^{2m} - 1/2 (f_0'-g_i')^{2m-2} tr (f_0'-g_i')^2 = 0",
+    breaks=("f", "roots"),
+    distinct_roots=True,
+)
+def cayley_hamilton(o: PaperObjects) -> Pairs:
+    """The theorem of Cayley and Hamilton for f_0' - g_i'"""
+    for i in o.free:
+        difference = o.df - o.jac(o.g_(i), o.x)
+        square = difference * difference
+        low = o.power(square, o.m - 1)
+        yield low * square, low * (o.trace(square) * o.number(1, 2))
+
+
+@claim(
+    "Lemma 8, proof",
+    "",
+    "32 f'^6 - 32 B_i^T f'^6 - (8 f'^4 - 8 B_i^T f'^4)(tr f'^2 - tr B_i^T f'^2) = 0",
+    only_m=3,
+    breaks=("H", "B"),
+)
+def sixth_powers(o: PaperObjects) -> Pairs:
+    """The equation that (50) turns into, and the one after division by f'^4"""
+    square = o.df * o.df
+    fourth = square * square
+    for i in o.free:
+        rest = o.I - o.B(i).transpose()
+        traces = o.trace(square) - o.trace(o.B(i).transpose() * square)
+        yield rest * (fourth * square) * o.number(32), rest * fourth * (o.number(8) * traces)
+        yield rest * square * o.number(32), rest * (o.number(8) * traces)
+
+
+@claim(
+    "Lemma 8, proof",
+    "",
+    "64 f'^2 - 8(4-m) tr(f'^2) I - 8 sum tr(B_i^T f'^2) B_i^T = 0",
+    breaks=("H", "B"),
+    distinct_roots=True,
+)
+def sum_of_the_squares(o: PaperObjects) -> Pairs:
+    """The sum over i, equivalent to (46); for m = 3 as printed"""
+    square = o.df * o.df
+    right = o.I * (o.number(8 * (4 - o.m)) * o.trace(square))
+    for i in o.each:
+        B = o.B(i).transpose()
+        right = right + B * (o.number(8) * o.trace(B * square))
+    yield square * o.number(64), right

@@ -1,0 +1,114 @@
+"""Beyond the paper: what lies behind its theorems, how far they reach, and where they end."""
+
+from __future__ import annotations
+
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import Kind, Pairs, claim
+
+
+@claim(
+    "Structure",
+    "",
+    "det(I - eps f') = prod (1 + eps^2 D_i),  x~ = (x + 2 eps f)/(1 + eps^2 D_i) on each block",
+    breaks=("H", "eps"),
+    distinct_roots=True,
+)
+def product_of_planar_maps(o: PaperObjects) -> Pairs:
+    """The map is a product of planar maps: no linear system has to be solved"""
+    product = o.K.one
+    for i in o.each:
+        E = o.projector(i).transpose()
+        factor = o.K.one - o.eps * o.eps * o.eigenvalue_of_square(i, o.x)
+        product = product * factor
+        yield E * o.x_tilde * factor, E * (o.x + o.fx * (o.number(2) * o.eps))
+    yield o.det(o.minus_eps_jac(o.f, o.x)), product
+
+
+@claim("Structure", "", "Phi_{f_s} = Phi_f on blocks with s_i = 1, Phi_f^{-1} where s_i = -1", breaks=("B", "H"), distinct_roots=True)
+def associated_maps_on_the_blocks(o: PaperObjects) -> Pairs:
+    """The map of an associated field is the map of f on some blocks and its inverse on the others"""
+    backwards = o.step(o.f, o.x, times=-1)
+    for signs in o.all_signs():
+        x_hat = o.step(o.g(o.B_signs(signs)), o.x)
+        for i in o.each:
+            E = o.projector(i).transpose()
+            yield E * x_hat, E * (o.x_tilde if signs[i] > 0 else backwards)
+
+
+@claim("Structure", "", "Phi_{-f} = Phi_f^{-1}", breaks=("map",), blockwise=True)
+def opposite_field(o: PaperObjects) -> Pairs:
+    """The map of -f is the inverse of the map of f"""
+    opposite = o.g(-o.I)
+    yield o.step(opposite, o.x_tilde), o.x
+
+
+@claim("Steps", "", "Phi_f(., eps) o Phi_g(., 2 eps) != Phi_g(., 2 eps) o Phi_f(., eps)", kind=Kind.DIFFERENT, breaks=("linear",))
+def different_steps_do_not_commute(o: PaperObjects) -> Pairs:
+    """Maps of associated fields with different eps do not commute in general, nor does a map with itself"""
+    for g in [o.f, *(o.g_(i) for i in o.each)]:
+        yield o.step(g, o.x_tilde, times=2), o.step(o.f, o.step(g, o.x, times=2))
+
+
+@claim("Inhomogeneous H", "", "Phi_f o Phi_g = Phi_g o Phi_f", breaks=("B", "H"), blockwise=True)
+def commutativity_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
+    """H with quadratic and linear terms, A nabla^2 H = nabla^2 H A^T: the maps still commute"""
+    p = o.inhomogeneous()
+    for B in p.associates():
+        f, g = p.f, p.g(B)
+        yield p.step(f, p.step(g, p.x)), p.step(g, p.step(f, p.x))
+
+
+@claim("Inhomogeneous H", "", "modified K = K + (2 eps/3) nabla K^T (I - eps g')^{-1} g is shared", breaks=("B", "H"), blockwise=True)
+def integrals_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
+    """Inhomogeneous H: the modified Hamiltonians are shared by all maps of the class"""
+    p = o.inhomogeneous()
+    x_tilde = p.step(p.f, p.x)
+    for B in p.associates():
+        x_hat = p.step(p.g(B), p.x)
+        for image in (x_tilde, x_hat):
+            yield p.modified(B, image), p.modified(B, p.x)
+            yield p.modified_H(image), p.modified_H(p.x)
+
+
+@claim("Inhomogeneous H", "", "eps^{-1} x^T J x~ is conserved", kind=Kind.DIFFERENT, breaks=("homogeneous",))
+def paper_integral_fails_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
+    """Inhomogeneous H: the paper's own form eps^{-1} x^T J x~ is NOT conserved"""
+    p = o.inhomogeneous()
+    yield p.H_tilde(p.step(p.f, p.x)), p.H_tilde(p.x)
+
+
+@claim("Inhomogeneous H", "", "dPhi Pi(x) dPhi^T = Pi(x~), for f and g", breaks=("H", "B"), blockwise=True)
+def poisson_map_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
+    """Inhomogeneous H: Pi = J - eps^2 f'^2 J is still invariant"""
+    p = o.inhomogeneous()
+    for g in [p.f, *(p.g(B) for B in p.associates())]:
+        jacobian = p.jacobian_of_step(g, p.x)
+        yield jacobian * p.Pi(p.x) * jacobian.transpose(), p.Pi(p.step(g, p.x))
+
+
+@claim("Inhomogeneous H", "", "{x_i,{x_j,x_k}} + cyclic = 0", least_m=2, pairwise=True, breaks=("H", "f"))
+def jacobi_identity_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
+    """Inhomogeneous H: Pi is still a Poisson tensor"""
+    from kahanmaps.paper.poisson_structure import jacobi_identity
+
+    yield from jacobi_identity(o.inhomogeneous())
+
+
+@claim("Inhomogeneous H", "", "nabla (modified K_s) = B_s nabla (modified H)", breaks=("H", "B"), blockwise=True)
+def gradients_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
+    """Inhomogeneous H: the modified Hamiltonians satisfy the same differential equation"""
+    v = o.vector("v")
+    p = o.inhomogeneous()
+    for signs in p.all_signs():
+        left = p.slope(lambda p, x, signs=signs: p.modified(p.B_signs(signs), x), p.x, v)
+        yield left, p.slope(lambda p, x: p.modified_H(x), p.x, p.B_signs(signs).transpose() * v)
+
+
+@claim("Inhomogeneous H", "", "modified H = P_0 H + eps^2 sum Q_i K_i", kind=Kind.DIFFERENT, breaks=("homogeneous",), distinct_roots=True)
+def formula_through_H_and_K_fails_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
+    """Inhomogeneous H: the formula (106) through H and the K_i does NOT survive"""
+    p = o.inhomogeneous()
+    right = p.P0(p.x) * p.H(p.x)
+    for i in p.each:
+        right = right + p.eps * p.eps * p.Q(i, p.x) * p.Kf(p.B(i), p.x)
+    yield p.modified_H(p.x), right

@@ -1,0 +1,223 @@
+"""Section 6: the maps of associated vector fields commute. x~ = Phi_f(x), x^ = Phi_g(x), g = B^T f."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import Pairs, claim
+from kahanmaps.systems.quadratic import SystemOver
+
+
+def associated_pairs(o: PaperObjects) -> Iterator[tuple[Any, SystemOver, Any]]:
+    """B, g and x^ for every associated system that is looked at."""
+    for B in o.associates():
+        yield B, o.g(B), o.step(o.g(B), o.x)
+
+
+@claim(
+    "Theorem 9 (51), (52)",
+    "eq: Phi1",
+    "x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, the same for g",
+    breaks=("eps", "inhomogeneous"),
+    blockwise=True,
+)
+def both_maps(o: PaperObjects) -> Pairs:
+    """Both maps in the forms of Section 2"""
+    yield o.x_tilde, o.solve(o.minus_eps_jac(o.f, o.x), o.x)
+    yield o.x_tilde, o.plus_eps_jac(o.f, o.x_tilde) * o.x
+    for _, g, x_hat in associated_pairs(o):
+        yield x_hat, o.solve(o.minus_eps_jac(g, o.x), o.x)
+        yield x_hat, o.plus_eps_jac(g, x_hat) * o.x
+
+
+@claim("Theorem 9", "th commute", "Phi_f o Phi_g = Phi_g o Phi_f", breaks=("B", "H", "map"), blockwise=True)
+def commutativity(o: PaperObjects) -> Pairs:
+    """The Kahan maps of associated vector fields commute, all pairs of the class"""
+    fields = [(o.f, o.x_tilde), *((g, x_hat) for _, g, x_hat in associated_pairs(o))]
+    if len(fields) > 8:  # pairs (f_s, f_t) are pairs (f, f_{st}) of another member: f with all, and neighbours
+        chosen = [(0, k) for k in range(1, len(fields))] + [(k, k + 1) for k in range(1, len(fields) - 1)]
+    else:
+        chosen = [(j, k) for k in range(len(fields)) for j in range(k)]
+    for j, k in chosen:
+        (f, x_tilde), (g, x_hat) = fields[j], fields[k]
+        yield o.step(f, x_hat), o.step(g, x_tilde)
+
+
+@claim(
+    "(53), (54)",
+    "eq: hat tilde",
+    "Phi_g(Phi_f(x)) = (I - eps g'(x~))^{-1} (I + eps f'(x~)) x",
+    breaks=("map", "eps", "inhomogeneous"),
+    blockwise=True,
+)
+def compositions(o: PaperObjects) -> Pairs:
+    """The two compositions as products of matrices"""
+    for _, g, x_hat in associated_pairs(o):
+        first = o.solve(o.minus_eps_jac(g, o.x_tilde), o.plus_eps_jac(o.f, o.x_tilde) * o.x)
+        second = o.solve(o.minus_eps_jac(o.f, x_hat), o.plus_eps_jac(g, x_hat) * o.x)
+        yield o.step(g, o.x_tilde), first
+        yield o.step(o.f, x_hat), second
+
+
+@claim(
+    "(55)",
+    "det",
+    "(I - eps g'(x~))^{-1} (I + eps f'(x~)) = (I - eps f'(x^))^{-1} (I + eps g'(x^))",
+    breaks=("B", "H"),
+    blockwise=True,
+)
+def matrix_equation(o: PaperObjects) -> Pairs:
+    """Commutativity as an identity of matrices, stronger than that of vectors"""
+    for _, g, x_hat in associated_pairs(o):
+        left = o.solve(o.minus_eps_jac(g, o.x_tilde), o.plus_eps_jac(o.f, o.x_tilde))
+        yield left, o.solve(o.minus_eps_jac(o.f, x_hat), o.plus_eps_jac(g, x_hat))
+
+
+@claim(
+    "(56)",
+    "det 1",
+    "(I - eps f'(x^)) (I - eps g'(x~))^{-1} = (I + eps g'(x^)) (I + eps f'(x~))^{-1}",
+    breaks=("B", "H"),
+    blockwise=True,
+)
+def matrix_equation_sorted(o: PaperObjects) -> Pairs:
+    """The matrix equation sorted by points"""
+    for _, g, x_hat in associated_pairs(o):
+        left = o.minus_eps_jac(o.f, x_hat) * o.inverse(o.minus_eps_jac(g, o.x_tilde))
+        yield left, o.plus_eps_jac(g, x_hat) * o.inverse(o.plus_eps_jac(o.f, o.x_tilde))
+
+
+@claim(
+    "Theorem 9, proof",
+    "",
+    "(I - eps g'(x~))^{-1} = (I + eps g'(x~)) (I - eps^2 f'(x~)^2)^{-1}",
+    breaks=("B", "H"),
+    blockwise=True,
+)
+def inverses(o: PaperObjects) -> Pairs:
+    """The inverses through I - eps^2 f'^2, for g' and for f'"""
+    common = o.inverse(o.one_minus_square(o.f, o.x_tilde))
+    yield o.inverse(o.plus_eps_jac(o.f, o.x_tilde)), o.minus_eps_jac(o.f, o.x_tilde) * common
+    for _, g, _ in associated_pairs(o):
+        yield o.inverse(o.minus_eps_jac(g, o.x_tilde)), o.plus_eps_jac(g, o.x_tilde) * common
+
+
+@claim(
+    "Theorem 9, proof",
+    "",
+    "(I - eps f'(x^)) (I + eps g'(x~)) = (I + eps g'(x^)) (I - eps f'(x~))",
+    breaks=("B", "H"),
+    blockwise=True,
+)
+def matrix_equation_without_inverses(o: PaperObjects) -> Pairs:
+    """The matrix equation without inverses"""
+    for _, g, x_hat in associated_pairs(o):
+        left = o.minus_eps_jac(o.f, x_hat) * o.plus_eps_jac(g, o.x_tilde)
+        yield left, o.plus_eps_jac(g, x_hat) * o.minus_eps_jac(o.f, o.x_tilde)
+
+
+@claim(
+    "Theorem 9, proof",
+    "",
+    "f'(x^) g'(x~) = f'(x^) B^T f'(x~) = B^T f'(x^) f'(x~) = g'(x^) f'(x~)",
+    breaks=("H", "A"),
+    blockwise=True,
+)
+def quadratic_terms_cancel(o: PaperObjects) -> Pairs:
+    """The terms quadratic in eps cancel"""
+    for B, g, x_hat in associated_pairs(o):
+        at_hat, at_tilde, BT = o.jac(o.f, x_hat), o.jac(o.f, o.x_tilde), B.transpose()
+        steps = [
+            at_hat * o.jac(g, o.x_tilde),
+            at_hat * BT * at_tilde,
+            BT * at_hat * at_tilde,
+            o.jac(g, x_hat) * at_tilde,
+        ]
+        yield from zip(steps, steps[1:], strict=False)
+
+
+@claim("(57)", "aux", "-f'(x^) + g'(x~) = g'(x^) - f'(x~)", breaks=("B", "H"), blockwise=True)
+def linear_terms(o: PaperObjects) -> Pairs:
+    """The terms linear in eps"""
+    for _, g, x_hat in associated_pairs(o):
+        left = o.jac(g, o.x_tilde) - o.jac(o.f, x_hat)
+        yield left, o.jac(g, x_hat) - o.jac(o.f, o.x_tilde)
+
+
+@claim(
+    "Theorem 9, proof",
+    "",
+    "f'(x^) = f'(x) + f''(x^ - x) = f'(x) + 2 eps f''(I - eps g')^{-1} g, ...",
+    breaks=("eps",),
+    blockwise=True,
+)
+def jacobians_at_the_images(o: PaperObjects) -> Pairs:
+    """f' and g' at x^ and at x~, through the constant tensors f'' and g''"""
+    two_eps = o.number(2) * o.eps
+    for _, g, x_hat in associated_pairs(o):
+        for field, image in ((g, x_hat), (o.f, o.x_tilde)):
+            increment = o.solve(o.minus_eps_jac(field, o.x), o.value(field, o.x))
+            for h in (o.f, g):
+                yield o.jac(h, image), o.jac(h, o.x) + o.second(h, image - o.x)
+                yield o.jac(h, image), o.jac(h, o.x) + o.second(h, increment) * two_eps
+
+
+@claim(
+    "(58)",
+    "aux2",
+    "f''(I - eps g')^{-1} g + g''(I - eps g')^{-1} g = f''(I - eps f')^{-1} f + g''(I - eps f')^{-1} f",
+    breaks=("B", "H"),
+    blockwise=True,
+)
+def equation_for_the_second_derivatives(o: PaperObjects) -> Pairs:
+    """The linear terms through f'' and g''"""
+    for B in o.associates():
+        g = o.g(B)
+        by_g = o.solve(o.minus_eps_jac(g, o.x), o.value(g, o.x))
+        by_f = o.solve(o.minus_eps_jac(o.f, o.x), o.fx)
+        yield o.second(o.f, by_g) + o.second(g, by_g), o.second(o.f, by_f) + o.second(g, by_f)
+
+
+@claim("Lemma 10 (59)", "g''", "g'' v = f'' (B^T v), f'' v = g'' (B^T v)", breaks=("H", "B"), blockwise=True)
+def second_derivatives_agree(o: PaperObjects) -> Pairs:
+    """The second derivatives of associated fields"""
+    v = o.vector("v")
+    for B in o.associates():
+        yield o.second(o.g(B), v), o.second(o.f, B.transpose() * v)
+        yield o.second(o.f, v), o.second(o.g(B), B.transpose() * v)
+
+
+@claim(
+    "Lemma 10 (60)", "Af''", "B^T (f'' v) = f'' (B^T v), B^T (g'' v) = g'' (B^T v)", least_m=2, breaks=("H", "A"), blockwise=True
+)
+def second_derivatives_commute_with_B(o: PaperObjects) -> Pairs:
+    """The equivalent form of Lemma 10; in components, its proof (the print lacks the square of d^2 f_i/dx_j dx_k)"""
+    v = o.vector("v")
+    for B in o.associates():
+        for h in (o.f, o.g(B)):
+            yield B.transpose() * o.second(h, v), o.second(h, B.transpose() * v)
+
+
+@claim(
+    "Theorem 9, proof",
+    "",
+    "f''(I - eps g')^{-1} g = f''(I - eps^2 f'^2)^{-1} (g + eps g'g), and seven more",
+    breaks=("B", "H"),
+    blockwise=True,
+)
+def last_displays(o: PaperObjects) -> Pairs:
+    """The matrices on both sides of (58), computed with the help of Lemma 10"""
+    common = o.one_minus_square(o.f, o.x)
+    f, fx, df = o.f, o.fx, o.df
+    for B in o.associates():
+        g, BT = o.g(B), B.transpose()
+        gx, dg = o.value(g, o.x), o.jac(g, o.x)
+        by_g, by_f = o.solve(o.minus_eps_jac(g, o.x), gx), o.solve(o.minus_eps_jac(f, o.x), fx)
+        yield o.second(f, by_g), o.second(f, o.solve(common, gx + dg * gx * o.eps))
+        yield o.second(g, by_g), o.second(f, o.solve(common, BT * (gx + dg * gx * o.eps)))
+        yield o.second(g, by_g), o.second(f, o.solve(common, fx + df * gx * o.eps))
+        yield o.second(f, by_f), o.second(f, o.solve(common, fx + df * fx * o.eps))
+        yield o.second(g, by_f), o.second(f, o.solve(common, BT * (fx + df * fx * o.eps)))
+        yield o.second(g, by_f), o.second(f, o.solve(common, gx + dg * fx * o.eps))

@@ -1,0 +1,361 @@
+"""Section 9: differential equations for H~ and K~_i, and the inverse of the Poisson tensor.
+
+For every m: s_i = 1 - eps^2 (p_0 + sum q_j - 2 q_i), P_0 = ((m-2)^2 + (4-m) sum 1/s_j)/4 and
+eps^2 Q_i = (2 - m + sum 1/s_j - 2/s_i)/4, which are the paper's formulas for m = 3, where s_0 = 1.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import Pairs, claim
+
+
+@claim("Theorem 15 (94)", "grad tK", "nabla K~_i = B_i nabla H~", pairwise=True, breaks=("H", "B"))
+def gradients_of_the_integrals(o: PaperObjects) -> Pairs:
+    """The integrals are related by the same differential equation as H and K_i"""
+    v = o.vector("v")
+    for signs in o.all_signs():
+        left = o.slope(lambda o, x, signs=signs: o.integral(o.g(o.B_signs(signs)), x), o.x, v)
+        yield left, o.slope(lambda o, x: o.H_tilde(x), o.x, o.B_signs(signs).transpose() * v)
+
+
+@claim("Theorem 15", "th diff eqs", "A nabla^2 H~ = nabla^2 H~ A^T, A nabla^2 K~_i = nabla^2 K~_i A^T", pairwise=True, breaks=("H", "A"))
+def second_order_equations_of_the_integrals(o: PaperObjects) -> Pairs:
+    """The integrals satisfy the same second order differential equations as H and K_i"""
+    v, w = o.vector("v"), o.vector("w")
+    left = o.second_slope(lambda o, x: o.H_tilde(x), o.x, o.AT * v, w)
+    yield left, o.second_slope(lambda o, x: o.H_tilde(x), o.x, v, o.AT * w)
+    for i in o.free:
+        left = o.second_slope(lambda o, x, i=i: o.integral(o.g_(i), x), o.x, o.AT * v, w)
+        yield left, o.second_slope(lambda o, x, i=i: o.integral(o.g_(i), x), o.x, v, o.AT * w)
+
+
+@claim("(95), (96)", "tH", "H~ = -2 x^T Pi^{-1} f, K~_i = -2 x^T Pi^{-1} g_i", breaks=("eps", "f"), blockwise=True)
+def integrals_by_the_inverse_tensor(o: PaperObjects) -> Pairs:
+    """The integrals through the inverse of the Poisson tensor"""
+    Pi = o.Pi(o.x)
+    for g in [o.f, *(o.g(B) for B in o.associates())]:
+        yield o.integral(g, o.x), o.dot(o.x, o.solve(Pi, o.value(g, o.x))) * o.number(-2)
+
+
+@claim("Lemma 16 (97)", "Pi inv", "Pi^{-1} = -P_0 J - eps^2 sum Q_i B_i J", breaks=("H", "B"), distinct_roots=True)
+def inverse_tensor(o: PaperObjects) -> Pairs:
+    """The inverse of the Poisson tensor"""
+    right = -(o.J * o.P0(o.x))
+    for i in o.each:
+        right = right - o.B(i) * o.J * (o.eps * o.eps * o.Q(i, o.x))
+    yield o.Pi(o.x) * right, o.I
+    yield o.inverse(o.Pi(o.x)), right
+
+
+@claim(
+    "Lemma 16 (98)-(101)",
+    "P0",
+    "P_0 = (1/s_0 + 1/s_1 + 1/s_2 + 1/s_3)/4, Q_1 = (-1/s_0 - 1/s_1 + 1/s_2 + 1/s_3)/(4 eps^2), ...",
+    only_m=3,
+    breaks=("B",),
+)
+def functions_P_and_Q(o: PaperObjects) -> Pairs:
+    """P_0 and Q_i as printed for m = 3, with s_0 = 1"""
+    s0 = _s0(o)
+    one = o.K.one
+    reciprocal = [one / o.s(i, o.x) for i in o.each]
+    yield o.P0(o.x) * o.number(4), one / s0 + o.sum(reciprocal)
+    for i in o.free:
+        right = o.sum(reciprocal) - reciprocal[i] - reciprocal[i] - one / s0
+        yield o.Q(i, o.x) * (o.number(4) * o.eps * o.eps), right
+
+
+@claim("(102)", "s0", "s_0 = 1 - eps^2 (p_0 - q_1 - q_2 - q_3) = 1", only_m=3, breaks=("B",))
+def function_s0(o: PaperObjects) -> Pairs:
+    """s_0 is 1, that is p_0 = q_1 + q_2 + q_3"""
+    yield _s0(o), o.K.one
+
+
+@claim("(102)", "s0", "p_0 = (4-m) tr f'^2/8, sum q_i = (m-2) tr f'^2/8", breaks=("B",), distinct_roots=True)
+def sum_of_the_q(o: PaperObjects) -> Pairs:
+    """The linear relation between p_0 and the q_i for every m"""
+    yield o.sum([o.q(i, o.x) for i in o.each]), o.eighth_of_trace(o.x) * o.number(o.m - 2)
+
+
+@claim("(103)-(105)", "s1", "s_1 = 1 - eps^2 (p_0 - q_1 + q_2 + q_3) = 1 - 2 eps^2 (q_2 + q_3), ...", only_m=3, breaks=("B",))
+def functions_s(o: PaperObjects) -> Pairs:
+    """s_1, s_2, s_3 in both forms"""
+    squared = o.eps * o.eps
+    q = [o.q(i, o.x) for i in o.each]
+    for i in o.free:
+        j, k = (other for other in o.each if other != i)
+        yield o.s(i, o.x), o.K.one - squared * o.p0(o.x) + squared * q[i] - squared * q[j] - squared * q[k]
+        yield o.s(i, o.x), o.K.one - (squared + squared) * q[j] - (squared + squared) * q[k]
+
+
+@claim(
+    "(103)-(105)",
+    "s1",
+    "s_i = 1 - eps^2 (eigenvalue of f'^2 on the eigenspace of lambda_i)",
+    breaks=("B",),
+    distinct_roots=True,
+)
+def functions_s_are_eigenvalues(o: PaperObjects) -> Pairs:
+    """What the s_i are: the eigenvalues of I - eps^2 f'^2"""
+    for i in o.free:
+        yield o.s(i, o.x), o.K.one - o.eps * o.eps * o.eigenvalue_of_square(i, o.x)
+
+
+@claim(
+    "(106)",
+    "tH thru H K",
+    "H~ = 2 P_0 x^T J f + 2 eps^2 sum Q_i x^T B_i J f = ... = -6 P_0 H - 6 eps^2 sum Q_i K_i",
+    breaks=("H", "B", "inhomogeneous"),
+    distinct_roots=True,
+)
+def H_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
+    """H~ through H and the K_i, all three lines"""
+    squared = o.eps * o.eps
+    P0, Q = o.P0(o.x), [o.Q(i, o.x) for i in o.each]
+    first = P0 * o.dot(o.x, o.J * o.fx) * o.number(2)
+    second = P0 * o.dot(o.x, o.grad(o.x)) * o.number(-2)
+    third = P0 * o.H(o.x) * o.number(-6)
+    for i in o.each:
+        first = first + squared * Q[i] * o.dot(o.x, o.B(i) * (o.J * o.fx)) * o.number(2)
+        second = second - squared * Q[i] * o.dot(o.x, o.B(i) * o.grad(o.x)) * o.number(2)
+        third = third - squared * Q[i] * o.Kf(o.B(i), o.x) * o.number(6)
+    for line in (first, second, third):
+        yield o.H_tilde(o.x), line
+
+
+@claim(
+    "(107)",
+    "tK thru H K",
+    "K~_1 = -6 P_0 K_1 - 6 eps^2 Q_1 H + 6 eps^2 Q_2 K_3 + 6 eps^2 Q_3 K_2",
+    only_m=3,
+    breaks=("B",),
+)
+def K_tilde_through_H_and_K(o: PaperObjects) -> Pairs:
+    """K~_i through H and the K_i, for m = 3"""
+    six = o.number(6) * o.eps * o.eps
+    K = [o.Kf(o.B(i), o.x) for i in o.each]
+    Q = [o.Q(i, o.x) for i in o.each]
+    for i in o.free:
+        j, k = (other for other in o.each if other != i)
+        right = P_times(o, K[i]) - six * Q[i] * o.H(o.x) + six * Q[j] * K[k] + six * Q[k] * K[j]
+        yield o.integral(o.g_(i), o.x), right
+
+
+@claim(
+    "(107)",
+    "tK thru H K",
+    "K~_i = -6 P_0 K_i - 6 eps^2 sum_j Q_j K_ij, nabla K_ij = B_i B_j nabla H",
+    breaks=("H", "B"),
+    distinct_roots=True,
+)
+def K_tilde_through_H_and_K_for_every_m(o: PaperObjects) -> Pairs:
+    """The general form of K~_i"""
+    six = o.number(6) * o.eps * o.eps
+    for i in o.free:
+        right = P_times(o, o.Kf(o.B(i), o.x))
+        for j in o.each:
+            right = right - six * o.Q(j, o.x) * o.Kf(o.B(i) * o.B(j), o.x)
+        yield o.integral(o.g_(i), o.x), right
+
+
+@claim(
+    "Lemma 17 (108)", "grads PQ", "nabla P_0 = (4-m) eps^2 B_i nabla Q_i", breaks=("H", "B"), distinct_roots=True
+)
+def gradients_of_P_and_Q(o: PaperObjects) -> Pairs:
+    """The gradients of P_0 and Q_i; for m = 3 the factor is eps^2"""
+    v = o.vector("v")
+    left = o.slope(lambda o, x: o.P0(x), o.x, v)
+    reciprocals = o.slope(lambda o, x: o.reciprocals(x), o.x, v) * o.number(1, 4)
+    for i in o.free:
+        right = o.slope(lambda o, x, i=i: o.Q(i, x), o.x, o.B(i).transpose() * v) * o.eps * o.eps
+        yield left, right * o.number(4 - o.m)
+        yield reciprocals, right  # for m = 4 the line above is 0 = 0
+
+
+@claim(
+    "Theorem 15, proof",
+    "",
+    "-nabla H~/6 = P_0 nabla H + H nabla P_0 + eps^2 sum (Q_i nabla K_i + K_i nabla Q_i)",
+    breaks=("H", "B"),
+    distinct_roots=True,
+)
+def gradient_of_H_tilde(o: PaperObjects) -> Pairs:
+    """The gradient of (106)"""
+    v = o.vector("v")
+    left = o.slope(lambda o, x: o.H_tilde(x), o.x, v) * o.number(-1, 6)
+    yield left, _product_rule(o, v)
+
+
+@claim(
+    "Theorem 15, proof",
+    "",
+    "-B_1 nabla H~/6 = P_0 nabla K_1 + eps^2 H nabla Q_1 + eps^2 Q_1 nabla H + K_1 nabla P_0 - ... = -nabla K~_1/6",
+    only_m=3,
+    breaks=("B", "H"),
+)
+def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
+    """The five lines that prove (94), for each i"""
+    v = o.vector("v")
+    squared = o.eps * o.eps
+    Q = [o.Q(i, o.x) for i in o.each]
+    K = [o.Kf(o.B(i), o.x) for i in o.each]
+    dK = [o.dot(v, o.B(i) * o.grad(o.x)) for i in o.each]
+    dQ = [o.slope(lambda o, x, i=i: o.Q(i, x), o.x, v) for i in o.each]
+    dP = o.slope(lambda o, x: o.P0(x), o.x, v)
+    dH = o.dot(v, o.grad(o.x))
+    for i in o.free:
+        j, k = (other for other in o.each if other != i)
+        along = o.B(i).transpose() * v
+        before = o.slope(lambda o, x: o.H_tilde(x), o.x, along) * o.number(-1, 6)
+        yield before, _product_rule(o, along)
+        lines = o.P0(o.x) * dK[i] + squared * o.H(o.x) * dQ[i]
+        lines = lines + squared * Q[i] * dH + K[i] * dP
+        lines = lines - squared * (Q[j] * dK[k] + K[j] * dQ[k])
+        lines = lines - squared * (Q[k] * dK[j] + K[k] * dQ[j])
+        yield before, lines
+        yield lines, o.slope(lambda o, x, i=i: o.integral(o.g_(i), x), o.x, v) * o.number(-1, 6)
+
+
+@claim(
+    "Theorem 15, proof", "", "B_1 nabla K_2 = B_1 B_2 nabla H = -B_3 nabla H = -nabla K_3", only_m=3, breaks=("B",)
+)
+def relations_of_gradients(o: PaperObjects) -> Pairs:
+    """The relations used on the way"""
+    gradient = o.grad(o.x)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        yield o.B(i) * (o.B(j) * gradient), -(o.B(k) * gradient)
+
+
+@claim(
+    "Lemma 16, proof",
+    "",
+    "B_i^T J B_i J = B_i^T B_i^T J^2 = -I, B_i^T J B_j J = B_i^T B_j^T J^2 = B_k^T",
+    only_m=3,
+    breaks=("B", "J"),
+)
+def products_with_J(o: PaperObjects) -> Pairs:
+    """The products of the matrices of the ansatz"""
+    for i in o.free:
+        B = o.B(i).transpose()
+        yield B * o.J * o.B(i) * o.J, B * B * o.J * o.J
+        yield B * B * o.J * o.J, -o.I
+        j, k = (other for other in o.each if other != i)
+        C = o.B(j).transpose()
+        yield B * o.J * o.B(j) * o.J, B * C * o.J * o.J
+        yield B * C * o.J * o.J, o.B(k).transpose()
+
+
+@claim(
+    "Lemma 16, proof",
+    "",
+    "4 x 4 system with entry (2,3) = eps^3 q_3",
+    only_m=3,
+    breaks=(),
+    misprint="the entry (2,3) is eps^2 q_3: the matrix is symmetric and its entries have the same order in eps",
+)
+def linear_system_as_printed(o: PaperObjects) -> Pairs:
+    """The linear system for P_0 and Q_i, as printed"""
+    yield from _linear_system(o, o.eps * o.eps * o.eps)
+
+
+@claim("Lemma 16, proof", "", "4 x 4 system with entry (2,3) = eps^2 q_3", only_m=3, breaks=("B",))
+def linear_system(o: PaperObjects) -> Pairs:
+    """The linear system for P_0 and Q_i, as mended; its solution is unique and gives the inverse of Pi"""
+    yield from _linear_system(o, o.eps * o.eps)
+    matrix, unknown, right = _system_matrix(o, o.eps * o.eps)
+    yield o.K.column(o.solve(matrix, right).entries()), unknown
+
+
+@claim("Lemma 16, proof", "", "determinant of the 4 x 4 system = s_0 s_1 s_2 s_3", only_m=3, breaks=("B",))
+def determinant_of_the_linear_system(o: PaperObjects) -> Pairs:
+    """The factorization of the determinant of the linear system, with s_0 = 1"""
+    matrix, _, _ = _system_matrix(o, o.eps * o.eps)
+    yield o.det(matrix), o.s(0, o.x) * o.s(1, o.x) * o.s(2, o.x)
+
+
+@claim("(109)", "", "det(I - eps f') = s_1 s_2 s_3", breaks=("H", "B"), distinct_roots=True)
+def factorization_of_the_determinant(o: PaperObjects) -> Pairs:
+    """The factorization of the determinant, for every m into m factors"""
+    product = o.K.one
+    for i in o.each:
+        product = product * o.s(i, o.x)
+    yield o.det(o.minus_eps_jac(o.f, o.x)), product
+
+
+@claim(
+    "Lemma 17, proof",
+    "",
+    "nabla P_0 = -(4-m)/4 sum nabla s_i/s_i^2, nabla Q_1 = (nabla s_1/s_1^2 - nabla s_2/s_2^2 - ...)/(4 eps^2)",
+    breaks=("B",),
+    distinct_roots=True,
+)
+def gradients_through_s(o: PaperObjects) -> Pairs:
+    """The gradients of P_0 and Q_i through those of the s_i, which are eigenvalues"""
+    v = o.vector("v")
+    weighted = []
+    for i in o.each:
+        slope = o.slope(lambda o, x, i=i: o.K.one - o.eps * o.eps * o.eigenvalue_of_square(i, x), o.x, v)
+        weighted.append(slope / (o.s(i, o.x) * o.s(i, o.x)))
+    total = o.sum(weighted)
+    yield o.slope(lambda o, x: o.P0(x), o.x, v), total * o.number(o.m - 4, 4)
+    for i in o.free:
+        right = (weighted[i] + weighted[i] - total) / (o.number(4) * o.eps * o.eps)
+        yield o.slope(lambda o, x, i=i: o.Q(i, x), o.x, v), right
+
+
+@claim(
+    "Lemma 17, proof", "", "B_1 nabla s_1 = -nabla s_1, B_1 nabla s_2 = nabla s_2, ...", breaks=("H", "B"), distinct_roots=True
+)
+def signs_of_the_gradients_of_s(o: PaperObjects) -> Pairs:
+    """B_i changes the sign of nabla s_i and keeps the others"""
+    v = o.vector("v")
+    for i in o.free:
+        along = o.B(i).transpose() * v
+        for j in o.each:
+            left = o.slope(lambda o, x, j=j: o.s(j, x), o.x, along)
+            right = o.slope(lambda o, x, j=j: o.s(j, x), o.x, v)
+            yield left, right * o.number(-1 if i == j else 1)
+
+
+def P_times(o: PaperObjects, value: Any) -> Any:
+    """-6 P_0 times a number."""
+    return o.P0(o.x) * value * o.number(-6)
+
+
+def _s0(o: PaperObjects) -> Any:
+    squared = o.eps * o.eps
+    return o.K.one - squared * o.p0(o.x) + squared * o.sum([o.q(i, o.x) for i in o.each])
+
+
+def _product_rule(o: PaperObjects, v: Any) -> Any:
+    """The slope of P_0 H + eps^2 sum Q_i K_i along v, by the product rule."""
+    value = o.P0(o.x) * o.dot(v, o.grad(o.x)) + o.H(o.x) * o.slope(lambda o, x: o.P0(x), o.x, v)
+    for i in o.each:
+        inner = o.Q(i, o.x) * o.dot(v, o.B(i) * o.grad(o.x))
+        inner = inner + o.Kf(o.B(i), o.x) * o.slope(lambda o, x, i=i: o.Q(i, x), o.x, v)
+        value = value + o.eps * o.eps * inner
+    return value
+
+
+def _system_matrix(o: PaperObjects, entry: Any) -> tuple[Any, Any, Any]:
+    """The matrix of the 4 x 4 system with the factor `entry` of q_3 in place (2,3), the unknowns, the right side."""
+    e = o.eps * o.eps
+    q1, q2, q3 = (o.q(i, o.x) for i in o.each)
+    d = o.K.one - e * o.p0(o.x)
+    rows = [
+        [d, e * q1, e * q2, e * q3],
+        [e * q1, d, entry * q3, e * q2],
+        [e * q2, e * q3, d, e * q1],
+        [e * q3, e * q2, e * q1, d],
+    ]
+    unknown = o.K.column([-o.P0(o.x), *(e * o.Q(i, o.x) for i in o.each)])
+    right = o.K.column([-o.K.one, o.K.zero, o.K.zero, o.K.zero])
+    return o.K.matrix(4, 4, [value for row in rows for value in row]), unknown, right
+
+
+def _linear_system(o: PaperObjects, entry: Any) -> Pairs:
+    matrix, unknown, right = _system_matrix(o, entry)
+    yield matrix * unknown, right

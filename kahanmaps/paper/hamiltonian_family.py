@@ -1,0 +1,186 @@
+"""Section 3: skew-Hamiltonian A, the cubics that belong to it, and their involution."""
+
+from __future__ import annotations
+
+from math import comb
+
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import Kind, Pairs, claim
+
+
+@claim(
+    "Sect. 3",
+    "",
+    "{x1,x3} = {x2,x4} = {x3,x6} = 1",
+    only_m=3,
+    breaks=(),
+    symplectic=False,
+    misprint="the indices belong to different dimensions; with J of (13) it is {x1,x4} = {x2,x5} = {x3,x6} = 1",
+)
+def brackets_as_printed(o: PaperObjects) -> Pairs:
+    """The brackets of the coordinate functions, as printed"""
+    for i, j in ((0, 2), (1, 3), (2, 5)):
+        yield o.dot(o.unit(i), o.J * o.unit(j)), o.K.one
+
+
+@claim("Sect. 3", "", "{x_i, x_{m+i}} = 1, all others 0", breaks=("J",), symplectic=False)
+def brackets(o: PaperObjects) -> Pairs:
+    """The brackets of the coordinate functions, as mended: {x1,x4} = {x2,x5} = {x3,x6} = 1 for m = 3"""
+    for i in range(o.n):
+        for j in range(o.n):
+            expected = 1 if j == i + o.m else -1 if i == j + o.m else 0
+            yield o.dot(o.unit(i), o.J * o.unit(j)), o.number(expected)
+
+
+@claim("(13)", "Ham", "x_i' = dH/dx_{m+i}, x_{m+i}' = -dH/dx_i", breaks=("f", "J"))
+def equations_of_motion(o: PaperObjects) -> Pairs:
+    """The Hamiltonian system is x' = J nabla H_0"""
+    gradient = o.gradient(lambda o, x: o.H(x), o.x)
+    for i in range(o.m):
+        yield o.fx[i, 0], gradient[o.m + i, 0]
+        yield o.fx[o.m + i, 0], -gradient[i, 0]
+
+
+@claim("(14), (15)", "grad K", "nabla H_1 = A nabla H_0, nabla H_2 = A nabla H_1", least_m=2, pairwise=True, breaks=("H",))
+def gradients_of_the_chain(o: PaperObjects) -> Pairs:
+    """The chain starts with H_1 and, for m > 2, H_2"""
+    v = o.vector("v")
+    for i in range(1, min(o.m, 3)):
+        yield o.slope(lambda o, x, i=i: o.H(x, i), o.x, v), o.dot(v, o.A * o.grad(o.x, i - 1))
+
+
+@claim("Prop. 1 (16)", "cond A", "A^T J = J A", breaks=("A", "J"), blockwise=True)
+def skew_hamiltonian(o: PaperObjects) -> Pairs:
+    """A is skew-Hamiltonian"""
+    yield o.AT * o.J, o.J * o.A
+
+
+@claim("Prop. 1", "", "{H_i, H_j} = 0", least_m=2, breaks=("A", "J"))
+def involution(o: PaperObjects) -> Pairs:
+    """H_0, ..., H_{m-1} are pairwise in involution"""
+    for i in range(o.m):
+        for j in range(i):
+            yield o.dot(o.grad(o.x, i), o.J * o.grad(o.x, j)), o.K.zero
+
+
+@claim("Prop. 1, proof", "", "JA skew;  (A^T)^2 J = A^T J A = J A^2", breaks=("A", "J"), blockwise=True)
+def reasons_for_involution(o: PaperObjects) -> Pairs:
+    """J A is skew-symmetric, and A^2 satisfies the condition on A as well"""
+    JA = o.J * o.A
+    yield JA.transpose(), -JA
+    yield o.AT * o.AT * o.J, o.AT * o.J * o.A
+    yield o.AT * o.J * o.A, o.J * o.A * o.A
+
+
+@claim(
+    "Prop. 1, proof",
+    "",
+    "A non-scalar => nabla H_0, nabla H_1, nabla H_2 independent",
+    only_m=3,
+    kind=Kind.ATTAINED,
+    breaks=(),
+    distinct_roots=True,
+    misprint="a non-scalar A may have a minimal polynomial of degree 2 (here A := B_1), and then H_2 is a combination "
+    "of H_0 and H_1; what is needed is a minimal polynomial of degree 3",
+)
+def independence_for_non_scalar_A(o: PaperObjects) -> Pairs:
+    """A non-scalar A ensures that the gradients are independent, generically"""
+    B = o.B(0)
+    yield o.rank(o.columns([o.grad(o.x), B * o.grad(o.x), B * (B * o.grad(o.x))])), 3
+
+
+@claim(
+    "Prop. 1, proof",
+    "",
+    "minimal polynomial of degree m => nabla H_i independent",
+    kind=Kind.ATTAINED,
+    breaks=("repeated", "H0"),
+    distinct_roots=True,
+)
+def independence_for_cyclic_A(o: PaperObjects) -> Pairs:
+    """The gradients are independent, generically, if the minimal polynomial of A has degree m"""
+    powers = [o.A_to(i).entries() for i in range(o.m)]
+    yield o.rank(o.K.matrix(o.m, o.n * o.n, [entry for power in powers for entry in power])), o.m
+    yield o.rank(o.columns([o.grad(o.x, i) for i in range(o.m)])), o.m
+
+
+@claim("(17)", "cond2", "A_1^T = A_4, A_2^T = -A_2, A_3^T = -A_3", breaks=("A",), symplectic=False)
+def blocks(o: PaperObjects) -> Pairs:
+    """The block form of a skew-Hamiltonian matrix"""
+    m = o.m
+    for i in range(m):
+        for j in range(m):
+            yield o.A[j, i], o.A[m + i, m + j]
+            yield o.A[j, m + i], -o.A[i, m + j]
+            yield o.A[m + j, i], -o.A[m + i, j]
+
+
+@claim("(18)", "A elem", "A with entries a_1, ..., a_15", only_m=3, breaks=("A",), symplectic=False)
+def matrix_written_out(o: PaperObjects) -> Pairs:
+    """The 15 parameters of A where the paper writes them"""
+    A, zero = o.A, o.K.zero
+    a = [zero, *(A[i, j] for i in range(3) for j in range(3))]
+    a += [-A[0, 4], -A[0, 5], -A[1, 5], A[3, 1], A[3, 2], A[4, 2]]
+    written = [
+        [a[1], a[2], a[3], zero, -a[10], -a[11]],
+        [a[4], a[5], a[6], a[10], zero, -a[12]],
+        [a[7], a[8], a[9], a[11], a[12], zero],
+        [zero, a[13], a[14], a[1], a[4], a[7]],
+        [-a[13], zero, a[15], a[2], a[5], a[8]],
+        [-a[14], -a[15], zero, a[3], a[6], a[9]],
+    ]
+    yield A, o.K.matrix(6, 6, [entry for row in written for entry in row])
+
+
+@claim("(19)", "d2H", "A nabla^2 H_i = nabla^2 H_i A^T, i = 0..m-1", breaks=("H", "A"), blockwise=True)
+def solvability(o: PaperObjects) -> Pairs:
+    """The condition for solvability holds for H_0 and is passed on to every H_i"""
+    for i in range(o.m):
+        yield o.A * o.hess(o.x, i), o.hess(o.x, i) * o.AT
+
+
+@claim("Sect. 3", "", "A^{-1} nabla^2 H_1 = nabla^2 H_1 (A^{-1})^T", least_m=2, breaks=("H",))
+def solvability_backwards(o: PaperObjects) -> Pairs:
+    """The condition for H_1 with A replaced by its inverse (A non-degenerate)"""
+    if not o.K.is_zero(o.det(o.A)):
+        inverse = o.inverse(o.A)
+        yield inverse * o.hess(o.x, 1), o.hess(o.x, 1) * inverse.transpose()
+        yield o.grad(o.x), inverse * o.grad(o.x, 1)
+
+
+@claim(
+    "Prop. 2, proof",
+    "",
+    "A X = X A^T: 2m(m-1) independent equations of m(2m-1)",
+    kind=Kind.ATTAINED,
+    breaks=("repeated", "A"),
+    distinct_roots=True,
+)
+def independent_equations(o: PaperObjects) -> Pairs:
+    """Of the m(2m-1) scalar equations C_i = 0 only 2m(m-1) are independent: 12 of 15 for m = 3"""
+    n = o.n
+    columns = []
+    for a in range(n):
+        for b in range(a, n):
+            X = o.K.matrix(n, n, [o.K.one if (i, j) in ((a, b), (b, a)) else o.K.zero for i in range(n) for j in range(n)])
+            C = o.A * X - X * o.AT
+            columns.append([C[i, j] for i in range(n) for j in range(i + 1, n)])
+    rank = o.rank(o.K.matrix(len(columns), len(columns[0]), [entry for column in columns for entry in column]))
+    yield len(columns[0]), o.m * (2 * o.m - 1)
+    yield rank, 2 * o.m * (o.m - 1)
+
+
+@claim(
+    "Prop. 2",
+    "",
+    "dim of the cubics = 4m, rank of the system C(2m+2,3) - 4m",
+    kind=Kind.ATTAINED,
+    breaks=("repeated", "A"),
+    distinct_roots=True,
+)
+def dimension_of_the_cubics(o: PaperObjects) -> Pairs:
+    """The cubics of A form a space of dimension 4m: 12 = 56 - 44 for m = 3"""
+    unknowns = comb(o.n + 2, 3)
+    rank = o.rank_of_cubic_equations()
+    yield unknowns - rank, 4 * o.m
+    yield rank, unknowns - 4 * o.m

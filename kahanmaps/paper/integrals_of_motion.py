@@ -1,0 +1,262 @@
+"""Section 7: the integrals H~ and K~, shared by all maps of a class. x~ = Phi_f(x), x^ = Phi_g(x), g = B^T f."""
+
+from __future__ import annotations
+
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import Kind, Pairs, claim
+
+
+@claim("Theorem 11", "th integrals", "H~(x~) = H~(x), H~(x^) = H~(x)", breaks=("B", "inhomogeneous"), blockwise=True)
+def H_tilde_is_shared(o: PaperObjects) -> Pairs:
+    """H~ is an integral of all maps of the class"""
+    yield o.H_tilde(o.x_tilde), o.H_tilde(o.x)
+    for B in o.associates():
+        yield o.H_tilde(o.step(o.g(B), o.x)), o.H_tilde(o.x)
+
+
+@claim("Theorem 11", "th integrals", "K~(x~) = K~(x), K~(x^) = K~(x)", breaks=("B", "H"), blockwise=True)
+def K_tilde_is_shared(o: PaperObjects) -> Pairs:
+    """Every K~ is an integral of f and of every single-index g_i: the class shares m independent ones"""
+    images = [o.x_tilde, *(o.step(o.g_(i), o.x) for i in o.each)]
+    for B in o.associates():
+        for image in images:
+            yield o.integral(o.g(B), image), o.integral(o.g(B), o.x)
+
+
+@claim(
+    "Theorem 11",
+    "th integrals",
+    "rank(nabla H~, nabla K~_1, ..., nabla K~_m) = m",
+    kind=Kind.ATTAINED,
+    breaks=("H0",),
+    distinct_roots=True,
+)
+def shared_integrals_are_independent(o: PaperObjects) -> Pairs:
+    """Two integrals of a pair f, g are independent; the class has exactly m independent ones"""
+    gradients = [o.gradient(lambda o, x: o.H_tilde(x), o.x)]
+    gradients += [o.gradient(lambda o, x, i=i: o.integral(o.g_(i), x), o.x) for i in o.each]
+    if o.m > 1:
+        for gradient in gradients[1:]:
+            yield o.rank(o.columns([gradients[0], gradient])), 2
+    yield o.rank(o.columns(gradients)), o.m
+
+
+@claim(
+    "(61), (62)",
+    "tH",
+    "H~ = eps^{-1} x^T J x~ = eps^{-1} x^T J (I - eps f')^{-1} x",
+    breaks=("eps", "inhomogeneous"),
+    blockwise=True,
+)
+def two_forms_of_H_tilde(o: PaperObjects) -> Pairs:
+    """H~ and K~ through the image and through the inverse matrix"""
+    yield o.H_tilde(o.x), o.dot(o.x, o.J * o.solve(o.minus_eps_jac(o.f, o.x), o.x)) / o.eps
+    for B in o.associates():
+        g = o.g(B)
+        yield o.integral(g, o.x), o.dot(o.x, o.J * o.solve(o.minus_eps_jac(g, o.x), o.x)) / o.eps
+
+
+@claim(
+    "Sect. 7",
+    "",
+    "J f'^k = -(nabla^2 H J ... J nabla^2 H), symmetric for odd k, skew for even k",
+    breaks=("f", "J"),
+)
+def terms_of_the_series(o: PaperObjects) -> Pairs:
+    """The matrices in the series of H~; so the terms with even k vanish"""
+    hessian = o.hess(o.x)
+    word, power = hessian, o.df
+    for k in range(1, 2 * o.order + 1):
+        yield o.J * power, -word
+        yield word.transpose(), word if k % 2 else -word
+        if k % 2 == 0:
+            yield o.dot(o.x, o.J * (power * o.x)), o.K.zero
+        word, power = word * o.J * hessian, power * o.df
+
+
+@claim(
+    "Sect. 7",
+    "",
+    "H~ = sum_{k<N} eps^{2k} x^T J f'^{2k+1} x + O(eps^{2N})",
+    breaks=("eps", "f", "inhomogeneous"),
+    blockwise=True,
+)
+def series_of_the_integrals(o: PaperObjects) -> Pairs:
+    """The series of H~ and K~ to every order up to the one asked for, with the exact remainder"""
+    for g in [o.f, *(o.g_(i) for i in o.each)]:
+        jacobian = o.jac(g, o.x)
+        square, squared_eps = jacobian * jacobian, o.eps * o.eps
+        vector, factor, total = jacobian * o.x, o.K.one, o.K.zero
+        for _ in range(o.order):
+            total = total + o.dot(o.x, o.J * vector) * factor
+            vector, factor = square * vector, factor * squared_eps
+            remainder = o.dot(o.x, o.J * o.solve(o.one_minus_square(g, o.x), vector)) * factor
+            yield o.integral(g, o.x), total + remainder
+
+
+@claim(
+    "(63), (64)",
+    "tH alt",
+    "H~ = x^T J (I - eps^2 f'^2)^{-1} f' x = 2 x^T J (I - eps^2 f'^2)^{-1} f",
+    breaks=("f", "eps", "inhomogeneous"),
+    blockwise=True,
+)
+def even_forms_of_the_integrals(o: PaperObjects) -> Pairs:
+    """H~ and K~ as even functions of eps"""
+    for g in [o.f, *(o.g(B) for B in o.associates())]:
+        square = o.one_minus_square(g, o.x)
+        middle = o.dot(o.x, o.J * o.solve(square, o.jac(g, o.x) * o.x))
+        yield o.integral(g, o.x), middle
+        yield middle, o.dot(o.x, o.J * o.solve(square, o.value(g, o.x))) * o.number(2)
+
+
+@claim(
+    "Sect. 7",
+    "",
+    "2 x^T J f = -2 x^T nabla H = -6 H, the same for K",
+    breaks=("f", "inhomogeneous"),
+    blockwise=True,
+)
+def leading_terms(o: PaperObjects) -> Pairs:
+    """The leading terms of H~ and K~"""
+    yield o.dot(o.x, o.J * o.fx) * o.number(2), o.dot(o.x, o.grad(o.x)) * o.number(-2)
+    yield o.dot(o.x, o.grad(o.x)) * o.number(-2), o.H(o.x) * o.number(-6)
+    for B in o.associates():
+        yield o.dot(o.x, o.J * o.value(o.g(B), o.x)) * o.number(2), o.Kf(B, o.x) * o.number(-6)
+
+
+@claim(
+    "(65)",
+    "",
+    "H~(x~) = eps^{-1} x^T J (I - eps f'(x~)) (I - eps f'(x~))^{-1} (I - eps f'(x))^{-1} x",
+    breaks=("f", "eps", "inhomogeneous"),
+    blockwise=True,
+)
+def H_tilde_at_the_image(o: PaperObjects) -> Pairs:
+    """The computation of H~(x~)"""
+    start = o.solve(o.minus_eps_jac(o.f, o.x), o.x)
+    after = o.solve(o.minus_eps_jac(o.f, o.x_tilde), start)
+    steps = [
+        o.H_tilde(o.x_tilde),
+        o.dot(o.x_tilde, o.J * o.solve(o.minus_eps_jac(o.f, o.x_tilde), o.x_tilde)) / o.eps,
+        o.dot(o.x, o.plus_eps_jac(o.f, o.x_tilde).transpose() * (o.J * after)) / o.eps,
+        o.dot(o.x, o.J * (o.minus_eps_jac(o.f, o.x_tilde) * after)) / o.eps,
+        o.H_tilde(o.x),
+    ]
+    yield from zip(steps, steps[1:], strict=False)
+
+
+@claim("(66)", "aux3", "K~(x~) = x^T J g'(x~) x", breaks=("B", "H", "inhomogeneous"), blockwise=True)
+def K_tilde_at_the_image(o: PaperObjects) -> Pairs:
+    """The computation of K~(x~)"""
+    for B in o.associates():
+        g = o.g(B)
+        inner = o.solve(o.one_minus_square(g, o.x_tilde), o.jac(g, o.x_tilde) * o.x_tilde)
+        steps = [
+            o.integral(g, o.x_tilde),
+            o.dot(o.x_tilde, o.J * inner),
+            o.dot(o.x, o.plus_eps_jac(o.f, o.x_tilde).transpose() * (o.J * inner)),
+            o.dot(o.x, o.J * (o.minus_eps_jac(o.f, o.x_tilde) * inner)),
+            o.dot(o.x, o.J * (o.jac(g, o.x_tilde) * o.x)),
+        ]
+        yield from zip(steps, steps[1:], strict=False)
+
+
+@claim(
+    "(67)",
+    "aux4",
+    "g'(x~) = g'(x) + 2 eps g'' (I - eps^2 f'^2)^{-1} (I + eps f') f",
+    breaks=("eps", "map"),
+    blockwise=True,
+)
+def jacobian_of_g_at_the_image(o: PaperObjects) -> Pairs:
+    """g'(x~) through f at x"""
+    increment = o.solve(o.one_minus_square(o.f, o.x), o.plus_eps_jac(o.f, o.x) * o.fx) * (o.number(2) * o.eps)
+    for B in o.associates():
+        g = o.g(B)
+        yield o.jac(g, o.x_tilde), o.jac(g, o.x) + o.second(g, o.x_tilde - o.x)
+        yield o.jac(g, o.x_tilde), o.jac(g, o.x) + o.second(g, increment)
+
+
+@claim(
+    "(68)",
+    "aux5",
+    "x^T J (g'' (I - eps^2 f'^2)^{-1} f) x = 0, through -2 nabla H^T (B^T (..)^{-1} J) nabla H",
+    breaks=("A", "f"),
+    blockwise=True,
+)
+def odd_terms_vanish(o: PaperObjects) -> Pairs:
+    """The odd terms in eps vanish: a skew-symmetric matrix between equal vectors"""
+    square = o.one_minus_square(o.f, o.x)
+    inner = o.solve(square, o.fx)
+    gradient = o.grad(o.x)
+    for B in o.associates():
+        g = o.g(B)
+        skew = B.transpose() * o.solve(square, o.J)
+        steps = [
+            o.dot(o.x, o.J * (o.second(g, inner) * o.x)),
+            o.dot(o.x, o.J * (o.jac(g, o.x) * inner)),
+            -o.dot(o.x, B * o.hess(o.x) * inner),
+            o.dot(B * gradient, inner) * o.number(-2),
+            o.dot(gradient, skew * gradient) * o.number(-2),
+            o.K.zero,
+        ]
+        yield from zip(steps, steps[1:], strict=False)
+        yield skew.transpose(), -skew
+
+
+@claim("(69)", "aux7", "(g'' v) x = g'(x) v", breaks=("inhomogeneous",), blockwise=True)
+def second_derivative_along_x(o: PaperObjects) -> Pairs:
+    """Homogeneity of g', for any vector v"""
+    v = o.vector("v")
+    for g in [o.f, *(o.g(B) for B in o.associates())]:
+        yield o.second(g, v) * o.x, o.jac(g, o.x) * v
+
+
+@claim(
+    "Theorem 11, proof",
+    "",
+    "K~(x~) = x^T J g' x + 2 eps^2 g'' (I - eps^2 f'^2)^{-1} f' f x",
+    breaks=(),
+    misprint="the second term is a vector, the first a number: x^T J is missing before g''. Read as a number by its "
+    "first component it fails",
+)
+def even_terms_as_printed(o: PaperObjects) -> Pairs:
+    """The even terms of K~(x~), as printed"""
+    inner = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
+    for B in o.associates():
+        g = o.g(B)
+        second = (o.second(g, inner) * o.x)[0, 0] * (o.number(2) * o.eps * o.eps)
+        yield o.integral(g, o.x_tilde), o.dot(o.x, o.J * (o.jac(g, o.x) * o.x)) + second
+
+
+@claim(
+    "Theorem 11, proof",
+    "",
+    "K~(x~) = x^T J g' x + 2 eps^2 x^T J g'' (I - eps^2 f'^2)^{-1} f' f x = ... = K~(x)",
+    breaks=("B", "H", "eps"),
+    blockwise=True,
+)
+def even_terms(o: PaperObjects) -> Pairs:
+    """The even terms, as mended, and the four lines that end the proof"""
+    inner = o.solve(o.one_minus_square(o.f, o.x), o.df * o.fx)
+    twice = o.number(2) * o.eps * o.eps
+    for B in o.associates():
+        g = o.g(B)
+        gx, dg, square = o.value(g, o.x), o.jac(g, o.x), o.one_minus_square(g, o.x)
+        inner_g = o.solve(square, dg * gx)
+        steps = [
+            o.integral(g, o.x_tilde),
+            o.dot(o.x, o.J * (dg * o.x)) + o.dot(o.x, o.J * (o.second(g, inner) * o.x)) * twice,
+            o.dot(o.x, o.J * (dg * o.x)) + o.dot(o.x, o.J * (o.second(g, inner_g) * o.x)) * twice,
+            o.dot(o.x, o.J * gx) * o.number(2) + o.dot(o.x, o.J * (dg * inner_g)) * twice,
+            o.dot(o.x, o.J * o.solve(square, gx)) * o.number(2),
+            o.integral(g, o.x),
+        ]
+        yield from zip(steps, steps[1:], strict=False)
+
+
+@claim("Sect. 7", "", "sum K~_i = (m-2) H~", breaks=("B", "H"), distinct_roots=True)
+def sum_of_the_integrals(o: PaperObjects) -> Pairs:
+    """The sum rule; for m = 3 the sum of the three K~_i is H~"""
+    yield o.sum([o.integral(o.g_(i), o.x) for i in o.each]), o.H_tilde(o.x) * o.number(o.m - 2)

@@ -1,0 +1,142 @@
+"""Abstract and Section 1: what the paper promises, each promise in the form in which it can be tested."""
+
+from __future__ import annotations
+
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import Kind, Pairs, claim
+
+
+@claim("(1)", "skew", "dim { A : A^T J = J A } = m(2m-1)", kind=Kind.ATTAINED, breaks=("J",), symplectic=False)
+def dimension_of_skew_hamiltonian_matrices(o: PaperObjects) -> Pairs:
+    """Skew-Hamiltonian matrices form a space of dimension m(2m-1)"""
+    n = o.n
+    columns = []
+    for k in range(n * n):
+        E = o.K.matrix(n, n, [o.K.one if k == j else o.K.zero for j in range(n * n)])
+        columns.append((E.transpose() * o.J - o.J * E).entries())
+    rank = o.rank(o.K.matrix(n * n, n * n, [entry for column in columns for entry in column]))
+    yield n * n - rank, o.m * (2 * o.m - 1)
+    yield o.is_standard(o.J), True
+
+
+@claim("(2)", "harm", "A nabla^2 H = nabla^2 H A^T", breaks=("H", "A"), blockwise=True)
+def matrix_differential_equation(o: PaperObjects) -> Pairs:
+    """H satisfies the system of second order linear PDEs of A"""
+    yield o.A * o.hess(o.x), o.hess(o.x) * o.AT
+
+
+@claim("(3)", "CR", "nabla H_i = A nabla H_{i-1}, i = 1..m-1", least_m=2, pairwise=True, breaks=("H",))
+def chain_of_gradients(o: PaperObjects) -> Pairs:
+    """H_0, ..., H_{m-1} form a chain of gradients"""
+    v = o.vector("v")
+    for i in range(1, o.m):
+        yield o.slope(lambda o, x, i=i: o.H(x, i), o.x, v), o.dot(v, o.A * o.grad(o.x, i - 1))
+
+
+@claim(
+    "Sect. 1", "", "rank(nabla H_0, ..., nabla H_{m-1}) = m", kind=Kind.ATTAINED, breaks=("repeated", "H0"), distinct_roots=True
+)
+def hamiltonians_are_independent(o: PaperObjects) -> Pairs:
+    """H_0, ..., H_{m-1} are functionally independent"""
+    yield o.rank(o.columns([o.grad(o.x, i) for i in range(o.m)])), o.m
+
+
+@claim(
+    "Sect. 1",
+    "",
+    "H~_i = eps^{-1} x^T J (A^T)^i x~ is conserved",
+    breaks=("H", "f", "inhomogeneous"),
+    blockwise=True,
+)
+def perturbed_hamiltonians_are_conserved(o: PaperObjects) -> Pairs:
+    """The map of f_0 has integrals H~_0, ..., H~_{m-1}, perturbations of the H_i"""
+    for i in range(o.m):
+        yield o.H_tilde_(i, o.x_tilde), o.H_tilde_(i, o.x)
+
+
+@claim("Sect. 1", "", "H~_i = -6 H_i + O(eps^2)", breaks=("eps", "inhomogeneous"), blockwise=True)
+def perturbed_hamiltonians_tend_to_the_hamiltonians(o: PaperObjects) -> Pairs:
+    """H~_i is a perturbation of -6 H_i: their difference is eps^2 times a function regular at eps = 0"""
+    for i in range(o.m):
+        rest = o.solve(o.one_minus_square(o.f, o.x), o.df * (o.df * o.fx))
+        remainder = o.dot(o.x, o.J * (o.power(o.AT, i) * rest)) * o.number(2)
+        yield o.H_tilde_(i, o.x), o.H(o.x, i) * o.number(-6) + remainder * (o.eps * o.eps)
+
+
+@claim("Sect. 1", "", "nabla H~_i = A nabla H~_{i-1}", least_m=2, pairwise=True, breaks=("H", "A"))
+def chain_of_perturbed_gradients(o: PaperObjects) -> Pairs:
+    """The integrals H~_i are related by the same equation as the H_i"""
+    v = o.vector("v")
+    for i in range(1, o.m):
+        left = o.slope(lambda o, x, i=i: o.H_tilde_(i, x), o.x, v)
+        yield left, o.slope(lambda o, x, i=i: o.H_tilde_(i - 1, x), o.x, o.AT * v)
+
+
+@claim("Sect. 1", "", "A nabla^2 H~_i = nabla^2 H~_i A^T", pairwise=True, breaks=("H", "A"))
+def matrix_differential_equation_of_perturbed_hamiltonians(o: PaperObjects) -> Pairs:
+    """The integrals H~_i satisfy the same second order differential equations as the H_i"""
+    v, w = o.vector("v"), o.vector("w")
+    for i in range(o.m):
+        left = o.second_slope(lambda o, x, i=i: o.H_tilde_(i, x), o.x, o.AT * v, w)
+        yield left, o.second_slope(lambda o, x, i=i: o.H_tilde_(i, x), o.x, v, o.AT * w)
+
+
+@claim("Sect. 1", "", "rank(nabla H~_0, ..., nabla H~_{m-1}) = m", kind=Kind.ATTAINED, breaks=("repeated", "H0"))
+def perturbed_hamiltonians_are_independent(o: PaperObjects) -> Pairs:
+    """The map possesses m functionally independent integrals"""
+    yield o.rank(o.columns([o.gradient(lambda o, x, i=i: o.H_tilde_(i, x), o.x) for i in range(o.m)])), o.m
+
+
+@claim("Sect. 1", "", "Phi_{f_0} o Phi_{f_1} != Phi_{f_1} o Phi_{f_0}", kind=Kind.DIFFERENT, least_m=2, breaks=("A=B",))
+def maps_of_the_chain_do_not_commute(o: PaperObjects) -> Pairs:
+    """In general the maps of J nabla H_0 and J nabla H_1 do not commute"""
+    f, g = o.f, o.f_(1)
+    yield o.step(g, o.step(f, o.x)), o.step(f, o.step(g, o.x))
+
+
+@claim("Sect. 1", "", "JB nabla H_0 = B^T J nabla H_0", least_m=2, breaks=("J", "A"), blockwise=True)
+def combination_of_the_vector_fields(o: PaperObjects) -> Pairs:
+    """A linear combination of the J nabla H_i is J B nabla H_0 = B^T J nabla H_0 with B a polynomial in A"""
+    for B in o.associates():
+        yield o.J * (B * o.grad(o.x)), B.transpose() * (o.J * o.grad(o.x))
+
+
+@claim("Sect. 1", "", "B(lambda_i)^2 = 1 for all i  <=>  B^2 = I", breaks=("B",), distinct_roots=True)
+def signs_at_the_eigenvalues(o: PaperObjects) -> Pairs:
+    """B^2 = I says that B(lambda) sends each eigenvalue of A to 1 or -1"""
+    for signs in o.all_signs():
+        B = o.B_signs(signs)
+        yield B * B, o.I
+        for i in o.each:
+            # B(A) = B(lambda_i) on the eigenspace of lambda_i, which is the image of prod_{j != i} (A - lambda_j).
+            onto = o.I
+            for j in o.each:
+                if j != i:
+                    onto = onto * (o.A - o.I * o.lam[j])
+            yield B * onto, onto * o.number(signs[i])
+
+
+@claim("Sect. 1", "", "#{ J B_s nabla H_0 } = 2^{m-1} up to sign", kind=Kind.DIFFERENT, breaks=("B=I",), least_m=2)
+def associated_fields_are_pairwise_different(o: PaperObjects) -> Pairs:
+    """The class of J nabla H_0 consists of 2^{m-1} vector fields, up to sign"""
+    values = [o.fx, *(o.value(o.g(B), o.x) for B in o.associates())]
+    for k, first in enumerate(values):
+        for second in values[:k]:
+            yield first, second
+            yield first, -second
+
+
+@claim("Sect. 1", "", "rank { J B_s nabla H_0 } = m", kind=Kind.ATTAINED, breaks=("B=I",), least_m=3, distinct_roots=True)
+def independent_associated_fields(o: PaperObjects) -> Pairs:
+    """If m > 2, the class contains m linearly independent vector fields"""
+    yield o.rank(o.columns([o.fx, *(o.value(o.g(B), o.x) for B in o.associates())])), o.m
+
+
+@claim("Abstract", "", "{K~_i, K~_j} = 0 for the bracket of Pi", pairwise=True, breaks=("H", "J"))
+def integrals_are_in_involution(o: PaperObjects) -> Pairs:
+    """The integrals are in involution with respect to the invariant symplectic structure"""
+    gradients = [o.gradient(lambda o, x: o.H_tilde(x), o.x)]
+    gradients += [o.gradient(lambda o, x, i=i: o.integral(o.g_(i), x), o.x) for i in o.each]
+    for k, first in enumerate(gradients):
+        for second in gradients[:k]:
+            yield o.dot(first, o.Pi(o.x) * second), o.K.zero

@@ -1,0 +1,339 @@
+"""Section 8: the Poisson tensor Pi = J - eps^2 f'^2 J, invariant under all maps of a class.
+
+For every m: f'^2 = sum_k pi_k (A^T)^k with pi_k = delta_k0 p_0 + sum_i (coefficient k of B_i) q_i; for m = 3 these are
+the paper's p, q, r. Horner's polynomials C_k of chi stand for its matrices C_1 and C_2.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import Any
+
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import Kind, Pairs, claim
+
+
+@claim("Theorem 12 (70)", "Pi short", "Pi = J - eps^2 f'^2 J, skew", breaks=("f",), blockwise=True)
+def tensor(o: PaperObjects) -> Pairs:
+    """The tensor is skew-symmetric"""
+    Pi = o.Pi(o.x)
+    yield Pi, o.one_minus_square(o.f, o.x) * o.J
+    yield Pi.transpose(), -Pi
+
+
+@claim(
+    "Theorem 12 (71)", "Pi long", "Pi = (1 - eps^2 p_0) J - eps^2 sum q_i B_i^T J", breaks=("H", "B"), distinct_roots=True
+)
+def tensor_by_B(o: PaperObjects) -> Pairs:
+    """The tensor through the B_i"""
+    yield o.Pi(o.x), _long_form(o, o.x)
+
+
+@claim(
+    "Theorem 12 (72)",
+    "Pi medium",
+    "Pi = (1 - eps^2 p) J - eps^2 q A^T J - eps^2 r (A^T)^2 J",
+    breaks=("H", "B"),
+    distinct_roots=True,
+)
+def tensor_by_A(o: PaperObjects) -> Pairs:
+    """The tensor through the powers of A; for m = 3 with p, q, r"""
+    right = o.J
+    for k in range(o.m):
+        right = right - o.A_to(k).transpose() * o.J * (o.eps * o.eps * o.coefficient_of_power(k, o.x))
+    yield o.Pi(o.x), right
+
+
+@claim("(73)-(75)", "p", "p = p_0 + sum alpha_i q_i, q = sum beta_i q_i, r = sum gamma_i q_i", breaks=("H", "B"))
+def coefficients_of_the_powers(o: PaperObjects) -> Pairs:
+    """p, q, r (for every m) are the coefficients of f'^2 in powers of A^T"""
+    total = o.zeros(o.n, o.n)
+    for k in range(o.m):
+        total = total + o.A_to(k).transpose() * o.coefficient_of_power(k, o.x)
+    yield o.df * o.df, total
+
+
+@claim("Theorem 12 (76)", "Pois prop", "dPhi Pi(x) dPhi^T = Pi(x~)", breaks=("H", "map"), blockwise=True)
+def poisson_map(o: PaperObjects) -> Pairs:
+    """The map of f is Poisson"""
+    jacobian = o.jacobian_of_step(o.f, o.x)
+    yield jacobian * o.Pi(o.x) * jacobian.transpose(), o.Pi(o.x_tilde)
+
+
+@claim("Theorem 12", "th Poisson", "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", breaks=("B", "H"), blockwise=True)
+def poisson_map_of_g(o: PaperObjects) -> Pairs:
+    """The maps of all associated fields are Poisson with respect to the same bracket"""
+    for B in o.associates():
+        jacobian = o.jacobian_of_step(o.g(B), o.x)
+        yield jacobian * o.Pi(o.x) * jacobian.transpose(), o.Pi(o.step(o.g(B), o.x))
+
+
+@claim(
+    "Theorem 12, proof",
+    "",
+    "(I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T = (I - eps f'(x)) Pi(x~) (I - eps f'(x))^T",
+    breaks=("H", "f"),
+    blockwise=True,
+)
+def poisson_property_without_inverses(o: PaperObjects) -> Pairs:
+    """The property (76) without inverses, then multiplied by J. It holds for any two points, not only for x and x~"""
+    plus, minus = o.plus_eps_jac(o.f, o.x_tilde), o.minus_eps_jac(o.f, o.x)
+    before, after = o.Pi(o.x), o.Pi(o.x_tilde)
+    yield plus * before * plus.transpose(), minus * after * minus.transpose()
+    left = plus * before * o.J * o.minus_eps_jac(o.f, o.x_tilde)
+    yield left, minus * after * o.J * o.plus_eps_jac(o.f, o.x)
+
+
+@claim("Theorem 12, proof", "", "Pi(x) J commutes with f'(y) at any point y", breaks=("H", "f"), blockwise=True)
+def tensor_commutes_with_jacobians(o: PaperObjects) -> Pairs:
+    """Pi J is a polynomial in A^T and so commutes with f' at any point"""
+    left, right = o.Pi(o.x) * o.J, o.jac(o.f, o.vector("y"))
+    yield left * right, right * left
+
+
+@claim(
+    "Theorem 12, proof",
+    "",
+    "(I - eps f'(x~)^2) Pi(x) J = Pi(x~) J (I - eps f'(x)^2)",
+    breaks=(),
+    misprint="the factor of both squares is eps^2, not eps",
+)
+def last_display_as_printed(o: PaperObjects) -> Pairs:
+    """The last display of the proof of (76), as printed"""
+    after, before = o.jac(o.f, o.x_tilde), o.df
+    left = (o.I - after * after * o.eps) * _long_form(o, o.x) * o.J
+    yield left, _long_form(o, o.x_tilde) * o.J * (o.I - before * before * o.eps)
+
+
+@claim(
+    "Theorem 12, proof",
+    "",
+    "(I - eps^2 f'(x~)^2) Pi(x) J = Pi(x~) J (I - eps^2 f'(x)^2)",
+    breaks=("H", "B"),
+    distinct_roots=True,
+)
+def last_display(o: PaperObjects) -> Pairs:
+    """The last display of the proof of (76), as mended, with Pi in the form (71)"""
+    left = o.one_minus_square(o.f, o.x_tilde) * _long_form(o, o.x) * o.J
+    yield left, _long_form(o, o.x_tilde) * o.J * o.one_minus_square(o.f, o.x)
+
+
+@claim(
+    "Lemma 13 (77), (78)",
+    "grad qr",
+    "nabla q = C_1 nabla r, nabla p = C_2 nabla r",
+    least_m=2,
+    breaks=("H",),
+    distinct_roots=True,
+)
+def gradient_conditions(o: PaperObjects) -> Pairs:
+    """The gradients of the coefficients: nabla pi_k = C_k(A) nabla pi_{m-1}"""
+    v = o.vector("v")
+    for k in range(o.m - 1):
+        left = o.slope(lambda o, x, k=k: o.coefficient_of_power(k, x), o.x, v)
+        # v . C_k(A) nabla r is the slope of r along C_k(A)^T v.
+        along = o.horner(k).transpose() * v
+        yield left, o.slope(lambda o, x: o.coefficient_of_power(o.m - 1, x), o.x, along)
+
+
+@claim("(79)-(81)", "C1", "C_1 = A - aI, C_2 = A^2 - aA + bI", only_m=3, breaks=("A",))
+def matrices_C(o: PaperObjects) -> Pairs:
+    """C_1, C_2 and a, b through traces of A and A^2"""
+    a = o.trace(o.A) * o.number(1, 2)
+    b = o.trace(o.A) * o.trace(o.A) * o.number(1, 8) - o.trace(o.A * o.A) * o.number(1, 4)
+    yield o.horner(1), o.A - o.I * a
+    yield o.horner(0), o.A * o.A - o.A * a + o.I * b
+
+
+@claim("Lemma 13 (82)", "Jacobi id", "{x_i,{x_j,x_k}} + cyclic = 0", least_m=2, pairwise=True, breaks=("H", "f"))
+def jacobi_identity(o: PaperObjects) -> Pairs:
+    """Pi is a Poisson tensor: the Jacobi identity for all triples of coordinates"""
+    Pi = o.Pi(o.x)
+    along = [_derivative_of_tensor(o, o.K.column([Pi[i, k] for k in range(o.n)])) for i in range(o.n)]
+    for i, j, k in combinations(range(o.n), 3):
+        yield along[i][j, k] + along[j][k, i] + along[k][i, j], o.K.zero
+
+
+@claim(
+    "Lemma 13, proof",
+    "",
+    "coefficient of eps^2: C(2m,3) equations of rank 2m(m-1), solved by pi_k = C_k pi_{m-1}",
+    kind=Kind.ATTAINED,
+    least_m=2,
+    breaks=("J", "A"),
+    distinct_roots=True,
+)
+def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
+    """Pi is Poisson if and only if the gradient conditions hold: 20 equations of rank 12 for m = 3"""
+    n, m = o.n, o.m
+    powers = [o.A_to(k).transpose() * o.J for k in range(m)]
+    # To first order in eps^2 the bracket of x_i with a function u is sum_l J_il d_l u. Unknowns: d_l pi_k.
+    rows = []
+    for triple in combinations(range(n), 3):
+        row = [o.K.zero] * (n * m)
+        for a in range(3):
+            i, j, k = triple[a], triple[(a + 1) % 3], triple[(a + 2) % 3]
+            for power in range(m):
+                for l in range(n):
+                    row[power * n + l] = row[power * n + l] + o.J[i, l] * powers[power][j, k]
+        rows.append(row)
+    system = o.K.matrix(len(rows), n * m, [entry for row in rows for entry in row])
+    yield o.rank(system), 2 * m * (m - 1)
+    # The solutions include (C_0 w, ..., C_{m-1} w) for every vector w, a space of dimension 2m: so there are no others.
+    stacked = [o.horner(k)[i, j] for k in range(m) for i in range(n) for j in range(n)]
+    solutions = o.K.matrix(n * m, n, stacked)
+    yield o.rank(system * solutions), 0
+    yield o.rank(solutions), n
+
+
+@claim(
+    "Lemma 13, proof",
+    "",
+    "coefficient of eps^4 vanishes by virtue of nabla pi_k = C_k nabla pi_{m-1}",
+    least_m=2,
+    pairwise=True, breaks=("H",),
+)
+def jacobi_identity_to_second_order(o: PaperObjects) -> Pairs:
+    """The coefficients of eps^4 in the Jacobi identity vanish identically"""
+    square = o.df * o.df * o.J
+    along = [_derivative_of_square(o, o.K.column([square[i, k] for k in range(o.n)])) for i in range(o.n)]
+    for i, j, k in combinations(range(o.n), 3):
+        yield along[i][j, k] + along[j][k, i] + along[k][i, j], o.K.zero
+
+
+@claim("Lemma 14 (83)", "grads pq", "nabla p_0 = (4-m) B_i nabla q_i", breaks=("H", "B"), distinct_roots=True)
+def gradients_of_the_coefficients(o: PaperObjects) -> Pairs:
+    """The gradients of p_0 and q_i; for m = 3 the factor is 1"""
+    v = o.vector("v")
+    left = o.slope(lambda o, x: o.p0(x), o.x, v)
+    trace = o.slope(lambda o, x: o.eighth_of_trace(x), o.x, v)
+    for i in o.free:
+        right = o.slope(lambda o, x, i=i: o.q(i, x), o.x, o.B(i).transpose() * v)
+        yield left, right * o.number(4 - o.m)
+        yield trace, right  # for m = 4 the line above is 0 = 0
+
+
+@claim(
+    "Theorem 12, proof",
+    "",
+    "nabla p = (I + sum alpha_i B_i) nabla p_0, nabla q = sum beta_i B_i nabla p_0, ...",
+    least_m=2, breaks=("H",),
+    distinct_roots=True,
+)
+def gradients_through_p0(o: PaperObjects) -> Pairs:
+    """The gradients of p, q, r through nabla tr f'^2/8, which is nabla p_0 for m = 3"""
+    v = o.vector("v")
+    for k in range(o.m):
+        matrix = o.sum([o.B(i) * o.lagrange(i)[k] for i in o.each])
+        if k == 0:
+            matrix = matrix + o.I * o.number(4 - o.m)
+        left = o.slope(lambda o, x, k=k: o.coefficient_of_power(k, x), o.x, v)
+        yield left, o.slope(lambda o, x: o.eighth_of_trace(x), o.x, matrix.transpose() * v)
+
+
+@claim(
+    "(84), (85)",
+    "",
+    "sum beta_i B_i = (A - aI) sum gamma_i B_i, I + sum alpha_i B_i = (A^2 - aA + bI) sum gamma_i B_i",
+    least_m=2,
+    breaks=("B",),
+    distinct_roots=True,
+)
+def sums_with_coefficients(o: PaperObjects) -> Pairs:
+    """The matrix identities behind the gradient conditions"""
+    last = o.sum([o.B(i) * o.lagrange(i)[o.m - 1] for i in o.each])
+    for k in range(o.m - 1):
+        left = o.sum([o.B(i) * o.lagrange(i)[k] for i in o.each])
+        if k == 0:
+            left = left + o.I * o.number(4 - o.m)
+        yield left, o.horner(k) * last
+
+
+@claim(
+    "(86), (87)",
+    "pois lemma cond 1",
+    "beta_j + beta_k - beta_i = (lambda_i - a)(gamma_j + gamma_k - gamma_i), 1 + alpha_j + alpha_k - alpha_i = ...",
+    only_m=3,
+    breaks=("B",),
+)
+def conditions_at_the_eigenvalues(o: PaperObjects) -> Pairs:
+    """The same at the eigenvalues, and the equivalent forms beta_i = (lambda_i - a) gamma_i, alpha_i - 1 = ..."""
+    a, b = -o.chi[2], o.chi[1]
+    for i in o.free:
+        j, k = (other for other in o.each if other != i)
+        (ai, bi, ci), (aj, bj, cj), (ak, bk, ck) = o.lagrange(i), o.lagrange(j), o.lagrange(k)
+        root = o.lam[i]
+        quadratic = root * root - a * root + b
+        yield bj + bk - bi, (root - a) * (cj + ck - ci)
+        yield bi, (root - a) * ci
+        yield o.K.one + aj + ak - ai, quadratic * (cj + ck - ci)
+        yield ai - o.K.one, quadratic * ci
+
+
+@claim("(88), (89)", "Af' comp", "sum_k B_kj d_m f_k = sum_k d_k f_j B_mk, and its derivative", least_m=2, breaks=("H", "A"))
+def components(o: PaperObjects) -> Pairs:
+    """B^T f' = f' B^T in components, and its derivative by x_l"""
+    for i in o.free:
+        B = o.B(i)
+        yield B.transpose() * o.df, o.df * B.transpose()
+        for l in range(o.n):
+            second = o.second(o.f, o.unit(l))
+            yield B.transpose() * second, second * B.transpose()
+
+
+@claim("(90)", "grad q comp", "dq/dx_l = tr(B^T f''_l f')/8 + tr(B^T f' f''_l)/8", breaks=("f''",))
+def gradient_of_q(o: PaperObjects) -> Pairs:
+    """The gradient of q_i in components: two sums"""
+    for i in o.free:
+        gradient = o.gradient(lambda o, x, i=i: o.q(i, x), o.x)
+        for l in range(o.n):
+            first, second = _two_sums(o, o.B(i), l)
+            yield gradient[l, 0], first + second
+
+
+@claim(
+    "(91)-(93)",
+    "A grad q comp",
+    "(B nabla q)_n = sum_l (B^T)_ln dq/dx_l = sum d_n d_m f_j d_j f_m/8 + sum d_j f_k d_j d_n f_k/8",
+    breaks=("H", "B"),
+)
+def gradient_of_q_times_B(o: PaperObjects) -> Pairs:
+    """Both contributions to B nabla q, and their sum nabla tr f'^2/8"""
+    trace = o.gradient(lambda o, x: o.eighth_of_trace(x), o.x)
+    for i in o.free:
+        B = o.B(i)
+        sums = [_two_sums(o, B, l) for l in range(o.n)]
+        for k in range(o.n):
+            derivative = o.second(o.f, o.unit(k))
+            expected = o.trace(derivative * o.df) * o.number(1, 8)
+            for part in range(2):
+                yield o.sum([B[k, l] * sums[l][part] for l in range(o.n)]), expected
+            yield expected * o.number(2), trace[k, 0]
+
+
+def _long_form(o: PaperObjects, x: Any) -> Any:
+    """(1 - eps^2 p_0) J - eps^2 sum q_i B_i^T J."""
+    right = o.J * (o.K.one - o.eps * o.eps * o.p0(x))
+    for i in o.each:
+        right = right - o.B(i).transpose() * o.J * (o.eps * o.eps * o.q(i, x))
+    return right
+
+
+def _two_sums(o: PaperObjects, B: Any, l: int) -> tuple[Any, Any]:
+    derivative = o.second(o.f, o.unit(l))
+    eighth = o.number(1, 8)
+    return (
+        o.trace(B.transpose() * derivative * o.df) * eighth,
+        o.trace(B.transpose() * o.df * derivative) * eighth,
+    )
+
+
+def _derivative_of_tensor(o: PaperObjects, v: Any) -> Any:
+    """The derivative of Pi along v."""
+    return _derivative_of_square(o, v) * (-(o.eps * o.eps))
+
+
+def _derivative_of_square(o: PaperObjects, v: Any) -> Any:
+    """The derivative of f'^2 J along v."""
+    second = o.second(o.f, v)
+    return (second * o.df + o.df * second) * o.J

@@ -1,0 +1,417 @@
+"""The paper's objects over one field after another: for a given member, and for the member with indeterminate data.
+
+* `MemberObjects`: a member at a point, over QQ or GF(p); where the library has its own code for a letter (the chain,
+  the associated systems, the integrals, Pi), that code is what is tested.
+* `normal_form_objects`: the normal form with indeterminate roots, coefficients, x and eps. Over the splitting field of
+  chi every member with distinct roots is symplectically similar to a specialization of it (docs/mathematics.md).
+* `random_objects`: everything at random over GF(p), hidden by a random symplectic matrix.
+* `etale_objects`: a member's own normal form, one planar system over Q[t]/chi.
+* `bound_objects`, `universal_bound_objects`: bounds for degrees and coefficients instead of numbers.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_poly, fmpz, nmod_poly
+
+from kahanmaps.algebra.etale import EtaleAlgebra
+from kahanmaps.algebra.fields import CC, QQ, Field, PrimeField
+from kahanmaps.algebra.functions import FunctionField
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.checks.decide import random_prime_field
+from kahanmaps.errors import InputError
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.cubics import third_derivatives
+from kahanmaps.family.planar import normal_form
+from kahanmaps.family.skew_hamiltonian import chi as chi_of
+from kahanmaps.invariants.integrals import ModifiedHamiltonian, PaperIntegral
+from kahanmaps.invariants.poisson import poisson_tensor
+from kahanmaps.paper.bounds import BoundField
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.quadratic import SystemOver
+
+Draw = Callable[[str], Any]
+
+# Above so many sign vectors a sample is taken: all single flips, and random ones.
+MAX_SIGN_VECTORS = 32
+
+
+class MemberObjects(PaperObjects):
+    """A given member at a point: the letters for which the library has code of its own come from that code."""
+
+    member: FamilyMember
+
+    @classmethod
+    def at(
+        cls,
+        member: FamilyMember,
+        K: Field,
+        eps: Any,
+        draw: Draw,
+        roots: tuple[Any, ...] | None,
+        sign_vectors: tuple[tuple[int, ...], ...] | None = None,
+        order: int = 3,
+    ) -> MemberObjects:
+        """The objects of a member over K; `roots` are those of chi, None where they do not lie in K."""
+        chi = chi_of(member.A)
+        objects = cls(
+            K=K,
+            A=K.convert_matrix(member.A),
+            J=K.convert_matrix(standard_structure(member.dim)),
+            third=K.convert_matrix(_third_matrix(member)),
+            eps=eps,
+            roots=roots,
+            draw=draw,
+            base=_hamiltonian(member, 0).system.over(K),
+            known_chi=tuple(K.convert(chi[k]) for k in range(member.m + 1)),
+            sign_vectors=sign_vectors,
+            order=order,
+        )
+        objects.member = member
+        return objects
+
+    def H(self, x: Any, i: int = 0) -> Any:
+        """H_i(x) from the library's chain."""
+        return evaluate(self.member.chain[i], self.K, x.entries())
+
+    def f_(self, i: int) -> SystemOver:
+        """f_i from the library's chain."""
+        return _hamiltonian(self.member, i).system.over(self.K)
+
+    def lagrange(self, i: int) -> list[Any]:
+        """The coefficients of B_i from the library, where the roots of chi are rational."""
+        if ("lagrange", i) not in self._memory and self._is_split:
+            signs = [-1 if j == i else 1 for j in range(self.m)]
+            self._memory["lagrange", i] = [self.K.convert(c) for c in self.member.associate(signs).coefficients]
+        return super().lagrange(i)
+
+    def B_signs(self, signs: Sequence[int]) -> Any:
+        """B_s from the library, where the roots of chi are rational."""
+        if self._is_split:
+            return self.K.convert_matrix(self.member.associate(signs).B)
+        return super().B_signs(signs)
+
+    def H_tilde(self, x: Any) -> Any:
+        """H~ from the library."""
+        return PaperIntegral(_hamiltonian(self.member, 0)).value(self.K, self.eps, x.entries())
+
+    def modified_H(self, x: Any) -> Any:
+        """The modified H from the library."""
+        return ModifiedHamiltonian(_hamiltonian(self.member, 0)).value(self.K, self.eps, x.entries())
+
+    def Pi(self, x: Any) -> Any:
+        """The Poisson tensor from the library."""
+        return poisson_tensor(_hamiltonian(self.member, 0), self.K, self.eps, x.entries())
+
+    @property
+    def _is_split(self) -> bool:
+        return self.roots is not None and is_split(self.member)
+
+
+def is_split(member: FamilyMember) -> bool:
+    """Whether chi has m distinct rational roots."""
+    return all(factor.degree == 1 and factor.multiplicity == 1 for factor in member.factors)
+
+
+def rational_roots(member: FamilyMember) -> tuple[fmpq, ...] | None:
+    """The roots of chi in the order of the signs, where they are rational and distinct."""
+    if not is_split(member):
+        return None
+    return tuple(factor.root for factor in member.factors if factor.root is not None)
+
+
+def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | None:
+    """All sign vectors (None), or a sample: the single flips and random ones."""
+    if 2 ** (m - 1) <= MAX_SIGN_VECTORS:
+        return None
+    flips = [tuple(-1 if j == i else 1 for j in range(m)) for i in range(m)]
+    more = [(1, *(rng.choice((1, -1)) for _ in range(m - 1))) for _ in range(4)]
+    return tuple(dict.fromkeys(signs for signs in [*flips, *more] if -1 in signs))
+
+
+# ---- points over GF(p) and Q --------------------------------------------------------------------------------------------
+
+
+def random_draw(K: Field, n: int, rng: random.Random) -> Draw:
+    """Random vectors of K^n."""
+    return lambda name: K.column([K.random(rng) for _ in range(n)])
+
+
+def split_prime_field(chi: fmpq_poly, rng: random.Random, tries: int) -> tuple[PrimeField, tuple[Any, ...]] | None:
+    """A random prime field of 63 bits in which chi has m distinct roots, and the roots; None after so many tries.
+
+    Drawn from all primes of that size until one fits, so it is uniform among those that fit.
+    """
+    m = chi.degree()
+    for _ in range(tries):
+        field = random_prime_field(rng)
+        p = field.prime
+        coefficients = [field.convert(chi[k]) for k in range(m + 1)]
+        polynomial = nmod_poly([int(c) for c in coefficients], p)
+        x = nmod_poly([0, 1], p)
+        if m > 1 and pow(x, p, polynomial) != x:
+            continue
+        _, factors = polynomial.factor()
+        roots = sorted(int(-factor[0] / factor[1]) for factor, _ in factors)
+        if len(roots) == m:
+            return field, tuple(field.convert(root) for root in roots)
+    return None
+
+
+def point_over(
+    member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, eps: fmpq | None, rng: random.Random, order: int = 3
+) -> MemberObjects:
+    """A member at a random point over QQ or GF(p), eps random where it is not given."""
+    value = K.convert(eps) if eps is not None else K.zero
+    while value == 0:
+        value = K.random(rng)
+    signs = sign_sample(member.m, rng)
+    return MemberObjects.at(member, K, value, random_draw(K, member.dim, rng), roots, signs, order)
+
+
+def random_objects(m: int, K: Field, rng: random.Random, order: int = 3) -> PaperObjects:
+    """A, H, x, eps at random over GF(p): roots and planar cubics at random, hidden by a random symplectic matrix.
+
+    The matrix is a product of five symmetric shears, upper and lower in turn, which reach every symplectic matrix.
+    """
+    n = 2 * m
+    roots = tuple(K.random(rng) for _ in range(m))
+    cubics = [[K.random(rng) for _ in range(4)] for _ in range(m)]
+    S, S_inverse = K.identity(n), K.identity(n)
+    for k in range(5):
+        entries = {}
+        for i in range(m):
+            for j in range(i, m):
+                entries[i, j] = entries[j, i] = K.random(rng)
+        shear, back = ([K.one if i == j else K.zero for i in range(n) for j in range(n)] for _ in range(2))
+        for (i, j), value in entries.items():
+            place = i * n + m + j if k % 2 == 0 else (m + i) * n + j
+            shear[place], back[place] = value, -value
+        S, S_inverse = S * K.matrix(n, n, shear), K.matrix(n, n, back) * S_inverse
+    A, third = _normal_form(K, roots, cubics)
+    # x = S z: the Hesse matrix is S^{-T} Hess_z S^{-1}, taken at z = S^{-1} x, and A becomes S^{-T} A S^T.
+    turned = S_inverse.transpose()
+    slices = K.matrix(n, n * n, (turned * K.matrix(n, n * n, third.entries())).entries())
+    columns = []
+    for l in range(n):
+        middle = K.matrix(n, n, [slices[i, j * n + l] for i in range(n) for j in range(n)]) * S_inverse
+        columns.append(middle.entries())
+    third = K.matrix(n * n, n, [entry for row in zip(*columns, strict=True) for entry in row]) * S_inverse
+    eps = K.zero
+    while eps == 0:
+        eps = K.random(rng)
+    signs = sign_sample(m, rng)
+    A = turned * A * S.transpose()
+    J = K.convert_matrix(standard_structure(n))
+    return PaperObjects(K, A, J, third, eps, roots, random_draw(K, n, rng), sign_vectors=signs, order=order)
+
+
+# ---- proofs: indeterminate data -------------------------------------------------------------------------------------------
+
+
+def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int = 3) -> PaperObjects:
+    """The normal form with indeterminate roots, planar cubics and eps; `vectors` are the further letters needed.
+
+    Each block may still be changed by a matrix of determinant 1. It is used to put the point to (u, v) = (1, 0) and the
+    coefficient of u^2 v in h to 0, so that h = a u^3 + c u v^2 + d v^3. For m = 1 both signs count as associated: this
+    is one block of a larger system.
+    """
+    n = 2 * m
+    lower = ["p", "q", "r", "s", "t"] if "linear" in vectors else []
+    blockwise = [f"{c}{i + 1}" for i in range(m) for c in ["a", "c", "d", *lower]]
+    drawn = [vector for vector in vectors if vector not in ("x", "linear", "u1", "u2", "u3")]
+    letters = {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(drawn)}
+    names = [*(f"l{i + 1}" for i in range(m)), *blockwise, "eps", *(name for found in letters.values() for name in found)]
+    K = FunctionField(names, budget, reduces=True)
+    by_name = dict(zip(names, K.variables, strict=True))
+    roots = tuple(by_name[f"l{i + 1}"] for i in range(m))
+    cubics = [[by_name[f"a{i + 1}"], K.zero, by_name[f"c{i + 1}"], by_name[f"d{i + 1}"]] for i in range(m)]
+    A, third = _normal_form(K, roots, cubics)
+    J = K.convert_matrix(standard_structure(n))
+
+    def draw(name: str) -> Any:
+        if name == "x":
+            return K.column([K.one] * m + [K.zero] * m)
+        return K.column([by_name[letter] for letter in letters[name]])
+
+    # Blocks may be permuted, and signs enter block by block: so many minus signs, on the first blocks, stand for all.
+    signs = tuple(tuple(-1 if j <= i else 1 for j in range(m)) for i in range(max(1, m - 1)))
+    objects = PaperObjects(
+        K=K,
+        A=A,
+        J=J,
+        third=third,
+        eps=by_name["eps"],
+        roots=roots,
+        draw=draw,
+        sign_vectors=((1,), (-1,)) if m == 1 else signs,
+        free_indices=(0,),
+        order=order,
+    )
+    if lower:
+        p, q, r, s, t = ([by_name[f"{c}{i + 1}"] for i in range(m)] for c in lower)
+        entries = {(i, i): p[i] for i in range(m)} | {(m + i, m + i): r[i] for i in range(m)}
+        entries |= {place: q[i] for i in range(m) for place in ((i, m + i), (m + i, i))}
+        X = K.matrix(n, n, [entries.get((i, j), K.zero) for i in range(n) for j in range(n)])
+        objects.lower_terms = (X, K.column([*s, *t]))
+    return objects
+
+
+def member_functions(
+    member: FamilyMember, vectors: Sequence[str], eps: fmpq | None, budget: int, order: int = 3
+) -> MemberObjects:
+    """A given member with indeterminate x (and eps, where it is not given) over the rational functions."""
+    n = member.dim
+    letters = {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(vectors)}
+    names = ["eps", *(name for letter in letters.values() for name in letter)]
+    K = FunctionField(names, budget)
+    by_name = dict(zip(names, K.variables, strict=True))
+
+    def draw(name: str) -> Any:
+        return K.column([by_name[letter] for letter in letters[name]])
+
+    roots = rational_roots(member)
+    lifted = None if roots is None else tuple(K.convert(root) for root in roots)
+    value = by_name["eps"] if eps is None else K.convert(eps)
+    signs = sign_sample(member.m, random.Random("signs"))
+    return MemberObjects.at(member, K, value, draw, lifted, signs, order)
+
+
+def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, order: int = 3) -> PaperObjects:
+    """A member's normal form at a random exact point: one planar system over Q[t]/chi, every root of chi at once."""
+    form = normal_form(member)
+    K = EtaleAlgebra(form.chi)
+    root = K.generator
+    A, third = _normal_form(K, (root,), [[K.convert(c) for c in form.coefficients]])
+    value = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
+    J = K.convert_matrix(standard_structure(2))
+    signs = ((1,), (-1,))
+    return PaperObjects(K, A, J, third, value, (root,), random_draw(K, 2, rng), sign_vectors=signs, order=order)
+
+
+def ball_objects(
+    member: FamilyMember, bits: int, rng: random.Random, eps: fmpq | None, order: int = 3
+) -> PaperObjects:
+    """A member at a random rational point over complex balls, with all complex roots of chi enclosed."""
+    K = CC(bits)
+    chi = chi_of(member.A)
+    below = fmpz(1)
+    for k in range(chi.degree() + 1):
+        below = below.lcm(chi[k].q)
+    integral = (chi * below).numer()
+    with K.working():
+        roots = tuple(K.convert(root) for root, _ in integral.complex_roots())
+        value = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
+        return PaperObjects(
+            K=K,
+            A=K.convert_matrix(member.A),
+            J=K.convert_matrix(standard_structure(member.dim)),
+            third=K.convert_matrix(_third_matrix(member)),
+            eps=value,
+            roots=roots,
+            draw=lambda name: K.column([K.convert(QQ.random(rng)) for _ in range(member.dim)]),
+            sign_vectors=sign_sample(member.m, rng),
+            order=order,
+        )
+
+
+# ---- bounds -----------------------------------------------------------------------------------------------------------------
+
+
+def bound_objects(member: FamilyMember, eps: fmpq | None, order: int = 3) -> PaperObjects:
+    """Bounds for a given member: x and all vectors are variables, eps as well unless it is given."""
+    K = BoundField()
+    n = member.dim
+    chi = chi_of(member.A)
+    if rational_roots(member) is None:
+        # Algebraic numbers: bounded in every embedding by Cauchy's bound, over the leading coefficient of integral chi.
+        largest = 1 + max(abs(chi[k]) for k in range(member.m))
+        root = K.polynomial(0, math.log2(float(largest) + 1.0)) / K.convert(_common_denominator(chi.coeffs()))
+    else:
+        root = K.matrix(1, member.m, [K.convert(abs(r)) for r in rational_roots(member) or ()])[0, 0]
+    value = K.variable() if eps is None else K.convert(eps)
+    return PaperObjects(
+        K=K,
+        A=K.convert_matrix(member.A),
+        J=K.convert_matrix(standard_structure(n)),
+        third=K.convert_matrix(_third_matrix(member)),
+        eps=value,
+        roots=(root,) * member.m,
+        draw=lambda name: K.matrix(n, 1, [K.variable()] * n),
+        known_chi=tuple(K.convert(abs(chi[k])) for k in range(member.m + 1)),
+        sign_vectors=(tuple(-1 for _ in range(member.m)),) if member.m > 1 else None,
+        order=order,
+    )
+
+
+def universal_bound_objects(m: int, order: int = 3) -> PaperObjects:
+    """Bounds for `random_objects`: roots, cubics, shears, x and eps are variables."""
+    K = BoundField()
+    n = 2 * m
+    # Five shears, each with entries of degree 1: entries of S and S^{-1} have degree 5, the sum of m^4 monomials.
+    S = K.polynomial(5, 4 * math.log2(m) + 5.0)
+    root, cubic = K.variable(), K.variable()
+    A = K.matrix(n, n, [S * S * root * K.convert(n * n)] * (n * n))
+    third = K.matrix(n * n, n, [S * S * S * cubic * K.convert(6 * n**3)] * n**3)
+    return PaperObjects(
+        K=K,
+        A=A,
+        J=K.convert_matrix(standard_structure(n)),
+        third=third,
+        eps=K.variable(),
+        roots=(root,) * m,
+        draw=lambda name: K.matrix(n, 1, [K.variable()] * n),
+        sign_vectors=(tuple(-1 for _ in range(m)),) if m > 1 else None,
+        order=order,
+    )
+
+
+# ---- helpers --------------------------------------------------------------------------------------------------------------------
+
+
+def _hamiltonian(member: FamilyMember, i: int) -> CubicHamiltonian:
+    """H_i with the standard structure, remembered on the member's chain."""
+    cached: dict[int, CubicHamiltonian] = member.__dict__.setdefault("_hamiltonians", {})
+    if i not in cached:
+        cached[i] = CubicHamiltonian(member.chain[i], standard_structure(member.dim))
+    return cached[i]
+
+
+def _third_matrix(member: FamilyMember) -> fmpq_mat:
+    """The third derivatives of H as an n^2 x n matrix."""
+    n = member.dim
+    slices = [matrix.entries() for matrix in third_derivatives(member.H)]
+    return fmpq_mat(n * n, n, [slices[l][row] for row in range(n * n) for l in range(n)])
+
+
+def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]) -> tuple[Any, Any]:
+    """A = diag(roots, roots) and the third derivatives of H = sum h_i(x_i, x_{m+i}), h = a u^3 + b u^2 v + c u v^2 + d v^3."""
+    m = len(roots)
+    n = 2 * m
+    A = K.matrix(n, n, [roots[i % m] if i == j else K.zero for i in range(n) for j in range(n)])
+    third = [K.zero] * n**3
+    for i, coefficients in enumerate(cubics):
+        for place in range(8):
+            where = [i + m * (place >> k & 1) for k in range(3)]
+            number_of_v = bin(place).count("1")
+            factor = K.convert((6, 2, 2, 6)[number_of_v])
+            third[(where[0] * n + where[1]) * n + where[2]] = coefficients[number_of_v] * factor
+    return A, K.matrix(n * n, n, third)
+
+
+def _common_denominator(numbers: Sequence[fmpq]) -> fmpz:
+    below = fmpz(1)
+    for number in numbers:
+        below = below.lcm(number.q)
+    return below
+
+
+def require_generic(member: FamilyMember) -> None:
+    """Raises InputError where chi has a repeated root."""
+    if not member.is_generic:
+        raise InputError("chi has a repeated root")

@@ -1,0 +1,121 @@
+"""The list of the paper's claims: one short function each, with its place in the paper.
+
+A claim is a function that takes the paper's objects (`PaperObjects`: A, J, H, f, B_i, x, eps, ...) and yields pairs
+(left, right) which the paper says are equal. It knows nothing of the numbers it runs on: the same function is
+evaluated at random points over GF(p), at exact points over Q, over rational functions (a proof), over an algebra
+Q[t]/chi, over complex balls, and over bounds for degrees and coefficients. To add a claim, write one such function in the
+file of its section.
+
+Formulas are printed for every m where the statement makes sense; where the paper's own form is for m = 3 and reads
+differently for other m, the general form reduces to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from kahanmaps.paper.objects import PaperObjects
+
+Pairs = Iterable[tuple[Any, Any]]
+ClaimFunction = Callable[[PaperObjects], Pairs]
+
+SECTIONS: dict[int, tuple[str, str]] = {
+    1: ("Introduction", "introduction"),
+    2: ("General properties of the discretization", "kahan_maps"),
+    3: ("A family of integrable Hamiltonian systems", "hamiltonian_family"),
+    4: ("General algebraic properties of the vector fields", "vector_fields"),
+    5: ("Associated vector fields", "associated_fields"),
+    6: ("Commutativity of maps", "commutativity"),
+    7: ("Integrals of motion", "integrals_of_motion"),
+    8: ("Invariant Poisson structure", "poisson_structure"),
+    9: ("Differential equations for the conserved quantities", "differential_equations"),
+    10: ("Beyond the paper", "beyond"),
+}
+
+
+class Kind(StrEnum):
+    """What a claim asserts of its pairs."""
+
+    EQUAL = "equal"  # both sides are equal, everywhere
+    DIFFERENT = "different"  # the sides of every pair differ somewhere: one point where all do is a proof
+    # Both sides are equal at some point, which is a proof: something exists there, or a rank is the largest possible.
+    ATTAINED = "attained"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One statement or display of the paper.
+
+    `place` names it in the paper ("Lemma 3", "(28)"), `label` is its label in the LaTeX source. `breaks` lists the
+    controls: inputs that break one hypothesis, on which the same function has to come out refuted.
+    """
+
+    key: str
+    section: int
+    place: str
+    label: str
+    formula: str
+    function: ClaimFunction
+    breaks: tuple[str, ...]
+    kind: Kind = Kind.EQUAL
+    least_m: int = 1
+    only_m: int | None = None
+    distinct_roots: bool = False  # makes sense only where chi has no repeated root
+    # A claim about a product of planar systems follows from the same claim about one block (blockwise) or about any
+    # two blocks (pairwise); docs/mathematics.md says why, and which claims are of that kind.
+    blockwise: bool = False
+    pairwise: bool = False
+    symplectic: bool = True  # keeps its form under symplectic changes of coordinates and extensions of the field
+    misprint: str = ""  # not empty: this is the form printed, it fails, and here is why
+
+    def makes_sense(self, m: int) -> bool:
+        """Whether the statement exists for this m."""
+        return m >= self.least_m and (self.only_m is None or m == self.only_m)
+
+    def blocks_for_proof(self, m: int) -> int:
+        """How many blocks a proof in normal form needs."""
+        return 1 if self.blockwise else min(m, 2) if self.pairwise else m
+
+    @property
+    def range_of_m(self) -> str:
+        """The m for which the statement makes sense, in words."""
+        return f"m = {self.only_m}" if self.only_m is not None else f"m >= {self.least_m}"
+
+    @property
+    def title(self) -> str:
+        """What the claim says, from the first line of its docstring."""
+        return (self.function.__doc__ or "").strip().splitlines()[0].rstrip(".")
+
+
+_claims: dict[str, Claim] = {}
+
+
+def claim(place: str, label: str, formula: str, **more: Any) -> Callable[[ClaimFunction], ClaimFunction]:
+    """Register a function as a claim; the section is that of its file.
+
+    Keywords are the fields of `Claim`: breaks, kind, least_m, only_m, distinct_roots, blockwise, symplectic, misprint.
+    """
+
+    def register(function: ClaimFunction) -> ClaimFunction:
+        file = function.__module__.rsplit(".", 1)[-1]
+        section = next(number for number, (_, name) in SECTIONS.items() if name == file)
+        key = function.__name__.strip("_").replace("_", "-")
+        if key in _claims:
+            raise ValueError(f"two claims have the name {key}")
+        _claims[key] = Claim(key, section, place, label, formula, function, **more)
+        return function
+
+    return register
+
+
+@cache
+def claims() -> tuple[Claim, ...]:
+    """All claims, in the order of the paper."""
+    for _, name in SECTIONS.values():
+        import_module(f"kahanmaps.paper.{name}")
+    return tuple(sorted(_claims.values(), key=lambda found: found.section))
