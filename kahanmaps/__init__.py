@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from kahanmaps.version import __version__
 
 if TYPE_CHECKING:
-    from kahanmaps.algebra.fields import GF, QQ, RR
+    from kahanmaps.algebra.fields import CC, GF, QQ, RR
     from kahanmaps.algebra.text import parse_point, parse_polynomial, parse_rational_function
     from kahanmaps.checks.claims import Finding, Report, Verdict
     from kahanmaps.checks.commute import check_commute
@@ -36,13 +36,14 @@ if TYPE_CHECKING:
     from kahanmaps.maps.fast import FloatOrbit, to_floats
     from kahanmaps.maps.kahan import KahanMap
     from kahanmaps.maps.orbits import Orbit
+    from kahanmaps.paper.verify import verify, verify_universal
     from kahanmaps.systems.catalog import load, names
     from kahanmaps.systems.files import SystemFile, parse_system, read_system
     from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
     from kahanmaps.systems.quadratic import QuadraticSystem
 
 _HOME = {
-    "algebra.fields": ("GF", "QQ", "RR"),
+    "algebra.fields": ("CC", "GF", "QQ", "RR"),
     "algebra.text": ("parse_point", "parse_polynomial", "parse_rational_function"),
     "systems.quadratic": ("QuadraticSystem",),
     "systems.hamiltonian": ("CubicHamiltonian", "standard_structure"),
@@ -60,11 +61,13 @@ _HOME = {
     "checks.commute": ("check_commute",),
     "checks.conserve": ("check_integrals",),
     "checks.preserve": ("check_measure", "check_poisson"),
+    "paper.verify": ("verify", "verify_universal"),
     "errors": ("InputError", "KahanmapsError", "SingularStep", "SystemFileError"),
 }
 _MODULE_OF = {name: module for module, exported in _HOME.items() for name in exported}
 
 __all__ = [
+    "CC",
     "GF",
     "QQ",
     "RR",
@@ -99,6 +102,8 @@ __all__ = [
     "check_integrals",
     "check_measure",
     "check_poisson",
+    "verify",
+    "verify_universal",
     "InputError",
     "KahanmapsError",
     "SingularStep",

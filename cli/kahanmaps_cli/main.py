@@ -26,6 +26,7 @@ COMMANDS = {
     "check-integrals": ("check_integrals", "Are the known or claimed integrals conserved?"),
     "check-measure": ("check_measure", "Is the measure dx/phi invariant?"),
     "check-poisson": ("check_poisson", "Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?"),
+    "verify": ("verify", "Every statement of the paper, for a random or given member, any m."),
     "family": ("family", "Make and look at members of the commuting family."),
     "systems": ("systems", "The catalogue of named systems."),
     "version": ("version", "The versions of kahanmaps and of what it computes with."),

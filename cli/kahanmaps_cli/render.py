@@ -15,7 +15,7 @@ from kahanmaps_cli.progress import say
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Evidence, Finding, Report, Witness
 
-_COLOURS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "yellow"}
+COLOURS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "yellow"}
 # On a terminal long numbers are shortened to this many characters, and long lists of claims to this many.
 NUMBER_WIDTH = 40
 CLAIMS_SHOWN = 40
@@ -65,7 +65,8 @@ def exit_status(report: Report) -> int:
     return 0
 
 
-def _headline(report: Report) -> str:
+def headline(report: Report) -> str:
+    """The first line: what was checked, of which systems, for which eps."""
     context = report.context
     names = context["system"] + (f", {context['other']}" if "other" in context else "")
     if context["eps"] == "every":
@@ -83,7 +84,7 @@ def _verdict_text(finding: Finding) -> str:
 
 
 def _print_plain(report: Report) -> None:
-    click.echo(_headline(report))
+    click.echo(headline(report))
     told: set[str] = set()
     for finding in report.findings:
         click.echo(f"{_verdict_text(finding)}\t{finding.claim}")
@@ -100,7 +101,7 @@ def _print_table(report: Report, verbose: bool) -> None:
     from rich.text import Text
 
     console = Console(markup=False, emoji=False, highlight=False)
-    console.print(Text(_headline(report), style="bold"))
+    console.print(Text(headline(report), style="bold"))
     table = Table(header_style="bold", show_lines=verbose)
     table.add_column("verdict", no_wrap=True)
     table.add_column("claim", overflow="fold")
@@ -109,7 +110,7 @@ def _print_table(report: Report, verbose: bool) -> None:
     shown = _selection(report.findings)
     told: set[str] = set()
     for finding in shown:
-        style = _COLOURS[str(finding.verdict)] if finding.is_as_expected else "yellow"
+        style = COLOURS[str(finding.verdict)] if finding.is_as_expected else "yellow"
         claim = Text(finding.claim)
         verdict = Text(_verdict_text(finding).replace(" (", "\n("), style=style)
         if verbose:
@@ -129,7 +130,7 @@ def _print_table(report: Report, verbose: bool) -> None:
     for note in report.notes:
         console.print(f"note: {note}")
     last = Text("verdict: ")
-    last.append(str(report.verdict), style=f"bold {_COLOURS[str(report.verdict)]}")
+    last.append(str(report.verdict), style=f"bold {COLOURS[str(report.verdict)]}")
     console.print(last)
 
 
@@ -153,7 +154,7 @@ def _below(findings: list[Finding]) -> list[str]:
     for finding in findings:
         if finding.witness is not None:
             lines.append(f"{_verdict_text(finding)}: {finding.claim}")
-            lines += [f"  {line}" for line in _witness_lines(finding.witness, NUMBER_WIDTH)]
+            lines += [f"  {line}" for line in witness_lines(finding.witness, NUMBER_WIDTH)]
     return lines
 
 
@@ -170,7 +171,7 @@ def _details(finding: Finding, told: set[str], width: int | None = None) -> list
     lines.append(_summary(finding.evidence, told))
     lines += [f"also: {evidence.summary}" for evidence in finding.also]
     if finding.witness is not None:
-        lines += _witness_lines(finding.witness, width)
+        lines += witness_lines(finding.witness, width)
     if finding.source:
         lines.append(f"source: {finding.source}")
     return [line if width is None else shorten(line, 1200) for line in lines]
@@ -188,13 +189,17 @@ def _summary(evidence: Evidence, told: set[str]) -> str:
     return f"{evidence.data['theorem']} applies: {'; '.join(new + [above] * bool(above))}"
 
 
-def _witness_lines(witness: Witness, width: int | None) -> list[str]:
+def witness_lines(witness: Witness, width: int | None) -> list[str]:
+    """A witness, the numbers shortened to `width`."""
+
     def numbers(values: tuple[str, ...]) -> str:
         return ", ".join(value if width is None else shorten(value, width) for value in values)
 
     where = "" if witness.field == "QQ" else f" over {witness.field}"
+    more = [f"  {name} = ({numbers(vector)})" for name, vector in witness.vectors.items()]
     return [
         f"witness: x = ({numbers(witness.point)}), eps = {witness.eps}{where}",
+        *more,
         f"  {witness.left_label} = {numbers(witness.left)}",
         f"  {witness.right_label} = {numbers(witness.right)}",
     ]

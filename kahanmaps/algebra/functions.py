@@ -119,6 +119,8 @@ class Function(Element):
 
     __slots__ = ("above", "below")
 
+    field: FunctionField
+
     def __init__(self, field: FunctionField, above: fmpq_mpoly, below: fmpq_mpoly) -> None:
         self.field = field
         self.above = above
@@ -163,9 +165,16 @@ class Function(Element):
 class FunctionMatrix(EntryMatrix):
     """A matrix over a `FunctionField`, with the operations that the Kahan map needs."""
 
+    def _dot(self, row: Sequence[Function], column: Sequence[Function]) -> Function:
+        total: Function = self.field.zero
+        for a, b in zip(row, column, strict=True):
+            if not a.above.is_zero() and not b.above.is_zero():  # most entries are zero where there are blocks
+                total = total._plus(a._times(b))
+        return total
+
     def det(self) -> Function:
         """The determinant, by Bareiss' fraction-free elimination on rows cleared of denominators, block by block."""
-        total = self.field.one
+        total: Function = self.field.one
         for block in self._blocks():
             rows, cleared = self._part(block, block)._polynomial_rows()
             total = total * Function(self.field, _bareiss(self.field, rows), cleared)
@@ -174,7 +183,7 @@ class FunctionMatrix(EntryMatrix):
     def solve(self, right: FunctionMatrix) -> FunctionMatrix:
         """The solution X of self X = right, by Cramer's rule, block by block. Raises ZeroDivisionError if singular."""
         columns = range(right._columns)
-        solution = {}
+        solution: dict[int, list[Function]] = {}
         for block in self._blocks():
             rows = self._part(block, block)._solve_block(right._part(block, columns)).tolist()
             solution.update(zip(block, rows, strict=True))

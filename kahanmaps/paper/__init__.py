@@ -1,1 +1,1 @@
-"""The paper of Petrera and Suris, statement by statement: every claim a short function, every verdict with its reason."""
+"""The paper of Petrera and Suris: every claim a short function, put to the test."""

@@ -30,7 +30,7 @@ def hamilton_function_of_the_associated_field(o: PaperObjects) -> Pairs:
     v = o.vector("v")
     for i in o.free:
         # J^T = J^{-1}, so v . g = v . J nabla K is the slope of K along J^T v.
-        slope = o.slope(lambda o, x, i=i: o.Kf(o.B(i), x), o.x, o.J.transpose() * v)
+        slope = o.slope(lambda o, x: o.Kf(o.B(i), x), o.x, o.J.transpose() * v)
         yield o.dot(v, o.value(o.g_(i), o.x)), slope
         combination = o.sum([coefficient * o.H(o.x, k) for k, coefficient in enumerate(o.lagrange(i))])
         yield o.Kf(o.B(i), o.x), combination

@@ -24,7 +24,13 @@ def product_of_planar_maps(o: PaperObjects) -> Pairs:
     yield o.det(o.minus_eps_jac(o.f, o.x)), product
 
 
-@claim("Structure", "", "Phi_{f_s} = Phi_f on blocks with s_i = 1, Phi_f^{-1} where s_i = -1", breaks=("B", "H"), distinct_roots=True)
+@claim(
+    "Structure",
+    "",
+    "Phi_{f_s} = Phi_f on blocks with s_i = 1, Phi_f^{-1} where s_i = -1",
+    breaks=("B", "H"),
+    distinct_roots=True,
+)
 def associated_maps_on_the_blocks(o: PaperObjects) -> Pairs:
     """The map of an associated field is the map of f on some blocks and its inverse on the others"""
     backwards = o.step(o.f, o.x, times=-1)
@@ -42,7 +48,13 @@ def opposite_field(o: PaperObjects) -> Pairs:
     yield o.step(opposite, o.x_tilde), o.x
 
 
-@claim("Steps", "", "Phi_f(., eps) o Phi_g(., 2 eps) != Phi_g(., 2 eps) o Phi_f(., eps)", kind=Kind.DIFFERENT, breaks=("linear",))
+@claim(
+    "Steps",
+    "",
+    "Phi_f(., eps) o Phi_g(., 2 eps) != Phi_g(., 2 eps) o Phi_f(., eps)",
+    kind=Kind.DIFFERENT,
+    breaks=("linear",),
+)
 def different_steps_do_not_commute(o: PaperObjects) -> Pairs:
     """Maps of associated fields with different eps do not commute in general, nor does a map with itself"""
     for g in [o.f, *(o.g_(i) for i in o.each)]:
@@ -58,7 +70,13 @@ def commutativity_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
         yield p.step(f, p.step(g, p.x)), p.step(g, p.step(f, p.x))
 
 
-@claim("Inhomogeneous H", "", "modified K = K + (2 eps/3) nabla K^T (I - eps g')^{-1} g is shared", breaks=("B", "H"), blockwise=True)
+@claim(
+    "Inhomogeneous H",
+    "",
+    "modified K = K + (2 eps/3) nabla K^T (I - eps g')^{-1} g is shared",
+    breaks=("B", "H"),
+    blockwise=True,
+)
 def integrals_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     """Inhomogeneous H: the modified Hamiltonians are shared by all maps of the class"""
     p = o.inhomogeneous()
@@ -100,11 +118,18 @@ def gradients_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     v = o.vector("v")
     p = o.inhomogeneous()
     for signs in p.all_signs():
-        left = p.slope(lambda p, x, signs=signs: p.modified(p.B_signs(signs), x), p.x, v)
+        left = p.slope(lambda p, x: p.modified(p.B_signs(signs), x), p.x, v)
         yield left, p.slope(lambda p, x: p.modified_H(x), p.x, p.B_signs(signs).transpose() * v)
 
 
-@claim("Inhomogeneous H", "", "modified H = P_0 H + eps^2 sum Q_i K_i", kind=Kind.DIFFERENT, breaks=("homogeneous",), distinct_roots=True)
+@claim(
+    "Inhomogeneous H",
+    "",
+    "modified H = P_0 H + eps^2 sum Q_i K_i",
+    kind=Kind.DIFFERENT,
+    breaks=("homogeneous",),
+    distinct_roots=True,
+)
 def formula_through_H_and_K_fails_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     """Inhomogeneous H: the formula (106) through H and the K_i does NOT survive"""
     p = o.inhomogeneous()

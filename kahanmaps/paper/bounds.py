@@ -77,7 +77,8 @@ class BoundField(Field):
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> BoundMatrix:
         """The matrix with the common bound of these entries."""
         common: dict[int, int] = {}
-        elements = [self.convert(entry) for entry in entries]
+        # Entries are mostly one object many times over.
+        elements = [self.convert(entry) for entry in {id(entry): entry for entry in entries}.values()]
         for element in elements:
             common = _larger(common, element.below)
         above = ONE
@@ -96,6 +97,8 @@ class Bound(Element):
     """The bound of one rational function."""
 
     __slots__ = ("above", "below")
+
+    field: BoundField
 
     def __init__(self, field: BoundField, above: Size, below: Mapping[int, int]) -> None:
         self.field = field

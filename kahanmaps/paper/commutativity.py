@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 from kahanmaps.paper.objects import PaperObjects
@@ -135,7 +136,7 @@ def quadratic_terms_cancel(o: PaperObjects) -> Pairs:
             BT * at_hat * at_tilde,
             o.jac(g, x_hat) * at_tilde,
         ]
-        yield from zip(steps, steps[1:], strict=False)
+        yield from pairwise(steps)
 
 
 @claim("(57)", "aux", "-f'(x^) + g'(x~) = g'(x^) - f'(x~)", breaks=("B", "H"), blockwise=True)
@@ -190,7 +191,12 @@ def second_derivatives_agree(o: PaperObjects) -> Pairs:
 
 
 @claim(
-    "Lemma 10 (60)", "Af''", "B^T (f'' v) = f'' (B^T v), B^T (g'' v) = g'' (B^T v)", least_m=2, breaks=("H", "A"), blockwise=True
+    "Lemma 10 (60)",
+    "Af''",
+    "B^T (f'' v) = f'' (B^T v), B^T (g'' v) = g'' (B^T v)",
+    least_m=2,
+    breaks=("H", "A"),
+    blockwise=True,
 )
 def second_derivatives_commute_with_B(o: PaperObjects) -> Pairs:
     """The equivalent form of Lemma 10; in components, its proof (the print lacks the square of d^2 f_i/dx_j dx_k)"""

@@ -17,19 +17,25 @@ def gradients_of_the_integrals(o: PaperObjects) -> Pairs:
     """The integrals are related by the same differential equation as H and K_i"""
     v = o.vector("v")
     for signs in o.all_signs():
-        left = o.slope(lambda o, x, signs=signs: o.integral(o.g(o.B_signs(signs)), x), o.x, v)
+        left = o.slope(lambda o, x: o.integral(o.g(o.B_signs(signs)), x), o.x, v)
         yield left, o.slope(lambda o, x: o.H_tilde(x), o.x, o.B_signs(signs).transpose() * v)
 
 
-@claim("Theorem 15", "th diff eqs", "A nabla^2 H~ = nabla^2 H~ A^T, A nabla^2 K~_i = nabla^2 K~_i A^T", pairwise=True, breaks=("H", "A"))
+@claim(
+    "Theorem 15",
+    "th diff eqs",
+    "A nabla^2 H~ = nabla^2 H~ A^T, A nabla^2 K~_i = nabla^2 K~_i A^T",
+    pairwise=True,
+    breaks=("H", "A"),
+)
 def second_order_equations_of_the_integrals(o: PaperObjects) -> Pairs:
     """The integrals satisfy the same second order differential equations as H and K_i"""
     v, w = o.vector("v"), o.vector("w")
     left = o.second_slope(lambda o, x: o.H_tilde(x), o.x, o.AT * v, w)
     yield left, o.second_slope(lambda o, x: o.H_tilde(x), o.x, v, o.AT * w)
     for i in o.free:
-        left = o.second_slope(lambda o, x, i=i: o.integral(o.g_(i), x), o.x, o.AT * v, w)
-        yield left, o.second_slope(lambda o, x, i=i: o.integral(o.g_(i), x), o.x, v, o.AT * w)
+        left = o.second_slope(lambda o, x: o.integral(o.g_(i), x), o.x, o.AT * v, w)
+        yield left, o.second_slope(lambda o, x: o.integral(o.g_(i), x), o.x, v, o.AT * w)
 
 
 @claim("(95), (96)", "tH", "H~ = -2 x^T Pi^{-1} f, K~_i = -2 x^T Pi^{-1} g_i", breaks=("eps", "f"), blockwise=True)
@@ -80,7 +86,13 @@ def sum_of_the_q(o: PaperObjects) -> Pairs:
     yield o.sum([o.q(i, o.x) for i in o.each]), o.eighth_of_trace(o.x) * o.number(o.m - 2)
 
 
-@claim("(103)-(105)", "s1", "s_1 = 1 - eps^2 (p_0 - q_1 + q_2 + q_3) = 1 - 2 eps^2 (q_2 + q_3), ...", only_m=3, breaks=("B",))
+@claim(
+    "(103)-(105)",
+    "s1",
+    "s_1 = 1 - eps^2 (p_0 - q_1 + q_2 + q_3) = 1 - 2 eps^2 (q_2 + q_3), ...",
+    only_m=3,
+    breaks=("B",),
+)
 def functions_s(o: PaperObjects) -> Pairs:
     """s_1, s_2, s_3 in both forms"""
     squared = o.eps * o.eps
@@ -161,16 +173,14 @@ def K_tilde_through_H_and_K_for_every_m(o: PaperObjects) -> Pairs:
         yield o.integral(o.g_(i), o.x), right
 
 
-@claim(
-    "Lemma 17 (108)", "grads PQ", "nabla P_0 = (4-m) eps^2 B_i nabla Q_i", breaks=("H", "B"), distinct_roots=True
-)
+@claim("Lemma 17 (108)", "grads PQ", "nabla P_0 = (4-m) eps^2 B_i nabla Q_i", breaks=("H", "B"), distinct_roots=True)
 def gradients_of_P_and_Q(o: PaperObjects) -> Pairs:
     """The gradients of P_0 and Q_i; for m = 3 the factor is eps^2"""
     v = o.vector("v")
     left = o.slope(lambda o, x: o.P0(x), o.x, v)
     reciprocals = o.slope(lambda o, x: o.reciprocals(x), o.x, v) * o.number(1, 4)
     for i in o.free:
-        right = o.slope(lambda o, x, i=i: o.Q(i, x), o.x, o.B(i).transpose() * v) * o.eps * o.eps
+        right = o.slope(lambda o, x: o.Q(i, x), o.x, o.B(i).transpose() * v) * o.eps * o.eps
         yield left, right * o.number(4 - o.m)
         yield reciprocals, right  # for m = 4 the line above is 0 = 0
 
@@ -203,7 +213,7 @@ def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
     Q = [o.Q(i, o.x) for i in o.each]
     K = [o.Kf(o.B(i), o.x) for i in o.each]
     dK = [o.dot(v, o.B(i) * o.grad(o.x)) for i in o.each]
-    dQ = [o.slope(lambda o, x, i=i: o.Q(i, x), o.x, v) for i in o.each]
+    dQ = [o.slope(lambda o, x: o.Q(i, x), o.x, v) for i in o.each]
     dP = o.slope(lambda o, x: o.P0(x), o.x, v)
     dH = o.dot(v, o.grad(o.x))
     for i in o.free:
@@ -216,12 +226,10 @@ def B_times_gradient_of_H_tilde(o: PaperObjects) -> Pairs:
         lines = lines - squared * (Q[j] * dK[k] + K[j] * dQ[k])
         lines = lines - squared * (Q[k] * dK[j] + K[k] * dQ[j])
         yield before, lines
-        yield lines, o.slope(lambda o, x, i=i: o.integral(o.g_(i), x), o.x, v) * o.number(-1, 6)
+        yield lines, o.slope(lambda o, x: o.integral(o.g_(i), x), o.x, v) * o.number(-1, 6)
 
 
-@claim(
-    "Theorem 15, proof", "", "B_1 nabla K_2 = B_1 B_2 nabla H = -B_3 nabla H = -nabla K_3", only_m=3, breaks=("B",)
-)
+@claim("Theorem 15, proof", "", "B_1 nabla K_2 = B_1 B_2 nabla H = -B_3 nabla H = -nabla K_3", only_m=3, breaks=("B",))
 def relations_of_gradients(o: PaperObjects) -> Pairs:
     """The relations used on the way"""
     gradient = o.grad(o.x)
@@ -297,17 +305,21 @@ def gradients_through_s(o: PaperObjects) -> Pairs:
     v = o.vector("v")
     weighted = []
     for i in o.each:
-        slope = o.slope(lambda o, x, i=i: o.K.one - o.eps * o.eps * o.eigenvalue_of_square(i, x), o.x, v)
+        slope = o.slope(lambda o, x: o.K.one - o.eps * o.eps * o.eigenvalue_of_square(i, x), o.x, v)
         weighted.append(slope / (o.s(i, o.x) * o.s(i, o.x)))
     total = o.sum(weighted)
     yield o.slope(lambda o, x: o.P0(x), o.x, v), total * o.number(o.m - 4, 4)
     for i in o.free:
         right = (weighted[i] + weighted[i] - total) / (o.number(4) * o.eps * o.eps)
-        yield o.slope(lambda o, x, i=i: o.Q(i, x), o.x, v), right
+        yield o.slope(lambda o, x: o.Q(i, x), o.x, v), right
 
 
 @claim(
-    "Lemma 17, proof", "", "B_1 nabla s_1 = -nabla s_1, B_1 nabla s_2 = nabla s_2, ...", breaks=("H", "B"), distinct_roots=True
+    "Lemma 17, proof",
+    "",
+    "B_1 nabla s_1 = -nabla s_1, B_1 nabla s_2 = nabla s_2, ...",
+    breaks=("H", "B"),
+    distinct_roots=True,
 )
 def signs_of_the_gradients_of_s(o: PaperObjects) -> Pairs:
     """B_i changes the sign of nabla s_i and keeps the others"""
@@ -315,8 +327,8 @@ def signs_of_the_gradients_of_s(o: PaperObjects) -> Pairs:
     for i in o.free:
         along = o.B(i).transpose() * v
         for j in o.each:
-            left = o.slope(lambda o, x, j=j: o.s(j, x), o.x, along)
-            right = o.slope(lambda o, x, j=j: o.s(j, x), o.x, v)
+            left = o.slope(lambda o, x: o.s(j, x), o.x, along)
+            right = o.slope(lambda o, x: o.s(j, x), o.x, v)
             yield left, right * o.number(-1 if i == j else 1)
 
 
@@ -335,7 +347,7 @@ def _product_rule(o: PaperObjects, v: Any) -> Any:
     value = o.P0(o.x) * o.dot(v, o.grad(o.x)) + o.H(o.x) * o.slope(lambda o, x: o.P0(x), o.x, v)
     for i in o.each:
         inner = o.Q(i, o.x) * o.dot(v, o.B(i) * o.grad(o.x))
-        inner = inner + o.Kf(o.B(i), o.x) * o.slope(lambda o, x, i=i: o.Q(i, x), o.x, v)
+        inner = inner + o.Kf(o.B(i), o.x) * o.slope(lambda o, x: o.Q(i, x), o.x, v)
         value = value + o.eps * o.eps * inner
     return value
 

@@ -41,12 +41,14 @@ def equations_of_motion(o: PaperObjects) -> Pairs:
         yield o.fx[o.m + i, 0], -gradient[i, 0]
 
 
-@claim("(14), (15)", "grad K", "nabla H_1 = A nabla H_0, nabla H_2 = A nabla H_1", least_m=2, pairwise=True, breaks=("H",))
+@claim(
+    "(14), (15)", "grad K", "nabla H_1 = A nabla H_0, nabla H_2 = A nabla H_1", least_m=2, pairwise=True, breaks=("H",)
+)
 def gradients_of_the_chain(o: PaperObjects) -> Pairs:
     """The chain starts with H_1 and, for m > 2, H_2"""
     v = o.vector("v")
     for i in range(1, min(o.m, 3)):
-        yield o.slope(lambda o, x, i=i: o.H(x, i), o.x, v), o.dot(v, o.A * o.grad(o.x, i - 1))
+        yield o.slope(lambda o, x: o.H(x, i), o.x, v), o.dot(v, o.A * o.grad(o.x, i - 1))
 
 
 @claim("Prop. 1 (16)", "cond A", "A^T J = J A", breaks=("A", "J"), blockwise=True)
@@ -141,11 +143,14 @@ def solvability(o: PaperObjects) -> Pairs:
 
 @claim("Sect. 3", "", "A^{-1} nabla^2 H_1 = nabla^2 H_1 (A^{-1})^T", least_m=2, breaks=("H",))
 def solvability_backwards(o: PaperObjects) -> Pairs:
-    """The condition for H_1 with A replaced by its inverse (A non-degenerate)"""
-    if not o.K.is_zero(o.det(o.A)):
-        inverse = o.inverse(o.A)
-        yield inverse * o.hess(o.x, 1), o.hess(o.x, 1) * inverse.transpose()
-        yield o.grad(o.x), inverse * o.grad(o.x, 1)
+    """The condition for H_1 with A replaced by its inverse (for a singular A: A plus a multiple of I, same space)"""
+    A, shift = o.A, 0
+    while o.K.is_zero(o.det(A)):
+        shift += 1
+        A = o.A + o.I * o.number(shift)
+    inverse, hessian = o.inverse(A), A * o.hess(o.x)
+    yield inverse * hessian, hessian * inverse.transpose()
+    yield A * hessian, hessian * A.transpose()
 
 
 @claim(
@@ -162,7 +167,9 @@ def independent_equations(o: PaperObjects) -> Pairs:
     columns = []
     for a in range(n):
         for b in range(a, n):
-            X = o.K.matrix(n, n, [o.K.one if (i, j) in ((a, b), (b, a)) else o.K.zero for i in range(n) for j in range(n)])
+            X = o.K.matrix(
+                n, n, [o.K.one if (i, j) in ((a, b), (b, a)) else o.K.zero for i in range(n) for j in range(n)]
+            )
             C = o.A * X - X * o.AT
             columns.append([C[i, j] for i in range(n) for j in range(i + 1, n)])
     rank = o.rank(o.K.matrix(len(columns), len(columns[0]), [entry for column in columns for entry in column]))

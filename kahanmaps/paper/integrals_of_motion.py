@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Kind, Pairs, claim
 
@@ -34,7 +36,7 @@ def K_tilde_is_shared(o: PaperObjects) -> Pairs:
 def shared_integrals_are_independent(o: PaperObjects) -> Pairs:
     """Two integrals of a pair f, g are independent; the class has exactly m independent ones"""
     gradients = [o.gradient(lambda o, x: o.H_tilde(x), o.x)]
-    gradients += [o.gradient(lambda o, x, i=i: o.integral(o.g_(i), x), o.x) for i in o.each]
+    gradients += [o.gradient(lambda o, x: o.integral(o.g_(i), x), o.x) for i in o.each]
     if o.m > 1:
         for gradient in gradients[1:]:
             yield o.rank(o.columns([gradients[0], gradient])), 2
@@ -143,7 +145,7 @@ def H_tilde_at_the_image(o: PaperObjects) -> Pairs:
         o.dot(o.x, o.J * (o.minus_eps_jac(o.f, o.x_tilde) * after)) / o.eps,
         o.H_tilde(o.x),
     ]
-    yield from zip(steps, steps[1:], strict=False)
+    yield from pairwise(steps)
 
 
 @claim("(66)", "aux3", "K~(x~) = x^T J g'(x~) x", breaks=("B", "H", "inhomogeneous"), blockwise=True)
@@ -159,7 +161,7 @@ def K_tilde_at_the_image(o: PaperObjects) -> Pairs:
             o.dot(o.x, o.J * (o.minus_eps_jac(o.f, o.x_tilde) * inner)),
             o.dot(o.x, o.J * (o.jac(g, o.x_tilde) * o.x)),
         ]
-        yield from zip(steps, steps[1:], strict=False)
+        yield from pairwise(steps)
 
 
 @claim(
@@ -201,7 +203,7 @@ def odd_terms_vanish(o: PaperObjects) -> Pairs:
             o.dot(gradient, skew * gradient) * o.number(-2),
             o.K.zero,
         ]
-        yield from zip(steps, steps[1:], strict=False)
+        yield from pairwise(steps)
         yield skew.transpose(), -skew
 
 
@@ -253,7 +255,7 @@ def even_terms(o: PaperObjects) -> Pairs:
             o.dot(o.x, o.J * o.solve(square, gx)) * o.number(2),
             o.integral(g, o.x),
         ]
-        yield from zip(steps, steps[1:], strict=False)
+        yield from pairwise(steps)
 
 
 @claim("Sect. 7", "", "sum K~_i = (m-2) H~", breaks=("B", "H"), distinct_roots=True)

@@ -30,11 +30,16 @@ def chain_of_gradients(o: PaperObjects) -> Pairs:
     """H_0, ..., H_{m-1} form a chain of gradients"""
     v = o.vector("v")
     for i in range(1, o.m):
-        yield o.slope(lambda o, x, i=i: o.H(x, i), o.x, v), o.dot(v, o.A * o.grad(o.x, i - 1))
+        yield o.slope(lambda o, x: o.H(x, i), o.x, v), o.dot(v, o.A * o.grad(o.x, i - 1))
 
 
 @claim(
-    "Sect. 1", "", "rank(nabla H_0, ..., nabla H_{m-1}) = m", kind=Kind.ATTAINED, breaks=("repeated", "H0"), distinct_roots=True
+    "Sect. 1",
+    "",
+    "rank(nabla H_0, ..., nabla H_{m-1}) = m",
+    kind=Kind.ATTAINED,
+    breaks=("repeated", "H0"),
+    distinct_roots=True,
 )
 def hamiltonians_are_independent(o: PaperObjects) -> Pairs:
     """H_0, ..., H_{m-1} are functionally independent"""
@@ -68,8 +73,8 @@ def chain_of_perturbed_gradients(o: PaperObjects) -> Pairs:
     """The integrals H~_i are related by the same equation as the H_i"""
     v = o.vector("v")
     for i in range(1, o.m):
-        left = o.slope(lambda o, x, i=i: o.H_tilde_(i, x), o.x, v)
-        yield left, o.slope(lambda o, x, i=i: o.H_tilde_(i - 1, x), o.x, o.AT * v)
+        left = o.slope(lambda o, x: o.H_tilde_(i, x), o.x, v)
+        yield left, o.slope(lambda o, x: o.H_tilde_(i - 1, x), o.x, o.AT * v)
 
 
 @claim("Sect. 1", "", "A nabla^2 H~_i = nabla^2 H~_i A^T", pairwise=True, breaks=("H", "A"))
@@ -77,14 +82,14 @@ def matrix_differential_equation_of_perturbed_hamiltonians(o: PaperObjects) -> P
     """The integrals H~_i satisfy the same second order differential equations as the H_i"""
     v, w = o.vector("v"), o.vector("w")
     for i in range(o.m):
-        left = o.second_slope(lambda o, x, i=i: o.H_tilde_(i, x), o.x, o.AT * v, w)
-        yield left, o.second_slope(lambda o, x, i=i: o.H_tilde_(i, x), o.x, v, o.AT * w)
+        left = o.second_slope(lambda o, x: o.H_tilde_(i, x), o.x, o.AT * v, w)
+        yield left, o.second_slope(lambda o, x: o.H_tilde_(i, x), o.x, v, o.AT * w)
 
 
 @claim("Sect. 1", "", "rank(nabla H~_0, ..., nabla H~_{m-1}) = m", kind=Kind.ATTAINED, breaks=("repeated", "H0"))
 def perturbed_hamiltonians_are_independent(o: PaperObjects) -> Pairs:
     """The map possesses m functionally independent integrals"""
-    yield o.rank(o.columns([o.gradient(lambda o, x, i=i: o.H_tilde_(i, x), o.x) for i in range(o.m)])), o.m
+    yield o.rank(o.columns([o.gradient(lambda o, x: o.H_tilde_(i, x), o.x) for i in range(o.m)])), o.m
 
 
 @claim("Sect. 1", "", "Phi_{f_0} o Phi_{f_1} != Phi_{f_1} o Phi_{f_0}", kind=Kind.DIFFERENT, least_m=2, breaks=("A=B",))
@@ -126,7 +131,9 @@ def associated_fields_are_pairwise_different(o: PaperObjects) -> Pairs:
             yield first, -second
 
 
-@claim("Sect. 1", "", "rank { J B_s nabla H_0 } = m", kind=Kind.ATTAINED, breaks=("B=I",), least_m=3, distinct_roots=True)
+@claim(
+    "Sect. 1", "", "rank { J B_s nabla H_0 } = m", kind=Kind.ATTAINED, breaks=("B=I",), least_m=3, distinct_roots=True
+)
 def independent_associated_fields(o: PaperObjects) -> Pairs:
     """If m > 2, the class contains m linearly independent vector fields"""
     yield o.rank(o.columns([o.fx, *(o.value(o.g(B), o.x) for B in o.associates())])), o.m
@@ -136,7 +143,7 @@ def independent_associated_fields(o: PaperObjects) -> Pairs:
 def integrals_are_in_involution(o: PaperObjects) -> Pairs:
     """The integrals are in involution with respect to the invariant symplectic structure"""
     gradients = [o.gradient(lambda o, x: o.H_tilde(x), o.x)]
-    gradients += [o.gradient(lambda o, x, i=i: o.integral(o.g_(i), x), o.x) for i in o.each]
+    gradients += [o.gradient(lambda o, x: o.integral(o.g_(i), x), o.x) for i in o.each]
     for k, first in enumerate(gradients):
         for second in gradients[:k]:
             yield o.dot(first, o.Pi(o.x) * second), o.K.zero

@@ -81,7 +81,7 @@ def jacobi_matrix_of_the_map(o: PaperObjects) -> Pairs:
         x_tilde = system.step(system.f, o.x)
         right = o.solve(o.minus_eps_jac(system.f, o.x), o.plus_eps_jac(system.f, x_tilde) * v)
         for k in range(o.n):
-            yield system.slope(lambda o, x, k=k: o.step(o.f, x)[k, 0], o.x, v), right[k, 0]
+            yield system.slope(lambda o, x: o.step(o.f, x)[k, 0], o.x, v), right[k, 0]
 
 
 @claim(

@@ -9,22 +9,20 @@ Nothing here checks anything: broken input is evaluated like any other, which is
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
-from flint import fmpq
-
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import Field
-from kahanmaps.algebra.matrices import det, rank, solve, trace
-from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.algebra.matrices import rank, solve
+from kahanmaps.paper.calculus import Calculus, remembered
 from kahanmaps.systems.quadratic import SystemOver
 
 
-@dataclass(eq=False)
-class PaperObjects:
+@dataclass(eq=False, kw_only=True)
+class PaperObjects(Calculus):
     """The paper's objects over the field `K`.
 
     `third` holds the third derivatives of H as an n^2 x n matrix: row i n + j gives the linear form d_i d_j H.
@@ -32,16 +30,12 @@ class PaperObjects:
     that the maps are computed with and `minus` the value of B_i at its own root: other values are for controls.
     """
 
-    K: Field
     A: Any
     J: Any
     third: Any
-    eps: Any
     roots: tuple[Any, ...] | None
-    draw: Callable[[str], Any]
     hessian_of_quadratic_part: Any = None  # of an inhomogeneous H
     gradient_of_linear_part: Any = None
-    step_eps: Any = None
     minus: Any = None
     base: SystemOver | None = None  # f_0, where it comes from a rational system
     sign_vectors: tuple[tuple[int, ...], ...] | None = None  # the associated systems to look at; None: all
@@ -51,38 +45,17 @@ class PaperObjects:
     known_chi: tuple[Any, ...] | None = None  # coefficients of chi, constant term first, where they are in K
     # The rest is for controls only: the explicit Euler method instead of Kahan's, an inhomogeneous H without lower
     # terms, a tensor f'' that is not the derivative of f'.
-    method: str = "kahan"
     has_lower_terms: bool = True
-    error_of_second: Any = None
-    used: set[str] = field(default_factory=set)
-    _memory: dict[Any, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.step_eps is None:
-            self.step_eps = self.eps
+        super().__post_init__()
         if self.minus is None:
             self.minus = -self.K.one
-
-    # ---- numbers, vectors and matrices ---------------------------------------------------------------------------
 
     @property
     def n(self) -> int:
         """The dimension 2m."""
         return int(self.A.nrows())
-
-    @property
-    def m(self) -> int:
-        """Half the dimension."""
-        return self.n // 2
-
-    def number(self, above: int, below: int = 1) -> Any:
-        """The rational number above/below as an element of K."""
-        return self.K.convert(fmpq(above, below))
-
-    @cached_property
-    def I(self) -> Any:  # noqa: E743 (the paper's letter)
-        """The identity matrix."""
-        return self.K.identity(self.n)
 
     @cached_property
     def AT(self) -> Any:
@@ -90,94 +63,26 @@ class PaperObjects:
         return self.A.transpose()
 
     @cached_property
-    def x(self) -> Any:
-        """The point."""
-        return self.vector("x")
-
-    def vector(self, name: str) -> Any:
-        """A vector of its own: the point x, another point, a direction."""
-        if name not in self._memory:
-            self.used.add(name)
-            self._memory[name] = self.draw(name)
-        return self._memory[name]
-
-    def scalar(self, name: str) -> Any:
-        """A number of its own."""
-        return self.vector(name)[0, 0]
-
-    def unit(self, k: int) -> Any:
-        """The k-th unit vector."""
-        return self.K.column([self.K.one if i == k else self.K.zero for i in range(self.n)])
-
-    def zeros(self, rows: int, columns: int) -> Any:
-        """The zero matrix."""
-        return self.K.matrix(rows, columns, [self.K.zero] * (rows * columns))
-
-    def solve(self, matrix: Any, right: Any) -> Any:
-        """matrix^{-1} right."""
-        return solve(matrix, right)
-
-    def inverse(self, matrix: Any) -> Any:
-        """matrix^{-1}."""
-        return solve(matrix, self.I)
-
-    def det(self, matrix: Any) -> Any:
-        """The determinant."""
-        return det(matrix)
-
-    def trace(self, matrix: Any) -> Any:
-        """The trace."""
-        return trace(matrix)
-
-    def dot(self, left: Any, right: Any) -> Any:
-        """left^T right, a number."""
-        return (left.transpose() * right)[0, 0]
-
-    def sum(self, terms: Sequence[Any]) -> Any:
-        """The sum of numbers, vectors or matrices (at least one)."""
-        total = terms[0]
-        for term in terms[1:]:
-            total = total + term
-        return total
-
-    def columns(self, vectors: Sequence[Any]) -> Any:
-        """The matrix with these columns."""
-        rows = zip(*(vector.entries() for vector in vectors), strict=True)
-        return self.K.matrix(self.n, len(vectors), [entry for row in rows for entry in row])
-
-    def rank(self, matrix: Any) -> int:
-        """The rank."""
-        return rank(self.K, matrix)
-
-    def power(self, matrix: Any, exponent: int) -> Any:
-        """matrix^exponent, exponent >= 0."""
-        result = self.I
-        for _ in range(exponent):
-            result = result * matrix
-        return result
+    def df(self) -> Any:
+        """f_0'(x)."""
+        return self.jac(self.f, self.x)
 
     @cached_property
-    def chi_of_roots(self) -> list[Any]:
-        """The coefficients of prod (t - lambda_i), constant term first, the leading one 1 among them."""
-        product = [self.K.one]
-        for root in self.lam:
-            product = _times_linear(self.K, product, root)
-        return product
+    def fx(self) -> Any:
+        """f_0(x)."""
+        return self.value(self.f, self.x)
 
-    @property
-    def chi(self) -> Sequence[Any]:
-        """The coefficients of chi, constant term first."""
-        return self.known_chi if self.known_chi is not None else self.chi_of_roots
+    @cached_property
+    def x_tilde(self) -> Any:
+        """x~ = Phi_f(x, eps)."""
+        return self.step(self.f, self.x)
 
-    def horner(self, k: int) -> Any:
-        """C_k(A) = A^(m-1-k) + c_(m-1) A^(m-2-k) + ... + c_(k+1), Horner's polynomial of chi = sum c_k t^k."""
-        return self.sum([self.A_to(j - k - 1) * self.chi[j] for j in range(k + 1, self.m + 1)])
-
-    # ---- H and its chain -------------------------------------------------------------------------------------------
+    # ---- H and its chain ----------------------------------------------------------------------------------------
 
     def _reshaped(self, column: Any) -> Any:
         return self.K.matrix(self.n, self.n, column.entries())
 
+    @remembered
     def hess(self, x: Any, i: int = 0) -> Any:
         """The Hesse matrix of H_i, nabla^2 H_i = A^i nabla^2 H_0 (the chain's definition)."""
         hessian = self._reshaped(self.third * x)
@@ -185,12 +90,12 @@ class PaperObjects:
             hessian = hessian + self.hessian_of_quadratic_part
         return self.A_to(i) * hessian
 
+    @remembered
     def A_to(self, i: int) -> Any:
         """A^i."""
-        if ("A", i) not in self._memory:
-            self._memory["A", i] = self.power(self.A, i)
-        return self._memory["A", i]
+        return self.power(self.A, i)
 
+    @remembered
     def grad(self, x: Any, i: int = 0) -> Any:
         """nabla H_i = A^i nabla H_0."""
         gradient = self._reshaped(self.third * x) * x * self.number(1, 2)
@@ -215,11 +120,10 @@ class PaperObjects:
         """The system f = f_0 = J nabla H_0."""
         return self.base if self.base is not None else self.hamiltonian_system(self.I)
 
+    @remembered
     def f_(self, i: int) -> SystemOver:
         """The system f_i = J nabla H_i = J A^i nabla H_0."""
-        if ("f", i) not in self._memory:
-            self._memory["f", i] = self.f if i == 0 else self.hamiltonian_system(self.A_to(i))
-        return self._memory["f", i]
+        return self.f if i == 0 else self.hamiltonian_system(self.A_to(i))
 
     def hamiltonian_system(self, matrix: Any) -> SystemOver:
         """The system J `matrix` nabla H_0."""
@@ -232,63 +136,7 @@ class PaperObjects:
             K, tensor, left * self.hessian_of_quadratic_part, left * self.gradient_of_linear_part
         )
 
-    # ---- any system and its Kahan map --------------------------------------------------------------------------------
-
-    def value(self, f: SystemOver, x: Any) -> Any:
-        """f(x)."""
-        return self.K.column(f.value(x.entries()))
-
-    def jac(self, f: SystemOver, x: Any) -> Any:
-        """The Jacobi matrix f'(x)."""
-        return f.jacobian(x.entries())
-
-    def second(self, f: SystemOver, v: Any) -> Any:
-        """The matrix f''v, with f'(x + v) = f'(x) + f''v."""
-        second = f.hessian_times(v.entries())
-        return second if self.error_of_second is None else second + self.error_of_second * v[0, 0]
-
-    def step(self, f: SystemOver, x: Any, times: int = 1) -> Any:
-        """Phi_f(x, eps), or Phi_f(x, times eps)."""
-        eps = self.step_eps if times == 1 else self.step_eps * self.number(times)
-        if self.method == "euler":
-            return x + self.value(f, x) * (eps * self.number(2))
-        return self.K.column(KahanMapOver(f, eps).step(x.entries()))
-
-    def jacobian_of_step(self, f: SystemOver, x: Any) -> Any:
-        """dPhi_f(x, eps)."""
-        if self.method == "euler":
-            return self.I + self.jac(f, x) * (self.step_eps * self.number(2))
-        return KahanMapOver(f, self.step_eps).jacobian(x.entries())
-
-    def minus_eps_jac(self, f: SystemOver, x: Any) -> Any:
-        """I - eps f'(x)."""
-        return self.I - self.jac(f, x) * self.eps
-
-    def plus_eps_jac(self, f: SystemOver, x: Any) -> Any:
-        """I + eps f'(x)."""
-        return self.I + self.jac(f, x) * self.eps
-
-    @cached_property
-    def df(self) -> Any:
-        """f_0'(x)."""
-        return self.jac(self.f, self.x)
-
-    @cached_property
-    def fx(self) -> Any:
-        """f_0(x)."""
-        return self.value(self.f, self.x)
-
-    @cached_property
-    def x_tilde(self) -> Any:
-        """x~ = Phi_f(x, eps)."""
-        return self.step(self.f, self.x)
-
-    def one_minus_square(self, f: SystemOver, x: Any) -> Any:
-        """I - eps^2 f'(x)^2."""
-        jacobian = self.jac(f, x)
-        return self.I - jacobian * jacobian * (self.eps * self.eps)
-
-    # ---- the associated systems ----------------------------------------------------------------------------------------
+    # ---- the associated systems ---------------------------------------------------------------------------------
 
     @property
     def lam(self) -> tuple[Any, ...]:
@@ -308,33 +156,30 @@ class PaperObjects:
         """The indices i that a claim "for all i" is tried at."""
         return self.each if self.free_indices is None else self.free_indices
 
+    @remembered
     def lagrange(self, i: int) -> list[Any]:
         """The coefficients of B_i(lambda), of degree < m, with B_i(lambda_i) = -1 and B_i(lambda_j) = 1.
 
         From the roots by Lagrange's formula 1 + (B_i(lambda_i) - 1) prod (lambda - lambda_j)/(lambda_i - lambda_j).
         """
-        if ("lagrange", i) not in self._memory:
-            product, below = [self.K.one], self.K.one
-            for j in self.each:
-                if j != i:
-                    product = _times_linear(self.K, product, self.lam[j])
-                    below = below * (self.lam[i] - self.lam[j])
-            factor = (self.minus - self.K.one) / below
-            coefficients = [coefficient * factor for coefficient in product]
-            coefficients[0] = coefficients[0] + self.K.one
-            self._memory["lagrange", i] = coefficients
-        found: list[Any] = self._memory["lagrange", i]
-        return found
+        product, below = [self.K.one], self.K.one
+        for j in self.each:
+            if j != i:
+                product = _times_linear(self.K, product, self.lam[j])
+                below = below * (self.lam[i] - self.lam[j])
+        factor = (self.minus - self.K.one) / below
+        coefficients = [coefficient * factor for coefficient in product]
+        coefficients[0] = coefficients[0] + self.K.one
+        return coefficients
 
     def polynomial_in_A(self, coefficients: Sequence[Any]) -> Any:
         """The polynomial in A with these coefficients, constant term first."""
         return self.sum([self.A_to(k) * coefficient for k, coefficient in enumerate(coefficients)])
 
+    @remembered
     def B(self, i: int) -> Any:
         """B_i."""
-        if ("B", i) not in self._memory:
-            self._memory["B", i] = self.polynomial_in_A(self.lagrange(i))
-        return self._memory["B", i]
+        return self.polynomial_in_A(self.lagrange(i))
 
     def B_signs(self, signs: Sequence[int]) -> Any:
         """B_s, the product of the B_i with s_i = -1."""
@@ -360,13 +205,10 @@ class PaperObjects:
             return ((-1,),)
         return tuple((1, *rest) for rest in itertools.product((1, -1), repeat=count - 1))[1:]
 
+    @remembered
     def g(self, B: Any) -> SystemOver:
         """The associated system g = J B nabla H_0 = J nabla K."""
-        key = ("g", id(B))
-        if key not in self._memory:
-            self._memory[key] = (B, self.hamiltonian_system(B))  # B is kept, so that its id stays its own
-        system: SystemOver = self._memory[key][1]
-        return system
+        return self.hamiltonian_system(B)
 
     def g_(self, i: int) -> SystemOver:
         """g_i, the system associated by B_i."""
@@ -376,26 +218,48 @@ class PaperObjects:
         """K(x) with nabla K = B nabla H_0."""
         return self.potential(B, x)
 
-    # ---- integrals and the Poisson tensor ------------------------------------------------------------------------------
+    @cached_property
+    def chi_of_roots(self) -> list[Any]:
+        """The coefficients of prod (t - lambda_i), constant term first, the leading one 1 among them."""
+        product = [self.K.one]
+        for root in self.lam:
+            product = _times_linear(self.K, product, root)
+        return product
 
+    @property
+    def chi(self) -> Sequence[Any]:
+        """The coefficients of chi, constant term first."""
+        return self.known_chi if self.known_chi is not None else self.chi_of_roots
+
+    def horner(self, k: int) -> Any:
+        """C_k(A) = A^(m-1-k) + c_(m-1) A^(m-2-k) + ... + c_(k+1), Horner's polynomial of chi = sum c_k t^k."""
+        return self.sum([self.A_to(j - k - 1) * self.chi[j] for j in range(k + 1, self.m + 1)])
+
+    # ---- integrals and the Poisson tensor -----------------------------------------------------------------------
+
+    @remembered
     def integral(self, g: SystemOver, x: Any) -> Any:
         """eps^{-1} x^T J x^ with x^ = Phi_g(x): H~ for g = f, K~ for an associated g."""
         return self.dot(x, self.J * self.step(g, x)) / self.eps
 
+    @remembered
     def H_tilde(self, x: Any) -> Any:
         """H~(x, eps)."""
         return self.integral(self.f, x)
 
+    @remembered
     def H_tilde_(self, i: int, x: Any) -> Any:
         """H~_i = eps^{-1} x^T J (A^T)^i x~, a perturbation of -6 H_i."""
         image = self.A_to(i).transpose() * self.step(self.f, x)
         return self.dot(x, self.J * image) / self.eps
 
+    @remembered
     def modified(self, B: Any, x: Any) -> Any:
         """K + (2 eps/3) nabla K^T (I - eps g')^{-1} g for the associated g, a function that tends to K."""
         g = self.g(B)
         return self._modified(g, self.potential(B, x), B * self.grad(x), x)
 
+    @remembered
     def modified_H(self, x: Any) -> Any:
         """H + (2 eps/3) nabla H^T (I - eps f')^{-1} f."""
         return self._modified(self.f, self.potential(self.I, x), self.grad(x), x)
@@ -409,38 +273,42 @@ class PaperObjects:
         jacobian = self.jac(self.f, x)
         return self.J - jacobian * jacobian * self.J * (self.eps * self.eps)
 
-    # ---- f'^2 as a combination of I and the B_i ----------------------------------------------------------------------
+    # ---- f'^2 as a combination of I and the B_i -----------------------------------------------------------------
 
+    @remembered
     def projector(self, i: int) -> Any:
-        """The projector onto the eigenspace of A for lambda_i along the others, prod (A - lambda_j)/(lambda_i - lambda_j)."""
-        if ("projector", i) not in self._memory:
-            product = self.I
-            for j in self.each:
-                if j != i:
-                    product = product * (self.A - self.I * self.lam[j]) * (self.K.one / (self.lam[i] - self.lam[j]))
-            self._memory["projector", i] = product
-        return self._memory["projector", i]
+        """The projector onto the eigenspace of A for lambda_i: prod (A - lambda_j)/(lambda_i - lambda_j), j != i."""
+        product = self.I
+        for j in self.each:
+            if j != i:
+                product = product * (self.A - self.I * self.lam[j]) * (self.K.one / (self.lam[i] - self.lam[j]))
+        return product
 
+    @remembered
     def eigenvalue_of_square(self, i: int, x: Any) -> Any:
         """The eigenvalue of f'^2 on the eigenspace of A^T for lambda_i, that is -D_i, D_i = det of the planar f'."""
         jacobian = self.jac(self.f, x)
         return self.trace(self.projector(i).transpose() * jacobian * jacobian) * self.number(1, 2)
 
+    @remembered
     def eighth_of_trace(self, x: Any) -> Any:
         """tr f'^2/8."""
         jacobian = self.jac(self.f, x)
         return self.trace(jacobian * jacobian) * self.number(1, 8)
 
+    @remembered
     def p0(self, x: Any) -> Any:
         """p_0 = (4 - m)/8 tr f'^2, for m = 3 the paper's 1/8 tr f'^2."""
         jacobian = self.jac(self.f, x)
         return self.trace(jacobian * jacobian) * self.number(4 - self.m, 8)
 
+    @remembered
     def q(self, i: int, x: Any) -> Any:
         """q_i = 1/8 tr (B_i^T f'^2)."""
         jacobian = self.jac(self.f, x)
         return self.trace(self.B(i).transpose() * jacobian * jacobian) * self.number(1, 8)
 
+    @remembered
     def coefficient_of_power(self, k: int, x: Any) -> Any:
         """pi_k with f'^2 = sum_k pi_k (A^T)^k; for m = 3 the paper's p, q, r."""
         value = self.p0(x) if k == 0 else self.K.zero
@@ -448,6 +316,7 @@ class PaperObjects:
             value = value + self.lagrange(i)[k] * self.q(i, x)
         return value
 
+    @remembered
     def s(self, i: int, x: Any) -> Any:
         """s_i = 1 - eps^2 (p_0 + sum_j q_j - 2 q_i), the factor of det(I - eps f') that belongs to lambda_i."""
         total = self.p0(x) - self.q(i, x) * self.number(2)
@@ -455,41 +324,24 @@ class PaperObjects:
             total = total + self.q(j, x)
         return self.K.one - self.eps * self.eps * total
 
+    @remembered
     def reciprocals(self, x: Any) -> Any:
         """sum_i 1/s_i."""
         return self.sum([self.K.one / self.s(i, x) for i in self.each])
 
+    @remembered
     def P0(self, x: Any) -> Any:
         """P_0 = ((m - 2)^2 + (4 - m) sum 1/s_j)/4, for m = 3 the paper's (1/s_0 + 1/s_1 + 1/s_2 + 1/s_3)/4."""
         m = self.m
         return (self.number((m - 2) ** 2) + self.number(4 - m) * self.reciprocals(x)) * self.number(1, 4)
 
+    @remembered
     def Q(self, i: int, x: Any) -> Any:
         """Q_i = (2 - m + sum 1/s_j - 2/s_i)/(4 eps^2)."""
         above = self.number(2 - self.m) + self.reciprocals(x) - self.number(2) / self.s(i, x)
         return above / (self.number(4) * self.eps * self.eps)
 
-    # ---- derivatives -----------------------------------------------------------------------------------------------------
-
-    def slope(self, function: Callable[[PaperObjects, Any], Any], x: Any, v: Any) -> Any:
-        """The derivative at x, along v, of a number-valued function of (objects, point): exact, by dual numbers."""
-        lifted = self.lifted()
-        dual: Any = lifted.K
-        moving = dual.matrix(self.n, 1, [dual.dual(a, b) for a, b in zip(x.entries(), v.entries(), strict=True)])
-        return function(lifted, moving).slope
-
-    def second_slope(self, function: Callable[[PaperObjects, Any], Any], x: Any, v: Any, w: Any) -> Any:
-        """The second derivative of a number-valued function at x along v and w."""
-
-        def along_w(o: PaperObjects, x: Any) -> Any:
-            dual: Any = o.K
-            return o.slope(function, x, dual.lift_matrix(w))
-
-        return self.slope(along_w, x, v)
-
-    def gradient(self, function: Callable[[PaperObjects, Any], Any], x: Any) -> Any:
-        """The gradient at x of a number-valued function of (objects, point), a column."""
-        return self.K.column([self.slope(function, x, self.unit(k)) for k in range(self.n)])
+    # ---- variations ---------------------------------------------------------------------------------------------
 
     def lifted(self) -> PaperObjects:
         """The same objects over the dual numbers K[d]/(d^2)."""
@@ -514,14 +366,11 @@ class PaperObjects:
                 lower_terms=self.lower_terms and (lift(self.lower_terms[0]), lift(self.lower_terms[1])),
                 step_eps=dual.convert(self.step_eps),
                 minus=dual.convert(self.minus),
-                base=base
-                and SystemOver.from_tensor(dual, lift(base.tensor), lift(base.B), lift(base.c)),
+                base=base and SystemOver.from_tensor(dual, lift(base.tensor), lift(base.B), lift(base.c)),
                 error_of_second=lift(self.error_of_second),
             )
         lifted: PaperObjects = self._memory["lifted"]
         return lifted
-
-    # ---- variations --------------------------------------------------------------------------------------------------------
 
     def changed(self, **changes: Any) -> PaperObjects:
         """Objects with some of the data replaced, and nothing remembered."""

@@ -22,7 +22,11 @@ def tensor(o: PaperObjects) -> Pairs:
 
 
 @claim(
-    "Theorem 12 (71)", "Pi long", "Pi = (1 - eps^2 p_0) J - eps^2 sum q_i B_i^T J", breaks=("H", "B"), distinct_roots=True
+    "Theorem 12 (71)",
+    "Pi long",
+    "Pi = (1 - eps^2 p_0) J - eps^2 sum q_i B_i^T J",
+    breaks=("H", "B"),
+    distinct_roots=True,
 )
 def tensor_by_B(o: PaperObjects) -> Pairs:
     """The tensor through the B_i"""
@@ -130,7 +134,7 @@ def gradient_conditions(o: PaperObjects) -> Pairs:
     """The gradients of the coefficients: nabla pi_k = C_k(A) nabla pi_{m-1}"""
     v = o.vector("v")
     for k in range(o.m - 1):
-        left = o.slope(lambda o, x, k=k: o.coefficient_of_power(k, x), o.x, v)
+        left = o.slope(lambda o, x: o.coefficient_of_power(k, x), o.x, v)
         # v . C_k(A) nabla r is the slope of r along C_k(A)^T v.
         along = o.horner(k).transpose() * v
         yield left, o.slope(lambda o, x: o.coefficient_of_power(o.m - 1, x), o.x, along)
@@ -191,7 +195,8 @@ def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
     "",
     "coefficient of eps^4 vanishes by virtue of nabla pi_k = C_k nabla pi_{m-1}",
     least_m=2,
-    pairwise=True, breaks=("H",),
+    pairwise=True,
+    breaks=("H",),
 )
 def jacobi_identity_to_second_order(o: PaperObjects) -> Pairs:
     """The coefficients of eps^4 in the Jacobi identity vanish identically"""
@@ -208,7 +213,7 @@ def gradients_of_the_coefficients(o: PaperObjects) -> Pairs:
     left = o.slope(lambda o, x: o.p0(x), o.x, v)
     trace = o.slope(lambda o, x: o.eighth_of_trace(x), o.x, v)
     for i in o.free:
-        right = o.slope(lambda o, x, i=i: o.q(i, x), o.x, o.B(i).transpose() * v)
+        right = o.slope(lambda o, x: o.q(i, x), o.x, o.B(i).transpose() * v)
         yield left, right * o.number(4 - o.m)
         yield trace, right  # for m = 4 the line above is 0 = 0
 
@@ -217,7 +222,8 @@ def gradients_of_the_coefficients(o: PaperObjects) -> Pairs:
     "Theorem 12, proof",
     "",
     "nabla p = (I + sum alpha_i B_i) nabla p_0, nabla q = sum beta_i B_i nabla p_0, ...",
-    least_m=2, breaks=("H",),
+    least_m=2,
+    breaks=("H",),
     distinct_roots=True,
 )
 def gradients_through_p0(o: PaperObjects) -> Pairs:
@@ -227,7 +233,7 @@ def gradients_through_p0(o: PaperObjects) -> Pairs:
         matrix = o.sum([o.B(i) * o.lagrange(i)[k] for i in o.each])
         if k == 0:
             matrix = matrix + o.I * o.number(4 - o.m)
-        left = o.slope(lambda o, x, k=k: o.coefficient_of_power(k, x), o.x, v)
+        left = o.slope(lambda o, x: o.coefficient_of_power(k, x), o.x, v)
         yield left, o.slope(lambda o, x: o.eighth_of_trace(x), o.x, matrix.transpose() * v)
 
 
@@ -270,7 +276,13 @@ def conditions_at_the_eigenvalues(o: PaperObjects) -> Pairs:
         yield ai - o.K.one, quadratic * ci
 
 
-@claim("(88), (89)", "Af' comp", "sum_k B_kj d_m f_k = sum_k d_k f_j B_mk, and its derivative", least_m=2, breaks=("H", "A"))
+@claim(
+    "(88), (89)",
+    "Af' comp",
+    "sum_k B_kj d_m f_k = sum_k d_k f_j B_mk, and its derivative",
+    least_m=2,
+    breaks=("H", "A"),
+)
 def components(o: PaperObjects) -> Pairs:
     """B^T f' = f' B^T in components, and its derivative by x_l"""
     for i in o.free:
@@ -285,7 +297,7 @@ def components(o: PaperObjects) -> Pairs:
 def gradient_of_q(o: PaperObjects) -> Pairs:
     """The gradient of q_i in components: two sums"""
     for i in o.free:
-        gradient = o.gradient(lambda o, x, i=i: o.q(i, x), o.x)
+        gradient = o.gradient(lambda o, x: o.q(i, x), o.x)
         for l in range(o.n):
             first, second = _two_sums(o, o.B(i), l)
             yield gradient[l, 0], first + second

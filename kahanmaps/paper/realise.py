@@ -23,8 +23,7 @@ from kahanmaps.algebra.fields import CC, QQ, Field, PrimeField
 from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.checks.decide import random_prime_field
-from kahanmaps.errors import InputError
-from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.cubics import third_derivatives
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
@@ -85,16 +84,23 @@ class MemberObjects(PaperObjects):
 
     def lagrange(self, i: int) -> list[Any]:
         """The coefficients of B_i from the library, where the roots of chi are rational."""
-        if ("lagrange", i) not in self._memory and self._is_split:
-            signs = [-1 if j == i else 1 for j in range(self.m)]
-            self._memory["lagrange", i] = [self.K.convert(c) for c in self.member.associate(signs).coefficients]
+        if self._is_split:
+            return [
+                self.K.convert(c) for c in self._associate(tuple(-1 if j == i else 1 for j in self.each)).coefficients
+            ]
         return super().lagrange(i)
 
     def B_signs(self, signs: Sequence[int]) -> Any:
         """B_s from the library, where the roots of chi are rational."""
         if self._is_split:
-            return self.K.convert_matrix(self.member.associate(signs).B)
+            return self.K.convert_matrix(self._associate(tuple(signs)).B)
         return super().B_signs(signs)
+
+    def _associate(self, signs: tuple[int, ...]) -> AssociatedSystem:
+        if ("associate", signs) not in self._memory:
+            self._memory["associate", signs] = self.member.associate(signs)
+        found: AssociatedSystem = self._memory["associate", signs]
+        return found
 
     def H_tilde(self, x: Any) -> Any:
         """H~ from the library."""
@@ -134,7 +140,7 @@ def sign_sample(m: int, rng: random.Random) -> tuple[tuple[int, ...], ...] | Non
     return tuple(dict.fromkeys(signs for signs in [*flips, *more] if -1 in signs))
 
 
-# ---- points over GF(p) and Q --------------------------------------------------------------------------------------------
+# ---- points over GF(p) and Q -----------------------------------------------------------------------------------
 
 
 def random_draw(K: Field, n: int, rng: random.Random) -> Draw:
@@ -208,10 +214,12 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int = 3) -> Pape
     signs = sign_sample(m, rng)
     A = turned * A * S.transpose()
     J = K.convert_matrix(standard_structure(n))
-    return PaperObjects(K, A, J, third, eps, roots, random_draw(K, n, rng), sign_vectors=signs, order=order)
+    return PaperObjects(
+        K=K, A=A, J=J, third=third, eps=eps, roots=roots, draw=random_draw(K, n, rng), sign_vectors=signs, order=order
+    )
 
 
-# ---- proofs: indeterminate data -------------------------------------------------------------------------------------------
+# ---- proofs: indeterminate data --------------------------------------------------------------------------------
 
 
 def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int = 3) -> PaperObjects:
@@ -226,7 +234,12 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int 
     blockwise = [f"{c}{i + 1}" for i in range(m) for c in ["a", "c", "d", *lower]]
     drawn = [vector for vector in vectors if vector not in ("x", "linear", "u1", "u2", "u3")]
     letters = {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(drawn)}
-    names = [*(f"l{i + 1}" for i in range(m)), *blockwise, "eps", *(name for found in letters.values() for name in found)]
+    names = [
+        *(f"l{i + 1}" for i in range(m)),
+        *blockwise,
+        "eps",
+        *(name for found in letters.values() for name in found),
+    ]
     K = FunctionField(names, budget, reduces=True)
     by_name = dict(zip(names, K.variables, strict=True))
     roots = tuple(by_name[f"l{i + 1}"] for i in range(m))
@@ -291,21 +304,29 @@ def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, or
     value = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
     J = K.convert_matrix(standard_structure(2))
     signs = ((1,), (-1,))
-    return PaperObjects(K, A, J, third, value, (root,), random_draw(K, 2, rng), sign_vectors=signs, order=order)
+    return PaperObjects(
+        K=K,
+        A=A,
+        J=J,
+        third=third,
+        eps=value,
+        roots=(root,),
+        draw=random_draw(K, 2, rng),
+        sign_vectors=signs,
+        order=order,
+    )
 
 
-def ball_objects(
-    member: FamilyMember, bits: int, rng: random.Random, eps: fmpq | None, order: int = 3
-) -> PaperObjects:
+def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq | None, order: int = 3) -> PaperObjects:
     """A member at a random rational point over complex balls, with all complex roots of chi enclosed."""
     K = CC(bits)
     chi = chi_of(member.A)
     below = fmpz(1)
     for k in range(chi.degree() + 1):
         below = below.lcm(chi[k].q)
-    integral = (chi * below).numer()
     with K.working():
-        roots = tuple(K.convert(root) for root, _ in integral.complex_roots())
+        enclosures: Any = (chi * below).numer().complex_roots()
+        roots = tuple(K.convert(root) for root, _ in enclosures)
         value = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
         return PaperObjects(
             K=K,
@@ -320,7 +341,7 @@ def ball_objects(
         )
 
 
-# ---- bounds -----------------------------------------------------------------------------------------------------------------
+# ---- bounds ----------------------------------------------------------------------------------------------------
 
 
 def bound_objects(member: FamilyMember, eps: fmpq | None, order: int = 3) -> PaperObjects:
@@ -371,7 +392,7 @@ def universal_bound_objects(m: int, order: int = 3) -> PaperObjects:
     )
 
 
-# ---- helpers --------------------------------------------------------------------------------------------------------------------
+# ---- helpers ---------------------------------------------------------------------------------------------------
 
 
 def _hamiltonian(member: FamilyMember, i: int) -> CubicHamiltonian:
@@ -390,7 +411,7 @@ def _third_matrix(member: FamilyMember) -> fmpq_mat:
 
 
 def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]) -> tuple[Any, Any]:
-    """A = diag(roots, roots) and the third derivatives of H = sum h_i(x_i, x_{m+i}), h = a u^3 + b u^2 v + c u v^2 + d v^3."""
+    """A = diag(roots, roots), and the third derivatives of the sum of a u^3 + b u^2 v + c u v^2 + d v^3 over blocks."""
     m = len(roots)
     n = 2 * m
     A = K.matrix(n, n, [roots[i % m] if i == j else K.zero for i in range(n) for j in range(n)])
@@ -409,9 +430,3 @@ def _common_denominator(numbers: Sequence[fmpq]) -> fmpz:
     for number in numbers:
         below = below.lcm(number.q)
     return below
-
-
-def require_generic(member: FamilyMember) -> None:
-    """Raises InputError where chi has a repeated root."""
-    if not member.is_generic:
-        raise InputError("chi has a repeated root")

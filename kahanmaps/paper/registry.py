@@ -3,8 +3,8 @@
 A claim is a function that takes the paper's objects (`PaperObjects`: A, J, H, f, B_i, x, eps, ...) and yields pairs
 (left, right) which the paper says are equal. It knows nothing of the numbers it runs on: the same function is
 evaluated at random points over GF(p), at exact points over Q, over rational functions (a proof), over an algebra
-Q[t]/chi, over complex balls, and over bounds for degrees and coefficients. To add a claim, write one such function in the
-file of its section.
+Q[t]/chi, over complex balls, and over bounds for degrees and coefficients. To add a claim, write one such function in
+the file of its section.
 
 Formulas are printed for every m where the statement makes sense; where the paper's own form is for m = 3 and reads
 differently for other m, the general form reduces to it.

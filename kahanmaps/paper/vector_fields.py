@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Pairs, claim
 
@@ -57,7 +59,7 @@ def jacobians_commute_with_A_step_by_step(o: PaperObjects) -> Pairs:
             o.J * hessian * o.AT,
             o.jac(o.f_(i), o.x) * o.AT,
         ]
-        yield from zip(steps, steps[1:], strict=False)
+        yield from pairwise(steps)
 
 
 @claim("Lemma 3 (29)", "vf comm", "f_i' f_j = f_j' f_i", least_m=2, breaks=("H", "A"))

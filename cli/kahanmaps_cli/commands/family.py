@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps.version import __version__
+from kahanmaps_cli.draw import draw_member, draw_options
 from kahanmaps_cli.options import load_system
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import on_terminal, print_json, shorten
@@ -36,11 +37,7 @@ def command() -> None:
 
 
 @command.command("new")
-@click.option("--m", type=int, help="Half the dimension, 1 to 16.")
-@click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them.")
-@click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q.")
-@click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'.")
-@click.option("--size", type=int, default=None, help="Bound for the integer coefficients drawn (default 2 or 1).")
+@draw_options
 @click.option("--signs", metavar="S1,S2,...", help="Pick an associated system: 1 or -1 for each factor of chi.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
 @click.option("--name", help="The name in the file.")
@@ -63,7 +60,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
     output = None if output == "-" else output
     if name is not None and not name.isprintable():
         raise click.UsageError(f"found --name {name!r}, expected printable text")
-    member = _with_signs(_draw(**options), signs)
+    member = _with_signs(draw_member(**options), signs)
     file = SystemFile.from_member(member, name or (_file_name(Path(output).stem) if output else "member"))
     _write(file, output)
     if not quiet:
@@ -253,47 +250,6 @@ def _print_normal_form(form: NormalForm) -> None:
         click.echo(f"t = {root}: h = {_formula(part.text)}, weight {weight}")
     click.echo("x = S z with the coefficients z of 1, t, ... in X and in Y, S =")
     _print_matrix(form.S)
-
-
-def _draw(
-    m: int | None, eigenvalues: str | None, generic: bool, chi: str | None, size: int | None, seed: int
-) -> FamilyMember:
-    from kahanmaps.algebra.text import parse_point
-    from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues, random_eigenvalues
-
-    if sum((eigenvalues is not None, generic, chi is not None)) > 1:
-        raise click.UsageError("give one of --eigenvalues, --generic and --chi")
-    if size is not None and not 1 <= size <= 10**6:
-        raise click.UsageError(f"found --size {size}, expected 1 to 1000000")
-    if eigenvalues is not None:
-        values = parse_point(eigenvalues)
-        if m is not None and m != len(values):
-            raise click.UsageError(f"found {len(values)} eigenvalues, expected m = {m}")
-        return draw_with_eigenvalues(values, seed, size or 2)
-    if chi is not None:
-        polynomial = _univariate(chi)
-        if m is not None and m != polynomial.degree():
-            raise click.UsageError(f"chi has degree {polynomial.degree()}, expected m = {m}")
-        return draw_with_chi(polynomial, seed, size or 1)
-    if m is None:
-        raise click.UsageError("missing --m M (half the dimension), or --eigenvalues L1,L2,..., or --chi EXPR")
-    if generic:
-        return draw_generic(m, seed, size or 1)
-    return draw_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
-
-
-def _univariate(text: str) -> Any:
-    from flint import fmpq_poly
-
-    from kahanmaps.algebra.text import parse_polynomial
-    from kahanmaps.errors import InputError
-
-    polynomial = parse_polynomial(text, ["t"])
-    coefficients = {monomial[0]: coefficient for monomial, coefficient in polynomial.terms()}
-    top = max(coefficients, default=0)
-    if top < 1:
-        raise InputError(f"found chi = {text}, expected a polynomial in t of degree m >= 1")
-    return fmpq_poly([coefficients.get(k, 0) for k in range(top + 1)])
 
 
 def _with_signs(member: FamilyMember, signs: str | None) -> FamilyMember:

@@ -1,0 +1,70 @@
+"""Options that say which member of the family to draw, and the drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from kahanmaps.family.associated import FamilyMember
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def draw_options(function: F) -> F:
+    """--m, --eigenvalues, --generic, --chi and --size."""
+    for option in reversed(
+        (
+            click.option("--m", type=int, help="Half the dimension, 1 to 16."),
+            click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
+            click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q."),
+            click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'."),
+            click.option("--size", type=int, help="Bound for the integer coefficients drawn (default 2 or 1)."),
+        )
+    ):
+        function = option(function)
+    return function
+
+
+def draw_member(
+    m: int | None, eigenvalues: str | None, generic: bool, chi: str | None, size: int | None, seed: int
+) -> FamilyMember:
+    """The member that the options ask for."""
+    from kahanmaps.algebra.text import parse_point
+    from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues, random_eigenvalues
+
+    if sum((eigenvalues is not None, generic, chi is not None)) > 1:
+        raise click.UsageError("give one of --eigenvalues, --generic and --chi")
+    if size is not None and not 1 <= size <= 10**6:
+        raise click.UsageError(f"found --size {size}, expected 1 to 1000000")
+    if eigenvalues is not None:
+        values = parse_point(eigenvalues)
+        if m is not None and m != len(values):
+            raise click.UsageError(f"found {len(values)} eigenvalues, expected m = {m}")
+        return draw_with_eigenvalues(values, seed, size or 2)
+    if chi is not None:
+        polynomial = _univariate(chi)
+        if m is not None and m != polynomial.degree():
+            raise click.UsageError(f"chi has degree {polynomial.degree()}, expected m = {m}")
+        return draw_with_chi(polynomial, seed, size or 1)
+    if m is None:
+        raise click.UsageError("missing --m M (half the dimension), or --eigenvalues L1,L2,..., or --chi EXPR")
+    if generic:
+        return draw_generic(m, seed, size or 1)
+    return draw_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
+
+
+def _univariate(text: str) -> Any:
+    from flint import fmpq_poly
+
+    from kahanmaps.algebra.text import parse_polynomial
+    from kahanmaps.errors import InputError
+
+    polynomial = parse_polynomial(text, ["t"])
+    coefficients = {monomial[0]: coefficient for monomial, coefficient in polynomial.terms()}
+    top = max(coefficients, default=0)
+    if top < 1:
+        raise InputError(f"found chi = {text}, expected a polynomial in t of degree m >= 1")
+    return fmpq_poly([coefficients.get(k, 0) for k in range(top + 1)])

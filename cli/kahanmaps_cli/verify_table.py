@@ -1,0 +1,144 @@
+"""The table of `kahanmaps verify`, section by section; in a pipe and as JSON it is a report like any other."""
+
+from __future__ import annotations
+
+from collections import Counter
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from kahanmaps_cli.render import COLOURS, exit_status, headline, on_terminal, print_report, shorten, witness_lines
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from kahanmaps.checks.claims import Evidence, Finding, Report
+
+_HOW = {
+    "symbolic, normal form": "symbolic",
+    "symbolic": "symbolic",
+    "exact": "exact",
+    "exact rational point": "exact",
+    "point over GF(p)": "point mod p",
+    "random points over GF(p)": "points",
+    "random points": "points",
+    "outside the hypotheses": "outside",
+    "control": "exact",
+}
+_LEGEND = {
+    "symbolic, normal form": "symbolic: an identity of rational functions in indeterminate roots of chi, coefficients "
+    "of H, x and eps, multiplied out for the normal form; the hypotheses of this member are verified exactly",
+    "symbolic": "symbolic: an identity of rational functions of x (and eps), multiplied out for this member",
+    "exact": "exact: no x in it, computed over Q",
+    "exact rational point": "exact: shown at an exact rational point, which is a proof (or a refutation)",
+    "point over GF(p)": "point mod p: shown at a point over GF(p), which is a proof (or a refutation)",
+    "random points over GF(p)": "points: held at random points over GF(p), error below the bound given",
+    "outside the hypotheses": "outside: the member does not satisfy the hypotheses of the statement",
+}
+
+
+def print_verification(report: Report, as_json: bool, verbose: bool, quiet: bool) -> int:
+    """Print the report and return the exit status."""
+    if as_json or not on_terminal():
+        return print_report(report, as_json, verbose, quiet)
+    with suppress(BrokenPipeError):
+        _print_tables(report, verbose)
+    return exit_status(report)
+
+
+def _print_tables(report: Report, verbose: bool) -> None:
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(markup=False, emoji=False, highlight=False)
+    console.print(Text(headline(report), style="bold"))
+    by_section: dict[tuple[int, str], list[Finding]] = {}
+    others = []
+    for finding in report.findings:
+        if "section" in finding.place:
+            key = (finding.place["section"], finding.place["section_title"])
+            by_section.setdefault(key, []).append(finding)
+        else:
+            others.append(finding)
+    for (number, title), findings in by_section.items():
+        name = title if number == 10 else f"Section {number}. {title}"
+        console.print(_table(name, findings, verbose, bool(report.context.get("controls"))))
+    for finding in others:
+        console.print(Text(f"{finding.claim}: {finding.evidence.summary}"))
+    for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
+        if method in _LEGEND:
+            console.print(Text(_LEGEND[method], style="dim"))
+    for line in _below(report):
+        console.print(Text(line))
+    for note in report.notes:
+        console.print(Text(f"note: {note}"))
+    last = Text("verdict: ")
+    last.append(str(report.verdict), style=f"bold {COLOURS[str(report.verdict)]}")
+    last.append(f" ({_count(report)})")
+    console.print(last)
+
+
+def _table(name: str, findings: list[Finding], verbose: bool, controls: bool) -> Table:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(
+        title=name, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_lines=verbose, expand=True
+    )
+    table.add_column("statement", overflow="fold", min_width=17, max_width=19)
+    table.add_column("formula", overflow="fold", ratio=1)
+    table.add_column("broken" if controls else "how", overflow="fold", min_width=11, max_width=24 if controls else 14)
+    table.add_column("verdict", no_wrap=True)
+    for finding in findings:
+        style = COLOURS[str(finding.verdict)] if finding.is_as_expected else "yellow"
+        if finding.is_as_expected and finding.control:
+            style = "magenta"
+        formula = Text(finding.formula or finding.claim)
+        misprint = finding.place.get("misprint")
+        if misprint:
+            formula.append(f"\nmisprint: {misprint}", style="dim")
+        if verbose:
+            formula.append("\n" + finding.claim.split(": ", 1)[-1], style="italic")
+            for evidence in (finding.evidence, *finding.also):
+                formula.append(f"\n{evidence.method}: {evidence.summary}", style="dim")
+        shows = finding.witness is not None and (verbose or not finding.control)
+        if shows and finding.witness is not None:
+            for line in witness_lines(finding.witness, 40):
+                formula.append("\n" + line, style="dim")
+        how = finding.place["broken"] if controls and "broken" in finding.place else _how(finding.evidence)
+        table.add_row(finding.place["place"], formula, how, Text(str(finding.verdict), style=style))
+    return table
+
+
+def _how(evidence: Evidence) -> str:
+    word = _HOW.get(evidence.method, evidence.method)
+    bound: Any = evidence.data.get("error_bound")
+    return f"{word}, {bound}" if bound else word
+
+
+def _below(report: Report) -> list[str]:
+    """Sentences on the evidence beside the one that decided."""
+    lines = []
+    bounds = [
+        int(str(evidence.data["error_bound"])[3:])
+        for finding in report.findings
+        for evidence in (finding.evidence, *finding.also)
+        if "error_bound" in evidence.data
+    ]
+    if bounds:
+        lines.append(
+            f"also: {len(bounds)} claims held at random points over GF(p), "
+            f"each false with probability below 2^-{min(bounds)}"
+        )
+    methods = Counter(e.method for f in report.findings for e in f.also if "error_bound" not in e.data)
+    lines += [f"also: {count} claims: {method} (-v)" for method, count in methods.items()]
+    refuted = [f for f in report.findings if str(f.verdict) == "refuted" and not f.control]
+    lines += [f"refuted: {shorten(f.claim, 200)}" for f in refuted]
+    return lines
+
+
+def _count(report: Report) -> str:
+    counted = Counter(str(f.verdict) for f in report.findings if not f.control)
+    text = ", ".join(f"{number} {verdict}" for verdict, number in counted.items())
+    misprints = sum(1 for f in report.findings if f.place.get("misprint"))
+    return text + (f"; {misprints} misprints, refuted as printed" if misprints else "")

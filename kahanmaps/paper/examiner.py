@@ -1,0 +1,318 @@
+"""How one claim is examined: random points over GF(p), proof, exact points, and its controls.
+
+What is common to a given member and to the member in general; `verify.py` has the two.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.checks.claims import Evidence, Finding, Verdict, Witness
+from kahanmaps.checks.decide import log2_error
+from kahanmaps.checks.settings import Settings
+from kahanmaps.errors import InputError
+from kahanmaps.invariants.sizes import Size
+from kahanmaps.paper.controls import CONTROLS, broken
+from kahanmaps.paper.evaluate import UNDEFINED, Outcome, evaluate, witness_of
+from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.registry import SECTIONS, Claim, Kind, claims
+
+_POLES = 40
+_POINTS = 4  # for statements that something differs, or has full rank
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to verify: sections (None: all), the order of the series, bits for complex balls, controls instead."""
+
+    sections: tuple[int, ...] | None = None
+    order: int = 3
+    ball_bits: int | None = None
+    controls: bool = False
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.order <= 20:
+            raise InputError(f"found the order {self.order}, expected 1 to 20")
+        if self.ball_bits is not None and not 32 <= self.ball_bits <= 100_000:
+            raise InputError(f"found {self.ball_bits} bits for the balls, expected 32 to 100000")
+        for section in self.sections or ():
+            if section not in SECTIONS:
+                raise InputError(
+                    f"found the section {section}, expected 1 to {max(SECTIONS)} ({max(SECTIONS)}: beyond)"
+                )
+
+
+class Examiner:
+    """What is common to a given member and to the universal one."""
+
+    m: int
+
+    def __init__(self, settings: Settings, options: Options) -> None:
+        self.settings = settings
+        self.options = options
+        self._points: dict[tuple[bool, int], PaperObjects | None] = {}
+
+    def selected(self) -> list[Claim]:
+        """The claims to look at."""
+        wanted = self.options.sections
+        return [c for c in claims() if c.makes_sense(self.m) and (wanted is None or c.section in wanted)]
+
+    def findings(self) -> list[Finding]:
+        """One finding a claim, or one a claim and control and a last one on all controls together."""
+        found: list[Finding] = []
+        without: list[str] = []
+        selected = self.selected()
+        for k, claim in enumerate(selected):
+            self.settings.progress(f"{claim.place} ({k + 1} of {len(selected)})")
+            if self.options.controls:
+                controls = self.controls(claim)
+                found += controls
+                if self.outside(claim) is None and not any(finding.is_as_expected for finding in controls):
+                    without.append(claim.key)
+            else:
+                found.append(self.examine(claim))
+        if self.options.controls:
+            found.append(_last_word(found, without))
+        return found
+
+    # what the two kinds of examiners fill in
+
+    def point(self, roots: bool, number: int) -> PaperObjects | None:
+        """The number-th random point over GF(p); with the roots of chi, if need be, or None where they are not had."""
+        raise NotImplementedError
+
+    def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
+        """A random point over Q, or None where the roots of chi are not rational."""
+        raise NotImplementedError
+
+    def bounds(self) -> PaperObjects:
+        """The objects as bounds."""
+        raise NotImplementedError
+
+    def conjugates(self, roots: bool) -> int:
+        """A bound for the degree of the field that the coefficients lie in."""
+        return 1
+
+    def outside(self, claim: Claim) -> str | None:
+        """Why a claim does not apply, if it does not."""
+        return None
+
+    def proof(self, claim: Claim, needs: set[str], equation: Size, poles: int) -> Evidence | None:
+        """A proof, if there is one."""
+        raise NotImplementedError
+
+    def also(self, claim: Claim) -> Iterable[Evidence]:
+        """Further evidence."""
+        return ()
+
+    # the examination
+
+    def examine(self, claim: Claim) -> Finding:
+        """The finding on one claim."""
+        reason = self.outside(claim)
+        if reason is not None:
+            return self._finding(claim, Verdict.UNDECIDED, Evidence("outside the hypotheses", reason))
+        if claim.kind is not Kind.EQUAL:
+            return self._examine_existence(claim)
+        needs, equation, poles = self._size(claim)
+        roots = "roots" in needs
+        decision = self._at_points(claim, roots, equation, poles)
+        if claim.misprint or decision.verdict is Verdict.REFUTED:
+            return decision
+        proof = self.proof(claim, needs, equation, poles)
+        if proof is not None:
+            if decision.verdict is Verdict.SUPPORTED:
+                return self._finding(claim, Verdict.PROVED, proof, (decision.evidence, *self.also(claim)))
+            if decision.evidence.data.get("points") == 0 and roots:  # no prime was found at which chi splits
+                return self._finding(claim, Verdict.PROVED, proof, tuple(self.also(claim)))
+        return decision.with_also(*self.also(claim))
+
+    def _at_points(self, claim: Claim, roots: bool, equation: Size, poles: int) -> Finding:
+        per_trial = log2_error(equation, poles, self.conjugates(roots))
+        if per_trial >= -1:
+            text = f"the degree bound {equation.degree} is too large for primes of 63 bits to decide anything"
+            return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
+        trials = max(1, math.ceil(self.settings.error_bits / -per_trial))
+        primes: list[int] = []
+        undefined = number = 0
+        while len(primes) < trials:
+            objects = self.point(roots, number)
+            number += 1
+            if objects is None:
+                text = "the roots of chi are not rational, and no prime was looked for at which chi splits"
+                return self._finding(
+                    claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text, {"points": 0})
+                )
+            try:
+                outcome = evaluate(claim, objects)
+            except UNDEFINED:
+                undefined += 1
+                if undefined > _POLES:
+                    text = f"the claim is not defined at any of {undefined} random points over GF(p)"
+                    return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
+                continue
+            if not outcome.holds:
+                return self._refuted(claim, roots, outcome)
+            if not outcome.pairs:
+                text = "it does not apply to this member: there is nothing to compare"
+                return self._finding(claim, Verdict.UNDECIDED, Evidence("outside the hypotheses", text))
+            primes.append(objects.K.characteristic)
+        bound = math.floor(-per_trial * trials)
+        assumed = ", the roots of chi among them" if roots and self.conjugates(True) > 1 else ""
+        evidence = Evidence(
+            "random points over GF(p)",
+            f"held at {trials} random point{'s' * (trials > 1)} over GF(p), p random of 63 bits{assumed}; "
+            f"false with probability below 2^-{bound}",
+            {
+                "points": trials,
+                "error_bound": f"2^-{bound}",
+                "degree_bound": equation.degree,
+                "coefficient_bits_bound": math.ceil(equation.bits),
+                "pole_degree_bound": poles,
+                "splitting_field_degree_bound": self.conjugates(roots),
+                "undefined_at": undefined,
+                "primes": [str(prime) for prime in primes],
+            },
+        )
+        return self._finding(claim, Verdict.SUPPORTED, evidence)
+
+    def _examine_existence(self, claim: Claim) -> Finding:
+        """Claims that something differs somewhere, or has a certain rank: one point that shows it is a proof."""
+        roots, outcome, tried = False, None, 0
+        for number in range(_POLES):
+            exact = claim.kind is Kind.ATTAINED and self.exact_point(roots, number)
+            objects = exact or self.point(roots, number)
+            if objects is None:
+                text = "the roots of chi are not rational, and no prime was looked for at which chi splits"
+                return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
+            try:
+                outcome = evaluate(claim, objects)
+            except LookupError:  # the roots of chi are needed, and this field does not have them
+                roots = True
+                continue
+            except UNDEFINED:
+                continue
+            tried += 1
+            if outcome.holds and outcome.pairs:
+                where = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
+                what = "both sides differ" if claim.kind is Kind.DIFFERENT else "attained"
+                method = "exact rational point" if objects.K is QQ else "point over GF(p)"
+                return self._finding(claim, Verdict.PROVED, Evidence(method, f"{what} at {where}", {"points": tried}))
+            if tried >= _POINTS:
+                break
+        if outcome is None or not outcome.pairs:
+            text = f"the claim is not defined at any of {_POLES} random points"
+            return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
+        text = "both sides agree" if claim.kind is Kind.DIFFERENT else "not attained"
+        evidence = Evidence("random points", f"{text} at each of {tried} random points", {"points": tried})
+        return self._finding(claim, Verdict.REFUTED, evidence, witness=witness_of(outcome))
+
+    def _size(self, claim: Claim) -> tuple[set[str], Size, int]:
+        """What a claim uses, a bound for the equation it amounts to, and the degree of all its denominators."""
+        bounds = self.bounds()
+        equation, poles = Size(0, 0.0), 0
+        for left, right in claim.function(bounds):
+            sides = [value.entry if hasattr(value, "entry") else bounds.K.convert(value) for value in (left, right)]
+            difference = sides[0] - sides[1]
+            equation = equation | difference.above
+            poles = max(poles, difference.pole_degree)
+        return bounds.used, equation, poles
+
+    def _refuted(self, claim: Claim, roots: bool, outcome: Outcome) -> Finding:
+        for number in range(12):
+            objects = self.exact_point(roots, number)
+            if objects is None:
+                break
+            try:
+                exact = evaluate(claim, objects)
+            except (*UNDEFINED, LookupError):
+                continue
+            if not exact.holds:
+                text = "fails at a rational point, exactly"
+                evidence = Evidence("exact rational point", text)
+                return self._finding(claim, Verdict.REFUTED, evidence, witness=witness_of(exact))
+        text = f"fails at a point over {outcome.objects.K.name}, where all denominators are units, so it fails over Q"
+        if roots:
+            text = f"fails at a point over {outcome.objects.K.name}, where chi splits"
+        evidence = Evidence("point over GF(p)", text)
+        return self._finding(claim, Verdict.REFUTED, evidence, witness=witness_of(outcome))
+
+    def controls(self, claim: Claim) -> list[Finding]:
+        """The claim on broken input, one finding for every control that it names: each is expected to be refuted."""
+        if claim.misprint:
+            return [self.examine(claim)]
+        found = []
+        for name in claim.breaks:
+            if self.m < CONTROLS[name].least_m or self.outside(claim) is not None:
+                continue
+            outcome = self._broken(claim, name)
+            text = f"control {name}: {CONTROLS[name].breaks}"
+            if outcome is None:
+                verdict, evidence = Verdict.UNDECIDED, Evidence("control", f"{text}; not defined, or no roots of chi")
+            elif outcome.holds or not outcome.pairs:
+                verdict, evidence = Verdict.SUPPORTED, Evidence("control", f"{text}; the claim holds all the same")
+            else:
+                field = outcome.objects.K.name
+                verdict, evidence = (
+                    Verdict.REFUTED,
+                    Evidence("control", f"{text}; fails at an exact point over {field}"),
+                )
+            finding = self._finding(claim, verdict, evidence, witness=witness_of(outcome) if outcome else None)
+            place = {**finding.place, "breaks": name, "broken": CONTROLS[name].breaks}
+            found.append(replace(finding, control=True, place=place))
+        # In low dimension some hypotheses always hold (for m = 1 every A is scalar), and their controls are idle.
+        return [finding for finding in found if finding.is_as_expected] or found
+
+    def _broken(self, claim: Claim, name: str) -> Outcome | None:
+        """The claim on input broken by a control: the first point at which it fails, or else the last one tried."""
+        outcome = None
+        for roots in (False, True):
+            for number in range(_POINTS):
+                for find in (self.exact_point, self.point):
+                    objects = find(roots, number)
+                    if objects is None:
+                        continue
+                    try:
+                        outcome = evaluate(claim, broken(name, objects))
+                    except (*UNDEFINED, LookupError):
+                        continue
+                    if not outcome.holds:
+                        return outcome
+        return outcome
+
+    def _finding(
+        self,
+        claim: Claim,
+        verdict: Verdict,
+        evidence: Evidence,
+        also: tuple[Evidence, ...] = (),
+        witness: Witness | None = None,
+    ) -> Finding:
+        place = {
+            "key": claim.key,
+            "section": claim.section,
+            "section_title": SECTIONS[claim.section][0],
+            "place": claim.place,
+            "label": claim.label,
+            "makes_sense_for": claim.range_of_m,
+            **({"misprint": claim.misprint} if claim.misprint else {}),
+        }
+        title = f"{claim.place}: {claim.title}" + (" (misprint)" if claim.misprint else "")
+        source = "" if claim.section == 10 else f"petrera-suris-2016, {claim.place}"
+        if claim.label:
+            source += f" [{claim.label}]"
+        return Finding(title, verdict, evidence, also, witness, claim.formula, source, bool(claim.misprint), place)
+
+
+def _last_word(found: Sequence[Finding], without: Sequence[str]) -> Finding:
+    """Whether every claim that was looked at was refuted by some control."""
+    claims_tried = len({finding.place["key"] for finding in found})
+    claim = "every claim fails on some input that breaks one of its hypotheses"
+    if without or not found:
+        text = f"no control refutes {', '.join(without)}" if without else "no claim was looked at"
+        return Finding(claim, Verdict.UNDECIDED, Evidence("controls", text, {"claims": claims_tried}))
+    text = f"{len(found)} controls of {claims_tried} claims, all refuted at exact points"
+    return Finding(claim, Verdict.PROVED, Evidence("controls", text, {"claims": claims_tried}))

@@ -1,0 +1,46 @@
+"""Proof of a claim in normal form, with indeterminate data: for every member with distinct roots at once."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+from kahanmaps.algebra.functions import BudgetExceeded
+from kahanmaps.checks.claims import Evidence
+from kahanmaps.checks.judge import Contradiction
+from kahanmaps.paper import realise
+from kahanmaps.paper.evaluate import evaluate
+from kahanmaps.paper.registry import claims
+
+# Beyond, only claims about one or two blocks are proved in normal form: the others have too many indeterminates.
+MAX_BLOCKS_IN_A_PROOF = 6
+PROOF_BUDGET = 100_000_000
+
+
+@lru_cache(maxsize=4096)
+def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
+    """The proof of a claim in normal form with so many blocks; None where it grows beyond the budget.
+
+    Raises Contradiction where the two sides are different rational functions.
+    """
+    claim = next(found for found in claims() if found.key == key)
+    bounds = realise.universal_bound_objects(blocks, order)
+    for _ in claim.function(bounds):
+        pass
+    vectors = sorted(bounds.used - {"roots"})
+    objects = realise.normal_form_objects(blocks, vectors, PROOF_BUDGET, order)
+    K: Any = objects.K
+    try:
+        outcome = evaluate(claim, objects)
+    except BudgetExceeded:
+        return None
+    if not outcome.holds:
+        raise Contradiction(f"{claim.place}: {claim.title}: the two sides differ in normal form")
+    if not outcome.pairs:
+        return None
+    what = "1 block" if blocks == 1 else f"{blocks} blocks"
+    return Evidence(
+        "symbolic, normal form",
+        f"multiplied out in normal form, {what}, all data indeterminate",
+        {"blocks": blocks, "indeterminates": len(K.variables), "products_of_terms": PROOF_BUDGET - K.budget},
+    )
