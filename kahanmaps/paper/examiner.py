@@ -142,7 +142,7 @@ class Examiner:
             objects = self.point(roots, number)
             number += 1
             if objects is None:
-                text = "the roots of chi are not rational, and no prime was looked for at which chi splits"
+                text = "no prime was found at which chi splits into distinct factors"
                 return self._finding(
                     claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text, {"points": 0})
                 )
@@ -186,7 +186,7 @@ class Examiner:
             exact = claim.kind is Kind.ATTAINED and self.exact_point(roots, number)
             objects = exact or self.point(roots, number)
             if objects is None:
-                text = "the roots of chi are not rational, and no prime was looked for at which chi splits"
+                text = "no prime was found at which chi splits into distinct factors"
                 return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
             try:
                 outcome = evaluate(claim, objects)

@@ -38,14 +38,12 @@ from kahanmaps.paper import realise
 from kahanmaps.paper.evaluate import UNDEFINED, entries, evaluate, same
 from kahanmaps.paper.examiner import Examiner, Options
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.proofs import MAX_BLOCKS_IN_A_PROOF, PROOF_BUDGET, normal_form_proof
+from kahanmaps.paper.proofs import PROOF_BUDGET, normal_form_proof
 from kahanmaps.paper.registry import Claim, Kind
 from kahanmaps.systems.files import SystemFile
 from kahanmaps.version import __version__
 
 MAX_M = 8
-# chi splits modulo one prime in m! at worst: beyond this m the search is not begun.
-MAX_M_FOR_SPLIT_PRIMES = 6
 NOTE_ON_PROOFS = (
     "proofs in normal form: the claim is an identity of rational functions in indeterminate roots of chi, coefficients "
     "of H, x and eps, multiplied out for so many planar blocks; it holds for every member with distinct roots, being "
@@ -141,14 +139,15 @@ class _MemberExaminer(Examiner):
 
     def _new_point(self, needs_split: bool, number: int) -> PaperObjects | None:
         rng = random.Random(f"verify {self.settings.seed} {needs_split} {number}")
-        if needs_split and (self.m > MAX_M_FOR_SPLIT_PRIMES or not self.member.is_generic):
+        if needs_split and not self.member.is_generic:
             return None
         while True:
             try:
                 if needs_split:
                     chi = chi_of(self.member.A)
                     self.settings.progress("looking for a prime at which chi splits")
-                    found = realise.split_prime_field(chi, rng, 40 * math.factorial(self.m) + 400)
+                    # One prime in m! splits at worst, so that this fails with probability e^-40.
+                    found = realise.split_prime_field(chi, rng, 40 * math.factorial(self.m))
                     if found is None:
                         return None
                     K, mod_roots = found
@@ -194,16 +193,11 @@ class _MemberExaminer(Examiner):
             if objects is not None and not needs & {"x"} and evaluate(claim, objects).holds and equation.degree == 0:
                 return Evidence("exact", "both sides are the same over Q", {})
         if claim.symplectic and self.member.is_generic:
-            blocks = claim.blocks_for_proof(self.m)
-            if blocks <= MAX_BLOCKS_IN_A_PROOF:
-                evidence = normal_form_proof(claim.key, blocks, self.options.order)
-                if evidence is not None:
-                    verified = "A^T J = J A, A Hess(H) = Hess(H) A^T, distinct roots: verified"
-                    return Evidence(
-                        evidence.method,
-                        f"{evidence.summary}; {verified}",
-                        {**evidence.data, "hypotheses_verified": verified},
-                    )
+            evidence = normal_form_proof(claim.key, claim.blocks_for_proof(self.m), self.options.order)
+            if evidence is not None:
+                verified = "A^T J = J A, A Hess(H) = Hess(H) A^T, distinct roots: verified"
+                data = {**evidence.data, "hypotheses_verified": verified}
+                return Evidence(evidence.method, f"{evidence.summary}; {verified}", data)
         if equation.degree <= 6 and poles <= 4:
             return self._symbolic(claim, needs)
         return None
@@ -261,10 +255,6 @@ class _MemberExaminer(Examiner):
         found = [diagnosis(self.member.A)]
         if self.member.is_generic and not self.options.controls:
             found.append(NOTE_ON_PROOFS)
-        if self.roots is None and self.m > MAX_M_FOR_SPLIT_PRIMES:
-            found.append(
-                f"for m > {MAX_M_FOR_SPLIT_PRIMES} no primes are looked for at which an irreducible chi splits"
-            )
         return found
 
 
@@ -290,10 +280,9 @@ class _UniversalExaminer(Examiner):
         return realise.universal_bound_objects(self.m, self.options.order)
 
     def proof(self, claim: Claim, needs: set[str], equation: Size, poles: int) -> Evidence | None:
-        blocks = claim.blocks_for_proof(self.m)
-        if not claim.symplectic or blocks > MAX_BLOCKS_IN_A_PROOF:
+        if not claim.symplectic:
             return None
-        return normal_form_proof(claim.key, blocks, self.options.order)
+        return normal_form_proof(claim.key, claim.blocks_for_proof(self.m), self.options.order)
 
     def notes(self) -> list[str]:
         """What holds for the whole table."""
