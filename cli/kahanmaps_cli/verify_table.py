@@ -6,6 +6,8 @@ from collections import Counter
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from kahanmaps_cli.render import COLOURS, exit_status, headline, on_terminal, print_report, shorten, witness_lines
 
 if TYPE_CHECKING:
@@ -36,13 +38,38 @@ _LEGEND = {
 }
 
 
-def print_verification(report: Report, as_json: bool, verbose: bool, quiet: bool) -> int:
+def print_verification(report: Report, as_json: bool, as_markdown: bool, verbose: bool, quiet: bool) -> int:
     """Print the report and return the exit status."""
+    if as_markdown:
+        with suppress(BrokenPipeError):
+            click.echo(markdown(report))
+        return exit_status(report)
     if as_json or not on_terminal():
         return print_report(report, as_json, verbose, quiet)
     with suppress(BrokenPipeError):
         _print_tables(report, verbose)
     return exit_status(report)
+
+
+def markdown(report: Report) -> str:
+    """The table in Markdown; docs/audit.md is made of it."""
+    lines = [headline(report)]
+    section = None
+    for finding in report.findings:
+        if finding.place.get("section") != section:
+            section = finding.place.get("section")
+            title = finding.place.get("section_title", "Together")
+            lines += ["", f"### {title if section in (None, 10) else f'{section} {title}'}", ""]
+            lines += ["| statement | formula | how | verdict |", "|---|---|---|---|"]
+        verdict = str(finding.verdict) + (" as printed" if finding.place.get("misprint") else "")
+        cells = (
+            finding.place.get("place", ""),
+            f"`{finding.formula or finding.claim}`",
+            _how(finding.evidence),
+            verdict,
+        )
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join([*lines, "", f"Verdict: {report.verdict} ({_count(report)})"])
 
 
 def _print_tables(report: Report, verbose: bool) -> None:

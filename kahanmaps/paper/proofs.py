@@ -13,7 +13,7 @@ from kahanmaps.paper.evaluate import evaluate
 from kahanmaps.paper.registry import claims
 
 # Enough for every claim up to m = 6; at m = 8 a few claims that sum over all roots exceed it.
-PROOF_BUDGET = 100_000_000
+PROOF_BUDGET = 50_000_000
 
 
 @lru_cache(maxsize=4096)

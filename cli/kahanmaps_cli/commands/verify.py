@@ -31,6 +31,7 @@ from kahanmaps_cli.verify_table import print_verification
     show_default=True,
     help="Random points until the probability of error is below 2^-BITS.",
 )
+@click.option("--markdown", "as_markdown", is_flag=True, help="The table in Markdown, on standard output.")
 @click.option("-v", "--verbose", is_flag=True, help="On a terminal: all evidence (a pipe always gets it).")
 @output_options
 def command(system: str | None, **options: Any) -> int:
@@ -58,6 +59,8 @@ def command(system: str | None, **options: Any) -> int:
     from kahanmaps.paper.verify import verify, verify_universal
     from kahanmaps.systems.files import SystemFile
 
+    if options["as_json"] and options["as_markdown"]:
+        raise click.UsageError("give --json or --markdown, not both")
     drawn = {name: options[name] for name in ("m", "eigenvalues", "generic", "chi", "size")}
     if options["universal"]:
         clash = [f"--{name}" for name, value in drawn.items() if value and name != "m"]
@@ -85,4 +88,4 @@ def command(system: str | None, **options: Any) -> int:
                 member = draw_member(**drawn, seed=options["seed"])
                 file = SystemFile.from_member(member, f"random member, m = {member.m}, seed {options['seed']}")
             report = verify(file, settings, what)
-    return print_verification(report, options["as_json"], options["verbose"], options["quiet"])
+    return print_verification(report, options["as_json"], options["as_markdown"], options["verbose"], options["quiet"])
