@@ -17,7 +17,7 @@ def draw_options(function: F) -> F:
     """--m, --eigenvalues, --generic, --chi and --size."""
     for option in reversed(
         (
-            click.option("--m", type=int, help="Half the dimension, 1 to 16."),
+            click.option("--m", type=int, help="Half the dimension, 1 to 16 (for verify 1 to 8)."),
             click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
             click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q."),
             click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'."),

@@ -24,6 +24,7 @@ _HOW = {
     "random points over GF(p)": "points",
     "random points": "points",
     "outside the hypotheses": "outside",
+    "special member": "special",
     "control": "exact",
 }
 _LEGEND = {
@@ -34,6 +35,7 @@ _LEGEND = {
     "exact rational point": "exact: shown at an exact rational point, which is a proof (or a refutation)",
     "point over GF(p)": "point mod p: shown at a point over GF(p), which is a proof (or a refutation)",
     "random points over GF(p)": "points: held at random points over GF(p), error below the bound given",
+    "special member": "special: the statement is for generic A and H, and this member is special; it does not count",
     "outside the hypotheses": "outside: the member does not satisfy the hypotheses of the statement",
 }
 
@@ -133,7 +135,8 @@ def _table(name: str, findings: list[Finding], verbose: bool, controls: bool) ->
             for line in witness_lines(finding.witness, 40):
                 formula.append("\n" + line, style="dim")
         how = finding.place["broken"] if controls and "broken" in finding.place else _how(finding.evidence)
-        table.add_row(finding.place["place"], formula, how, Text(str(finding.verdict), style=style))
+        verdict = f"{finding.verdict}\nas printed" if misprint else str(finding.verdict)
+        table.add_row(finding.place["place"], formula, how, Text(verdict, style=style))
     return table
 
 
@@ -165,7 +168,7 @@ def _below(report: Report) -> list[str]:
 
 
 def _count(report: Report) -> str:
-    counted = Counter(str(f.verdict) for f in report.findings if not f.control)
+    counted = Counter(str(f.verdict) for f in report.findings if f.applies and not f.control)
     text = ", ".join(f"{number} {verdict}" for verdict, number in counted.items())
     misprints = sum(1 for f in report.findings if f.place.get("misprint"))
     return text + (f"; {misprints} misprints, refuted as printed" if misprints else "")

@@ -77,6 +77,7 @@ class Finding:
     source: str = ""
     control: bool = False
     place: Mapping[str, Any] = field(default_factory=dict)  # where the claim stands, as plain data
+    applies: bool = True  # False: stated for generic input, and this is special; it does not count
 
     def with_also(self, *more: Evidence) -> Finding:
         """The same finding with further evidence beside the one that decided."""
@@ -101,6 +102,8 @@ class Finding:
             plain["formula"] = self.formula
         if self.source:
             plain["source"] = self.source
+        if not self.applies:
+            plain["applies"] = False
         if self.control:
             plain["control"] = True
             plain["expected"] = str(Verdict.REFUTED)
@@ -119,8 +122,8 @@ class Report:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict on all claims together; controls do not count."""
-        return combined(finding.verdict for finding in self.findings if not finding.control)
+        """The verdict on all claims together; controls, and claims that do not apply, do not count."""
+        return combined(finding.verdict for finding in self.findings if finding.applies and not finding.control)
 
     @property
     def holds(self) -> bool | None:

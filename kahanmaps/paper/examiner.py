@@ -207,6 +207,10 @@ class Examiner:
             text = f"the claim is not defined at any of {_POLES} random points"
             return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
         text = "both sides agree" if claim.kind is Kind.DIFFERENT else "not attained"
+        if claim.in_general:
+            special = f"stated in general; for this member {text} at {tried} random points: its A or H is special"
+            evidence = Evidence("special member", special, {"points": tried})
+            return replace(self._finding(claim, Verdict.UNDECIDED, evidence), applies=False)
         evidence = Evidence("random points", f"{text} at each of {tried} random points", {"points": tried})
         return self._finding(claim, Verdict.REFUTED, evidence, witness=witness_of(outcome))
 

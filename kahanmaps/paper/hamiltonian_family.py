@@ -96,6 +96,7 @@ def independence_for_non_scalar_A(o: PaperObjects) -> Pairs:
     "",
     "minimal polynomial of degree m => nabla H_i independent",
     kind=Kind.ATTAINED,
+    in_general=True,
     breaks=("repeated", "H0"),
     distinct_roots=True,
 )

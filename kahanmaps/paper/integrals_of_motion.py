@@ -30,6 +30,7 @@ def K_tilde_is_shared(o: PaperObjects) -> Pairs:
     "th integrals",
     "rank(nabla H~, nabla K~_1, ..., nabla K~_m) = m",
     kind=Kind.ATTAINED,
+    in_general=True,
     breaks=("H0",),
     distinct_roots=True,
 )

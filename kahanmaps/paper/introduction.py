@@ -38,6 +38,7 @@ def chain_of_gradients(o: PaperObjects) -> Pairs:
     "",
     "rank(nabla H_0, ..., nabla H_{m-1}) = m",
     kind=Kind.ATTAINED,
+    in_general=True,
     breaks=("repeated", "H0"),
     distinct_roots=True,
 )
@@ -86,13 +87,28 @@ def matrix_differential_equation_of_perturbed_hamiltonians(o: PaperObjects) -> P
         yield left, o.second_slope(lambda o, x: o.H_tilde_(i, x), o.x, v, o.AT * w)
 
 
-@claim("Sect. 1", "", "rank(nabla H~_0, ..., nabla H~_{m-1}) = m", kind=Kind.ATTAINED, breaks=("repeated", "H0"))
+@claim(
+    "Sect. 1",
+    "",
+    "rank(nabla H~_0, ..., nabla H~_{m-1}) = m",
+    kind=Kind.ATTAINED,
+    in_general=True,
+    breaks=("repeated", "H0"),
+)
 def perturbed_hamiltonians_are_independent(o: PaperObjects) -> Pairs:
     """The map possesses m functionally independent integrals"""
     yield o.rank(o.columns([o.gradient(lambda o, x: o.H_tilde_(i, x), o.x) for i in range(o.m)])), o.m
 
 
-@claim("Sect. 1", "", "Phi_{f_0} o Phi_{f_1} != Phi_{f_1} o Phi_{f_0}", kind=Kind.DIFFERENT, least_m=2, breaks=("A=B",))
+@claim(
+    "Sect. 1",
+    "",
+    "Phi_{f_0} o Phi_{f_1} != Phi_{f_1} o Phi_{f_0}",
+    kind=Kind.DIFFERENT,
+    least_m=2,
+    in_general=True,
+    breaks=("A=B",),
+)
 def maps_of_the_chain_do_not_commute(o: PaperObjects) -> Pairs:
     """In general the maps of J nabla H_0 and J nabla H_1 do not commute"""
     f, g = o.f, o.f_(1)
@@ -121,7 +137,15 @@ def signs_at_the_eigenvalues(o: PaperObjects) -> Pairs:
             yield B * onto, onto * o.number(signs[i])
 
 
-@claim("Sect. 1", "", "#{ J B_s nabla H_0 } = 2^{m-1} up to sign", kind=Kind.DIFFERENT, breaks=("B=I",), least_m=2)
+@claim(
+    "Sect. 1",
+    "",
+    "#{ J B_s nabla H_0 } = 2^{m-1} up to sign",
+    kind=Kind.DIFFERENT,
+    in_general=True,
+    breaks=("B=I",),
+    least_m=2,
+)
 def associated_fields_are_pairwise_different(o: PaperObjects) -> Pairs:
     """The class of J nabla H_0 consists of 2^{m-1} vector fields, up to sign"""
     values = [o.fx, *(o.value(o.g(B), o.x) for B in o.associates())]
@@ -132,7 +156,14 @@ def associated_fields_are_pairwise_different(o: PaperObjects) -> Pairs:
 
 
 @claim(
-    "Sect. 1", "", "rank { J B_s nabla H_0 } = m", kind=Kind.ATTAINED, breaks=("B=I",), least_m=3, distinct_roots=True
+    "Sect. 1",
+    "",
+    "rank { J B_s nabla H_0 } = m",
+    kind=Kind.ATTAINED,
+    in_general=True,
+    breaks=("B=I",),
+    least_m=3,
+    distinct_roots=True,
 )
 def independent_associated_fields(o: PaperObjects) -> Pairs:
     """If m > 2, the class contains m linearly independent vector fields"""

@@ -99,7 +99,7 @@ def two_forms_of_the_integral(o: PaperObjects) -> Pairs:
 @claim(
     "(11)",
     "eq: CMOQ integral",
-    "the same for any cubic H",
+    "x^T J^{-1} x~/(6 eps) = H + (2 eps/3) nabla H^T (I - eps f')^{-1} f for any cubic H",
     breaks=(),
     misprint="as printed, for arbitrary cubic H, the first form is not the second: it needs H homogeneous (and J "
     "invertible)",

@@ -317,16 +317,26 @@ def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, or
     )
 
 
+def complex_roots(member: FamilyMember, bits: int) -> tuple[Any, ...]:
+    """The complex roots of chi, enclosed in balls of so many bits."""
+    K = CC(bits)
+    chi = chi_of(member.A)
+    with K.working():
+        enclosures: Any = (chi * _common_denominator(chi.coeffs())).numer().complex_roots()
+        return tuple(K.convert(root) for root, _ in enclosures)
+
+
+def root_enclosures(member: FamilyMember, bits: int) -> list[str]:
+    """The complex roots of chi as text, to 20 digits at most."""
+    with CC(bits).working():
+        return [str(root.str(20)) for root in complex_roots(member, bits)]
+
+
 def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq | None, order: int = 3) -> PaperObjects:
     """A member at a random rational point over complex balls, with all complex roots of chi enclosed."""
     K = CC(bits)
-    chi = chi_of(member.A)
-    below = fmpz(1)
-    for k in range(chi.degree() + 1):
-        below = below.lcm(chi[k].q)
+    roots = complex_roots(member, bits)
     with K.working():
-        enclosures: Any = (chi * below).numer().complex_roots()
-        roots = tuple(K.convert(root) for root, _ in enclosures)
         value = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
         return PaperObjects(
             K=K,

@@ -65,6 +65,7 @@ class Claim:
     kind: Kind = Kind.EQUAL
     least_m: int = 1
     only_m: int | None = None
+    in_general: bool = False  # stated for generic A and H: a special member for which it fails refutes nothing
     distinct_roots: bool = False  # makes sense only where chi has no repeated root
     # A claim about a product of planar systems follows from the same claim about one block (blockwise) or about any
     # two blocks (pairwise); docs/mathematics.md says why, and which claims are of that kind.

@@ -255,6 +255,9 @@ class _MemberExaminer(Examiner):
         found = [diagnosis(self.member.A)]
         if self.member.is_generic and not self.options.controls:
             found.append(NOTE_ON_PROOFS)
+        if self.options.ball_bits is not None and self.member.is_generic:
+            enclosures = realise.root_enclosures(self.member, self.options.ball_bits)
+            found.append(f"roots of chi in balls of {self.options.ball_bits} bits: {', '.join(enclosures)}")
         return found
 
 

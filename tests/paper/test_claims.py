@@ -180,7 +180,9 @@ def test_every_control_that_a_claim_names_refutes_it(claim):
 
 
 @pytest.mark.parametrize(
-    "claim", [found for found in RIGHT if found.makes_sense(1)], ids=[found.key for found in RIGHT if found.makes_sense(1)]
+    "claim",
+    [found for found in RIGHT if found.makes_sense(1)],
+    ids=[found.key for found in RIGHT if found.makes_sense(1)],
 )
 def test_some_control_refutes_a_claim_for_m_1(claim):
     applicable = [control for control in claim.breaks if CONTROLS[control].least_m == 1]

@@ -1,0 +1,390 @@
+"""verify and verify_universal: what they say of whole members, of broken input and of members that are not generic.
+
+For a member with distinct roots every claim is proved, m = 7 and 8 aside, and misprints are refuted. Beside each proof
+stand random points over GF(p) with an error bound. Where chi has repeated roots, claims that need distinct ones are
+undecided and say why; nothing is refuted there but misprints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+
+import pytest
+from flint import fmpq_mat, fmpq_poly
+from helpers import LORENZ
+from paper.members import LARGE_SPECTRA, SPECTRA, file, member
+
+from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.settings import Settings
+from kahanmaps.errors import InputError
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.paper import verify as verify_module
+from kahanmaps.paper.controls import CONTROLS
+from kahanmaps.paper.examiner import Options
+from kahanmaps.paper.registry import Kind, claims
+from kahanmaps.paper.verify import verify, verify_universal
+from kahanmaps.systems.files import SystemFile
+
+PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
+SLOW = {*LARGE_SPECTRA, "m=4, partly split", "m=4, complex"}
+over_members = pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow, pytest.mark.timeout(900)] if name in SLOW else [])
+        for name in [*SPECTRA, *LARGE_SPECTRA]
+    ],
+)
+SIXTH = Options(sections=(6,))
+
+
+def by_key(report):
+    return {finding.place["key"]: finding for finding in report.findings if "key" in finding.place}
+
+
+def keys(report, verdict):
+    return {key for key, finding in by_key(report).items() if finding.verdict is verdict}
+
+
+def all_evidence(report):
+    return [evidence for finding in report.findings for evidence in (finding.evidence, *finding.also)]
+
+
+def bits(evidence):
+    """e of an error bound 2^-e."""
+    base, exponent = evidence.data["error_bound"].split("^-")
+    assert base == "2"
+    return int(exponent)
+
+
+def misprints(m):
+    return {claim.key for claim in claims() if claim.misprint and claim.makes_sense(m)}
+
+
+@cache
+def whole(name):
+    """The report on a member, everything as it is without options."""
+    return verify(file(name))
+
+
+@cache
+def broken(name):
+    """The report on the controls of a member."""
+    return verify(file(name), options=Options(controls=True))
+
+
+# Whole members
+
+
+@over_members
+def test_the_findings_are_the_claims_that_make_sense_in_the_order_of_the_paper(name):
+    expected = [claim.key for claim in claims() if claim.makes_sense(member(name).m)]
+    assert [finding.place["key"] for finding in whole(name).findings] == expected
+
+
+@over_members
+def test_every_claim_but_misprints_is_proved_for_a_member_with_distinct_roots(name):
+    assert keys(whole(name), PROVED) == set(by_key(whole(name))) - misprints(member(name).m)
+    assert whole(name).verdict is PROVED
+
+
+@over_members
+def test_every_misprint_is_refuted(name):
+    assert keys(whole(name), REFUTED) == misprints(member(name).m)
+
+
+@pytest.mark.parametrize("name", ["m=2, split", "m=3, split", "m=3, complex"])
+def test_a_refuted_misprint_shows_both_sides_and_counts_as_a_control(name):
+    report = whole(name)
+    for key in misprints(member(name).m):
+        finding = by_key(report)[key]
+        assert finding.control
+        assert finding.place["misprint"]
+        assert finding.witness is not None
+        assert finding.witness.left != finding.witness.right
+
+
+def test_beside_a_proof_stand_random_points_with_an_error_bound():
+    report = verify(file("m=3, split"), options=SIXTH)
+    for finding in report.findings:
+        points = [evidence for evidence in finding.also if evidence.method == "random points over GF(p)"]
+        assert len(points) == 1
+        assert bits(points[0]) >= 100
+
+
+@pytest.mark.parametrize("asked", [1, 60, 300])
+def test_error_bounds_are_at_least_what_was_asked_for(asked):
+    report = verify(file("m=2, irreducible"), Settings(error_bits=asked), SIXTH)
+    found = [bits(evidence) for evidence in all_evidence(report) if "error_bound" in evidence.data]
+    assert found
+    assert min(found) >= asked
+
+
+def test_more_error_bits_take_more_points():
+    few, many = (verify(file("m=2, split"), Settings(error_bits=b), SIXTH) for b in (50, 500))
+    count = [
+        sum(evidence.data["points"] for evidence in all_evidence(report) if "primes" in evidence.data)
+        for report in (few, many)
+    ]
+    assert count[0] < count[1]
+
+
+def test_the_roots_enter_the_error_bound_where_chi_does_not_split():
+    reports = [verify(file(name), options=SIXTH) for name in ("m=2, split", "m=2, irreducible")]
+    conjugates = [by_key(report)["commutativity"].also[0].data["splitting_field_degree_bound"] for report in reports]
+    assert conjugates == [1, 2]
+
+
+@pytest.mark.parametrize("name", ["m=3, irreducible", "m=2, complex"])
+def test_claims_about_one_block_hold_over_the_algebra_of_all_roots(name):
+    report = verify(file(name), options=SIXTH)
+    methods = [evidence.method for evidence in by_key(report)["commutativity"].also]
+    assert "exact over Q[t]/chi" in methods
+
+
+@pytest.mark.parametrize("name", ["m=2, complex", "m=3, irreducible", "m=3, split"])
+def test_complex_balls_overlap_to_within_a_few_bits(name):
+    report = verify(file(name), options=Options(sections=(6,), ball_bits=200))
+    for finding in report.findings:
+        (balls,) = [evidence for evidence in finding.also if evidence.method == "complex balls"]
+        assert balls.data["bits"] == 200
+        assert balls.data["pairs"] > 0
+        assert int(balls.summary.split("2^-")[1]) > 100
+
+
+def test_without_balls_there_is_no_evidence_by_balls():
+    methods = {evidence.method for evidence in all_evidence(verify(file("m=2, complex"), options=SIXTH))}
+    assert "complex balls" not in methods
+
+
+@pytest.mark.parametrize("section", range(1, 11))
+def test_a_section_alone_is_what_it_is_among_all(section):
+    part = verify(file("m=2, split"), options=Options(sections=(section,)))
+    among = [finding for finding in whole("m=2, split").findings if finding.place["section"] == section]
+    assert [f.place for f in part.findings] == [f.place for f in among]
+    assert [f.verdict for f in part.findings] == [f.verdict for f in among]
+
+
+def test_the_same_seed_says_the_same_and_another_takes_other_primes():
+    first, again, other = (verify(file("m=2, split"), Settings(seed=seed), SIXTH).to_json() for seed in (1, 1, 2))
+    assert first == again
+    primes = [report["claims"][0]["also"][0]["primes"] for report in (first, other)]
+    assert primes[0] != primes[1]
+
+
+def test_at_one_eps_everything_is_proved_as_well():
+    report = verify(file("m=2, split"), Settings(eps="1/10"))
+    assert report.verdict is PROVED
+    assert report.context["eps"] == "1/10"
+    for key in misprints(2):
+        assert by_key(report)[key].witness.eps == "1/10"
+
+
+@pytest.mark.parametrize("order", [1, 3, 6])
+def test_the_series_of_the_integrals_is_proved_to_the_order_asked_for(order):
+    report = verify(file("m=2, split"), options=Options(sections=(7,), order=order))
+    assert by_key(report)["series-of-the-integrals"].verdict is PROVED
+    assert report.context["order"] == order
+
+
+# Controls
+
+
+@over_members
+def test_every_control_is_refuted_at_a_witness(name):
+    *findings, last = broken(name).findings
+    assert {finding.place["key"] for finding in findings} == {c.key for c in claims() if c.makes_sense(member(name).m)}
+    for finding in findings:
+        assert finding.verdict is REFUTED
+        assert finding.control
+        assert finding.witness is not None
+    assert last.verdict is PROVED
+    assert broken(name).verdict is PROVED
+
+
+def test_a_claim_that_no_control_refutes_is_told(monkeypatch):
+    # The control "eps" without its effect: the claim that only it refutes is no check any more.
+    monkeypatch.setitem(CONTROLS, "eps", replace(CONTROLS["eps"], function=lambda o: o.changed()))
+    report = verify(file("m=2, split"), options=Options(sections=(6,), controls=True))
+    assert report.verdict is UNDECIDED
+    assert report.findings[-1].evidence.summary == "no control refutes jacobians-at-the-images"
+
+
+# Members with repeated roots
+
+REPEATED = {
+    "(t-1)^2 (t+2)": draw_with_chi(fmpq_poly([2, -3, 0, 1]), seed=3),
+    "(t-1)^2": draw_with_chi(fmpq_poly([1, -2, 1]), seed=3),
+    "1, 1, 2": draw_with_eigenvalues([1, 1, 2], seed=3),
+    "1, 1": draw_with_eigenvalues([1, 1], seed=3),
+}
+over_repeated = pytest.mark.parametrize("repeated", REPEATED.values(), ids=REPEATED.keys())
+
+
+@over_repeated
+def test_where_roots_are_repeated_nothing_is_refuted_but_misprints(repeated):
+    report = verify(SystemFile.from_member(repeated))
+    assert keys(report, REFUTED) <= misprints(repeated.m)
+    assert report.verdict is UNDECIDED
+
+
+@over_repeated
+def test_claims_that_need_distinct_roots_are_undecided_with_the_diagnosis(repeated):
+    found = by_key(verify(SystemFile.from_member(repeated)))
+    for claim in claims():
+        if claim.makes_sense(repeated.m) and claim.distinct_roots:
+            assert found[claim.key].verdict is UNDECIDED
+            assert found[claim.key].evidence.method == "outside the hypotheses"
+            assert "repeated" in found[claim.key].evidence.summary
+
+
+@over_repeated
+def test_claims_that_hold_for_every_quadratic_system_hold_where_roots_are_repeated(repeated):
+    found = by_key(verify(SystemFile.from_member(repeated), options=Options(sections=(2,))))
+    assert all(found[key].verdict in (PROVED, SUPPORTED) for key in set(found) - misprints(repeated.m))
+
+
+@over_repeated
+def test_the_fields_of_the_chain_commute_where_roots_are_repeated(repeated):
+    found = by_key(verify(SystemFile.from_member(repeated), options=Options(sections=(4,))))
+    assert {finding.verdict for finding in found.values()} <= {PROVED, SUPPORTED}
+
+
+@pytest.mark.xfail(reason="claims that something differs are not told to be outside the hypotheses", strict=True)
+@pytest.mark.parametrize("key", ["associated-fields-are-pairwise-different", "independent-matrices"])
+def test_claims_of_existence_that_need_distinct_roots_say_so_too(key):
+    found = by_key(verify(SystemFile.from_member(REPEATED["(t-1)^2 (t+2)"])))[key]
+    assert found.verdict is UNDECIDED
+    assert found.evidence.method == "outside the hypotheses"
+
+
+@pytest.mark.xfail(reason="claims of existence have no control where roots are repeated", strict=True)
+@over_repeated
+def test_where_roots_are_repeated_the_claims_that_apply_are_refuted_by_controls(repeated):
+    report = verify(SystemFile.from_member(repeated), options=Options(controls=True))
+    assert report.findings[-1].verdict is PROVED
+
+
+# Special members
+
+
+def special_member():
+    """Distinct roots, but H vanishes on the second block: nothing moves there."""
+    A = fmpq_mat(4, 4, [1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2])
+    return FamilyMember(A, parse_polynomial("x1^3 + x1*x3^2", ["x1", "x2", "x3", "x4"]))
+
+
+def test_what_is_said_in_general_only_is_not_refuted_by_a_special_member():
+    report = verify(SystemFile.from_member(special_member()))
+    assert keys(report, REFUTED) <= misprints(2)
+    assert "hamiltonians-are-independent" in keys(report, UNDECIDED)
+    assert by_key(report)["hamiltonians-are-independent"].evidence.method == "outside the hypotheses"
+
+
+def test_identities_are_proved_for_a_special_member_as_well():
+    report = verify(SystemFile.from_member(special_member()))
+    identities = {c.key for c in claims() if c.kind is Kind.EQUAL and c.makes_sense(2) and not c.misprint}
+    assert identities <= keys(report, PROVED)
+
+
+def test_the_zero_hamiltonian_refutes_nothing():
+    A = fmpq_mat(4, 4, [1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2])
+    zero = parse_polynomial("x1 - x1", ["x1", "x2", "x3", "x4"])
+    report = verify(SystemFile.from_member(FamilyMember(A, zero)))
+    assert keys(report, REFUTED) <= misprints(2)
+
+
+# Systems of files
+
+
+def test_the_signs_of_a_file_choose_the_system_that_is_examined(monkeypatch):
+    examined = []
+    original = verify_module._MemberExaminer.__init__
+
+    def spy(self, found, settings, options):
+        examined.append(found)
+        original(self, found, settings, options)
+
+    monkeypatch.setattr(verify_module._MemberExaminer, "__init__", spy)
+    plain = member("m=3, split")
+    signed = FamilyMember(plain.A, plain.H, (1, -1, 1))
+    report = verify(SystemFile.from_member(signed), options=Options(sections=(4,)))
+    assert report.verdict is PROVED
+    assert examined[0].H == signed.chosen.K
+    assert examined[0].H != plain.H
+    assert examined[0].A == plain.A
+
+
+def test_a_system_that_is_not_of_kind_family_is_wrong_use():
+    with pytest.raises(InputError, match=r"of kind \[system\], expected one of kind \[family\]"):
+        verify(SystemFile.from_system(LORENZ, "lorenz"))
+
+
+def test_a_member_with_m_9_is_wrong_use():
+    with pytest.raises(InputError, match="found a member with m = 9, expected m <= 8"):
+        verify(SystemFile.from_member(draw_with_eigenvalues(range(1, 10), seed=1)))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"sections": (0,)}, "found the section 0, expected 1 to 10"),
+        ({"sections": (1, 11)}, "found the section 11, expected 1 to 10"),
+        ({"order": 0}, "found the order 0, expected 1 to 20"),
+        ({"order": 21}, "found the order 21, expected 1 to 20"),
+        ({"ball_bits": 31}, "found 31 bits for the balls, expected 32 to 100000"),
+        ({"ball_bits": 100_001}, "found 100001 bits for the balls"),
+    ],
+)
+def test_options_out_of_range_are_wrong_use(options, message):
+    with pytest.raises(InputError, match=message):
+        Options(**options)
+
+
+# The member in general
+
+
+@pytest.mark.parametrize("m", [1, 2, 3])
+def test_every_claim_is_proved_for_the_member_in_general(m):
+    report = verify_universal(m, options=Options(order=2))
+    assert keys(report, REFUTED) == misprints(m)
+    assert keys(report, UNDECIDED) == set()
+    assert report.verdict in (PROVED, SUPPORTED)
+    unproved = {claim.key for claim in claims() if not claim.symplectic}
+    assert keys(report, SUPPORTED) <= unproved
+
+
+def test_error_bounds_for_the_member_in_general_are_below_2_to_the_minus_100():
+    evidence = [found for found in all_evidence(verify_universal(2)) if "error_bound" in found.data]
+    assert len(evidence) > 100
+    assert min(bits(found) for found in evidence) >= 100
+
+
+def test_controls_refute_the_claims_for_the_member_in_general():
+    report = verify_universal(2, options=Options(controls=True))
+    assert report.verdict is PROVED
+    assert all(finding.verdict is REFUTED for finding in report.findings[:-1])
+
+
+def test_the_member_in_general_is_for_every_eps():
+    with pytest.raises(InputError, match="found an eps, expected none"):
+        verify_universal(2, Settings(eps="1/10"))
+
+
+@pytest.mark.parametrize("m", [0, 9, -1])
+def test_the_member_in_general_has_m_from_1_to_8(m):
+    with pytest.raises(InputError, match=f"found m = {m}, expected 1 <= m <= 8"):
+        verify_universal(m)
+
+
+# Witnesses of misprints, computed a second time
+
+
+def test_the_witness_of_the_misprint_in_the_two_forms_is_a_rational_point_with_both_sides():
+    witness = by_key(whole("m=2, split"))["two-forms-of-the-integral-for-any-cubic"].witness
+    assert witness.field == "QQ"
+    assert set(witness.vectors) == {"linear", "u1", "u2", "u3"}
+    assert Fraction(witness.left[0]) != Fraction(witness.right[0])
