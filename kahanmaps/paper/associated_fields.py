@@ -104,7 +104,7 @@ def A_is_diagonalisable(o: PaperObjects) -> Pairs:
     "Lemma 7, proof",
     "",
     "A = S diag(W, W^T) S^{-1}, S^T J S = J",
-    kind=Kind.ATTAINED,
+    kind=Kind.EXISTS,
     breaks=("A",),
     distinct_roots=True,
     symplectic=False,
@@ -129,14 +129,18 @@ def matrices_as_polynomials_in_A(o: PaperObjects) -> Pairs:
         yield o.A * E, E * o.lam[i]
 
 
-@claim("Lemma 7", "", "B_1, ..., B_m linearly independent (m != 2)", kind=Kind.ATTAINED, least_m=2, breaks=("B=I",))
+@claim(
+    "Lemma 7",
+    "",
+    "B_1, ..., B_m linearly independent (m > 2; for m = 2 B_2 = -B_1)",
+    kind=Kind.ATTAINED,
+    least_m=3,
+    breaks=("B=I",),
+)
 def independent_matrices(o: PaperObjects) -> Pairs:
-    """The matrices B_i are linearly independent; for m = 2 they are opposite"""
+    """The matrices B_i are linearly independent"""
     rows = [o.B(i).entries() for i in o.each]
-    if o.m == 2:
-        yield o.rank(o.B(0) + o.B(1)), 0
-    else:
-        yield o.rank(o.K.matrix(o.m, o.n * o.n, [entry for row in rows for entry in row])), o.m
+    yield o.rank(o.K.matrix(o.m, o.n * o.n, [entry for row in rows for entry in row])), o.m
 
 
 @claim("Lemma 7 (35)", "B^2", "B_i^2 = I", breaks=("B", "roots"), distinct_roots=True)

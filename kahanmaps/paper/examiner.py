@@ -183,8 +183,7 @@ class Examiner:
         """Claims that something differs somewhere, or has a certain rank: one point that shows it is a proof."""
         roots, outcome, tried = False, None, 0
         for number in range(_POLES):
-            exact = claim.kind is Kind.ATTAINED and self.exact_point(roots, number)
-            objects = exact or self.point(roots, number)
+            objects = self.exact_point(roots, number) or self.point(roots, number)
             if objects is None:
                 text = "no prime was found at which chi splits into distinct factors"
                 return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
@@ -200,7 +199,9 @@ class Examiner:
                 where = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
                 what = "both sides differ" if claim.kind is Kind.DIFFERENT else "attained"
                 method = "exact rational point" if objects.K is QQ else "point over GF(p)"
-                return self._finding(claim, Verdict.PROVED, Evidence(method, f"{what} at {where}", {"points": tried}))
+                lifts = objects.K is QQ or claim.kind is not Kind.EXISTS
+                verdict = Verdict.PROVED if lifts else Verdict.SUPPORTED
+                return self._finding(claim, verdict, Evidence(method, f"{what} at {where}", {"points": tried}))
             if tried >= _POINTS:
                 break
         if outcome is None or not outcome.pairs:

@@ -161,33 +161,30 @@ def jacobi_identity(o: PaperObjects) -> Pairs:
 @claim(
     "Lemma 13, proof",
     "",
-    "coefficient of eps^2: C(2m,3) equations of rank 2m(m-1), solved by pi_k = C_k pi_{m-1}",
-    kind=Kind.ATTAINED,
+    "coefficient of eps^2 in the Jacobi identities vanishes for nabla pi_k = C_k w, w any vector",
     least_m=2,
     breaks=("J", "A"),
-    distinct_roots=True,
 )
 def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
-    """Pi is Poisson if and only if the gradient conditions hold: 20 equations of rank 12 for m = 3"""
-    n, m = o.n, o.m
-    powers = [o.A_to(k).transpose() * o.J for k in range(m)]
-    # To first order in eps^2 the bracket of x_i with a function u is sum_l J_il d_l u. Unknowns: d_l pi_k.
-    rows = []
-    for triple in combinations(range(n), 3):
-        row = [o.K.zero] * (n * m)
-        for a in range(3):
-            i, j, k = triple[a], triple[(a + 1) % 3], triple[(a + 2) % 3]
-            for power in range(m):
-                for l in range(n):
-                    row[power * n + l] = row[power * n + l] + o.J[i, l] * powers[power][j, k]
-        rows.append(row)
-    system = o.K.matrix(len(rows), n * m, [entry for row in rows for entry in row])
-    yield o.rank(system), 2 * m * (m - 1)
-    # The solutions include (C_0 w, ..., C_{m-1} w) for every vector w, a space of dimension 2m: so there are no others.
-    stacked = [o.horner(k)[i, j] for k in range(m) for i in range(n) for j in range(n)]
-    solutions = o.K.matrix(n * m, n, stacked)
-    yield o.rank(system * solutions), 0
-    yield o.rank(solutions), n
+    """The gradient conditions solve the equations of first order in eps^2"""
+    equations, solutions = _first_order(o)
+    yield equations * solutions, o.zeros(equations.nrows(), o.n)
+
+
+@claim(
+    "Lemma 13, proof",
+    "",
+    "these C(2m,3) equations for the gradients have rank 2m(m-1), so there are no other solutions",
+    kind=Kind.ATTAINED,
+    least_m=3,
+    breaks=("repeated",),
+    distinct_roots=True,
+)
+def rank_of_the_first_order(o: PaperObjects) -> Pairs:
+    """Pi is Poisson only if the gradient conditions hold: 20 equations of rank 12 in 18 unknowns for m = 3"""
+    equations, solutions = _first_order(o)
+    yield o.rank(equations), 2 * o.m * (o.m - 1)
+    yield o.rank(solutions), equations.ncols() - 2 * o.m * (o.m - 1)
 
 
 @claim(
@@ -329,6 +326,24 @@ def _long_form(o: PaperObjects, x: Any) -> Any:
     for i in o.each:
         right = right - o.B(i).transpose() * o.J * (o.eps * o.eps * o.q(i, x))
     return right
+
+
+def _first_order(o: PaperObjects) -> tuple[Any, Any]:
+    """The equations of first order in eps^2 for the unknowns d_l pi_k, and the solutions (C_0 w, ..., C_{m-1} w)."""
+    n, m = o.n, o.m
+    powers = [o.A_to(k).transpose() * o.J for k in range(m)]
+    rows = []
+    for triple in combinations(range(n), 3):
+        row = [o.K.zero] * (n * m)
+        for a in range(3):
+            i, j, k = triple[a], triple[(a + 1) % 3], triple[(a + 2) % 3]
+            for power in range(m):
+                for l in range(n):  # to this order the bracket of x_i with a function u is sum_l J_il d_l u
+                    row[power * n + l] = row[power * n + l] + o.J[i, l] * powers[power][j, k]
+        rows.append(row)
+    equations = o.K.matrix(len(rows), n * m, [entry for row in rows for entry in row])
+    stacked = [o.horner(k)[i, j] for k in range(m) for i in range(n) for j in range(n)]
+    return equations, o.K.matrix(n * m, n, stacked)
 
 
 def _two_sums(o: PaperObjects, B: Any, l: int) -> tuple[Any, Any]:

@@ -43,8 +43,10 @@ class Kind(StrEnum):
 
     EQUAL = "equal"  # both sides are equal, everywhere
     DIFFERENT = "different"  # the sides of every pair differ somewhere: one point where all do is a proof
-    # Both sides are equal at some point, which is a proof: something exists there, or a rank is the largest possible.
+    # The rank or number on the left reaches the one on the right somewhere, which is the largest possible (or, for a
+    # dimension, the smallest): one point over Q or GF(p) is a proof, since ranks do not grow modulo p.
     ATTAINED = "attained"
+    EXISTS = "exists"  # both sides are equal for some choice of the free vectors: one point over Q is a proof
 
 
 @dataclass(frozen=True)
