@@ -360,9 +360,10 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int = 3) -> Pap
     n = member.dim
     chi = chi_of(member.A)
     if rational_roots(member) is None:
-        # Algebraic numbers: bounded in every embedding by Cauchy's bound, over the leading coefficient of integral chi.
-        largest = 1 + max(abs(chi[k]) for k in range(member.m))
-        root = K.polynomial(0, math.log2(float(largest) + 1.0)) / K.convert(_common_denominator(chi.coeffs()))
+        # d root is an algebraic integer, d the common denominator of chi, and Cauchy bounds the root in every embedding.
+        below = _common_denominator(chi.coeffs())
+        largest = below * (2 + max(abs(chi[k]) for k in range(member.m)))
+        root = K.polynomial(0, float(largest.p.bit_length())) / K.convert(below)
     else:
         root = K.matrix(1, member.m, [K.convert(abs(r)) for r in rational_roots(member) or ()])[0, 0]
     value = K.variable() if eps is None else K.convert(eps)
