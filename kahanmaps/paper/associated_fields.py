@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Kind, Pairs, claim
 
@@ -28,12 +30,18 @@ def associated_field(o: PaperObjects) -> Pairs:
 def hamilton_function_of_the_associated_field(o: PaperObjects) -> Pairs:
     """The associated field is Hamiltonian, with the combination K of the H_i"""
     v = o.vector("v")
-    for i in o.free:
+    for signs in o.all_signs():
         # J^T = J^{-1}, so v . g = v . J nabla K is the slope of K along J^T v.
-        slope = o.slope(lambda o, x: o.Kf(o.B(i), x), o.x, o.J.transpose() * v)
-        yield o.dot(v, o.value(o.g_(i), o.x)), slope
-        combination = o.sum([coefficient * o.H(o.x, k) for k, coefficient in enumerate(o.lagrange(i))])
-        yield o.Kf(o.B(i), o.x), combination
+        B = o.B_signs(signs)
+        slope = o.slope(lambda o, x: o.Kf(o.B_signs(signs), x), o.x, o.J.transpose() * v)
+        yield o.dot(v, o.value(o.g(B), o.x)), slope
+        # B_s = I + sum of B_i - I over the minus signs, as a polynomial in A.
+        minus = [o.lagrange(i) for i in o.each if signs[i] < 0]
+        coefficients = [o.sum([c[k] for c in minus]) for k in range(o.m)]
+        coefficients[0] = coefficients[0] + o.number(1 - len(minus))
+        yield B, o.polynomial_in_A(coefficients)
+        combination = o.sum([coefficient * o.H(o.x, k) for k, coefficient in enumerate(coefficients)])
+        yield o.Kf(B, o.x), combination
 
 
 @claim("Def. 4", "", "B_s^T g_s = f_0;  (B_s B_t)^2 = I", breaks=("B",), blockwise=True)
@@ -61,6 +69,21 @@ def squares_of_jacobians_agree(o: PaperObjects) -> Pairs:
         yield jacobian * jacobian, o.df * o.df
 
 
+@claim(
+    "Lemma 5, proof",
+    "",
+    "g'g = g'B^T f_0 = B^T g' f_0 = (B^T)^2 f_0' f_0 = f_0' f_0, the same for (g')^2",
+    breaks=("B", "H"),
+    blockwise=True,
+)
+def squares_step_by_step(o: PaperObjects) -> Pairs:
+    """The chains of equalities that prove (31) and (32)"""
+    for B in o.associates():
+        BT, gx, dg = B.transpose(), o.value(o.g(B), o.x), o.jac(o.g(B), o.x)
+        yield from pairwise([dg * gx, dg * (BT * o.fx), BT * (dg * o.fx), BT * (BT * (o.df * o.fx)), o.df * o.fx])
+        yield from pairwise([dg * dg, dg * BT * o.df, BT * dg * o.df, BT * BT * o.df * o.df, o.df * o.df])
+
+
 @claim("Cor. 6 (33)", "condet", "det(I - eps g') = det(I - eps f_0')", breaks=("B", "f"), blockwise=True)
 def determinants_agree(o: PaperObjects) -> Pairs:
     """Maps of associated fields share the invariant measure"""
@@ -70,15 +93,18 @@ def determinants_agree(o: PaperObjects) -> Pairs:
 
 @claim("Cor. 6, proof", "", "tr f'^k = tr g'^k, both 0 for odd k", breaks=("B", "f"))
 def traces_agree(o: PaperObjects) -> Pairs:
-    """Traces of powers of the Jacobi matrices agree, and those of odd powers vanish"""
-    for i in o.free:
-        first, second = o.df, o.jac(o.g_(i), o.x)
-        a, b = first, second
-        for k in range(1, 5):
-            yield o.trace(a), o.trace(b)
+    """Traces of powers of the Jacobi matrices agree, up to k = 2m, and those of odd powers vanish"""
+    powers = [o.df]
+    for _ in range(2 * o.m - 1):
+        powers.append(powers[-1] * o.df)
+    for B in o.associates():
+        second = o.jac(o.g(B), o.x)
+        power = second
+        for k in range(1, 2 * o.m + 1):
+            yield o.trace(powers[k - 1]), o.trace(power)
             if k % 2:
-                yield o.trace(a), o.K.zero
-            a, b = a * first, b * second
+                yield o.trace(power), o.K.zero
+            power = power * second
 
 
 @claim("Lemma 7, proof", "", "det(A - t I) = chi(t)^2, chi = prod (t - lambda_i)", breaks=("roots", "A"))
@@ -119,6 +145,23 @@ def symplectic_normal_form_of_A(o: PaperObjects) -> Pairs:
     yield S.transpose() * o.J * S, o.J
 
 
+@claim(
+    "Lemma 7, proof",
+    "",
+    "rank E_i = 2 for the projector E_i onto the eigenspace of lambda_i",
+    kind=Kind.ATTAINED,
+    at_most="the rank of a projector is its trace, and the eigenvalue lambda_i is double",
+    breaks=("roots",),
+    distinct_roots=True,
+)
+def two_eigenvectors(o: PaperObjects) -> Pairs:
+    """Each eigenvalue has two linearly independent eigenvectors"""
+    for i in o.each:
+        E = o.projector(i)
+        yield o.rank(E), 2
+        yield o.is_zero(o.A * E - E * o.lam[i]), True
+
+
 @claim("Lemma 7 (34)", "", "B_i = alpha_i I + beta_i A + gamma_i A^2", breaks=("roots",), distinct_roots=True)
 def matrices_as_polynomials_in_A(o: PaperObjects) -> Pairs:
     """B_i is a polynomial in A of degree < m, with the coefficients of Lagrange interpolation"""
@@ -135,6 +178,8 @@ def matrices_as_polynomials_in_A(o: PaperObjects) -> Pairs:
     "B_1, ..., B_m linearly independent (m > 2; for m = 2 B_2 = -B_1)",
     kind=Kind.ATTAINED,
     least_m=3,
+    at_most="there are m of them",
+    distinct_roots=True,
     breaks=("B=I",),
 )
 def independent_matrices(o: PaperObjects) -> Pairs:

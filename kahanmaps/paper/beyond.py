@@ -54,6 +54,7 @@ def opposite_field(o: PaperObjects) -> Pairs:
     "Phi_f(., eps) o Phi_g(., 2 eps) != Phi_g(., 2 eps) o Phi_f(., eps)",
     kind=Kind.DIFFERENT,
     in_general=True,
+    distinct_roots=True,
     breaks=("linear",),
 )
 def different_steps_do_not_commute(o: PaperObjects) -> Pairs:
@@ -103,7 +104,14 @@ def paper_integral_fails_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     yield p.H_tilde(p.step(p.f, p.x)), p.H_tilde(p.x)
 
 
-@claim("Inhomogeneous H", "", "dPhi Pi(x) dPhi^T = Pi(x~), for f and g", breaks=("H", "B"), blockwise=True)
+@claim(
+    "Inhomogeneous H",
+    "",
+    "dPhi Pi(x) dPhi^T = Pi(x~), for f and g",
+    distinct_roots=True,
+    breaks=("H", "B"),
+    blockwise=True,
+)
 def poisson_map_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     """Inhomogeneous H: Pi = J - eps^2 f'^2 J is still invariant"""
     p = o.inhomogeneous()
@@ -112,7 +120,15 @@ def poisson_map_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
         yield jacobian * p.Pi(p.x) * jacobian.transpose(), p.Pi(p.step(g, p.x))
 
 
-@claim("Inhomogeneous H", "", "{x_i,{x_j,x_k}} + cyclic = 0", least_m=2, pairwise=True, breaks=("H", "f"))
+@claim(
+    "Inhomogeneous H",
+    "",
+    "{x_i,{x_j,x_k}} + cyclic = 0",
+    least_m=2,
+    pairwise=True,
+    distinct_roots=True,
+    breaks=("H", "f"),
+)
 def jacobi_identity_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     """Inhomogeneous H: Pi is still a Poisson tensor"""
     from kahanmaps.paper.poisson_structure import jacobi_identity

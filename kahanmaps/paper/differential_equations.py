@@ -33,9 +33,9 @@ def second_order_equations_of_the_integrals(o: PaperObjects) -> Pairs:
     v, w = o.vector("v"), o.vector("w")
     left = o.second_slope(lambda o, x: o.H_tilde(x), o.x, o.AT * v, w)
     yield left, o.second_slope(lambda o, x: o.H_tilde(x), o.x, v, o.AT * w)
-    for i in o.free:
-        left = o.second_slope(lambda o, x: o.integral(o.g_(i), x), o.x, o.AT * v, w)
-        yield left, o.second_slope(lambda o, x: o.integral(o.g_(i), x), o.x, v, o.AT * w)
+    for signs in o.all_signs():
+        left = o.second_slope(lambda o, x: o.integral(o.g(o.B_signs(signs)), x), o.x, o.AT * v, w)
+        yield left, o.second_slope(lambda o, x: o.integral(o.g(o.B_signs(signs)), x), o.x, v, o.AT * w)
 
 
 @claim("(95), (96)", "tH", "H~ = -2 x^T Pi^{-1} f, K~_i = -2 x^T Pi^{-1} g_i", breaks=("eps", "f"), blockwise=True)
@@ -64,14 +64,13 @@ def inverse_tensor(o: PaperObjects) -> Pairs:
     breaks=("B",),
 )
 def functions_P_and_Q(o: PaperObjects) -> Pairs:
-    """P_0 and Q_i as printed for m = 3, with s_0 = 1"""
-    s0 = _s0(o)
-    one = o.K.one
-    reciprocal = [one / o.s(i, o.x) for i in o.each]
-    yield o.P0(o.x) * o.number(4), one / s0 + o.sum(reciprocal)
-    for i in o.free:
-        right = o.sum(reciprocal) - reciprocal[i] - reciprocal[i] - one / s0
-        yield o.Q(i, o.x) * (o.number(4) * o.eps * o.eps), right
+    """P_0 and Q_i as printed for m = 3, with s_0 = 1 and the s_i taken as eigenvalues of I - eps^2 f'^2"""
+    one, squared = o.K.one, o.eps * o.eps
+    reciprocal = [one / (one - squared * o.eigenvalue_of_square(i, o.x)) for i in o.each]
+    yield o.P0(o.x) * o.number(4), one + o.sum(reciprocal)
+    for i in o.each:
+        right = o.sum(reciprocal) - reciprocal[i] - reciprocal[i] - one
+        yield o.Q(i, o.x) * (o.number(4) * squared), right
 
 
 @claim("(102)", "s0", "s_0 = 1 - eps^2 (p_0 - q_1 - q_2 - q_3) = 1", only_m=3, breaks=("B",))
@@ -271,10 +270,45 @@ def linear_system_as_printed(o: PaperObjects) -> Pairs:
 
 @claim("Lemma 16, proof", "", "4 x 4 system with entry (2,3) = eps^2 q_3", only_m=3, breaks=("B",))
 def linear_system(o: PaperObjects) -> Pairs:
-    """The linear system for P_0 and Q_i, as mended; its solution is unique and gives the inverse of Pi"""
+    """The linear system for P_0 and Q_i, as mended; its solution is unique"""
     yield from _linear_system(o, o.eps * o.eps)
     matrix, unknown, right = _system_matrix(o, o.eps * o.eps)
     yield o.K.column(o.solve(matrix, right).entries()), unknown
+
+
+@claim(
+    "Lemma 16, proof",
+    "",
+    "Pi (u_0 J - sum u_i B_i J) = -(M u)_0 I + sum (M u)_i B_i^T, M the matrix of the system, u any vector",
+    only_m=3,
+    breaks=("B", "H"),
+)
+def ansatz_for_the_inverse(o: PaperObjects) -> Pairs:
+    """Pi times the ansatz is a combination of I and the B_i^T, with the coefficients of the linear system"""
+    matrix, _, _ = _system_matrix(o, o.eps * o.eps)
+    u = o.K.column([o.vector("u")[k, 0] for k in range(4)])
+    coefficients = matrix * u
+    ansatz = o.J * u[0, 0]
+    right = -(o.I * coefficients[0, 0])
+    for i in o.each:
+        ansatz = ansatz - o.B(i) * o.J * u[i + 1, 0]
+        right = right + o.B(i).transpose() * coefficients[i + 1, 0]
+    yield o.Pi(o.x) * ansatz, right
+
+
+@claim(
+    "Theorem 12",
+    "",
+    "det Pi = (s_1 ... s_m)^2",
+    breaks=("H", "B"),
+    distinct_roots=True,
+)
+def non_degenerate_tensor(o: PaperObjects) -> Pairs:
+    """Pi is non-degenerate where the map is defined: the structure is symplectic"""
+    product = o.K.one
+    for i in o.each:
+        product = product * o.s(i, o.x)
+    yield o.det(o.Pi(o.x)), product * product
 
 
 @claim("Lemma 16, proof", "", "determinant of the 4 x 4 system = s_0 s_1 s_2 s_3", only_m=3, breaks=("B",))

@@ -108,6 +108,10 @@ class Examiner:
         """Further evidence."""
         return ()
 
+    def what_is_special(self) -> str:
+        """Why a statement for generic A and H may fail here."""
+        return "its A or H is special"
+
     # the examination
 
     def examine(self, claim: Claim) -> Finding:
@@ -120,6 +124,11 @@ class Examiner:
         needs, equation, poles = self._size(claim)
         roots = "roots" in needs
         decision = self._at_points(claim, roots, equation, poles)
+        if claim.misprint and decision.verdict is Verdict.SUPPORTED:
+            silent = Evidence("special member", f"the misprint does not show for this member: {self.what_is_special()}")
+            return replace(
+                decision, verdict=Verdict.UNDECIDED, evidence=silent, also=(decision.evidence,), applies=False
+            )
         if claim.misprint or decision.verdict is Verdict.REFUTED:
             return decision
         proof = self.proof(claim, needs, equation, poles)
@@ -161,7 +170,9 @@ class Examiner:
                 return self._finding(claim, Verdict.UNDECIDED, Evidence("outside the hypotheses", text))
             primes.append(objects.K.characteristic)
         bound = math.floor(-per_trial * trials)
-        assumed = ", the roots of chi among them" if roots and self.conjugates(True) > 1 else ""
+        assumed = ""
+        if roots and self.conjugates(True) > 1:
+            assumed = " at which chi splits (of which at least half as many are assumed as Chebotarev's density gives)"
         evidence = Evidence(
             "random points over GF(p)",
             f"held at {trials} random point{'s' * (trials > 1)} over GF(p), p random of 63 bits{assumed}; "
@@ -197,11 +208,14 @@ class Examiner:
             tried += 1
             if outcome.holds and outcome.pairs:
                 where = "an exact rational point" if objects.K is QQ else f"a point over {objects.K.name}"
-                what = "both sides differ" if claim.kind is Kind.DIFFERENT else "attained"
                 method = "exact rational point" if objects.K is QQ else "point over GF(p)"
-                lifts = objects.K is QQ or claim.kind is not Kind.EXISTS
-                verdict = Verdict.PROVED if lifts else Verdict.SUPPORTED
-                return self._finding(claim, verdict, Evidence(method, f"{what} at {where}", {"points": tried}))
+                text = f"{'both sides differ' if claim.kind is Kind.DIFFERENT else 'attained'} at {where}"
+                if claim.kind is Kind.ATTAINED and claim.at_most:
+                    text += f", and it cannot be larger: {claim.at_most}"
+                # Modulo p a rank may be smaller and an equation hold that does not hold over Q, but not conversely.
+                is_proof = claim.kind is Kind.DIFFERENT or bool(claim.at_most) or objects.K is QQ
+                verdict = Verdict.PROVED if is_proof else Verdict.SUPPORTED
+                return self._finding(claim, verdict, Evidence(method, text, {"points": tried}))
             if tried >= _POINTS:
                 break
         if outcome is None or not outcome.pairs:
@@ -209,7 +223,7 @@ class Examiner:
             return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
         text = "both sides agree" if claim.kind is Kind.DIFFERENT else "not attained"
         if claim.in_general:
-            special = f"stated in general; for this member {text} at {tried} random points: its A or H is special"
+            special = f"stated in general; for this member {text} at {tried} random points: {self.what_is_special()}"
             evidence = Evidence("special member", special, {"points": tried})
             return replace(self._finding(claim, Verdict.UNDECIDED, evidence), applies=False)
         evidence = Evidence("random points", f"{text} at each of {tried} random points", {"points": tried})
@@ -272,8 +286,13 @@ class Examiner:
         return [finding for finding in found if finding.is_as_expected] or found
 
     def _broken(self, claim: Claim, name: str) -> Outcome | None:
-        """The claim on input broken by a control: the first point at which it fails, or else the last one tried."""
-        outcome = None
+        """The claim on input broken by a control, at a point at which it fails; else the last outcome.
+
+        One point refutes an equation; that something differs, exists or has a certain rank is refuted where several
+        points in a row do not show it.
+        """
+        needed = 1 if claim.kind is Kind.EQUAL else _POINTS
+        outcome, failed = None, 0
         for roots in (False, True):
             for number in range(_POINTS):
                 for find in (self.exact_point, self.point):
@@ -284,7 +303,12 @@ class Examiner:
                         outcome = evaluate(claim, broken(name, objects))
                     except (*UNDEFINED, LookupError):
                         continue
-                    if not outcome.holds:
+                    if outcome.holds:
+                        if claim.kind is not Kind.EQUAL:
+                            return outcome
+                        continue
+                    failed += 1
+                    if failed >= needed:
                         return outcome
         return outcome
 

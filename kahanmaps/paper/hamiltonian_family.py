@@ -46,12 +46,11 @@ def equations_of_motion(o: PaperObjects) -> Pairs:
 )
 def gradients_of_the_chain(o: PaperObjects) -> Pairs:
     """The chain starts with H_1 and, for m > 2, H_2"""
-    v = o.vector("v")
     for i in range(1, min(o.m, 3)):
-        yield o.slope(lambda o, x: o.H(x, i), o.x, v), o.dot(v, o.A * o.grad(o.x, i - 1))
+        yield o.gradient_of_chain(i, o.x), o.A * o.gradient_of_chain(i - 1, o.x)
 
 
-@claim("Prop. 1 (16)", "cond A", "A^T J = J A", breaks=("A", "J"), blockwise=True)
+@claim("Prop. 1 (16)", "cond A", "A^T J = J A", breaks=("A", "J"), symplectic=False)
 def skew_hamiltonian(o: PaperObjects) -> Pairs:
     """A is skew-Hamiltonian"""
     yield o.AT * o.J, o.J * o.A
@@ -60,9 +59,11 @@ def skew_hamiltonian(o: PaperObjects) -> Pairs:
 @claim("Prop. 1", "", "{H_i, H_j} = 0", least_m=2, breaks=("A", "J"))
 def involution(o: PaperObjects) -> Pairs:
     """H_0, ..., H_{m-1} are pairwise in involution"""
+    first, second = o.gradient_of_chain(0, o.x), o.gradient_of_chain(1, o.x)
+    yield o.dot(first, o.J * second), o.dot(first, o.J * (o.A * first))
     for i in range(o.m):
         for j in range(i):
-            yield o.dot(o.grad(o.x, i), o.J * o.grad(o.x, j)), o.K.zero
+            yield o.dot(o.gradient_of_chain(i, o.x), o.J * o.gradient_of_chain(j, o.x)), o.K.zero
 
 
 @claim("Prop. 1, proof", "", "JA skew;  (A^T)^2 J = A^T J A = J A^2", breaks=("A", "J"), blockwise=True)
@@ -70,6 +71,9 @@ def reasons_for_involution(o: PaperObjects) -> Pairs:
     """J A is skew-symmetric, and A^2 satisfies the condition on A as well"""
     JA = o.J * o.A
     yield JA.transpose(), -JA
+    w = o.vector("w")  # any vector instead of nabla H_0
+    yield o.dot(w, JA * w), o.K.zero
+    yield o.dot(o.A * w, o.J * (o.A * (o.A * w))), o.K.zero
     yield o.AT * o.AT * o.J, o.AT * o.J * o.A
     yield o.AT * o.J * o.A, o.J * o.A * o.A
 
@@ -97,6 +101,7 @@ def independence_for_non_scalar_A(o: PaperObjects) -> Pairs:
     "minimal polynomial of degree m => nabla H_i independent",
     kind=Kind.ATTAINED,
     in_general=True,
+    at_most="there are m of them",
     breaks=("repeated", "H0"),
     distinct_roots=True,
 )
@@ -135,11 +140,19 @@ def matrix_written_out(o: PaperObjects) -> Pairs:
     yield A, o.K.matrix(6, 6, [entry for row in written for entry in row])
 
 
-@claim("(19)", "d2H", "A nabla^2 H_i = nabla^2 H_i A^T, i = 0..m-1", breaks=("H", "A"), blockwise=True)
+@claim("(19)", "d2H", "A nabla^2 H_i = nabla^2 H_i A^T, i = 0..m-1", breaks=("H", "A"), symplectic=False)
 def solvability(o: PaperObjects) -> Pairs:
-    """The condition for solvability holds for H_0 and is passed on to every H_i"""
+    """The condition for solvability holds for H_0 and is passed on to every H_i
+
+    It is necessary and sufficient, for any cubic H: the curl of A nabla H is A nabla^2 H - nabla^2 H A^T.
+    """
     for i in range(o.m):
         yield o.A * o.hess(o.x, i), o.hess(o.x, i) * o.AT
+    p, v, w = o.arbitrary_hamiltonian(standard=True), o.vector("v"), o.vector("w")
+    along_v = p.slope(lambda p, x: p.dot(p.K.lift_matrix(w), p.A * p.grad(x)), p.x, v)
+    along_w = p.slope(lambda p, x: p.dot(p.K.lift_matrix(v), p.A * p.grad(x)), p.x, w)
+    hessian = p.hess(p.x)
+    yield along_v - along_w, o.dot(w, (p.A * hessian - hessian * p.AT) * v)
 
 
 @claim("Sect. 3", "", "A^{-1} nabla^2 H_1 = nabla^2 H_1 (A^{-1})^T", least_m=2, breaks=("H",))
@@ -159,6 +172,7 @@ def solvability_backwards(o: PaperObjects) -> Pairs:
     "",
     "A X = X A^T: 2m(m-1) independent equations of m(2m-1)",
     kind=Kind.ATTAINED,
+    at_most="the 3m quadratic forms on the eigenspaces solve them",
     breaks=("repeated", "A"),
     distinct_roots=True,
 )
@@ -181,8 +195,25 @@ def independent_equations(o: PaperObjects) -> Pairs:
 @claim(
     "Prop. 2",
     "",
+    "dim of the cubics = 4m for any skew-Hamiltonian A",
+    only_m=3,
+    kind=Kind.ATTAINED,
+    breaks=(),
+    distinct_roots=True,
+    misprint="stated for any A of the kind; it needs distinct roots. With lambda_1 := lambda_2 the dimension is 24",
+)
+def dimension_of_the_cubics_for_any_A(o: PaperObjects) -> Pairs:
+    """The cubics of A form a space of dimension 12, without a condition on the roots"""
+    repeated = o.changed(A=o.A + o.projector(0) * (o.lam[1] - o.lam[0]))
+    yield comb(o.n + 2, 3) - repeated.rank_of_cubic_equations(), 4 * o.m
+
+
+@claim(
+    "Prop. 2",
+    "",
     "dim of the cubics = 4m, rank of the system C(2m+2,3) - 4m",
     kind=Kind.ATTAINED,
+    at_most="the 4m cubics on the eigenspaces solve them",
     breaks=("repeated", "A"),
     distinct_roots=True,
 )

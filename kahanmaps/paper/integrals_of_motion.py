@@ -31,6 +31,7 @@ def K_tilde_is_shared(o: PaperObjects) -> Pairs:
     "rank(nabla H~, nabla K~_1, ..., nabla K~_m) = m",
     kind=Kind.ATTAINED,
     in_general=True,
+    at_most="nabla K~_i = B_i nabla H~, and the B_i lie in a space of dimension m",
     breaks=("H0",),
     distinct_roots=True,
 )
@@ -125,7 +126,9 @@ def leading_terms(o: PaperObjects) -> Pairs:
     yield o.dot(o.x, o.J * o.fx) * o.number(2), o.dot(o.x, o.grad(o.x)) * o.number(-2)
     yield o.dot(o.x, o.grad(o.x)) * o.number(-2), o.H(o.x) * o.number(-6)
     for B in o.associates():
-        yield o.dot(o.x, o.J * o.value(o.g(B), o.x)) * o.number(2), o.Kf(B, o.x) * o.number(-6)
+        middle = o.dot(o.x, B * o.grad(o.x)) * o.number(-2)
+        yield o.dot(o.x, o.J * o.value(o.g(B), o.x)) * o.number(2), middle
+        yield middle, o.Kf(B, o.x) * o.number(-6)
 
 
 @claim(

@@ -6,7 +6,15 @@ from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Kind, Pairs, claim
 
 
-@claim("(1)", "skew", "dim { A : A^T J = J A } = m(2m-1)", kind=Kind.ATTAINED, breaks=("J",), symplectic=False)
+@claim(
+    "(1)",
+    "skew",
+    "dim { A : A^T J = J A } = m(2m-1)",
+    kind=Kind.ATTAINED,
+    at_most="the block form (17) has so many parameters",
+    breaks=("J",),
+    symplectic=False,
+)
 def dimension_of_skew_hamiltonian_matrices(o: PaperObjects) -> Pairs:
     """Skew-Hamiltonian matrices form a space of dimension m(2m-1)"""
     n = o.n
@@ -19,7 +27,7 @@ def dimension_of_skew_hamiltonian_matrices(o: PaperObjects) -> Pairs:
     yield o.is_standard(o.J), True
 
 
-@claim("(2)", "harm", "A nabla^2 H = nabla^2 H A^T", breaks=("H", "A"), blockwise=True)
+@claim("(2)", "harm", "A nabla^2 H = nabla^2 H A^T", breaks=("H", "A"), symplectic=False)
 def matrix_differential_equation(o: PaperObjects) -> Pairs:
     """H satisfies the system of second order linear PDEs of A"""
     yield o.A * o.hess(o.x), o.hess(o.x) * o.AT
@@ -28,9 +36,8 @@ def matrix_differential_equation(o: PaperObjects) -> Pairs:
 @claim("(3)", "CR", "nabla H_i = A nabla H_{i-1}, i = 1..m-1", least_m=2, pairwise=True, breaks=("H",))
 def chain_of_gradients(o: PaperObjects) -> Pairs:
     """H_0, ..., H_{m-1} form a chain of gradients"""
-    v = o.vector("v")
     for i in range(1, o.m):
-        yield o.slope(lambda o, x: o.H(x, i), o.x, v), o.dot(v, o.A * o.grad(o.x, i - 1))
+        yield o.gradient_of_chain(i, o.x), o.A * o.gradient_of_chain(i - 1, o.x)
 
 
 @claim(
@@ -39,6 +46,7 @@ def chain_of_gradients(o: PaperObjects) -> Pairs:
     "rank(nabla H_0, ..., nabla H_{m-1}) = m",
     kind=Kind.ATTAINED,
     in_general=True,
+    at_most="there are m of them",
     breaks=("repeated", "H0"),
     distinct_roots=True,
 )
@@ -93,6 +101,8 @@ def matrix_differential_equation_of_perturbed_hamiltonians(o: PaperObjects) -> P
     "rank(nabla H~_0, ..., nabla H~_{m-1}) = m",
     kind=Kind.ATTAINED,
     in_general=True,
+    at_most="there are m of them",
+    distinct_roots=True,
     breaks=("repeated", "H0"),
 )
 def perturbed_hamiltonians_are_independent(o: PaperObjects) -> Pairs:
@@ -107,6 +117,7 @@ def perturbed_hamiltonians_are_independent(o: PaperObjects) -> Pairs:
     kind=Kind.DIFFERENT,
     least_m=2,
     in_general=True,
+    distinct_roots=True,
     breaks=("A=B",),
 )
 def maps_of_the_chain_do_not_commute(o: PaperObjects) -> Pairs:
@@ -124,7 +135,19 @@ def combination_of_the_vector_fields(o: PaperObjects) -> Pairs:
 
 @claim("Sect. 1", "", "B(lambda_i)^2 = 1 for all i  <=>  B^2 = I", breaks=("B",), distinct_roots=True)
 def signs_at_the_eigenvalues(o: PaperObjects) -> Pairs:
-    """B^2 = I says that B(lambda) sends each eigenvalue of A to 1 or -1"""
+    """B^2 = I says that B(lambda) sends each eigenvalue of A to 1 or -1
+
+    Any polynomial b has b(A) E_i = b(lambda_i) E_i with the projectors E_i, which are not 0 and add up to I; so
+    b(A)^2 = I if and only if b(lambda_i)^2 = 1 for all i.
+    """
+    coefficients = [o.vector("b")[k, 0] for k in range(o.m)]
+    polynomial = o.polynomial_in_A(coefficients)
+    for i in o.each:
+        value = o.K.zero
+        for coefficient in reversed(coefficients):
+            value = value * o.lam[i] + coefficient
+        yield polynomial * o.projector(i), o.projector(i) * value
+    yield o.sum([o.projector(i) for i in o.each]), o.I
     for signs in o.all_signs():
         B = o.B_signs(signs)
         yield B * B, o.I
@@ -143,16 +166,18 @@ def signs_at_the_eigenvalues(o: PaperObjects) -> Pairs:
     "#{ J B_s nabla H_0 } = 2^{m-1} up to sign",
     kind=Kind.DIFFERENT,
     in_general=True,
+    distinct_roots=True,
     breaks=("B=I",),
     least_m=2,
 )
 def associated_fields_are_pairwise_different(o: PaperObjects) -> Pairs:
-    """The class of J nabla H_0 consists of 2^{m-1} vector fields, up to sign"""
-    values = [o.fx, *(o.value(o.g(B), o.x) for B in o.associates())]
-    for k, first in enumerate(values):
-        for second in values[:k]:
-            yield first, second
-            yield first, -second
+    """The class of J nabla H_0 consists of 2^{m-1} vector fields, up to sign
+
+    g_s - g_t and g_s + g_t are sums, with signs and a factor 2, of the parts of f in those eigenspaces where s and t
+    differ, or agree; so all are different, up to sign, if no part of f vanishes, that is, if g_i != f for all i.
+    """
+    for i in o.each:
+        yield o.value(o.g_(i), o.x), o.fx
 
 
 @claim(
@@ -161,6 +186,7 @@ def associated_fields_are_pairwise_different(o: PaperObjects) -> Pairs:
     "rank { J B_s nabla H_0 } = m",
     kind=Kind.ATTAINED,
     in_general=True,
+    at_most="B_s is a combination of I, A, ..., A^(m-1)",
     breaks=("B=I",),
     least_m=3,
     distinct_roots=True,
@@ -168,6 +194,24 @@ def associated_fields_are_pairwise_different(o: PaperObjects) -> Pairs:
 def independent_associated_fields(o: PaperObjects) -> Pairs:
     """If m > 2, the class contains m linearly independent vector fields"""
     yield o.rank(o.columns([o.fx, *(o.value(o.g(B), o.x) for B in o.associates())])), o.m
+
+
+@claim(
+    "Sect. 1",
+    "",
+    "rank { Phi_{f_s}(x) - x } >= m",
+    kind=Kind.ATTAINED,
+    at_most="it is counted up to m only",
+    in_general=True,
+    breaks=("B=I",),
+    least_m=3,
+    distinct_roots=True,
+)
+def independent_maps(o: PaperObjects) -> Pairs:
+    """If m > 2, the class contains m independent maps"""
+    moved = [o.x_tilde - o.x, *(o.step(o.g(B), o.x) - o.x for B in o.associates())]
+    rank = o.rank(o.columns(moved))
+    yield min(rank, o.m), o.m
 
 
 @claim("Abstract", "", "{K~_i, K~_j} = 0 for the bracket of Pi", pairwise=True, breaks=("H", "J"))

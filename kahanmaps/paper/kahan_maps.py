@@ -1,12 +1,106 @@
 """Section 2: the discretization of any quadratic system; of Hamiltonian ones, an integral and a measure.
 
-The properties of any quadratic system are tried on the homogeneous f = J nabla H and on an inhomogeneous one.
+The claims are tried on the homogeneous f = J nabla H and on an inhomogeneous one; those that are stated for any system,
+or any Hamiltonian one, also on systems without any structure.
 """
 
 from __future__ import annotations
 
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Pairs, claim
+
+
+@claim(
+    "(4)", "eq: diff eq gen", "f = Q + Bx + c, f' and f'' its derivatives, nabla^2 H that of nabla H", breaks=("f''",)
+)
+def derivatives_of_the_system(o: PaperObjects) -> Pairs:
+    """What is called f', f'', nabla H and nabla^2 H is obtained by differentiation, for any quadratic f and cubic H"""
+    v, w = o.vector("v"), o.vector("w")
+    p = o.inhomogeneous()
+    for k in range(o.n):
+        yield p.slope(lambda p, x: p.value(p.f, x)[k, 0], p.x, v), (p.jac(p.f, p.x) * v)[k, 0]
+    yield p.jac(p.f, p.x + v), p.jac(p.f, p.x) + p.second(p.f, v)
+    yield p.slope(lambda p, x: p.H(x), p.x, v), o.dot(v, p.grad(p.x))
+    yield p.second_slope(lambda p, x: p.H(x), p.x, v, w), o.dot(v, p.hess(p.x) * w)
+
+
+@claim(
+    "(5)-(7)",
+    "eq: Kahan gen",
+    "Kahan's equation, its solution and its inverse, for any quadratic f",
+    breaks=("map",),
+    symplectic=False,
+)
+def any_quadratic_system(o: PaperObjects) -> Pairs:
+    """A quadratic system without any structure: the equation, the explicit form, reversibility"""
+    f = o.arbitrary_system()
+    x_tilde = o.step(f, o.x)
+    right = o.K.column(f.polarised(o.x.entries(), x_tilde.entries()))
+    yield x_tilde - o.x, right * (o.eps * o.number(2))
+    increment = o.solve(o.minus_eps_jac(f, o.x), o.value(f, o.x))
+    yield x_tilde, o.x + increment * (o.number(2) * o.eps)
+    yield o.step(f, x_tilde, times=-1), o.x
+
+
+@claim(
+    "(8), (9)",
+    "eq: Phi hom",
+    "x~ = (I - eps f'(x))^{-1} x = (I + eps f'(x~)) x, for any homogeneous f",
+    breaks=("map", "eps"),
+    symplectic=False,
+)
+def any_homogeneous_system(o: PaperObjects) -> Pairs:
+    """A homogeneous quadratic system without any structure"""
+    f = o.arbitrary_system(homogeneous=True)
+    x_tilde = o.step(f, o.x)
+    yield x_tilde, o.solve(o.minus_eps_jac(f, o.x), o.x)
+    yield x_tilde, o.plus_eps_jac(f, x_tilde) * o.x
+
+
+@claim(
+    "(10)",
+    "Jac",
+    "dPhi_f = (I - eps f'(x))^{-1} (I + eps f'(x~)), for any quadratic f",
+    breaks=("map", "eps"),
+    symplectic=False,
+)
+def jacobi_matrix_of_any_map(o: PaperObjects) -> Pairs:
+    """The Jacobi matrix of the map of a system without any structure: M(x + t v) x~(x + t v) differentiated"""
+    f, v = o.arbitrary_system(), o.vector("v")
+    x_tilde = o.step(f, o.x)
+    moved = o.jacobian_of_step(f, o.x) * v
+    yield moved, o.solve(o.minus_eps_jac(f, o.x), o.plus_eps_jac(f, x_tilde) * v)
+    # The defining equation, differentiated along v: the moved x~ solves the equation linearized at (x, x~).
+    half_sum = (o.jac(f, x_tilde) * v + o.jac(f, o.x) * moved) * o.eps
+    yield moved - v, half_sum
+
+
+@claim(
+    "(11)",
+    "eq: CMOQ integral",
+    "H + (2 eps/3) nabla H^T (I - eps f')^{-1} f is conserved, for any cubic H and any skew J",
+    breaks=("map", "eps"),
+    symplectic=False,
+)
+def integral_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
+    """An arbitrary cubic H, with terms of all degrees, and an arbitrary skew J"""
+    p = o.arbitrary_hamiltonian()
+    yield p.modified_H(p.step(p.f, p.x)), p.modified_H(p.x)
+
+
+@claim(
+    "(12)",
+    "eq: CMOQ measure",
+    "dx/det(I - eps f') is invariant, for any cubic H and any skew J",
+    breaks=("map", "eps"),
+    symplectic=False,
+)
+def measure_of_any_hamiltonian_system(o: PaperObjects) -> Pairs:
+    """The invariant measure for an arbitrary cubic H and an arbitrary skew J"""
+    p = o.arbitrary_hamiltonian()
+    x_tilde = p.step(p.f, p.x)
+    before, after = p.det(p.minus_eps_jac(p.f, p.x)), p.det(p.minus_eps_jac(p.f, x_tilde))
+    yield p.det(p.jacobian_of_step(p.f, p.x)) * before, after
 
 
 @claim("(5)", "eq: Kahan gen", "(x~ - x)/(2 eps) = Q(x,x~) + B(x + x~)/2 + c", breaks=("eps", "map"), blockwise=True)

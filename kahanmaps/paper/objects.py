@@ -39,6 +39,7 @@ class PaperObjects(Calculus):
     minus: Any = None
     base: SystemOver | None = None  # f_0, where it comes from a rational system
     sign_vectors: tuple[tuple[int, ...], ...] | None = None  # the associated systems to look at; None: all
+    associate_matrices: tuple[Any, ...] | None = None  # their B, where they are given without the roots of chi
     free_indices: tuple[int, ...] | None = None  # those i that a claim for all i is tried at; None: all
     order: int = 3  # to which order in eps^2 series are expanded
     lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient of the inhomogeneous part, where it is given
@@ -106,6 +107,10 @@ class PaperObjects(Calculus):
     def H(self, x: Any, i: int = 0) -> Any:
         """H_i(x), the function with gradient A^i nabla H_0 if there is one, by Euler's formula term by term."""
         return self.potential(self.A_to(i), x)
+
+    def gradient_of_chain(self, i: int, x: Any) -> Any:
+        """The gradient of the function H_i at x, by differentiation."""
+        return self.gradient(lambda o, x: o.H(x, i), x)
 
     def potential(self, matrix: Any, x: Any) -> Any:
         """The function that vanishes at 0 with gradient `matrix` nabla H_0, if there is one."""
@@ -191,6 +196,9 @@ class PaperObjects(Calculus):
 
     def associates(self) -> Iterator[Any]:
         """The matrices B of the associated systems, I itself not among them, up to an overall sign."""
+        if self.associate_matrices is not None:
+            yield from self.associate_matrices
+            return
         for signs in self.all_signs():
             if ("B", signs) not in self._memory:
                 self._memory["B", signs] = self.B_signs(signs)
@@ -359,6 +367,7 @@ class PaperObjects(Calculus):
                 third=lift(self.third),
                 eps=dual.convert(self.eps),
                 roots=None if self.roots is None else tuple(dual.convert(root) for root in self.roots),
+                associate_matrices=self.associate_matrices and tuple(lift(B) for B in self.associate_matrices),
                 known_chi=None if self.known_chi is None else tuple(dual.convert(c) for c in self.known_chi),
                 draw=lambda name: dual.lift_matrix(self.vector(name)),
                 hessian_of_quadratic_part=lift(self.hessian_of_quadratic_part),
@@ -406,6 +415,40 @@ class PaperObjects(Calculus):
         found: PaperObjects = self._memory["inhomogeneous"]
         return found
 
+    def arbitrary_system(self, homogeneous: bool = False) -> SystemOver:
+        """A quadratic system without any structure: f'', B and c are drawn."""
+        n, K = self.n, self.K
+        rows: dict[tuple[int, int], Any] = {}
+        for j in range(n):
+            for k in range(j, n):
+                rows[j, k] = rows[k, j] = self.vector(f"f'' {j} {k}")
+        tensor = [rows[j, k][i, 0] for i in range(n) for j in range(n) for k in range(n)]
+        if homogeneous:
+            return SystemOver.from_tensor(K, K.matrix(n * n, n, tensor))
+        linear = self.columns([self.vector(f"B {j}") for j in range(n)])
+        return SystemOver.from_tensor(K, K.matrix(n * n, n, tensor), linear, self.vector("c"))
+
+    def arbitrary_hamiltonian(self, standard: bool = False) -> PaperObjects:
+        """A cubic H with terms of all degrees and (unless it is to be standard) a skew J, without any structure."""
+        n, K = self.n, self.K
+        tensor: dict[tuple[int, ...], Any] = {}
+        for i, j in itertools.combinations_with_replacement(range(n), 2):
+            entries = self.vector(f"H {i} {j}")
+            for k in range(j, n):
+                for place in itertools.permutations((i, j, k)):
+                    tensor[place] = entries[k, 0]
+        third = K.matrix(n * n, n, [tensor[place] for place in itertools.product(range(n), repeat=3)])
+        X = self.columns([self.vector(f"X {j}") for j in range(n)])
+        J = self.columns([self.vector(f"J {j}") for j in range(n)])
+        return self.changed(
+            third=third,
+            hessian_of_quadratic_part=X + X.transpose(),
+            gradient_of_linear_part=self.vector("linear"),
+            J=self.J if standard else J - J.transpose(),
+            base=None,
+            draw=self.vector,
+        )
+
     def symplectic_normal_form(self) -> tuple[Any, Any]:
         """S and the companion matrix W of chi with A S = S diag(W, W^T) and S^T J S = J.
 
@@ -423,6 +466,10 @@ class PaperObjects(Calculus):
             -self.chi[i] if j == m - 1 else K.one if i == j + 1 else K.zero for i in range(m) for j in range(m)
         ]
         return S, K.matrix(m, m, companion)
+
+    def is_zero(self, matrix: Any) -> bool:
+        """Whether all entries are zero."""
+        return all(self.K.is_zero(entry) for entry in matrix.entries())
 
     def is_standard(self, matrix: Any) -> bool:
         """Whether the matrix is [[0, I], [-I, 0]]."""

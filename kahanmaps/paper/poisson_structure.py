@@ -7,6 +7,7 @@ the paper's p, q, r. Horner's polynomials C_k of chi stand for its matrices C_1 
 from __future__ import annotations
 
 from itertools import combinations
+from math import comb
 from typing import Any
 
 from kahanmaps.paper.objects import PaperObjects
@@ -57,14 +58,23 @@ def coefficients_of_the_powers(o: PaperObjects) -> Pairs:
     yield o.df * o.df, total
 
 
-@claim("Theorem 12 (76)", "Pois prop", "dPhi Pi(x) dPhi^T = Pi(x~)", breaks=("H", "map"), blockwise=True)
+@claim(
+    "Theorem 12 (76)",
+    "Pois prop",
+    "dPhi Pi(x) dPhi^T = Pi(x~)",
+    distinct_roots=True,
+    breaks=("H", "map"),
+    blockwise=True,
+)
 def poisson_map(o: PaperObjects) -> Pairs:
     """The map of f is Poisson"""
     jacobian = o.jacobian_of_step(o.f, o.x)
     yield jacobian * o.Pi(o.x) * jacobian.transpose(), o.Pi(o.x_tilde)
 
 
-@claim("Theorem 12", "th Poisson", "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", breaks=("B", "H"), blockwise=True)
+@claim(
+    "Theorem 12", "th Poisson", "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", distinct_roots=True, breaks=("B", "H"), blockwise=True
+)
 def poisson_map_of_g(o: PaperObjects) -> Pairs:
     """The maps of all associated fields are Poisson with respect to the same bracket"""
     for B in o.associates():
@@ -76,6 +86,7 @@ def poisson_map_of_g(o: PaperObjects) -> Pairs:
     "Theorem 12, proof",
     "",
     "(I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T = (I - eps f'(x)) Pi(x~) (I - eps f'(x))^T",
+    distinct_roots=True,
     breaks=("H", "f"),
     blockwise=True,
 )
@@ -88,7 +99,14 @@ def poisson_property_without_inverses(o: PaperObjects) -> Pairs:
     yield left, minus * after * o.J * o.plus_eps_jac(o.f, o.x)
 
 
-@claim("Theorem 12, proof", "", "Pi(x) J commutes with f'(y) at any point y", breaks=("H", "f"), blockwise=True)
+@claim(
+    "Theorem 12, proof",
+    "",
+    "Pi(x) J commutes with f'(y) at any point y",
+    distinct_roots=True,
+    breaks=("H", "f"),
+    blockwise=True,
+)
 def tensor_commutes_with_jacobians(o: PaperObjects) -> Pairs:
     """Pi J is a polynomial in A^T and so commutes with f' at any point"""
     left, right = o.Pi(o.x) * o.J, o.jac(o.f, o.vector("y"))
@@ -149,7 +167,15 @@ def matrices_C(o: PaperObjects) -> Pairs:
     yield o.horner(0), o.A * o.A - o.A * a + o.I * b
 
 
-@claim("Lemma 13 (82)", "Jacobi id", "{x_i,{x_j,x_k}} + cyclic = 0", least_m=2, pairwise=True, breaks=("H", "f"))
+@claim(
+    "Lemma 13 (82)",
+    "Jacobi id",
+    "{x_i,{x_j,x_k}} + cyclic = 0",
+    least_m=2,
+    pairwise=True,
+    distinct_roots=True,
+    breaks=("H", "f"),
+)
 def jacobi_identity(o: PaperObjects) -> Pairs:
     """Pi is a Poisson tensor: the Jacobi identity for all triples of coordinates"""
     Pi = o.Pi(o.x)
@@ -177,12 +203,14 @@ def jacobi_identity_to_first_order(o: PaperObjects) -> Pairs:
     "these C(2m,3) equations for the gradients have rank 2m(m-1), so there are no other solutions",
     kind=Kind.ATTAINED,
     least_m=3,
+    at_most="the gradients (C_0 w, ..., C_(m-1) w) solve them",
     breaks=("repeated",),
     distinct_roots=True,
 )
 def rank_of_the_first_order(o: PaperObjects) -> Pairs:
     """Pi is Poisson only if the gradient conditions hold: 20 equations of rank 12 in 18 unknowns for m = 3"""
     equations, solutions = _first_order(o)
+    yield equations.nrows(), comb(2 * o.m, 3)
     yield o.rank(equations), 2 * o.m * (o.m - 1)
     yield o.rank(solutions), equations.ncols() - 2 * o.m * (o.m - 1)
 
@@ -190,15 +218,20 @@ def rank_of_the_first_order(o: PaperObjects) -> Pairs:
 @claim(
     "Lemma 13, proof",
     "",
-    "coefficient of eps^4 vanishes by virtue of nabla pi_k = C_k nabla pi_{m-1}",
+    "coefficient of eps^4 vanishes by virtue of nabla pi_k = C_k w, for any values pi_k and any vector w",
     least_m=2,
-    pairwise=True,
-    breaks=("H",),
+    breaks=("J", "A"),
+    distinct_roots=True,
 )
 def jacobi_identity_to_second_order(o: PaperObjects) -> Pairs:
-    """The coefficients of eps^4 in the Jacobi identity vanish identically"""
-    square = o.df * o.df * o.J
-    along = [_derivative_of_square(o, o.K.column([square[i, k] for k in range(o.n)])) for i in range(o.n)]
+    """The coefficients of eps^4 in the Jacobi identity vanish, whatever p, q, r are, if the gradient conditions hold"""
+    values, w = o.vector("values"), o.vector("w")
+    powers = [o.A_to(k).transpose() * o.J for k in range(o.m)]
+    P = o.sum([power * values[k, 0] for k, power in enumerate(powers)])
+    gradients = [o.horner(k) * w for k in range(o.m)]
+    # The derivative of P along row i of P is the sum over k of (P nabla pi_k)_i times the k-th power.
+    slopes = [P * gradient for gradient in gradients]
+    along = [o.sum([power * slope[i, 0] for power, slope in zip(powers, slopes, strict=True)]) for i in range(o.n)]
     for i, j, k in combinations(range(o.n), 3):
         yield along[i][j, k] + along[j][k, i] + along[k][i, j], o.K.zero
 
@@ -231,6 +264,10 @@ def gradients_through_p0(o: PaperObjects) -> Pairs:
         if k == 0:
             matrix = matrix + o.I * o.number(4 - o.m)
         left = o.slope(lambda o, x: o.coefficient_of_power(k, x), o.x, v)
+        terms = [o.lagrange(i)[k] * o.slope(lambda o, x: o.q(i, x), o.x, v) for i in o.each]
+        if k == 0:
+            terms.append(o.slope(lambda o, x: o.p0(x), o.x, v))
+        yield left, o.sum(terms)
         yield left, o.slope(lambda o, x: o.eighth_of_trace(x), o.x, matrix.transpose() * v)
 
 
@@ -267,6 +304,12 @@ def conditions_at_the_eigenvalues(o: PaperObjects) -> Pairs:
         (ai, bi, ci), (aj, bj, cj), (ak, bk, ck) = o.lagrange(i), o.lagrange(j), o.lagrange(k)
         root = o.lam[i]
         quadratic = root * root - a * root + b
+        sums = []
+        for c in range(3):  # sum over j of (alpha, beta or gamma)_j B_j(lambda_i)
+            values = [o.lagrange(l)[0] + root * (o.lagrange(l)[1] + root * o.lagrange(l)[2]) for l in o.each]
+            sums.append(o.sum([o.lagrange(l)[c] * values[l] for l in o.each]))
+        yield sums[1], (root - a) * sums[2]
+        yield o.K.one + sums[0], quadratic * sums[2]
         yield bj + bk - bi, (root - a) * (cj + ck - ci)
         yield bi, (root - a) * ci
         yield o.K.one + aj + ak - ai, quadratic * (cj + ck - ci)
@@ -317,6 +360,13 @@ def gradient_of_q_times_B(o: PaperObjects) -> Pairs:
             expected = o.trace(derivative * o.df) * o.number(1, 8)
             for part in range(2):
                 yield o.sum([B[k, l] * sums[l][part] for l in range(o.n)]), expected
+            # The lines between: (88) and (89) move B^T to the index that is differentiated.
+            BT = B.transpose()
+            moved = [o.second(o.f, BT * o.unit(l)) for l in range(o.n)]
+            for l in range(o.n):
+                yield sums[l][0], o.trace(moved[l] * o.df) * o.number(1, 8)
+                yield sums[l][1], o.trace(o.df * BT * o.second(o.f, o.unit(l))) * o.number(1, 8)
+                yield sums[l][1], o.trace(o.df * moved[l]) * o.number(1, 8)
             yield expected * o.number(2), trace[k, 0]
 
 

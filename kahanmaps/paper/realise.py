@@ -41,7 +41,10 @@ MAX_SIGN_VECTORS = 32
 
 
 class MemberObjects(PaperObjects):
-    """A given member at a point: the letters for which the library has code of its own come from that code."""
+    """A given member at a point: at a point the letters for which the library has code of its own come from it.
+
+    Inside derivatives (dual numbers) and in variations they are computed as everywhere else.
+    """
 
     member: FamilyMember
 
@@ -69,6 +72,7 @@ class MemberObjects(PaperObjects):
             base=_hamiltonian(member, 0).system.over(K),
             known_chi=tuple(K.convert(chi[k]) for k in range(member.m + 1)),
             sign_vectors=sign_vectors,
+            associate_matrices=_matrices_by_factor(member, K),
             order=order,
         )
         objects.member = member
@@ -77,6 +81,11 @@ class MemberObjects(PaperObjects):
     def H(self, x: Any, i: int = 0) -> Any:
         """H_i(x) from the library's chain."""
         return evaluate(self.member.chain[i], self.K, x.entries())
+
+    def gradient_of_chain(self, i: int, x: Any) -> Any:
+        """The gradient of H_i, from the library."""
+        gradient = _hamiltonian(self.member, i).gradient
+        return self.K.column([evaluate(component, self.K, x.entries()) for component in gradient])
 
     def f_(self, i: int) -> SystemOver:
         """f_i from the library's chain."""
@@ -360,7 +369,7 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int = 3) -> Pap
     n = member.dim
     chi = chi_of(member.A)
     if rational_roots(member) is None:
-        # d root is an algebraic integer, d the common denominator of chi, and Cauchy bounds the root in every embedding.
+        # d root is an algebraic integer, d the common denominator of chi; Cauchy bounds the root in every embedding.
         below = _common_denominator(chi.coeffs())
         largest = below * (2 + max(abs(chi[k]) for k in range(member.m)))
         root = K.polynomial(0, float(largest.p.bit_length())) / K.convert(below)
@@ -376,7 +385,8 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int = 3) -> Pap
         roots=(root,) * member.m,
         draw=lambda name: K.matrix(n, 1, [K.variable()] * n),
         known_chi=tuple(K.convert(abs(chi[k])) for k in range(member.m + 1)),
-        sign_vectors=(tuple(-1 for _ in range(member.m)),) if member.m > 1 else None,
+        sign_vectors=_two_sign_vectors(member.m),
+        associate_matrices=_matrices_by_factor(member, K),
         order=order,
     )
 
@@ -398,7 +408,7 @@ def universal_bound_objects(m: int, order: int = 3) -> PaperObjects:
         eps=K.variable(),
         roots=(root,) * m,
         draw=lambda name: K.matrix(n, 1, [K.variable()] * n),
-        sign_vectors=(tuple(-1 for _ in range(m)),) if m > 1 else None,
+        sign_vectors=_two_sign_vectors(m),
         order=order,
     )
 
@@ -434,6 +444,18 @@ def _normal_form(K: Field, roots: Sequence[Any], cubics: Sequence[Sequence[Any]]
             factor = K.convert((6, 2, 2, 6)[number_of_v])
             third[(where[0] * n + where[1]) * n + where[2]] = coefficients[number_of_v] * factor
     return A, K.matrix(n * n, n, third)
+
+
+def _two_sign_vectors(m: int) -> tuple[tuple[int, ...], ...] | None:
+    """Two associated systems with as many factors B_i as there can be: what is bounded for them is so for any pair."""
+    return None if m == 1 else ((-1,) * m, (1,) + (-1,) * (m - 1))
+
+
+def _matrices_by_factor(member: FamilyMember, K: Field) -> tuple[Any, ...] | None:
+    """For a chi with repeated roots: the B with one sign for each of its irreducible factors, to its power."""
+    if member.is_generic:
+        return None
+    return tuple(K.convert_matrix(associate.B) for associate in list(member.associated())[1:])
 
 
 def _common_denominator(numbers: Sequence[fmpq]) -> fmpz:

@@ -43,8 +43,8 @@ class Kind(StrEnum):
 
     EQUAL = "equal"  # both sides are equal, everywhere
     DIFFERENT = "different"  # the sides of every pair differ somewhere: one point where all do is a proof
-    # The rank or number on the left reaches the one on the right somewhere, which is the largest possible (or, for a
-    # dimension, the smallest): one point over Q or GF(p) is a proof, since ranks do not grow modulo p.
+    # The rank on the left is the one on the right at some point. One point over Q or GF(p) shows that it is not smaller
+    # in general, since ranks do not grow modulo p; that it is not larger needs a reason (`at_most`).
     ATTAINED = "attained"
     EXISTS = "exists"  # both sides are equal for some choice of the free vectors: one point over Q is a proof
 
@@ -65,6 +65,7 @@ class Claim:
     function: ClaimFunction
     breaks: tuple[str, ...]
     kind: Kind = Kind.EQUAL
+    at_most: str = ""  # of a rank that is attained: why it cannot be larger
     least_m: int = 1
     only_m: int | None = None
     in_general: bool = False  # stated for generic A and H: a special member for which it fails refutes nothing

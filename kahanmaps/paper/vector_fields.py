@@ -71,6 +71,22 @@ def fields_commute(o: PaperObjects) -> Pairs:
             yield o.jac(fi, o.x) * o.value(fj, o.x), o.jac(fj, o.x) * o.value(fi, o.x)
 
 
+@claim(
+    "Lemma 3, proof",
+    "",
+    "f_0' f_1 = f_0' A^T f_0 = A^T f_0' f_0 = f_1' f_0, f_0' f_1' = f_0' A^T f_0' = A^T f_0' f_0' = f_1' f_0'",
+    least_m=2,
+    breaks=("H", "A"),
+)
+def commutation_step_by_step(o: PaperObjects) -> Pairs:
+    """The chains of equalities that prove (29) and (30)"""
+    f1 = o.f_(1)
+    steps = [o.df * o.value(f1, o.x), o.df * (o.AT * o.fx), o.AT * (o.df * o.fx), o.jac(f1, o.x) * o.fx]
+    yield from pairwise(steps)
+    steps = [o.df * o.jac(f1, o.x), o.df * o.AT * o.df, o.AT * o.df * o.df, o.jac(f1, o.x) * o.df]
+    yield from pairwise(steps)
+
+
 @claim("Lemma 3 (30)", "f'g'=g'f'", "f_i' f_j' = f_j' f_i'", least_m=2, breaks=("H", "A"))
 def jacobians_commute(o: PaperObjects) -> Pairs:
     """The Jacobi matrices commute pairwise"""

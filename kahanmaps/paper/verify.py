@@ -22,6 +22,8 @@ import random
 from collections.abc import Iterable
 from typing import Any
 
+from flint import fmpq_poly
+
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.text import format_number
@@ -31,6 +33,7 @@ from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import CONVENTION, Settings
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost
 from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.family.skew_hamiltonian import diagnosis, format_univariate
 from kahanmaps.invariants.sizes import Size
@@ -176,16 +179,32 @@ class _MemberExaminer(Examiner):
     def outside(self, claim: Claim) -> str | None:
         if self.member.is_generic:
             return None
-        needs = claim.distinct_roots
-        if not needs:
-            bounds = self.bounds()
-            if claim.kind is Kind.EQUAL:
-                for _ in claim.function(bounds):
-                    pass
-                needs = "roots" in bounds.used
-            else:
-                needs = bool(claim.breaks) and "repeated" in claim.breaks
-        return f"outside the hypotheses: {diagnosis(self.member.A).split(';')[0]}" if needs else None
+        bounds = self.bounds()
+        if not claim.distinct_roots and claim.kind in (Kind.EQUAL, Kind.DIFFERENT):
+            pairs = sum(1 for _ in claim.function(bounds))
+            if not pairs:
+                return "there is no associated system but f itself: chi is a power of one irreducible polynomial"
+        if claim.distinct_roots or "roots" in bounds.used:
+            return f"the statement needs distinct roots. {diagnosis(self.member.A).split(';')[0]}"
+        return None
+
+    def what_is_special(self) -> str:
+        if not self.member.is_generic:
+            return "its A is not generic"
+        reasons = []
+        form = normal_form(self.member)
+        chi = form.chi
+        vanishing = _common_factor(chi, form.coefficients)
+        if vanishing.degree() > 0:
+            reasons.append(f"H vanishes on the eigenspaces of the roots of {format_univariate(vanishing)}")
+        flat = _common_factor(chi, form.D_coefficients) // vanishing
+        if flat.degree() > 0:
+            reasons.append(
+                f"H is the cube of a linear form on the eigenspaces of the roots of {format_univariate(flat)}"
+            )
+        if all(factor.degree == 1 and abs(factor.polynomial[0]) in (0, 1) for factor in self.member.factors):
+            reasons.append("A^3 = A, so that H_1 is associated to H_0 where it is not 0")
+        return "; ".join(reasons) or "its A or H is special"
 
     def proof(self, claim: Claim, needs: set[str], equation: Size, poles: int) -> Evidence | None:
         if not needs - {"roots"} and (self.roots is not None or "roots" not in needs):
@@ -293,6 +312,14 @@ class _UniversalExaminer(Examiner):
             "random members: A = S^{-T} diag(L, L) S^T with random roots L and a random symplectic S, H = sum of "
             "random planar cubics, hidden by S; x and eps at random. Bounds are for the generic member"
         ]
+
+
+def _common_factor(chi: fmpq_poly, coefficients: Iterable[fmpq_poly]) -> fmpq_poly:
+    """The monic gcd of chi and these elements of Q[t]/chi: the roots at which all of them vanish."""
+    common = chi
+    for coefficient in coefficients:
+        common = common.gcd(coefficient)
+    return common
 
 
 def _log2_radius(ball: Any) -> float:
