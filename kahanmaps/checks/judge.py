@@ -6,7 +6,7 @@ a point is a bug here, and is reported as one.
 
 from __future__ import annotations
 
-from kahanmaps.checks.claims import Evidence, Finding, Verdict
+from kahanmaps.checks.claims import Evidence, Finding, Verdict, Witness
 from kahanmaps.checks.decide import Identity, decide
 from kahanmaps.checks.expand import NotEqual, expansion
 from kahanmaps.checks.settings import OrbitRun, Settings, along
@@ -14,6 +14,10 @@ from kahanmaps.checks.settings import OrbitRun, Settings, along
 
 class Contradiction(AssertionError):
     """A theorem and an exact computation disagree: an error in kahanmaps, never in the input."""
+
+    def __init__(self, message: str, witness: Witness | None = None) -> None:
+        super().__init__(message)
+        self.witness = witness
 
 
 def judge(

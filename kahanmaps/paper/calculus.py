@@ -95,6 +95,17 @@ class Calculus(ABC):
             self._memory[name] = self.draw(name)
         return self._memory[name]
 
+    def forget(self, kept: tuple[str, ...] = ()) -> None:
+        """Forget what was computed, but for the vectors that were drawn and the values of the methods `kept`."""
+        drawn = {
+            key: value
+            for key, value in self._memory.items()
+            if isinstance(key, str) and key not in ("lifted", "inhomogeneous")
+        }
+        drawn |= {key: value for key, value in self._memory.items() if not isinstance(key, str) and key[0] in kept}
+        self._memory.clear()
+        self._memory.update(drawn)
+
     def scalar(self, name: str) -> Any:
         """A number of its own."""
         return self.vector(name)[0, 0]

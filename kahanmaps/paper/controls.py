@@ -81,13 +81,14 @@ def broken_second_derivative(o: PaperObjects) -> PaperObjects:
 @control("B", "B^2 = I fails: B_i(lambda_i) = 2")
 def broken_B(o: PaperObjects) -> PaperObjects:
     """B_i takes the value 2 at its own root instead of -1."""
-    return o.changed(minus=o.number(2))
+    given = o.associate_matrices and tuple((o.I * o.number(3) - B) * o.number(1, 2) for B in o.associate_matrices)
+    return o.changed(minus=o.number(2), associate_matrices=given)
 
 
 @control("B=I", "all B_i are I")
 def trivial_B(o: PaperObjects) -> PaperObjects:
     """B_i takes the value 1 at its own root as well, so all associated systems are f."""
-    return o.changed(minus=o.K.one)
+    return o.changed(minus=o.K.one, associate_matrices=o.associate_matrices and (o.I,))
 
 
 @control("eps", "the maps are computed with twice the eps of the formulas")

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.checks.claims import Evidence, Finding, Verdict, Witness
 from kahanmaps.checks.decide import log2_error
+from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.sizes import Size
@@ -74,6 +75,9 @@ class Examiner:
                     without.append(claim.key)
             else:
                 found.append(self.examine(claim))
+            for objects in self._points.values():  # or they would remember the values of all claims
+                if objects is not None:
+                    objects.forget(("A_to", "B", "lagrange", "projector", "associate"))
         if self.options.controls:
             found.append(_last_word(found, without))
         return found
@@ -131,19 +135,25 @@ class Examiner:
             )
         if claim.misprint or decision.verdict is Verdict.REFUTED:
             return decision
-        proof = self.proof(claim, needs, equation, poles)
+        try:
+            proof = self.proof(claim, needs, equation, poles)
+            also = tuple(self.also(claim))
+        except Contradiction as error:
+            text = f"{error}, although it {decision.evidence.summary}: an error in kahanmaps"
+            return self._finding(claim, Verdict.REFUTED, Evidence("contradiction", text), witness=error.witness)
         if proof is not None:
             if decision.verdict is Verdict.SUPPORTED:
-                return self._finding(claim, Verdict.PROVED, proof, (decision.evidence, *self.also(claim)))
-            if decision.evidence.data.get("points") == 0 and roots:  # no prime was found at which chi splits
-                return self._finding(claim, Verdict.PROVED, proof, tuple(self.also(claim)))
-        return decision.with_also(*self.also(claim))
+                return self._finding(claim, Verdict.PROVED, proof, (decision.evidence, *also))
+            if decision.evidence.data.get("points") == 0:  # no prime, or none large enough, for a point
+                return self._finding(claim, Verdict.PROVED, proof, also)
+        return decision.with_also(*also)
 
     def _at_points(self, claim: Claim, roots: bool, equation: Size, poles: int) -> Finding:
         per_trial = log2_error(equation, poles, self.conjugates(roots))
         if per_trial >= -1:
             text = f"the degree bound {equation.degree} is too large for primes of 63 bits to decide anything"
-            return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
+            evidence = Evidence("random points over GF(p)", text, {"points": 0})
+            return self._finding(claim, Verdict.UNDECIDED, evidence)
         trials = max(1, math.ceil(self.settings.error_bits / -per_trial))
         primes: list[int] = []
         undefined = number = 0
@@ -194,7 +204,9 @@ class Examiner:
         """Claims that something differs somewhere, or has a certain rank: one point that shows it is a proof."""
         roots, outcome, tried = False, None, 0
         for number in range(_POLES):
-            objects = self.exact_point(roots, number) or self.point(roots, number)
+            # Large matrices over Q are dear, and where there is a reason for the other side a point over GF(p) will do.
+            modular = bool(claim.at_most) and self.m > 4
+            objects = (None if modular else self.exact_point(roots, number)) or self.point(roots, number)
             if objects is None:
                 text = "no prime was found at which chi splits into distinct factors"
                 return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))

@@ -9,7 +9,7 @@ from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.checks.claims import Evidence
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.paper import realise
-from kahanmaps.paper.evaluate import evaluate
+from kahanmaps.paper.evaluate import UNDEFINED, evaluate, witness_of
 from kahanmaps.paper.registry import claims
 
 # Enough for every claim up to m = 6; at m = 8 a few claims that sum over all roots exceed it.
@@ -27,14 +27,15 @@ def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
     for _ in claim.function(bounds):
         pass
     vectors = sorted(bounds.used - {"roots"})
-    objects = realise.normal_form_objects(blocks, vectors, PROOF_BUDGET, order)
-    K: Any = objects.K
     try:
+        objects = realise.normal_form_objects(blocks, vectors, PROOF_BUDGET, order)
         outcome = evaluate(claim, objects)
-    except BudgetExceeded:
+    except (BudgetExceeded, *UNDEFINED):
         return None
+    K: Any = objects.K
     if not outcome.holds:
-        raise Contradiction(f"{claim.place}: {claim.title}: the two sides differ in normal form")
+        text = f"{claim.place}: {claim.title}: the two sides are different rational functions in normal form"
+        raise Contradiction(text, witness_of(outcome))
     if not outcome.pairs:
         return None
     what = "1 block" if blocks == 1 else f"{blocks} blocks"

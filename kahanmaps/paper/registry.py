@@ -93,7 +93,8 @@ class Claim:
     @property
     def title(self) -> str:
         """What the claim says, from the first line of its docstring."""
-        return (self.function.__doc__ or "").strip().splitlines()[0].rstrip(".")
+        lines = (self.function.__doc__ or self.key).strip().splitlines()
+        return lines[0].rstrip(".")
 
 
 _claims: dict[str, Claim] = {}

@@ -38,7 +38,7 @@ from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.family.skew_hamiltonian import diagnosis, format_univariate
 from kahanmaps.invariants.sizes import Size
 from kahanmaps.paper import realise
-from kahanmaps.paper.evaluate import UNDEFINED, entries, evaluate, same
+from kahanmaps.paper.evaluate import UNDEFINED, entries, evaluate, same, witness_of
 from kahanmaps.paper.examiner import Examiner, Options
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.proofs import PROOF_BUDGET, normal_form_proof
@@ -47,6 +47,7 @@ from kahanmaps.systems.files import SystemFile
 from kahanmaps.version import __version__
 
 MAX_M = 8
+_MAX_INDETERMINATES = 64  # of a proof for one member
 NOTE_ON_PROOFS = (
     "proofs in normal form: the claim is an identity of rational functions in indeterminate roots of chi, coefficients "
     "of H, x and eps, multiplied out for so many planar blocks; it holds for every member with distinct roots, being "
@@ -209,7 +210,7 @@ class _MemberExaminer(Examiner):
     def proof(self, claim: Claim, needs: set[str], equation: Size, poles: int) -> Evidence | None:
         if not needs - {"roots"} and (self.roots is not None or "roots" not in needs):
             objects = self.exact_point("roots" in needs, 0)
-            if objects is not None and not needs & {"x"} and evaluate(claim, objects).holds and equation.degree == 0:
+            if objects is not None and equation.degree == 0 and _holds(claim, objects):
                 return Evidence("exact", "both sides are the same over Q", {})
         if claim.symplectic and self.member.is_generic:
             evidence = normal_form_proof(claim.key, claim.blocks_for_proof(self.m), self.options.order)
@@ -222,17 +223,19 @@ class _MemberExaminer(Examiner):
         return None
 
     def _symbolic(self, claim: Claim, needs: set[str]) -> Evidence | None:
-        if "roots" in needs and self.roots is None:
+        vectors = needs - {"roots"}
+        if ("roots" in needs and self.roots is None) or len(vectors) * self.member.dim > _MAX_INDETERMINATES:
             return None
         objects = realise.member_functions(
             self.member, sorted(needs - {"roots"}), self.settings.eps, PROOF_BUDGET, self.options.order
         )
         try:
             outcome = evaluate(claim, objects)
-        except BudgetExceeded:
+        except (BudgetExceeded, *UNDEFINED):
             return None
         if not outcome.holds:
-            raise Contradiction(f"{claim.place}: {claim.title}: held at random points, but the two sides differ")
+            text = f"{claim.place}: {claim.title}: the two sides are different functions for this member"
+            raise Contradiction(text, witness_of(outcome))
         scope = "x and eps" if self.settings.eps is None else f"x, for eps = {format_number(self.settings.eps)}"
         return Evidence("symbolic", f"both sides are the same function of {scope}, multiplied out for this member")
 
@@ -320,6 +323,14 @@ def _common_factor(chi: fmpq_poly, coefficients: Iterable[fmpq_poly]) -> fmpq_po
     for coefficient in coefficients:
         common = common.gcd(coefficient)
     return common
+
+
+def _holds(claim: Claim, objects: PaperObjects) -> bool:
+    """Whether a claim is defined and holds."""
+    try:
+        return evaluate(claim, objects).holds
+    except UNDEFINED:
+        return False
 
 
 def _log2_radius(ball: Any) -> float:

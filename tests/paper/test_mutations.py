@@ -56,7 +56,7 @@ def red_universal(*sections):
     return {f.place["key"] for f in report.findings if f.verdict is Verdict.REFUTED} - MISPRINTS
 
 
-@pytest.mark.parametrize("name", ["m=2, split", "m=3, split"])
+@pytest.mark.parametrize("name", ["m=2, split", pytest.param("m=3, split", marks=pytest.mark.slow)])
 def test_without_a_mutation_nothing_is_red(name):
     assert red(name) == set()
 
@@ -138,7 +138,6 @@ def test_a_wrong_step_is_seen_by_the_member_in_general(step, monkeypatch):
     assert {"defining-equation", "explicit-form"} <= red_universal(2)
 
 
-@pytest.mark.xfail(reason="(10) does not ask the library for dPhi, and no other row sees this sign", strict=True)
 def test_a_wrong_inverse_map_is_seen_by_the_jacobi_matrix(monkeypatch):
     # dPhi = (I - eps f'(x))^{-1} (I - eps f'(x~)).
     monkeypatch.setattr(KahanMapOver, "inverse", property(lambda self: KahanMapOver(self._local, self.eps)))
@@ -232,7 +231,7 @@ def test_a_transposed_matrix_b_is_seen(monkeypatch):
     assert {"second-derivatives-agree", "commutativity"} <= red("m=2, split", 6)
 
 
-def test_a_chain_with_the_transpose_of_a_is_seen_or_cannot_be_made(monkeypatch):
+def test_a_chain_with_the_transpose_of_a_cannot_be_made(monkeypatch):
     original = cubics.chain
     monkeypatch.setattr(associated, "chain", lambda A, H, *more: original(A.transpose(), H, *more))
     with pytest.raises(Exception, match=r"closed|space|Hess"):

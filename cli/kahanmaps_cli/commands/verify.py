@@ -62,12 +62,13 @@ def command(system: str | None, **options: Any) -> int:
     if options["as_json"] and options["as_markdown"]:
         raise click.UsageError("give --json or --markdown, not both")
     drawn = {name: options[name] for name in ("m", "eigenvalues", "generic", "chi", "size")}
+    given = [name for name, value in drawn.items() if value is not None and value is not False]
     if options["universal"]:
-        clash = [f"--{name}" for name, value in drawn.items() if value and name != "m"]
+        clash = [f"--{name}" for name in given if name != "m"]
         clash += ["SYSTEM"] * (system is not None)
         if clash:
             raise click.UsageError(f"found --universal and {clash[0]}, expected --universal with --m only")
-    elif system is not None and any(drawn.values()):
+    elif system is not None and given:
         raise click.UsageError("give a SYSTEM or say which member to draw (--m, --eigenvalues, ...), not both")
     with Progress(options["quiet"]) as progress:
         settings = Settings(

@@ -1,0 +1,414 @@
+"""kahanmaps verify: the paper's statements for people on a terminal, in a pipe, and for scripts.
+
+In a pipe every statement stands with its verdict, formula and evidence; --json is one object with everything, in the
+shape of the other checks and with the place of each statement in the paper. On a terminal there is a table a section.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import time
+from collections import Counter
+
+import pytest
+from cli_helpers import shell, terminal
+
+from kahanmaps.paper.registry import SECTIONS, claims
+from kahanmaps.version import __version__
+
+QUICK = "verify --m 2 --section 6"
+PLACE = {"key", "section", "section_title", "place", "label", "makes_sense_for"}
+CLAIM = {"claim", "verdict", "evidence", "witness"}
+OPTIONAL = {"also", "formula", "source", "control", "expected", "misprint", "breaks", "broken"}
+COMMON = {"check", "verdict", "holds", "version", "system", "eps", "time_step", "convention", "arithmetic", "seed"}
+COMMON |= {"error_bits", "ended_early", "claims", "notes", "m", "order", "controls"}
+
+
+def keys(report):
+    return [claim["key"] for claim in report["claims"] if "key" in claim]
+
+
+def expected(m, *sections):
+    return [c.key for c in claims() if c.makes_sense(m) and (not sections or c.section in sections)]
+
+
+# JSON
+
+
+def test_a_report_has_the_documented_shape(kahanmaps):
+    report = kahanmaps(f"{QUICK} --json").json
+    assert set(report) == COMMON | {"chi", "factors", "document"}
+    assert list(report)[:3] == ["check", "verdict", "holds"]
+    assert report["check"] == "verify"
+    assert report["version"] == __version__
+    assert (report["m"], report["eps"], report["order"], report["controls"]) == (2, "every", 3, False)
+
+
+def test_a_universal_report_has_no_member(kahanmaps):
+    report = kahanmaps("verify --universal --m 2 --section 6 --json").json
+    assert set(report) == COMMON
+    assert report["system"] == "universal, m = 2"
+
+
+@pytest.mark.parametrize("command", ["verify --m 3", "verify --m 2 --controls"])
+def test_a_claim_has_the_documented_shape(kahanmaps, command):
+    for claim in kahanmaps(f"{command} --json").json["claims"]:
+        if "section" not in claim:  # the last word on the controls
+            assert claim["evidence"]["method"] == "controls"
+            continue
+        assert set(claim) >= PLACE | CLAIM
+        assert set(claim) <= PLACE | CLAIM | OPTIONAL
+        assert claim["section_title"] == SECTIONS[claim["section"]][0]
+        assert claim["verdict"] in ("proved", "refuted", "supported", "undecided")
+        assert {"method", "summary"} <= set(claim["evidence"])
+        assert (claim["witness"] is not None) == (claim["verdict"] == "refuted")
+
+
+def test_one_object_is_printed_on_one_line(kahanmaps):
+    assert kahanmaps(f"{QUICK} --json").out.count("\n") == 1
+
+
+def test_without_options_a_random_member_with_m_3_is_drawn_and_everything_is_verified(kahanmaps):
+    outcome = kahanmaps("verify --json")
+    assert outcome.status == 0
+    assert outcome.json["m"] == 3
+    assert outcome.json["holds"] is True
+    assert keys(outcome.json) == expected(3)
+
+
+def test_the_document_of_a_report_makes_the_same_report_again(kahanmaps, tmp_path):
+    first = kahanmaps(f"{QUICK} --json").json
+    family = first["document"]["family"]
+    path = tmp_path / "again.toml"
+    path.write_text(f"name = 'again'\n[family]\nA = {json.dumps(family['A'])}\nH = '{family['H']}'\n")
+    again = kahanmaps(f"verify {path} --section 6 --json").json
+    assert again["claims"] == first["claims"]
+
+
+@pytest.mark.parametrize("options", ["", "--controls", "--universal", "--balls 64"])
+def test_the_same_seed_gives_the_same_report(kahanmaps, options):
+    command = f"{QUICK} {options} --seed 5 --json"
+    assert kahanmaps(command).out == kahanmaps(command).out
+
+
+def test_the_seed_draws_the_member(kahanmaps):
+    first, second = (kahanmaps(f"{QUICK} --seed {seed} --json").json for seed in (1, 2))
+    assert first["chi"] != second["chi"]
+    assert (first["seed"], second["seed"]) == (1, 2)
+
+
+# Which member
+
+
+def test_a_file_of_kind_family_is_verified(kahanmaps, pair):
+    report = kahanmaps("verify", pair, "--section 6 --json").json
+    assert report["chi"] == "t^2 + t - 2"
+    assert report["verdict"] == "proved"
+
+
+def test_a_member_of_the_catalogue_is_verified(kahanmaps):
+    assert kahanmaps("verify paper_m2 --section 4 --json").json["verdict"] == "proved"
+
+
+@pytest.mark.parametrize(
+    ("options", "m", "chi"),
+    [
+        ("--eigenvalues 1,-2", 2, "t^2 + t - 2"),
+        ("--eigenvalues=-1/2,3 --m 2", 2, "t^2 - 5/2*t - 3/2"),
+        ("--chi t^2+1", 2, "t^2 + 1"),
+        ("--chi '(t-1)*(t^2+1)'", 3, "t^3 - t^2 + t - 1"),
+    ],
+)
+def test_the_spectrum_is_that_asked_for(kahanmaps, options, m, chi):
+    report = kahanmaps(f"verify {options} --section 4 --json").json
+    assert (report["m"], report["chi"], report["verdict"]) == (m, chi, "proved")
+
+
+def test_a_generic_member_has_integer_chi(kahanmaps):
+    report = kahanmaps("verify --m 3 --generic --section 4 --json").json
+    assert report["m"] == 3
+    assert "/" not in report["chi"]
+
+
+# What to verify
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_a_section_is_verified_alone(kahanmaps, section):
+    assert keys(kahanmaps(f"verify --m 1 --section {section} --json").json) == expected(1, section)
+
+
+def test_sections_add_up(kahanmaps):
+    assert keys(kahanmaps("verify --m 1 --section 6 --section 4 --json").json) == expected(1, 4, 6)
+
+
+def test_controls_are_refuted_and_that_is_success(kahanmaps):
+    outcome = kahanmaps("verify --m 2 --controls --json")
+    assert outcome.status == 0
+    *found, last = outcome.json["claims"]
+    assert {claim["verdict"] for claim in found} == {"refuted"}
+    assert all(claim["control"] and claim["expected"] == "refuted" for claim in found)
+    assert {claim["key"] for claim in found} == set(expected(2))
+    assert last["verdict"] == "proved"
+
+
+def test_the_member_in_general_is_verified(kahanmaps):
+    outcome = kahanmaps("verify --universal --m 2 --json")
+    assert outcome.status == 0
+    assert outcome.json["verdict"] in ("proved", "supported")
+    assert keys(outcome.json) == expected(2)
+
+
+def test_balls_enclose_the_complex_roots(kahanmaps):
+    report = kahanmaps("verify --chi t^2+1 --section 6 --balls 128 --json").json
+    for claim in report["claims"]:
+        (balls,) = [evidence for evidence in claim["also"] if evidence["method"] == "complex balls"]
+        assert balls["bits"] == 128
+
+
+def test_the_order_of_the_series_is_that_asked_for(kahanmaps):
+    report = kahanmaps("verify --m 1 --section 7 --order 5 --json").json
+    assert report["order"] == 5
+    assert report["verdict"] == "proved"
+
+
+@pytest.mark.parametrize("option", ["--eps 1/14", "--time-step 1/7"])
+def test_eps_and_time_step_are_both_told(kahanmaps, option):
+    report = kahanmaps(f"{QUICK} {option} --json").json
+    assert (report["eps"], report["time_step"], report["verdict"]) == ("1/14", "1/7", "proved")
+
+
+def test_more_error_bits_give_smaller_bounds(kahanmaps):
+    report = kahanmaps(f"{QUICK} --error-bits 300 --json").json
+    bounds = [
+        evidence["error_bound"] for claim in report["claims"] for evidence in claim["also"] if "primes" in evidence
+    ]
+    assert bounds
+    assert all(int(bound.removeprefix("2^-")) >= 300 for bound in bounds)
+
+
+# A pipe
+
+
+def test_in_a_pipe_every_statement_stands_on_a_line_with_its_verdict(kahanmaps):
+    outcome = kahanmaps("verify --m 3")
+    rows = [row for row in outcome.rows if row[0] and len(row) == 2 and row[0] not in ("note", "verdict")]
+    assert len(rows) == len(expected(3))
+    assert {row[0] for row in rows} <= {"proved", "supported", "refuted (as expected)"}
+    assert outcome.out.splitlines()[-1] in ("verdict\tproved", "verdict\tsupported")
+
+
+def test_in_a_pipe_the_statements_are_those_of_json(kahanmaps):
+    text, report = kahanmaps(QUICK).out, kahanmaps(f"{QUICK} --json").json
+    for claim in report["claims"]:
+        assert f"{claim['verdict']}\t{claim['claim']}" in text
+        assert claim["formula"] in text
+
+
+def test_misprints_are_marked(kahanmaps):
+    lines = kahanmaps("verify --m 3 --section 9").out.splitlines()
+    assert [line for line in lines if "(misprint)" in line] == [
+        "refuted (as expected)\tLemma 16, proof: The linear system for P_0 and Q_i, as printed (misprint)"
+    ]
+
+
+def test_a_quiet_command_says_nothing_on_standard_error(kahanmaps, slow_clock):
+    assert kahanmaps(f"{QUICK} -q").err == ""
+
+
+def test_progress_names_the_statement_and_counts(kahanmaps, slow_clock):
+    err = kahanmaps(QUICK).err
+    assert "Theorem 9 (2 of" in err
+
+
+def test_quiet_or_not_the_report_is_the_same(kahanmaps):
+    assert kahanmaps(QUICK).out == kahanmaps(f"{QUICK} -q").out
+
+
+def test_the_report_can_be_cut_short_by_its_reader(tmp_path):
+    outcome = shell(f"{'kahanmaps ' + QUICK} | head -n 1", tmp_path)
+    assert outcome.status == 0
+    assert outcome.out.startswith("verify: random member, m = 2, seed 0")
+    assert outcome.err == ""
+
+
+# Exit statuses
+
+
+@pytest.mark.parametrize("command", [QUICK, f"{QUICK} --controls", "verify --universal --m 1 --section 4"])
+def test_what_holds_gives_0(kahanmaps, command):
+    assert kahanmaps(command).status == 0
+
+
+def test_a_refuted_claim_gives_1(kahanmaps, monkeypatch):
+    # H~ with twice its value is not the function that (61) says.
+    from kahanmaps.invariants.integrals import PaperIntegral
+
+    original = PaperIntegral.value
+    monkeypatch.setattr(PaperIntegral, "value", lambda self, K, eps, x: original(self, K, eps, x) * K.convert(2))
+    outcome = kahanmaps("verify --m 2 --section 7 --json")
+    assert outcome.status == 1
+    assert outcome.json["holds"] is False
+
+
+def test_a_member_that_is_not_generic_gives_3(kahanmaps):
+    outcome = kahanmaps("verify --chi '(t-1)^2*(t+2)' --section 9 --json")
+    assert outcome.status == 3
+    assert outcome.json["holds"] is None
+    undecided = [claim for claim in outcome.json["claims"] if claim["verdict"] == "undecided"]
+    assert undecided
+    assert all("repeated roots" in claim["evidence"]["summary"] for claim in undecided)
+
+
+WRONG_USE = [
+    ("verify lorenz", "expected one of kind [family]"),
+    ("verify no-such-file", "no-such-file"),
+    ("verify paper_m2 --m 2", "give a SYSTEM or say which member to draw"),
+    ("verify paper_m2 --eigenvalues 1,2", "give a SYSTEM or say which member to draw"),
+    ("verify --universal --generic", "found --universal and --generic, expected --universal with --m only"),
+    ("verify --universal --chi t^2+1", "found --universal and --chi"),
+    ("verify --universal --eigenvalues 1,2", "found --universal and --eigenvalues"),
+    ("verify --universal paper_m2", "found --universal and SYSTEM"),
+    ("verify --universal --m 2 --eps 1/10", "found an eps, expected none"),
+    ("verify --universal --m 9", "found m = 9, expected 1 <= m <= 8"),
+    ("verify --universal --m 0", "found m = 0, expected 1 <= m <= 8"),
+    ("verify --m 9", "found a member with m = 9, expected m <= 8"),
+    ("verify --m 0", "found m = 0"),
+    ("verify --m 2 --eigenvalues 1,2,3", "found 3 eigenvalues, expected m = 2"),
+    ("verify --m 3 --chi t^2+1", "chi has degree 2, expected m = 3"),
+    ("verify --eigenvalues 1,2 --generic", "give one of --eigenvalues, --generic and --chi"),
+    ("verify --chi 7", "expected a polynomial in t"),
+    ("verify --chi t^2+x", "x"),
+    ("verify --m 2 --size 0", "found --size 0, expected 1 to 1000000"),
+    ("verify --m 2 --section 11", "found the section 11, expected 1 to 10"),
+    ("verify --m 2 --section 0", "found the section 0, expected 1 to 10"),
+    ("verify --m 2 --section six", "six"),
+    ("verify --m 2 --order 0", "found the order 0, expected 1 to 20"),
+    ("verify --m 2 --order 21", "found the order 21, expected 1 to 20"),
+    ("verify --m 2 --balls 8", "found 8 bits for the balls, expected 32 to 100000"),
+    ("verify --m 2 --error-bits 0", "found an error bound of 0 bits"),
+    ("verify --m 2 --eps 0", "found eps = 0"),
+    ("verify --m 2 --eps 0.1x", "0.1x"),
+    ("verify --m 2 --eps 1/10 --time-step 1/5", "--time-step"),
+]
+
+
+@pytest.mark.parametrize(("command", "message"), WRONG_USE, ids=[command for command, _ in WRONG_USE])
+def test_wrong_use_gives_2_and_a_sentence(kahanmaps, command, message):
+    outcome = kahanmaps(command)
+    assert outcome.status == 2
+    assert outcome.out == ""
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+
+
+@pytest.mark.xfail(reason="an option with the value 0 counts as not given", strict=True)
+@pytest.mark.parametrize("command", ["verify --universal --m 1 --size 0", "verify paper_m2 --m 0"])
+def test_an_option_that_does_not_belong_is_wrong_use_even_with_the_value_0(kahanmaps, command):
+    assert kahanmaps(f"{command} --section 4").status == 2
+
+
+def test_wrong_use_is_told_at_once(kahanmaps):
+    before = time.monotonic()
+    kahanmaps("verify --m 8 --section 11")
+    assert time.monotonic() - before < 2
+
+
+# Help
+
+
+def test_help_shows_examples_and_exit_statuses(kahanmaps):
+    text = kahanmaps("verify --help").out
+    assert "kahanmaps verify --universal --m 3" in text
+    assert "kahanmaps verify --chi '(t-1)*(t^2+1)' --balls 128" in text
+    assert "Exit status: 0 every claim holds" in text
+
+
+def test_every_example_of_the_help_is_accepted(kahanmaps, tmp_path, monkeypatch):
+    # The work itself is replaced: only whether the options are understood is asked here.
+    from kahanmaps.checks.claims import Report
+
+    def done(*_):
+        return Report("verify", (), {"system": "nothing", "eps": "every", "time_step": "every"})
+
+    monkeypatch.setattr("kahanmaps.paper.verify.verify", done)
+    monkeypatch.setattr("kahanmaps.paper.verify.verify_universal", done)
+    monkeypatch.chdir(tmp_path)
+    assert kahanmaps("family new --m 2 -q -o pair.toml").status == 0
+    text = kahanmaps("verify --help").out
+    examples = re.findall(r"^    kahanmaps (verify.*?)(?:  .*| \|.*)?$", text, re.MULTILINE)
+    assert len(examples) >= 6
+    assert [example for example in examples if kahanmaps(example).status == 2] == []
+
+
+def test_the_command_is_listed(kahanmaps):
+    assert re.search(r"^  verify ", kahanmaps("--help").out, re.MULTILINE)
+
+
+# A terminal
+
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+
+
+def plain(outcome):
+    return COLOUR.sub("", outcome.out)
+
+
+@pytest.mark.parametrize(
+    ("options", "columns"),
+    [
+        ("--m 2", 80),
+        ("--m 3 -v", 100),
+        ("--m 2 --section 9 -v", 80),
+        ("--m 2 --controls", 100),
+        ("--m 2 --universal", 100),
+        ("--chi (t-1)^2", 100),
+        ("--m 2 --section 6 --eps 1/10", 60),
+    ],
+)
+def test_a_table_fits_the_terminal(options, columns):
+    lines = plain(terminal("verify", *shlex.split(options), columns=columns)).splitlines()
+    assert max(len(line) for line in lines) <= columns
+
+
+def test_on_a_terminal_every_section_has_its_table():
+    text = plain(terminal("verify", "--m", "1", columns=100))
+    for number, (title, _) in SECTIONS.items():
+        assert (title if number == 10 else f"Section {number}. {title}") in text
+
+
+def test_the_last_line_on_a_terminal_counts_verdicts(kahanmaps):
+    last = plain(terminal("verify", "--m", "1", columns=100)).splitlines()[-1]
+    report = kahanmaps("verify --m 1 --json").json
+    for verdict, count in Counter(c["verdict"] for c in report["claims"] if "misprint" not in c).items():
+        assert f"{count} {verdict}" in last
+    assert last.startswith(f"verdict: {report['verdict']}")
+    assert f"{sum('misprint' in c for c in report['claims'])} misprints" in last
+
+
+def test_misprints_are_explained_on_a_terminal():
+    text = " ".join(plain(terminal("verify", "--m", "3", "--section", "9", columns=200)).split())
+    assert "misprint: the entry (2,3) is eps^2 q_3" in text
+
+
+def test_verbose_shows_the_evidence():
+    short, long = (plain(terminal("verify", "--m", "1", "--section", "6", *v, columns=200)) for v in ([], ["-v"]))
+    assert "random points over GF(p): held at" not in short
+    assert "random points over GF(p): held at" in long
+
+
+def test_what_is_outside_the_hypotheses_is_told_on_a_terminal():
+    outcome = terminal("verify", "--chi", "(t-1)^2*(t+2)", "--section", "9", columns=200)
+    assert outcome.status == 3
+    assert "undecided" in plain(outcome)
+    assert "repeated roots" in plain(outcome)
+
+
+def test_json_is_plain_on_a_terminal(kahanmaps):
+    assert terminal(*shlex.split(QUICK), "--json").json == kahanmaps(f"{QUICK} --json").json
+
+
+def test_no_colour_is_used_where_it_is_not_wanted():
+    assert "\x1b[3" not in terminal(*shlex.split(QUICK), NO_COLOR="1").out
