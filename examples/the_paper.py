@@ -1,7 +1,8 @@
 """The paper of Petrera and Suris, statement by statement, for a member whose eigenvalues are not rational.
 
-chi = t^3 - 2 is irreducible with two complex roots, so no associated system but f_0 itself is rational. All claims of
-the paper are proved all the same. Then one hypothesis after the other is broken, and a theorem fails.
+chi = t^3 - 2 is irreducible with two complex roots, so no associated system but f_0 itself is rational. The
+claims of the paper are proved all the same; those about any quadratic system, in the family or not, are supported.
+Then one hypothesis after the other is broken, and a theorem fails.
 """
 
 from collections import Counter
@@ -9,7 +10,6 @@ from collections import Counter
 from flint import fmpq_poly
 
 import kahanmaps as km
-from kahanmaps.paper.examiner import Options
 
 member = km.draw_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=1)
 file = km.SystemFile.from_member(member, "cube root of 2")
@@ -27,6 +27,6 @@ for finding in report.findings:
         print(f"  {finding.verdict}: {finding.place['place']}, {finding.formula}")
 
 print("what makes Theorem 9 fail:")
-for finding in km.verify(file, options=Options(sections=(6,), controls=True)).findings:
+for finding in km.verify(file, options=km.VerifyOptions(sections=(6,), controls=True)).findings:
     if finding.place.get("key") == "commutativity":
         print(f"  {finding.verdict} if {finding.place['broken']}")

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from kahanmaps.maps.fast import FloatOrbit, to_floats
     from kahanmaps.maps.kahan import KahanMap
     from kahanmaps.maps.orbits import Orbit
+    from kahanmaps.paper.examiner import VerifyOptions
     from kahanmaps.paper.verify import verify, verify_universal
     from kahanmaps.systems.catalog import load, names
     from kahanmaps.systems.files import SystemFile, parse_system, read_system
@@ -61,6 +62,7 @@ _HOME = {
     "checks.commute": ("check_commute",),
     "checks.conserve": ("check_integrals",),
     "checks.preserve": ("check_measure", "check_poisson"),
+    "paper.examiner": ("VerifyOptions",),
     "paper.verify": ("verify", "verify_universal"),
     "errors": ("InputError", "KahanmapsError", "SingularStep", "SystemFileError"),
 }
@@ -104,6 +106,7 @@ __all__ = [
     "check_poisson",
     "verify",
     "verify_universal",
+    "VerifyOptions",
     "InputError",
     "KahanmapsError",
     "SingularStep",

@@ -26,7 +26,7 @@ _POINTS = 4  # for statements that something differs, or has full rank
 
 
 @dataclass(frozen=True)
-class Options:
+class VerifyOptions:
     """What to verify: sections (None: all), the order of the series, bits for complex balls, controls instead."""
 
     sections: tuple[int, ...] | None = None
@@ -51,7 +51,7 @@ class Examiner:
 
     m: int
 
-    def __init__(self, settings: Settings, options: Options) -> None:
+    def __init__(self, settings: Settings, options: VerifyOptions) -> None:
         self.settings = settings
         self.options = options
         self._points: dict[tuple[bool, int], PaperObjects | None] = {}

@@ -39,7 +39,7 @@ from kahanmaps.family.skew_hamiltonian import diagnosis, format_univariate
 from kahanmaps.invariants.sizes import Size
 from kahanmaps.paper import realise
 from kahanmaps.paper.evaluate import UNDEFINED, entries, evaluate, same, witness_of
-from kahanmaps.paper.examiner import Examiner, Options
+from kahanmaps.paper.examiner import Examiner, VerifyOptions
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.proofs import PROOF_BUDGET, normal_form_proof
 from kahanmaps.paper.registry import Claim, Kind
@@ -55,7 +55,7 @@ NOTE_ON_PROOFS = (
 )
 
 
-def verify(file: SystemFile, settings: Settings | None = None, options: Options | None = None) -> Report:
+def verify(file: SystemFile, settings: Settings | None = None, options: VerifyOptions | None = None) -> Report:
     """Every claim of the paper for a member of the family.
 
     `settings` gives eps (None: every eps, an indeterminate), the seed and the error bound. Exact but for the claims
@@ -66,11 +66,11 @@ def verify(file: SystemFile, settings: Settings | None = None, options: Options 
 
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
     >>> file = SystemFile.from_member(draw_with_eigenvalues([1, -2], seed=7), "pair")
-    >>> report = verify(file, options=Options(sections=(6,)))
+    >>> report = verify(file, options=VerifyOptions(sections=(6,)))
     >>> str(report.verdict), report.findings[1].claim
     ('proved', 'Theorem 9: The Kahan maps of associated vector fields commute, all pairs of the class')
     """
-    settings, options = settings or Settings(), options or Options()
+    settings, options = settings or Settings(), options or VerifyOptions()
     member = file.member
     if member is None:
         raise InputError(
@@ -95,13 +95,13 @@ def verify(file: SystemFile, settings: Settings | None = None, options: Options 
     return Report("verify", tuple(findings), context, notes)
 
 
-def verify_universal(m: int, settings: Settings | None = None, options: Options | None = None) -> Report:
+def verify_universal(m: int, settings: Settings | None = None, options: VerifyOptions | None = None) -> Report:
     """Every claim for the member in general: roots, cubics, symplectic change, x and eps all at random over GF(p).
 
     The error bound of each claim is on the probability that it is false for the generic member. A claim that could
     also be proved in normal form is `proved`, for every member with distinct roots.
     """
-    settings, options = settings or Settings(), options or Options()
+    settings, options = settings or Settings(), options or VerifyOptions()
     if not 1 <= m <= MAX_M:
         raise InputError(f"found m = {m}, expected 1 <= m <= {MAX_M}")
     if settings.eps is not None:
@@ -127,7 +127,7 @@ def verify_universal(m: int, settings: Settings | None = None, options: Options 
 class _MemberExaminer(Examiner):
     """A given member."""
 
-    def __init__(self, member: FamilyMember, settings: Settings, options: Options) -> None:
+    def __init__(self, member: FamilyMember, settings: Settings, options: VerifyOptions) -> None:
         super().__init__(settings, options)
         self.member = member
         self.m = member.m
@@ -286,7 +286,7 @@ class _MemberExaminer(Examiner):
 class _UniversalExaminer(Examiner):
     """The member in general."""
 
-    def __init__(self, m: int, settings: Settings, options: Options) -> None:
+    def __init__(self, m: int, settings: Settings, options: VerifyOptions) -> None:
         super().__init__(settings, options)
         self.m = m
 

@@ -304,7 +304,6 @@ def test_wrong_use_gives_2_and_a_sentence(kahanmaps, command, message):
     assert "Traceback" not in outcome.err
 
 
-@pytest.mark.xfail(reason="an option with the value 0 counts as not given", strict=True)
 @pytest.mark.parametrize("command", ["verify --universal --m 1 --size 0", "verify paper_m2 --m 0"])
 def test_an_option_that_does_not_belong_is_wrong_use_even_with_the_value_0(kahanmaps, command):
     assert kahanmaps(f"{command} --section 4").status == 2

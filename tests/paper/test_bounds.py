@@ -22,7 +22,7 @@ from kahanmaps.invariants.sizes import Size
 from kahanmaps.paper import realise
 from kahanmaps.paper.bounds import BoundField
 from kahanmaps.paper.controls import broken
-from kahanmaps.paper.examiner import Options
+from kahanmaps.paper.examiner import VerifyOptions
 from kahanmaps.paper.registry import Kind, claims
 from kahanmaps.paper.verify import _MemberExaminer
 
@@ -299,7 +299,7 @@ def difference_sizes(claim, o):
 @pytest.mark.parametrize(("claim", "control"), BROKEN, ids=[f"{claim.key}, {control}" for claim, control in BROKEN])
 def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, monkeypatch):
     found = member("m=1")
-    examined = _MemberExaminer(found, Settings(), Options())
+    examined = _MemberExaminer(found, Settings(), VerifyOptions())
     bounds = broken(control, realise.bound_objects(found, None))
     monkeypatch.setattr(examined, "bounds", lambda: bounds)
     needs, equation, poles = examined._size(claim)

@@ -55,7 +55,7 @@ def command(system: str | None, **options: Any) -> int:
     Misprints are expected to be refuted and do not count.
     """
     from kahanmaps.checks.settings import Settings
-    from kahanmaps.paper.examiner import Options
+    from kahanmaps.paper.examiner import VerifyOptions
     from kahanmaps.paper.verify import verify, verify_universal
     from kahanmaps.systems.files import SystemFile
 
@@ -77,7 +77,7 @@ def command(system: str | None, **options: Any) -> int:
             error_bits=options["error_bits"],
             progress=progress,
         )
-        what = Options(options["sections"] or None, options["order"], options["ball_bits"], options["controls"])
+        what = VerifyOptions(options["sections"] or None, options["order"], options["ball_bits"], options["controls"])
         if options["universal"]:
             report = verify_universal(3 if drawn["m"] is None else drawn["m"], settings, what)
         else:
