@@ -90,6 +90,13 @@ def cli(ctx: click.Context, show_version: bool) -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
+    try:
+        return _run(argv)
+    finally:
+        _leave_nothing_to_flush()
+
+
+def _run(argv: Sequence[str] | None) -> int:
     _have_standard_streams()
     status = HOLDS
     try:
@@ -106,8 +113,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         say("interrupted")
         return INTERRUPTED
     except (BrokenPipeError, SystemExit):  # click turns the one into the other
-        # The reader (head, say) has what it wanted. Python would complain once more when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        pass  # the reader (head, say) has what it wanted
     except Exception as error:
         return _report(error)
     return status
@@ -135,6 +141,16 @@ def _report(error: Exception) -> int:
         "This is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened."
     )
     return INTERNAL
+
+
+def _leave_nothing_to_flush() -> None:
+    """Let go of what a stream still holds and cannot write: Python would fail on it once more, and exit with 120."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _have_standard_streams() -> None:

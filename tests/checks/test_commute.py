@@ -25,7 +25,7 @@ from check_helpers import (
 )
 from flint import fmpq, fmpq_mat, fmpq_poly
 from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rationals, systems
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 
 from kahanmaps.checks import commute, judge, theorems
 from kahanmaps.checks import settings as settings_module
@@ -289,6 +289,8 @@ def test_a_commuting_pair_disturbed_in_a_far_digit_is_refuted(monomial, power):
 def test_decoupled_inhomogeneous_systems_one_part_reversed_commute(first, second, eps):
     f, g = side_by_side(first, second), side_by_side(first, second.scaled(-1))
     report = pair(f, g, Settings(eps=eps, steps=2))
+    # x' = x at eps = 1 has no map: det(I - eps f') = 0 everywhere.
+    assume("not defined at any" not in report.findings[0].evidence.summary)
     assert report.holds
     C = theorems.linear_relation(f, g)
     assert C is None or report.verdict is PROVED
