@@ -111,6 +111,11 @@ class FamilyMember:
         """H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}."""
         return chain(self.A, self.H)
 
+    @cached_property
+    def hamiltonians(self) -> tuple[CubicHamiltonian, ...]:
+        """The chain with the standard structure J."""
+        return tuple(CubicHamiltonian(H, standard_structure(self.dim)) for H in self.chain)
+
     def associate(self, signs: Sequence[int]) -> AssociatedSystem:
         """The associated system with these signs. Raises InputError unless they are 1 or -1, one for each factor."""
         if len(signs) != len(self.factors):

@@ -6,6 +6,7 @@ What is common to a given member and to the member in general; `verify.py` has t
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -46,7 +47,7 @@ class VerifyOptions:
                 )
 
 
-class Examiner:
+class Examiner(ABC):
     """What is common to a given member and to the universal one."""
 
     m: int
@@ -84,17 +85,17 @@ class Examiner:
 
     # what the two kinds of examiners fill in
 
+    @abstractmethod
     def point(self, roots: bool, number: int) -> PaperObjects | None:
         """The number-th random point over GF(p); with the roots of chi, if need be, or None where they are not had."""
-        raise NotImplementedError
 
+    @abstractmethod
     def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
         """A random point over Q, or None where the roots of chi are not rational."""
-        raise NotImplementedError
 
+    @abstractmethod
     def bounds(self) -> PaperObjects:
         """The objects as bounds."""
-        raise NotImplementedError
 
     def conjugates(self, roots: bool) -> int:
         """A bound for the degree of the field that the coefficients lie in."""
@@ -104,9 +105,9 @@ class Examiner:
         """Why a claim does not apply, if it does not."""
         return None
 
+    @abstractmethod
     def proof(self, claim: Claim, needs: set[str], equation: Size, poles: int) -> Evidence | None:
         """A proof, if there is one."""
-        raise NotImplementedError
 
     def also(self, claim: Claim) -> Iterable[Evidence]:
         """Further evidence."""
@@ -249,7 +250,7 @@ class Examiner:
             sides = [value.entry if hasattr(value, "entry") else bounds.K.convert(value) for value in (left, right)]
             difference = sides[0] - sides[1]
             equation = equation | difference.above
-            poles = max(poles, difference.pole_degree)
+            poles += difference.pole_degree
         return bounds.used, equation, poles
 
     def _refuted(self, claim: Claim, roots: bool, outcome: Outcome) -> Finding:

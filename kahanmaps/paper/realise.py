@@ -31,7 +31,7 @@ from kahanmaps.invariants.integrals import ModifiedHamiltonian, PaperIntegral
 from kahanmaps.invariants.poisson import poisson_tensor
 from kahanmaps.paper.bounds import BoundField
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.hamiltonian import standard_structure
 from kahanmaps.systems.quadratic import SystemOver
 
 Draw = Callable[[str], Any]
@@ -69,7 +69,7 @@ class MemberObjects(PaperObjects):
             eps=eps,
             roots=roots,
             draw=draw,
-            base=_hamiltonian(member, 0).system.over(K),
+            base=member.hamiltonians[0].system.over(K),
             known_chi=tuple(K.convert(chi[k]) for k in range(member.m + 1)),
             sign_vectors=sign_vectors,
             associate_matrices=_matrices_by_factor(member, K),
@@ -84,12 +84,12 @@ class MemberObjects(PaperObjects):
 
     def gradient_of_chain(self, i: int, x: Any) -> Any:
         """The gradient of H_i, from the library."""
-        gradient = _hamiltonian(self.member, i).gradient
+        gradient = self.member.hamiltonians[i].gradient
         return self.K.column([evaluate(component, self.K, x.entries()) for component in gradient])
 
     def f_(self, i: int) -> SystemOver:
         """f_i from the library's chain."""
-        return _hamiltonian(self.member, i).system.over(self.K)
+        return self.member.hamiltonians[i].system.over(self.K)
 
     def lagrange(self, i: int) -> list[Any]:
         """The coefficients of B_i from the library, where the roots of chi are rational."""
@@ -113,15 +113,15 @@ class MemberObjects(PaperObjects):
 
     def H_tilde(self, x: Any) -> Any:
         """H~ from the library."""
-        return PaperIntegral(_hamiltonian(self.member, 0)).value(self.K, self.eps, x.entries())
+        return PaperIntegral(self.member.hamiltonians[0]).value(self.K, self.eps, x.entries())
 
     def modified_H(self, x: Any) -> Any:
         """The modified H from the library."""
-        return ModifiedHamiltonian(_hamiltonian(self.member, 0)).value(self.K, self.eps, x.entries())
+        return ModifiedHamiltonian(self.member.hamiltonians[0]).value(self.K, self.eps, x.entries())
 
     def Pi(self, x: Any) -> Any:
         """The Poisson tensor from the library."""
-        return poisson_tensor(_hamiltonian(self.member, 0), self.K, self.eps, x.entries())
+        return poisson_tensor(self.member.hamiltonians[0], self.K, self.eps, x.entries())
 
     @property
     def _is_split(self) -> bool:
@@ -414,14 +414,6 @@ def universal_bound_objects(m: int, order: int = 3) -> PaperObjects:
 
 
 # ---- helpers ---------------------------------------------------------------------------------------------------
-
-
-def _hamiltonian(member: FamilyMember, i: int) -> CubicHamiltonian:
-    """H_i with the standard structure, remembered on the member's chain."""
-    cached: dict[int, CubicHamiltonian] = member.__dict__.setdefault("_hamiltonians", {})
-    if i not in cached:
-        cached[i] = CubicHamiltonian(member.chain[i], standard_structure(member.dim))
-    return cached[i]
 
 
 def _third_matrix(member: FamilyMember) -> fmpq_mat:

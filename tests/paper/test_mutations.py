@@ -243,10 +243,11 @@ def test_a_chain_with_wrong_factors_is_seen_by_sections_1_and_4(monkeypatch):
 
 
 def test_fields_of_the_chain_with_a_wrong_sign_are_seen_by_section_4(monkeypatch):
-    def opposite(member, i):
-        return hamiltonian.CubicHamiltonian(member.chain[i] * (-1 if i else 1), standard(member.dim))
+    def opposite(member):
+        J = standard(member.dim)
+        return [hamiltonian.CubicHamiltonian(H * (-1 if i else 1), J) for i, H in enumerate(member.chain)]
 
-    monkeypatch.setattr(realise, "_hamiltonian", opposite)
+    monkeypatch.setattr(associated.FamilyMember, "hamiltonians", property(opposite))
     assert {"fields-of-the-chain", "fields-by-powers-of-A"} <= red("m=2, split", 4)
 
 
