@@ -80,7 +80,7 @@ def commutativity_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     blockwise=True,
 )
 def integrals_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """Inhomogeneous H: the modified Hamiltonians are shared by all maps of the class"""
+    """The modified Hamiltonians are shared by all maps of the class"""
     p = o.inhomogeneous()
     x_tilde = p.step(p.f, p.x)
     for B in p.associates():
@@ -99,7 +99,7 @@ def integrals_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     breaks=("homogeneous",),
 )
 def paper_integral_fails_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """Inhomogeneous H: the paper's own form eps^{-1} x^T J x~ is NOT conserved"""
+    """The paper's own form eps^{-1} x^T J x~ is NOT conserved"""
     p = o.inhomogeneous()
     yield p.H_tilde(p.step(p.f, p.x)), p.H_tilde(p.x)
 
@@ -113,7 +113,7 @@ def paper_integral_fails_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     blockwise=True,
 )
 def poisson_map_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """Inhomogeneous H: Pi = J - eps^2 f'^2 J is still invariant"""
+    """Pi = J - eps^2 f'^2 J is still invariant"""
     p = o.inhomogeneous()
     for g in [p.f, *(p.g(B) for B in p.associates())]:
         jacobian = p.jacobian_of_step(g, p.x)
@@ -130,7 +130,7 @@ def poisson_map_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     breaks=("H", "f"),
 )
 def jacobi_identity_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """Inhomogeneous H: Pi is still a Poisson tensor"""
+    """Pi is still a Poisson tensor"""
     from kahanmaps.paper.poisson_structure import jacobi_identity
 
     yield from jacobi_identity(o.inhomogeneous())
@@ -138,7 +138,7 @@ def jacobi_identity_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
 
 @claim("Inhomogeneous H", "", "nabla (modified K_s) = B_s nabla (modified H)", breaks=("H", "B"), blockwise=True)
 def gradients_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """Inhomogeneous H: the modified Hamiltonians satisfy the same differential equation"""
+    """The modified Hamiltonians satisfy the same differential equation"""
     v = o.vector("v")
     p = o.inhomogeneous()
     for signs in p.all_signs():
@@ -156,7 +156,7 @@ def gradients_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     distinct_roots=True,
 )
 def formula_through_H_and_K_fails_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """Inhomogeneous H: the formula (106) through H and the K_i does NOT survive"""
+    """The formula (106) through H and the K_i does NOT survive"""
     p = o.inhomogeneous()
     right = p.P0(p.x) * p.H(p.x)
     for i in p.each:

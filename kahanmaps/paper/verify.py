@@ -99,7 +99,14 @@ def verify_universal(m: int, settings: Settings | None = None, options: VerifyOp
     """Every claim for the member in general: roots, cubics, symplectic change, x and eps all at random over GF(p).
 
     The error bound of each claim is on the probability that it is false for the generic member. A claim that could
-    also be proved in normal form is `proved`, for every member with distinct roots.
+    also be proved in normal form is `proved`, for every member with distinct roots. Half the dimension is `m`, from 1
+    to 8; the claims are for every eps. Returns a Report like `verify`; raises InputError for another m, or an eps.
+
+    Source: petrera-suris-2016, all of it; schwartz-1980 for the bounds.
+
+    >>> report = verify_universal(2, options=VerifyOptions(sections=(6,)))
+    >>> str(report.verdict), report.findings[1].also[0].data["error_bound"]
+    ('proved', '2^-145')
     """
     settings, options = settings or Settings(), options or VerifyOptions()
     if not 1 <= m <= MAX_M:
@@ -249,7 +256,7 @@ class _MemberExaminer(Examiner):
                 if not evaluate(claim, objects).holds:
                     raise Contradiction(f"{claim.place}: {claim.title}: fails over Q[t]/chi, but not over GF(p)")
                 yield Evidence("exact over Q[t]/chi", f"{text}, for all roots at once", {"points": 1})
-            except UNDEFINED:
+            except UNDEFINED:  # a point where the map has no value: no evidence, and none is claimed
                 pass
         if self.options.ball_bits is not None and self.member.is_generic:
             yield self._by_balls(claim, self.options.ball_bits, rng)
