@@ -5,6 +5,7 @@ What a seed draws is the same everywhere. Files that are written are read by eve
 
 from __future__ import annotations
 
+import json
 import tomllib
 from fractions import Fraction
 from pathlib import Path
@@ -183,6 +184,92 @@ def test_a_member_with_repeated_roots_has_no_normal_form(kahanmaps, tmp_path, op
     outcome = kahanmaps("family show", tmp_path / "a.toml", f"--normal-form {json}")
     assert (outcome.status, outcome.out) == (2, "")
     assert "chi has the repeated factor (t - 1)" in outcome.err
+
+
+# show: members that do not say so
+
+HIDDEN = """
+variables = ["q1", "p1", "q2", "p2"]
+[hamiltonian]
+H = "q1^3 + p1^2*q1 + 3*q2^3 - 2*p2^2*q2"
+J = [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 2], [0, 0, -2, 0]]
+"""
+
+
+@pytest.fixture
+def forgetful(kahanmaps, pair):
+    """The member `pair` once more: as H alone, and as equations alone."""
+    shown = kahanmaps("systems", pair, "--json").json
+    variables = f"variables = {json.dumps(shown['variables'])}\n"
+    declared, equations = pair.with_name("declared.toml"), pair.with_name("equations.toml")
+    declared.write_text(f"{variables}[hamiltonian]\nH = {json.dumps(shown['document']['family']['H'])}\nJ = 'standard'")
+    equations.write_text(f"{variables}[system]\nrhs = {json.dumps(shown['rhs'])}\n")
+    return declared, equations
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_member_that_does_not_say_so_is_found(kahanmaps, pair, forgetful, which):
+    shown = kahanmaps("family show", forgetful[which], "--json").json
+    member = kahanmaps("family show", pair, "--json").json
+    assert set(shown) == {*member, "found"}
+    assert set(shown["found"]) == {"text", "A", "generic", "dimension", "standard", "T"}
+    assert shown["found"]["A"] == shown["A"]
+    assert (shown["found"]["generic"], shown["found"]["dimension"], shown["found"]["standard"]) == (True, 2, True)
+    assert shown["hamiltonians"][0] == member["hamiltonians"][0]
+    assert [factor["factor"] for factor in shown["factors"]] == ["t - 1", "t - 2"]
+
+
+def test_people_are_told_that_it_was_found_and_not_declared(kahanmaps, pair, forgetful):
+    lines = kahanmaps("family show", forgetful[0]).out.splitlines()
+    expected = "found, not declared: H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)"
+    assert lines[1] == expected
+    assert "found" not in kahanmaps("family show", pair).out
+
+
+def test_what_was_found_has_a_normal_form(kahanmaps, forgetful):
+    outcome = kahanmaps("family show", forgetful[1], "--normal-form")
+    assert "x = S z with the coefficients" in outcome.out
+    form = kahanmaps("family show", forgetful[1], "--normal-form --json").json["normal_form"]
+    assert [(part["root"], part["weight"]) for part in form["parts"]] == [("1", "-1"), ("2", "1")]
+
+
+def test_another_structure_is_shown_in_coordinates_that_make_it_standard(kahanmaps, tmp_path):
+    (tmp_path / "a.toml").write_text(HIDDEN)
+    shown = kahanmaps("family show", tmp_path / "a.toml", "--json").json
+    assert shown["variables"] == ["y1", "y2", "y3", "y4"]
+    assert shown["found"]["standard"] is False
+    t, m = ([[Fraction(entry) for entry in row] for row in shown["found"][key]] for key in ("T", "A"))
+    # T [[0, I], [-I, 0]] T^T = J
+    structure = [
+        [sum(t[i][k] * t[j][k + 2] - t[i][k + 2] * t[j][k] for k in range(2)) for j in range(4)] for i in range(4)
+    ]
+    assert structure == [[0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 2], [0, 0, -2, 0]]
+    # q1, p1 are one part, q2, p2 the other
+    assert [[m[i][j] * (i != j) for j in range(4)] for i in range(4)] == [[0] * 4] * 4
+    assert m[0][0] == m[1][1] != m[2][2] == m[3][3]
+    out = kahanmaps("family show", tmp_path / "a.toml", "--normal-form").out
+    assert "in coordinates y with x = T y and standard J\n" in out
+    assert "\nx = T y, T =\n" in out
+    assert "\ny = S z with" in out
+
+
+def test_a_homogeneous_cubic_in_the_plane_is_a_member(kahanmaps):
+    assert kahanmaps("family show nahm_tetrahedral --json").json["found"]["A"] == [["1", "0"], ["0", "1"]]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "reason"),
+    [
+        ("henon_heiles", "hamiltonian", "H is not a homogeneous cubic"),
+        ("three_wave", "hamiltonian", "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"),
+        ("lorenz", "system", "x' is not J grad H with J = [[0, I], [-I, 0]]"),
+    ],
+)
+def test_where_nothing_is_found_it_is_said_what_was_looked_for(kahanmaps, name, kind, reason):
+    outcome = kahanmaps(f"family show {name}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert f"{name} is of kind [{kind}], expected one of kind [family]. An A that makes it a member" in outcome.err
+    assert reason in outcome.err
 
 
 # space

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from flint import fmpq_mat
 
     from kahanmaps.family.associated import FamilyMember
+    from kahanmaps.family.hidden import HiddenMember
     from kahanmaps.family.planar import NormalForm
     from kahanmaps.systems.files import SystemFile
 
@@ -75,15 +76,19 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
 def show(system: str, normal_form: bool, as_json: bool) -> None:
     """Show a member: A, how chi factors, and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.
 
+    For a SYSTEM of kind [hamiltonian] or [system] an A is looked for: any with A^T J = J A and
+    A Hess(H) = Hess(H) A^T that is not a multiple of I makes it a member.
+
     \b
       kahanmaps family show pair.toml
       kahanmaps family show pair.toml --normal-form
+      kahanmaps family show hamiltonian.toml
       kahanmaps family show pair.toml --json | jq -r '.hamiltonians[1]'
     """
     from kahanmaps.algebra.text import format_polynomial
     from kahanmaps.family.skew_hamiltonian import chi, diagnosis, format_univariate
 
-    file, member = _member(system)
+    file, member, hidden = _member_or_hidden(system)
     data: dict[str, Any] = {
         "version": __version__,
         "system": file.name,
@@ -98,6 +103,8 @@ def show(system: str, normal_form: bool, as_json: bool) -> None:
         "signs": list(member.signs),
         "hamiltonians": [format_polynomial(H) for H in member.chain],
     }
+    if hidden is not None:
+        data["found"] = _hidden_data(hidden)
     form = _normal_form(member) if normal_form else None
     if form is not None:
         data["normal_form"] = _normal_form_data(form)
@@ -105,7 +112,12 @@ def show(system: str, normal_form: bool, as_json: bool) -> None:
         print_json(data)
         return
     click.echo(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
+    if hidden is not None:
+        click.echo(f"found, not declared: {hidden.text}")
     click.echo(data["diagnosis"])
+    if hidden is not None and not hidden.is_standard:
+        click.echo("x = T y, T =")
+        _print_matrix(hidden.T)
     click.echo("A =")
     _print_matrix(member.A)
     for k, text in enumerate(data["hamiltonians"]):
@@ -113,7 +125,7 @@ def show(system: str, normal_form: bool, as_json: bool) -> None:
     if any(sign < 0 for sign in member.signs):
         click.echo(f"signs = {','.join(map(str, member.signs))}: K = {_formula(format_polynomial(member.chosen.K))}")
     if form is not None:
-        _print_normal_form(form)
+        _print_normal_form(form, "x" if hidden is None or hidden.is_standard else "y")
 
 
 @command.command("space")
@@ -234,7 +246,7 @@ def _normal_form_data(form: NormalForm) -> dict[str, Any]:
     }
 
 
-def _print_normal_form(form: NormalForm) -> None:
+def _print_normal_form(form: NormalForm, point: str) -> None:
     from kahanmaps.algebra.text import format_number
 
     click.echo(f"normal form over Q[t]/chi, chi = {_formula(form.chi_text)}:")
@@ -248,7 +260,7 @@ def _print_normal_form(form: NormalForm) -> None:
     for part in form.parts:
         root, weight = _formula(format_number(part.root)), _formula(format_number(part.weight))
         click.echo(f"t = {root}: h = {_formula(part.text)}, weight {weight}")
-    click.echo("x = S z with the coefficients z of 1, t, ... in X and in Y, S =")
+    click.echo(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
     _print_matrix(form.S)
 
 
@@ -270,6 +282,35 @@ def _member(reference: str) -> tuple[SystemFile, FamilyMember]:
     if file.member is None:
         raise InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]: A and H")
     return file, file.member
+
+
+def _member_or_hidden(reference: str) -> tuple[SystemFile, FamilyMember, HiddenMember | None]:
+    """The member that a system is declared to be, or is found to be."""
+    from kahanmaps.errors import InputError
+    from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member, reason_against
+
+    file = load_system(reference, None, (), ())
+    if file.member is not None:
+        return file, file.member, None
+    hamiltonian = file.hamiltonian or hidden_hamiltonian(file.system)
+    hidden = None if hamiltonian is None else hidden_member(hamiltonian)
+    if hidden is None:
+        raise InputError(
+            f"{file.name} is of kind [{file.kind}], expected one of kind [family]. An A that makes it a member all the "
+            f"same was looked for and not found: {reason_against(hamiltonian)}"
+        )
+    return file, hidden.member, hidden
+
+
+def _hidden_data(hidden: HiddenMember) -> dict[str, Any]:
+    return {
+        "text": hidden.text,
+        "A": _rows(hidden.A),
+        "generic": hidden.is_generic,
+        "dimension": hidden.dimension,
+        "standard": hidden.is_standard,
+        "T": _rows(hidden.T),
+    }
 
 
 def _parse_matrix(text: str) -> fmpq_mat:

@@ -1,0 +1,479 @@
+"""Members of the family that do not say so: a matrix A is looked for, given H and J alone.
+
+x' = J grad H(x) with a homogeneous cubic H and a constant invertible skew J belongs to the family through every A with
+
+    A^T J = J A   and   A Hess(H) = Hess(H) A^T.
+
+These are linear conditions on the skew matrix S = J A: S T_l J is symmetric for each l, where T_l is the derivative of
+Hess(H) along x_l. The multiples of I always solve them. Where H depends on all variables the solutions are a
+commutative algebra, and the factors of that algebra are the finest splitting of H; where it does not, solutions need
+not commute, and idempotents are split off one after the other. docs/mathematics.md, "Hidden members", has the proofs.
+"""
+
+from __future__ import annotations
+
+import itertools
+import random
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz, fmpz_mat
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank, trace
+from kahanmaps.algebra.polynomials import gradient, names_of, ring
+from kahanmaps.errors import HypothesisError, InputError
+from kahanmaps.family.associated import FamilyMember, sign_polynomial
+from kahanmaps.family.cubics import third_derivatives
+from kahanmaps.family.skew_hamiltonian import Factor, evaluate_at_matrix, factors_of_chi
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+MAX_DIMENSION = 32  # as for the members that are drawn; the unknowns are n(n-1)/2
+_DRAWS = 24  # small combinations that are tried beside the basis
+_TRIAL_DIVISION = 1000
+_T = fmpq_poly([0, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class HiddenMember:
+    """A Hamiltonian system that was found to be a member: `member` is the system in the coordinates y with x = T y.
+
+    T is rational and invertible with J = T [[0, I], [-I, 0]] T^T, and T = I for the standard J. `dimension` is that of
+    all A with A^T J = J A and A Hess(H) = Hess(H) A^T. Made by `hidden_member`; that `member` is the system is
+    verified at construction, exactly. Raises HypothesisError otherwise.
+    """
+
+    hamiltonian: CubicHamiltonian
+    member: FamilyMember
+    T: fmpq_mat
+    dimension: int
+
+    def __post_init__(self) -> None:
+        if self.T * standard_structure(self.member.dim) * self.T.transpose() != self.hamiltonian.J:
+            raise HypothesisError("J is not T [[0, I], [-I, 0]] T^T")
+        if any(sign < 0 for sign in self.member.signs):
+            raise HypothesisError("found a member with a sign -1, expected f_0 itself")
+        if _pulled_back(self.hamiltonian.H, self.T, self.member.variables) != self.member.H:
+            raise HypothesisError("the cubic of the member is not H(T y)")
+
+    @cached_property
+    def A(self) -> fmpq_mat:
+        """A in the coordinates x: T^{-T} A_y T^T."""
+        return self.T.inv().transpose() * self.member.A * self.T.transpose()
+
+    @property
+    def is_generic(self) -> bool:
+        """Whether chi has no repeated root."""
+        return self.member.is_generic
+
+    @property
+    def is_standard(self) -> bool:
+        """Whether T = I: the member has the coordinates of the system."""
+        return self.T == _identity(self.member.dim)
+
+    @property
+    def text(self) -> str:
+        """In a sentence: what was found."""
+        factors = self.member.factors
+        chi = " ".join(f"({factor})" + (f"^{factor.multiplicity}" * (factor.multiplicity > 1)) for factor in factors)
+        if self.member.m == 1:
+            found = f"every homogeneous cubic in dimension 2 is a member, with A = I and chi = {chi}"
+        else:
+            how = "H splits: A"
+            if len(factors) == 1:
+                split = factors[0].degree > 1
+                how = "H splits over the splitting field of chi: A" if split else "H does not split: A, not scalar,"
+            found = f"{how} with A Hess(H) = Hess(H) A^T has chi = {chi}"
+        return found if self.is_standard else f"{found}, in coordinates y with x = T y and standard J"
+
+
+def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
+    """A basis of all rational A with A^T J = J A and A Hess(H) = Hess(H) A^T, for an invertible J (default: standard).
+
+    H is a homogeneous cubic. The matrices have integer entries, generate all the integer solutions, and are short: a
+    reduced lattice basis. The identity is among their combinations. Exact.
+
+    Raises InputError where H is not a homogeneous cubic, J not an invertible skew matrix of its size, or the dimension
+    larger than 32.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> names = ["x1", "x2", "x3", "x4"]
+    >>> len(structure_space(parse_polynomial("x1^3 + x3^3 + x2^2*x4", names)))
+    2
+    >>> structure_space(parse_polynomial("x1^3 + x1*x2*x3 + x2^2*x4", names))
+    [[1, 0, 0, 0]
+    [0, 1, 0, 0]
+    [0, 0, 1, 0]
+    [0, 0, 0, 1]]
+    """
+    if J is None:
+        J = standard_structure(len(names_of(H)))
+    reason = _reason_against(CubicHamiltonian(H, J))
+    if reason:
+        raise InputError(reason)
+    _require_size(J.nrows())
+    n = J.nrows()
+    inverse = J.inv()
+    conditions = [_integral(third * J) for third in third_derivatives(H)]
+    # A few combinations of the conditions nearly always say as much as all of them.
+    rng = random.Random(n)
+    few = [_combination(conditions, [rng.randint(-9, 9) for _ in conditions]) for _ in range(3)]
+    for chosen in (few, conditions):
+        found = _skew_solutions(chosen, n)
+        if all(_is_symmetric(S * condition) for S in found for condition in conditions):
+            break
+    return _reduced([inverse * fmpq_mat(S) for S in found])
+
+
+def hidden_member(hamiltonian: CubicHamiltonian) -> HiddenMember | None:
+    """The system as a member of the family, if it is one: with an A that splits H the furthest, of small entries.
+
+    H must be a homogeneous cubic and J invertible, in dimension 2m; otherwise, and where only the multiples of I
+    satisfy A Hess(H) = Hess(H) A^T, None. (In dimension 2 the answer is A = I, for every H.) Where chi of A splits
+    over Q its roots are 1, 2, ..., r. The member is exact: FamilyMember verifies it. That no other A has more
+    distinct roots is certain where H depends on all variables, and otherwise what many small combinations showed.
+
+    Raises InputError beyond dimension 32.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> H = parse_polynomial("x1^3 + x3^3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
+    >>> found = hidden_member(CubicHamiltonian(H, standard_structure(4)))
+    >>> found.text
+    'H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)'
+    >>> [g.label for g in found.member.associated()]
+    ['++', '+-']
+    >>> H = parse_polynomial("x1^3 + x1*x2*x3 + x2^2*x4", ["x1", "x2", "x3", "x4"])
+    >>> hidden_member(CubicHamiltonian(H, standard_structure(4))) is None
+    True
+    """
+    if _reason_against(hamiltonian):
+        return None
+    _require_size(hamiltonian.dim)
+    T = _identity(hamiltonian.dim) if hamiltonian.is_standard else darboux_coordinates(hamiltonian.J)
+    names = hamiltonian.variables if hamiltonian.is_standard else _other_names(hamiltonian.variables)
+    H = _pulled_back(hamiltonian.H, T, names)
+    space = structure_space(H)
+    if len(space) == 1 and hamiltonian.dim > 2:
+        return None
+    return HiddenMember(hamiltonian, FamilyMember(_furthest(space), H), T, len(space))
+
+
+def hidden_hamiltonian(system: QuadraticSystem) -> CubicHamiltonian | None:
+    """H with x' = J grad H for J = [[0, I], [-I, 0]], without constant term; None if there is none. Exact.
+
+    Other structures J are not searched for.
+
+    >>> print(hidden_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "-q^2"])).H)
+    1/3*q^3 + 1/2*p^2
+    >>> hidden_hamiltonian(QuadraticSystem.from_text(["q", "p"], ["p", "p^2"])) is None
+    True
+    """
+    if system.dim % 2:
+        return None
+    J = standard_structure(system.dim)
+    field = linear_combinations(-J, system.rhs)
+    context = field[0].context()
+    H = context.constant(0)
+    for i, component in enumerate(field):
+        for exponent, coefficient in component.terms():
+            raised = tuple(power + (i == j) for j, power in enumerate(exponent))
+            # Euler's formula, for each degree by itself.
+            H = H + context.from_dict({raised: coefficient / sum(raised)})
+    return CubicHamiltonian(H, J) if gradient(H) == field else None
+
+
+def hidden_member_of(system: QuadraticSystem) -> HiddenMember | None:
+    """`hidden_member` of the system, where x' = J grad H with the standard J; None otherwise.
+
+    >>> rhs = ["3*x3^2", "x2^2", "-3*x1^2", "-2*x2*x4"]
+    >>> print(hidden_member_of(QuadraticSystem.from_text(["x1", "x2", "x3", "x4"], rhs)).text)
+    H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)
+    """
+    hamiltonian = hidden_hamiltonian(system)
+    return None if hamiltonian is None else hidden_member(hamiltonian)
+
+
+def reason_against(hamiltonian: CubicHamiltonian | None) -> str:
+    """In a sentence why there is no hidden member; None stands for a system that `hidden_hamiltonian` has no H for."""
+    if hamiltonian is None:
+        return "x' is not J grad H with J = [[0, I], [-I, 0]]"
+    return _reason_against(hamiltonian) or "only the multiples of I satisfy A^T J = J A and A Hess(H) = Hess(H) A^T"
+
+
+def darboux_coordinates(J: fmpq_mat) -> fmpq_mat:
+    """An invertible T with J = T [[0, I], [-I, 0]] T^T, so that x' = J grad H is y' = [[0, I], [-I, 0]] grad H(T y).
+
+    T = I for the standard J. Raises InputError unless J is skew and invertible.
+
+    >>> darboux_coordinates(fmpq_mat([[0, 3], [-3, 0]]))
+    [3, 0]
+    [0, 1]
+    """
+    n = J.nrows()
+    if n != J.ncols() or n % 2 or J.transpose() != -J:
+        raise InputError("J is not a skew matrix of even size")
+    rest, first, second = J, [], []
+    for _ in range(n // 2):
+        entries = [(i, j) for i in range(n) for j in range(i + 1, n) if rest[i, j] != 0]
+        if not entries:
+            raise InputError("J is singular, expected an invertible matrix")
+        i, j = min(entries, key=lambda place: _bits(rest[place]))
+        pivot = rest[i, j]
+        a, b = (fmpq_mat([[rest[k, column]] for k in range(n)]) for column in (i, j))
+        first.append(b.entries())
+        second.append((a / -pivot).entries())
+        rest = rest - (a * b.transpose() - b * a.transpose()) / pivot
+    return fmpq_mat([*first, *second]).transpose()
+
+
+@dataclass(frozen=True)
+class _Part:
+    """An idempotent E of the space, not split further, and X = E X E: zero, nilpotent, or a generator of a field.
+
+    The distinct roots of X on the part are those of `factor`, which is t where X is zero or nilpotent.
+    """
+
+    E: fmpq_mat
+    X: fmpq_mat
+    factor: fmpq_poly
+
+
+def _furthest(space: Sequence[fmpq_mat]) -> fmpq_mat:
+    """An element with as many distinct eigenvalues as can be, made of small numbers."""
+    parts = list(_parts(space, _identity(space[0].nrows())))
+    A = fmpq_mat(space[0].nrows(), space[0].nrows())
+    # The largest idempotent gets the eigenvalue 1: then A = I + ..., in which it does not occur.
+    simple = sorted((part for part in parts if part.factor.degree() == 1), key=lambda part: -_size(part.E))
+    for value, part in enumerate(simple, start=1):
+        A = A + part.E * value + part.X
+    taken: list[fmpq_poly] = []
+    for part in parts:
+        if part.factor.degree() > 1:
+            shifts = (k // 2 if k % 2 else -(k // 2) for k in itertools.count(1))  # 0, -1, 1, -2, ...
+            shift, shifted = next((c, moved) for c in shifts if (moved := part.factor(fmpq_poly([-c, 1]))) not in taken)
+            taken.append(shifted)
+            A = A + part.X + part.E * shift
+    return A
+
+
+def _parts(space: Sequence[fmpq_mat], E: fmpq_mat) -> Iterator[_Part]:
+    """The idempotent E of the space taken apart, as far as its elements E X E do it."""
+    found = _part_or_pieces(space, E)
+    if isinstance(found, _Part):
+        yield found
+    else:
+        for piece in found:
+            yield from _parts(space, piece)
+
+
+def _part_or_pieces(space: Sequence[fmpq_mat], E: fmpq_mat) -> _Part | list[fmpq_mat]:
+    """The idempotents that an element E X E splits E into; where there is none, E with the best X."""
+    if trace(E) == 2:  # self-adjoint in a symplectic plane: scalar
+        return _Part(E, E * 0, _T)
+    for X in space:
+        if len(pieces := _projections(E * X * E, E)) > 1:
+            return pieces
+    own = _reduced([E * X * E for X in space])
+    if len(own) == 1:
+        return _Part(E, E * 0, _T)
+    # In a commutative algebra the trace form has the rank of its semisimple part, the number of roots to be found.
+    target = _semisimple_dimension(own) if _commute(own) else 0
+    found: list[tuple[tuple[int, int, int, int], fmpq_mat, fmpq_poly]] = []
+    for tried, X in enumerate(_candidates(own)):
+        if len(pieces := _projections(X, E)) > 1:
+            return pieces
+        polynomial = _factors_on(X, E)[0].polynomial
+        length = _powers_needed(polynomial, X, E) * polynomial.degree()
+        for Y, minimal in _variants(X, E, polynomial):
+            height = sum(map(_bits, minimal.coeffs()))
+            found.append(((minimal.degree(), length, -height, -_size(Y)), Y, minimal))
+        if tried >= len(own) + _DRAWS and max(key[0] for key, _, _ in found) >= target:
+            break
+    _, X, polynomial = max(found, key=lambda choice: choice[0])
+    if polynomial.degree() > 1:
+        return _Part(E, X, polynomial)
+    return _Part(E, _reduced([X + E * polynomial[0]])[0], _T)
+
+
+def _projections(X: fmpq_mat, E: fmpq_mat) -> list[fmpq_mat]:
+    """The idempotents that X = E X E splits E into, one for each irreducible factor; E itself where there is one."""
+    factors = _factors_on(X, E)
+    if len(factors) == 1:
+        return [E]
+    found = []
+    for which in range(len(factors)):
+        signs = [2 * (i == which) - 1 for i in range(len(factors))]
+        found.append(evaluate_at_matrix((sign_polynomial(factors, signs) + 1) / 2, X) * E)
+    return found
+
+
+def _candidates(basis: Sequence[fmpq_mat]) -> Iterator[fmpq_mat]:
+    """The basis, then combinations with small coefficients, which grow slowly. Without end."""
+    yield from basis
+    rng = random.Random(len(basis))
+    for count in itertools.count(2 * _DRAWS):
+        bound = count // _DRAWS - 1
+        yield _combination(basis, [rng.randint(-bound, bound) for _ in basis])
+
+
+def _factors_on(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
+    """The factors of chi of X = E X E on the image of E; zero on the image of I - E does not count."""
+    dim, factors = int(trace(E).p), []
+    for factor in factors_of_chi(X):
+        multiplicity = factor.multiplicity - (X.nrows() - dim) // 2 * (factor.root == 0)
+        if multiplicity:
+            factors.append(Factor(factor.polynomial, multiplicity))
+    return factors
+
+
+def _variants(X: fmpq_mat, E: fmpq_mat, polynomial: fmpq_poly) -> Iterator[tuple[fmpq_mat, fmpq_poly]]:
+    """X, with its irreducible polynomial, and (X - a E)/b for integers a, b such that the polynomial stays integral."""
+    yield X, polynomial
+    d = polynomial.degree()
+    if d == 1:
+        return
+    a = fmpq(-polynomial[d - 1] / d + fmpq(1, 2)).floor()
+    X, polynomial = X - E * a, polynomial(fmpq_poly([a, 1]))
+    common = fmpz(0)
+    for k in range(d):
+        common = common.gcd(polynomial[k].p)
+    for b, _ in common.factor(trial_limit=_TRIAL_DIVISION):
+        while b > 1 and all(polynomial[d - k].p % b**k == 0 for k in range(1, d + 1)):
+            X, polynomial = X / b, fmpq_poly([polynomial[d - k] / b**k for k in range(d, -1, -1)])
+    yield X, polynomial
+
+
+def _powers_needed(polynomial: fmpq_poly, X: fmpq_mat, E: fmpq_mat) -> int:
+    """The least k with polynomial(X)^k E = 0."""
+    value, power, k = evaluate_at_matrix(polynomial, X) * E, E, 0
+    while not _is_zero(power):
+        power, k = power * value, k + 1
+    return k
+
+
+def _semisimple_dimension(basis: Sequence[fmpq_mat]) -> int:
+    """The rank of tr(X Y): of a commutative algebra modulo its nilpotent elements."""
+    flat = fmpq_mat([X.entries() for X in basis])
+    turned = fmpq_mat([X.transpose().entries() for X in basis])
+    return rank(QQ, flat * turned.transpose())
+
+
+def _commute(basis: Sequence[fmpq_mat]) -> bool:
+    return all(X * Y == Y * X for X, Y in itertools.combinations(basis, 2))
+
+
+def _skew_solutions(conditions: Sequence[fmpz_mat], n: int) -> list[fmpz_mat]:
+    """The skew S with S F symmetric for each F of `conditions`: a basis."""
+    place = {pair: k for k, pair in enumerate(itertools.combinations(range(n), 2))}
+    rows = []
+    for condition in conditions:
+        columns = condition.transpose().tolist()
+        for i, j in place:
+            row = [fmpz(0)] * len(place)
+            for k in range(n):  # S[i, k] F[k, j] - S[j, k] F[k, i]
+                if k != i:
+                    row[place[min(i, k), max(i, k)]] += columns[j][k] if i < k else -columns[j][k]
+                if k != j:
+                    row[place[min(j, k), max(j, k)]] -= columns[i][k] if j < k else -columns[i][k]
+            rows.append(row)
+    found = []
+    for vector in nullspace(QQ, fmpq_mat(fmpz_mat(rows))):
+        S = fmpz_mat(n, n)
+        for (i, j), value in zip(place, primitive_integers(vector), strict=True):
+            S[i, j], S[j, i] = value, -value
+        found.append(S)
+    return found
+
+
+def _reduced(matrices: Sequence[fmpq_mat]) -> list[fmpq_mat]:
+    """A reduced basis of all integer matrices in the span; empty for zeros."""
+    lattice = fmpz_mat([primitive_integers(tuple(matrix.entries())) for matrix in matrices])
+    if not _is_saturated(lattice):
+        reduced = lattice.lll()
+        d = lattice.rank()
+        lattice = fmpz_mat(
+            d, lattice.ncols(), [entry for row in reduced.tolist()[len(matrices) - d :] for entry in row]
+        )
+        if d == 0:
+            return []
+        # c B is integral exactly if c G is, G the d x d Hermite form of the columns: G^-1 B generates all such c B.
+        G = fmpz_mat(lattice.transpose().hnf().tolist()[:d]).transpose()
+        lattice = (fmpq_mat(G).inv() * fmpq_mat(lattice)).numer_denom()[0]
+    shape = matrices[0].nrows(), matrices[0].ncols()
+    return [fmpq_mat(*shape, primitive_integers(tuple(map(fmpq, row)))) for row in lattice.lll().tolist()]
+
+
+def _is_saturated(lattice: fmpz_mat) -> bool:
+    """Whether every row has an entry 1 or -1 that is alone in its column: then the rows generate all integer points."""
+    rows = lattice.tolist()
+    alone = [sum(entry != 0 for entry in column) == 1 for column in lattice.transpose().tolist()]
+    return all(any(single and abs(entry) == 1 for entry, single in zip(row, alone, strict=True)) for row in rows)
+
+
+def _reason_against(hamiltonian: CubicHamiltonian) -> str:
+    """Why a system is not of the kind in which A is looked for; empty where it is."""
+    if hamiltonian.dim % 2:
+        return f"the dimension is {hamiltonian.dim}, expected an even one"
+    if not hamiltonian.is_homogeneous:
+        return "H is not a homogeneous cubic"
+    if hamiltonian.J.rank() < hamiltonian.dim:
+        return "J is singular, expected an invertible matrix"
+    return ""
+
+
+def _require_size(dim: int) -> None:
+    if dim > MAX_DIMENSION:
+        raise InputError(f"A is looked for in dimensions up to {MAX_DIMENSION}, found {dim}")
+
+
+def _pulled_back(H: fmpq_mpoly, T: fmpq_mat, names: Sequence[str]) -> fmpq_mpoly:
+    """H(T y) in the variables `names`."""
+    context = ring(names)
+    if T == _identity(T.nrows()):
+        return context.from_dict(H.to_dict())
+    return H.compose(*linear_combinations(T, context.gens()), ctx=context)
+
+
+def _other_names(names: Sequence[str]) -> tuple[str, ...]:
+    """y1, y2, ..., or yy1, ... where the system itself uses these."""
+    letters = "y"
+    while any(name.startswith(letters) for name in names):
+        letters += "y"
+    return tuple(f"{letters}{i + 1}" for i in range(len(names)))
+
+
+def _integral(matrix: fmpq_mat) -> fmpz_mat:
+    numerators: fmpz_mat = matrix.numer_denom()[0]
+    return numerators
+
+
+def _is_symmetric(matrix: fmpz_mat) -> bool:
+    return bool(matrix == matrix.transpose())
+
+
+def _combination(matrices: Sequence[Any], factors: Sequence[int]) -> Any:
+    total = matrices[0] * 0
+    for matrix, factor in zip(matrices, factors, strict=True):
+        if factor:
+            total = total + matrix * factor
+    return total
+
+
+def _identity(n: int) -> fmpq_mat:
+    return fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+
+
+def _is_zero(matrix: fmpq_mat) -> bool:
+    return not any(entry != 0 for entry in matrix.entries())
+
+
+def _bits(number: fmpq) -> int:
+    """The length of a number: 1 for 1, 0 for zero."""
+    return int(abs(number.p).bit_length() + number.q.bit_length()) - 1
+
+
+def _size(matrix: fmpq_mat) -> int:
+    return sum(map(_bits, matrix.entries()))
