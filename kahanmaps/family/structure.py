@@ -1,0 +1,68 @@
+"""The normal form of a system, declared or found: what fast orbits and the n-th iterate are made from.
+
+A member of the family has a normal form where chi has no repeated root. A system that was not declared a member is one all the same
+if linear algebra finds an A for its Hamiltonian (`hidden`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flint import fmpq_mat
+
+from kahanmaps.errors import HypothesisError
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member, reason_against
+from kahanmaps.family.planar import NormalForm, normal_form
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+_MAX_DIMENSION = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """A normal form with x = T S z; `T` is None where the form is in the system's own coordinates.
+
+    `declared` says whether the system came as a member of the family, `text` what the structure is.
+    """
+
+    form: NormalForm
+    T: fmpq_mat | None
+    declared: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class NoStructure:
+    """There is no normal form, with the reason."""
+
+    reason: str
+
+
+def structure_of(
+    system: QuadraticSystem, hamiltonian: CubicHamiltonian | None = None, member: FamilyMember | None = None
+) -> Structure | NoStructure:
+    """The normal form of a system, from what is known of it: a member, its Hamiltonian, or nothing.
+
+    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
+    >>> structure_of(system).text
+    'a hidden member of the family, chi = (t - 1)*(t - 2)*(t - 3)'
+    """
+    if system.dim > _MAX_DIMENSION:
+        return NoStructure(f"the dimension {system.dim} is above {_MAX_DIMENSION}")
+    declared, T = member is not None, None
+    if member is None:
+        hamiltonian = hamiltonian or hidden_hamiltonian(system)
+        found = None if hamiltonian is None else hidden_member(hamiltonian)
+        if found is None:
+            return NoStructure(reason_against(hamiltonian))
+        member = found.member
+        T = None if found.is_standard else found.T
+    try:
+        form = normal_form(member)
+    except HypothesisError:
+        return NoStructure("chi has a repeated root")
+    factors = "*".join(f"({factor})" for factor in member.factors)
+    return Structure(form, T, declared, f"{'a' if declared else 'a hidden'} member of the family, chi = {factors}")

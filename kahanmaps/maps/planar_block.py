@@ -1,0 +1,90 @@
+"""One plane of the normal form, and its Kahan map in homogeneous coordinates, without eps and without division.
+
+The Kahan map of u' = h_v, v' = -h_u for a binary cubic h = a u^3 + b u^2 v + c u v^2 + d v^3 depends on 2 eps (u, v) only.
+Write 2 eps (u, v) = (U/W, V/W). Then one step is
+
+    Psi(U : V : W) = (U W + h_V : V W - h_U : W^2 + D),      D = (3ac - b^2) U^2 + (9ad - bc) UV + (3bd - c^2) V^2,
+
+and the inverse step is the same with -W. It conserves the level h : W (W^2 + D), so that a point stays on the plane cubic
+
+    E:   h(U, V) = level * W (W^2 + D(U, V)),
+
+on which Psi is a translation. Let delta = disc(h) level^2. On the Jacobian
+
+    y^2 + 6 x y + 16 gamma y = x^3 + 3 gamma x^2,      gamma = 1 - delta,
+
+it is the translation by T = (0, 0); E is singular for delta = 0 and, three lines, for gamma = 0 (docs/mathematics.md).
+Elements may be of any field, or integers: there is nothing here but sums and products.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+Triple = tuple[Any, Any, Any]
+
+
+class PlanarBlock:
+    """Psi for the cubic with these four coefficients, elements of a field or integers.
+
+    >>> block = PlanarBlock(1, 0, 0, 1)
+    >>> block.image((1, 2, 1)), block.preimage(block.image((1, 2, 1)))
+    ((13, -1, 19), (244, 488, 244))
+    """
+
+    __slots__ = ("D", "a", "b", "c", "d", "_twice_b", "_twice_c", "_thrice_a", "_thrice_d")
+
+    def __init__(self, a: Any, b: Any, c: Any, d: Any) -> None:
+        self.a, self.b, self.c, self.d = a, b, c, d
+        self.D: Triple = (3 * a * c - b * b, 9 * a * d - b * c, 3 * b * d - c * c)
+        self._thrice_a, self._twice_b, self._twice_c, self._thrice_d = 3 * a, 2 * b, 2 * c, 3 * d
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether h = 0, so that Psi is the identity."""
+        return bool(self.a == 0 and self.b == 0 and self.c == 0 and self.d == 0)
+
+    @property
+    def discriminant(self) -> Any:
+        """disc(h) = b^2 c^2 - 4 a c^3 - 4 b^3 d + 18 abcd - 27 a^2 d^2."""
+        a, b, c, d = self.a, self.b, self.c, self.d
+        return b * b * c * c - 4 * (a * c * c * c + b * b * b * d) + 18 * (a * b * c * d) - 27 * (a * a * d * d)
+
+    def image(self, point: Sequence[Any]) -> Triple:
+        """Psi(U : V : W), content not removed; (0, 0, 0) where Psi has no value."""
+        U, V, W = point
+        UU, UV, VV = U * U, U * V, V * V
+        p, q, r = self.D
+        return (
+            U * W + self.b * UU + self._twice_c * UV + self._thrice_d * VV,
+            V * W - self._thrice_a * UU - self._twice_b * UV - self.c * VV,
+            W * W + p * UU + q * UV + r * VV,
+        )
+
+    def preimage(self, point: Sequence[Any]) -> Triple:
+        """The inverse of Psi at (U : V : W), content not removed."""
+        U, V, W = point
+        above, right, below = self.image((U, V, -W))
+        return -above, -right, below
+
+    def h(self, U: Any, V: Any) -> Any:
+        """The cubic form."""
+        return (self.a * U + self.b * V) * (U * U) + (self.c * U + self.d * V) * (V * V)
+
+    def level(self, point: Sequence[Any]) -> tuple[Any, Any]:
+        """The conserved ratio h : W (W^2 + D), numerator and denominator."""
+        U, V, W = point
+        p, q, r = self.D
+        return self.h(U, V), W * (W * W + p * (U * U) + q * (U * V) + r * (V * V))
+
+
+def determinant(P: Sequence[Any], Q: Sequence[Any], R: Sequence[Any]) -> Any:
+    """det(P, Q, R), zero for three points on a line."""
+    return P[0] * (Q[1] * R[2] - Q[2] * R[1]) - P[1] * (Q[0] * R[2] - Q[2] * R[0]) + P[2] * (Q[0] * R[1] - Q[1] * R[0])
+
+
+def same_point(P: Sequence[Any], Q: Sequence[Any], modulus: int | None = None) -> bool:
+    """Whether two triples are proportional (neither of them zero), as integers modulo `modulus` if it is given."""
+    minors = (P[0] * Q[1] - P[1] * Q[0], P[0] * Q[2] - P[2] * Q[0], P[1] * Q[2] - P[2] * Q[1])
+    return all((minor if modulus is None else minor % modulus) == 0 for minor in minors)
