@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_poly, fmpz
+from flint import fmpq, fmpq_mat, fmpq_poly
 
 from kahanmaps.algebra.fields import Element, Field, rational
 from kahanmaps.algebra.matrices import EntryMatrix, trace
@@ -147,11 +147,7 @@ class EtaleElement(Element):
         return EtaleElement(self.field, self.polynomial * other.polynomial % self.field.chi)
 
     def _over(self, other: EtaleElement) -> EtaleElement:
-        if (
-            other.polynomial.denom().bit_length()
-            + max(abs(c) for c in other.polynomial.numer().coeffs() or [fmpz(0)]).bit_length()
-            > _LONG
-        ):
+        if max((max(c.p.bit_length(), c.q.bit_length()) for c in other.polynomial.coeffs()), default=0) > _LONG:
             return self._over_long(other)
         common, inverse, _ = other.polynomial.xgcd(self.field.chi)
         if common.degree() != 0:
@@ -160,7 +156,7 @@ class EtaleElement(Element):
         return EtaleElement(self.field, self.polynomial * inverse % self.field.chi)
 
     def _over_long(self, other: EtaleElement) -> EtaleElement:
-        """The quotient by a linear system over Q: for long coefficients that is ten times as fast as Euclid's algorithm."""
+        """The quotient by a linear system over Q: ten times as fast as Euclid's algorithm for long coefficients."""
         try:
             solution = other.matrix.solve(fmpq_mat(self.field.degree, 1, self.coefficients))
         except ZeroDivisionError as error:

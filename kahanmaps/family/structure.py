@@ -1,7 +1,7 @@
 """The normal form of a system, declared or found: what fast orbits and the n-th iterate are made from.
 
-A member of the family has a normal form where chi has no repeated root. A system that was not declared a member is one all the same
-if linear algebra finds an A for its Hamiltonian (`hidden`).
+A member of the family has a normal form where chi has no repeated root. A system that was not declared a member is
+one all the same if linear algebra finds an A for its Hamiltonian (`hidden`).
 """
 
 from __future__ import annotations

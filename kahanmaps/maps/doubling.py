@@ -1,9 +1,10 @@
 """The n-th point of an orbit in a plane over Q, directly: windows of psi and chi, doubled along the binary digits of n.
 
-A window around i holds psi at i-3, ..., i+4 and chi at i-1, i, i+1. With the bilinear relation of `tau` for (a, b) = (k+1, k) and
-(k+1, k-1) it gives psi_{2k+1} and psi_{2k}, for a = i and b near i it gives chi_{i+b}: each new value is a difference of two products of four
-factors a quarter of its length. No number is longer than the result, and no content arises but of bad primes. The scales s_n stay
-unformed: t_n of the new window follows from t_n of the old one and from what was stripped.
+A window around i holds psi at i-3, ..., i+4 and chi at i-1, i, i+1. With the bilinear relation of `tau` for (a, b) =
+(k+1, k) and (k+1, k-1) it gives psi_{2k+1} and psi_{2k}, for a = i and b near i it gives chi_{i+b}: each new value is
+a difference of two products of four factors a quarter of its length. No number is longer than the result, and no
+content arises but of bad primes. The scales s_n stay unformed: t_n of the new window follows from t_n of the old one
+and from what was stripped.
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ def _doubled(start: TauStart, old: _Window, i: int, odd: int, wanted: range) -> 
     def bilinear(
         left: tuple[fmpq, fmpz], b_square: fmpz, right: tuple[fmpq, fmpz], a_square: fmpz, a: int, b: int
     ) -> tuple[fmpz, fmpz]:
-        """t_a phi_{a+1} phi_{a-1} psi_b^2 - t_b psi_{b+1} psi_{b-1} phi_a^2, with gamma where it belongs, and its denominator."""
+        """t_a phi_{a+1} phi_{a-1} psi_b^2 - t_b psi_{b+1} psi_{b-1} phi_a^2, with gamma, and its denominator."""
         first, second = left[0].p * right[0].q, right[0].p * left[0].q
         below = left[0].q * right[0].q
         if (a % 3 == 0) != (b % 3 == 0):

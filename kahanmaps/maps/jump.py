@@ -1,8 +1,8 @@
 """The n-th iterate of a Kahan map directly, without the iterates before it, for members of the family.
 
-In every plane of the normal form the map is a translation on a plane cubic, so n takes about log2(n) doublings: over Q in integers
-(`doubling`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles on the way are passed over, except over Q, where
-none goes unnoticed.
+In every plane of the normal form the map is a translation on a plane cubic, so n takes about log2(n) doublings: over
+Q in integers (`doubling`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles on the way are
+passed over, except over Q, where none goes unnoticed.
 """
 
 from __future__ import annotations
@@ -63,8 +63,9 @@ class Jump:
     def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
         """Phi^n(start) for n >= 0: over Q a PlanesPoint, if chi splits; otherwise the coordinates.
 
-        Raises SingularStep where the map has no value, over Q at any step, elsewhere at one of the first few or the last; PrecisionLost for
-        balls that are too wide; OverBudget, over Q, where the result would have more than `max_bits` bits.
+        Raises SingularStep where the map has no value, over Q at any step, elsewhere at one of the first few or the
+        last; PrecisionLost for balls that are too wide; OverBudget, over Q, where the result would have more than
+        `max_bits` bits.
         """
         if n < 0:
             raise InputError(f"found the step {n}, expected 0 or more (for the inverse map, change the sign of eps)")
@@ -215,7 +216,7 @@ def _stepped_over(block: PlanarBlock, start: Triple, n: int) -> Triple:
 
 
 def _around_cycle(block: PlanarBlock, start: Triple, n: int) -> Triple:
-    """P_n in a plane over a small finite field, where the orbit soon comes back or meets a pole. Raises SingularStep."""
+    """P_n over a small finite field, where orbits soon come back or meet a pole. Raises SingularStep."""
     point = start
     for k in range(1, n + 1):
         if k > _CYCLE:

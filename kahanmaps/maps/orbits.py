@@ -80,9 +80,10 @@ class Orbit:
     """The orbit of `start` under a Kahan map: iterate over it once, then look at `end`.
 
     `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit, even after the start came
-    back), `backward` steps by the inverse map. `max_digits` bounds the decimal digits of the integers over one
-    common denominator (over Q). With a `structure` (family.structure.structure_of) the orbit is walked in normal form: over Q plane
-    by plane, if chi splits there; over balls every point directly, so that balls do not widen from step to step.
+    back), `backward` steps by the inverse map. `max_digits` bounds the decimal digits of the integers over one common
+    denominator (over Q). With a `structure` (family.structure.structure_of) the orbit is walked in normal form: over
+    Q plane by plane, if chi splits there; over balls every point directly, so that balls do not widen from step to
+    step.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> orbit = Orbit(KahanMap(QuadraticSystem.from_text(["x"], ["x^2"]), "1/2"), ["1/5"], 3)
@@ -190,14 +191,15 @@ class Orbit:
 class Iterates:
     """Some iterates of a start, each reached directly, not by way of those before it: iterate once, then look at `end`.
 
-    `at` are the steps wanted, in increasing order; the rest is as for `Orbit`. Poles on the way are passed over, except over Q.
+    `at` are the steps wanted, in increasing order; the rest is as for `Orbit`. Poles on the way are passed over,
+    except over Q.
 
     >>> from kahanmaps.algebra.fields import GF
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
     >>> from kahanmaps.family.structure import structure_of
     >>> system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
-    >>> far = Iterates(KahanMap(system, "1/10", GF(10007)), [1, 2, 3, 4, 5, 6], [10**30], structure=structure_of(system))
-    >>> [point.text for point in far]
+    >>> kahan = KahanMap(system, "1/10", GF(10007))
+    >>> [point.text for point in Iterates(kahan, [1, 2, 3, 4, 5, 6], [10**30], structure=structure_of(system))]
     [['5212', '9799', '6471', '5788', '2175', '9896']]
     """
 

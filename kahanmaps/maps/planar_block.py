@@ -1,11 +1,12 @@
 """One plane of the normal form, and its Kahan map in homogeneous coordinates, without eps and without division.
 
-The Kahan map of u' = h_v, v' = -h_u for a binary cubic h = a u^3 + b u^2 v + c u v^2 + d v^3 depends on 2 eps (u, v) only.
-Write 2 eps (u, v) = (U/W, V/W). Then one step is
+The Kahan map of u' = h_v, v' = -h_u for a binary cubic h = a u^3 + b u^2 v + c u v^2 + d v^3 depends on 2 eps (u, v)
+only. Write 2 eps (u, v) = (U/W, V/W). Then one step is
 
     Psi(U : V : W) = (U W + h_V : V W - h_U : W^2 + D),      D = (3ac - b^2) U^2 + (9ad - bc) UV + (3bd - c^2) V^2,
 
-and the inverse step is the same with -W. It conserves the level h : W (W^2 + D), so that a point stays on the plane cubic
+and the inverse step is the same with -W. It conserves the level h : W (W^2 + D), so that a point stays on the plane
+cubic
 
     E:   h(U, V) = level * W (W^2 + D(U, V)),
 
@@ -33,7 +34,7 @@ class PlanarBlock:
     ((13, -1, 19), (244, 488, 244))
     """
 
-    __slots__ = ("D", "a", "b", "c", "d", "_twice_b", "_twice_c", "_thrice_a", "_thrice_d")
+    __slots__ = ("D", "_thrice_a", "_thrice_d", "_twice_b", "_twice_c", "a", "b", "c", "d")
 
     def __init__(self, a: Any, b: Any, c: Any, d: Any) -> None:
         self.a, self.b, self.c, self.d = a, b, c, d

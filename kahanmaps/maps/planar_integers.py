@@ -1,11 +1,11 @@
 """A plane over Q in integers: primitive triples, and steps whose common factor is known beforehand.
 
-h and the start are scaled such that h is a primitive integer form and (U, V, W) integers without a common factor;
-eps is in that scale. Psi(P_k) is quadratic in the triple P_k, and its content has to go, or the numbers would double
+h and the start are scaled such that h is a primitive integer form and (U, V, W) integers without a common factor; eps
+is in that scale. Psi(P_k) is quadratic in the triple P_k, and its content has to go, or the numbers would double
 their length with every step. **Content rule.** For primes that do not divide 6 disc(h) den(level) the content of
 Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (docs/mathematics.md proves it). So one divides by
-W_{k-1}, which is exact, and then strips the few bad primes, by residues: no gcd of large numbers. A division that leaves a
-remainder would be a mistake of ours; the lowest 64 bits are multiplied back each time.
+W_{k-1}, which is exact, and then strips the few bad primes, by residues: no gcd of large numbers. A division that
+leaves a remainder would be a mistake of ours; the lowest 64 bits are multiplied back each time.
 
 For disc(h) = 0 or level 0 the rule says nothing, but there numbers hardly grow, and gcds are cheap.
 """
@@ -63,7 +63,8 @@ class IntegerBlock:
     def delta(self) -> fmpq:
         """disc(h) level^2; the level cubic is singular where this is 0 or 1."""
         assert self.level is not None
-        return self.block.discriminant * self.level * self.level
+        found: fmpq = self.block.discriminant * self.level * self.level
+        return found
 
     @property
     def is_degenerate(self) -> bool:
@@ -77,7 +78,7 @@ class IntegerBlock:
         return radical(6 * self.block.discriminant, self.level.q)
 
     def triples(self, previous: IntegerTriple | None = None) -> Iterator[IntegerTriple]:
-        """P_0, P_1, ..., primitive, as long as the map has a value; by the content rule, or by gcds where it is silent."""
+        """P_0, P_1, ..., primitive, as long as there is a value; by the content rule, or by gcds where it is silent."""
         if self.is_constant:
             while True:
                 yield self.start

@@ -1,9 +1,10 @@
 """Rational points that are kept as their primitive triples in the planes; x is put together only when asked for.
 
-x_r = sum over i of (alpha_{ri} U_i + beta_{ri} V_i) / W_i with fixed rational alpha and beta. The numerators over the product of the W_i cost a
-few multiplications. In lowest terms they are after three more things: the gcds of the W_i among each other; the primes of the
-fixed numbers (denominators of alpha, beta and of the level, and h_i(beta, -alpha): a prime that divides alpha U + beta V and W divides h(U, V)
-too, so it divides h(beta, -alpha)); and, where h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W.
+x_r = sum over i of (alpha_{ri} U_i + beta_{ri} V_i) / W_i with fixed rational alpha and beta. The numerators over the
+product of the W_i cost a few multiplications. In lowest terms they are after three more things: the gcds of the W_i
+among each other; the primes of the fixed numbers (denominators of alpha, beta and of the level, and h_i(beta,
+-alpha): a prime that divides alpha U + beta V and W divides h(U, V) too, so it divides h(beta, -alpha)); and, where
+h_i(beta, -alpha) = 0, the gcd of alpha U + beta V and W.
 """
 
 from __future__ import annotations
@@ -152,7 +153,7 @@ class PlanesPoint:
         return pairs
 
     def _divisor(self, i: int, alpha: fmpz, beta: fmpz, known: dict[tuple[int, fmpq], fmpz]) -> fmpz:
-        """gcd(alpha U + beta V, W) but for fixed primes, in a plane where alpha U + beta V divides h: one gcd for all rows."""
+        """gcd(alpha U + beta V, W) but for fixed primes, where alpha U + beta V divides h: one gcd for all rows."""
         key = (i, fmpq(alpha, beta) if beta != 0 else fmpq(0))
         if key not in known:
             U, V, W = self.triples[i]
@@ -182,7 +183,7 @@ class PlanesPoint:
 
 
 def _common_part(above: fmpz, below: fmpz, modulus: fmpz) -> fmpz:
-    """The common divisor of two numbers that divides the modulus; with any one of its primes, it is all but a high power."""
+    """What two numbers and the modulus have in common: all of it, unless one of its primes is there to a high power."""
     residue = above % modulus
     common = modulus.gcd(residue) if residue != 0 else modulus
     return common if common == 1 else common.gcd(below % common)

@@ -39,8 +39,8 @@ class Plane:
 class Splitting:
     """The planes of a normal form over QQ, GF(p) or real balls, for the map with this eps (the time step is 2 eps).
 
-    `T` is the change x = T y from the coordinates y of the form, None for none. Raises BadPrime where there is no reduction
-    modulo p, or chi has a repeated root there.
+    `T` is the change x = T y from the coordinates y of the form, None for none. Raises BadPrime where there is no
+    reduction modulo p, or chi has a repeated root there.
     """
 
     def __init__(self, form: NormalForm, field: Field, eps: Any, T: fmpq_mat | None = None) -> None:
@@ -203,7 +203,8 @@ def _modulo(form: NormalForm, field: PrimeField) -> tuple[list[Plane], list[list
 def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[list[list[Any]]]]:
     planes, lifts = [], []
     slope = form.chi.derivative()
-    for root, _ in form.chi.complex_roots():
+    for found in form.chi.complex_roots():
+        root: Any = found[0]  # type: ignore[index]  # the stub has forgotten the multiplicity
         if root.imag < 0:
             continue
         real = bool(root.imag == 0)

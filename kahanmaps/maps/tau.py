@@ -4,8 +4,9 @@ On the level cubic E the orbit is P_n = P_0 + n T. For lifts of the points to tr
 
     P_{n+1} W_{n-1} = Psi(P_n)                                                     (natural lifts)
 
-the determinants factor, det(P_i, P_j, P_k) = (const) psi_{j-i} psi_{k-i} psi_{k-j} chi_{i+j+k}, into values psi_n = sigma(n T) and chi_n =
-sigma(n T - kappa) of one sigma function, kappa = -3 P_0 for the zero of E with which three points on a line have sum 0. So
+the determinants factor, det(P_i, P_j, P_k) = (const) psi_{j-i} psi_{k-i} psi_{k-j} chi_{i+j+k}, into values psi_n =
+sigma(n T) and chi_n = sigma(n T - kappa) of one sigma function, kappa = -3 P_0 for the zero of E with which three
+points on a line have sum 0. So
 
     P_n  ~  -2 psi_{n-1} psi_{n+1} chi_n P_0 + psi_n psi_{n+1} chi_{n-1} P_1 + psi_{n-1} psi_n chi_{n+1} P_{-1},
 
@@ -13,14 +14,15 @@ and for a + b and a - b everything is bilinear (phi is psi or chi; there are no 
 
     phi_{a+b} phi_{a-b} = phi_{a+1} phi_{a-1} psi_b^2 - psi_{b+1} psi_{b-1} phi_a^2.
 
-psi depends on delta = disc(h) level^2 alone: psi_1 = 1, psi_2 = 2, psi_3 = 3 gamma^(1/3), psi_4 = 4, gamma = 1 - delta. The cube roots are taken out:
-psi_n and chi_n are what is written here times gamma^(1/3) where 3 divides n, and then the square on the right is to be multiplied
-by gamma whose index alone of a, b is divisible by 3. For b = 2 this is a Somos-4 recursion, for a = b a doubling.
+psi depends on delta = disc(h) level^2 alone: psi_1 = 1, psi_2 = 2, psi_3 = 3 gamma^(1/3), psi_4 = 4, gamma = 1 -
+delta. The cube roots are taken out: psi_n and chi_n are what is written here times gamma^(1/3) where 3 divides n, and
+then the square on the right is to be multiplied by gamma whose index alone of a, b is divisible by 3. For b = 2 this
+is a Somos-4 recursion, for a = b a doubling.
 
-Steps follow the recursion, the n-th iterate the doublings, from a window of psi at i-3..i+4 and of chi at i-1, i, i+1 to one around 2i or
-2i + 1. Over Q the numbers would grow by powers of the bad primes like everything else here, with exponents quadratic in n.
-So a value is kept as an integer prime to the bad primes times a scale s_n that is never formed: only t_n = s_{n+1} s_{n-1} / s_n^2 is
-needed, a small rational number. docs/mathematics.md has the proofs.
+Steps follow the recursion, the n-th iterate the doublings, from a window of psi at i-3..i+4 and of chi at i-1, i, i+1
+to one around 2i or 2i + 1. Over Q the numbers would grow by powers of the bad primes like everything else here, with
+exponents quadratic in n. So a value is kept as an integer prime to the bad primes times a scale s_n that is never
+formed: only t_n = s_{n+1} s_{n-1} / s_n^2 is needed, a small rational number. docs/mathematics.md has the proofs.
 """
 
 from __future__ import annotations
@@ -28,7 +30,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any
 
 from flint import fmpq, fmpz
 
@@ -101,7 +102,8 @@ class TauStart:
             scales[k + 1] = t[k] * scales[k] * scales[k] / scales[k - 1]
 
         def det(i: int, j: int, k: int) -> fmpq:
-            return determinant(P[i], P[j], P[k]) * (scales[i] * scales[j] * scales[k])
+            found: fmpq = determinant(P[i], P[j], P[k]) * (scales[i] * scales[j] * scales[k])
+            return found
 
         chi = {0: 3 * det(-1, 0, 1), 1: det(-1, 0, 2), -1: det(-2, 0, 1), 2: det(-1, 1, 2), -2: det(-2, -1, 1)}
         self.usable = all(value != 0 for value in chi.values())
@@ -119,8 +121,8 @@ class TauStart:
     def point(self, chi: Sequence[fmpz], products: Sequence[fmpz], ratio: fmpq, next_ratio: fmpq) -> IntegerTriple:
         """P_n, primitive, from chi at n-1, n, n+1 and products of psi.
 
-        `products` are psi_{n-1} psi_{n+1}, psi_n psi_{n+1} and psi_{n-1} psi_n; `ratio` is (s_n/s_{n-1} of psi) over (that
-        of chi), `next_ratio` the same for n + 1.
+        `products` are psi_{n-1} psi_{n+1}, psi_n psi_{n+1} and psi_{n-1} psi_n; `ratio` is (s_n/s_{n-1} of psi) over
+        (that of chi), `next_ratio` the same for n + 1.
         """
         last = self._minus_scale / next_ratio
         common = ratio.q.lcm(last.q)
@@ -222,7 +224,7 @@ def _steps(block: IntegerBlock, start: TauStart) -> Iterator[IntegerTriple]:
 
 
 def somos(window: Window, bad: fmpz, gamma: fmpq) -> Iterator[tuple[fmpz, fmpq]]:
-    """phi_{n+2} and t_{n+1} for n from the last index but one of a window of four: phi_{n+2} phi_{n-2} = 4 phi_{n+1} phi_{n-1} - ..."""
+    """phi_{n+2} and t_{n+1}, from the last index but one of a window of four on: the Somos-4 recursion."""
     first, second, third, fourth = window.values
     n = window.first + 2
     t_before, t = window.t(n - 1), window.t(n)

@@ -1,10 +1,11 @@
 """The n-th point of an orbit in a plane over any field, directly: a translation on a plane cubic, by doublings.
 
-The formulas are those of `tau`, with natural lifts and without scales: over a finite field, or in balls, numbers do not grow. Where the
-level cubic is no translation of this kind the orbit moves on lines, on which Psi (or Psi^3, if the cubic is three lines) is a
-projective map: a 2 x 2 matrix to the power n.
+The formulas are those of `tau`, with natural lifts and without scales: over a finite field, or in balls, numbers do
+not grow. Where the level cubic is no translation of this kind the orbit moves on lines, on which Psi (or Psi^3, if
+the cubic is three lines) is a projective map: a 2 x 2 matrix to the power n.
 
-Poles are passed over: P_n is the value of the rational map Psi^n, also if an orbit that steps would have met W = 0 before.
+Poles are passed over: P_n is the value of the rational map Psi^n, also if an orbit that steps would have met W = 0
+before.
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ class NoTranslation(Exception):
 def iterate(block: PlanarBlock, start: Triple, n: int, is_zero: Callable[[Any], bool]) -> Triple:
     """P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
 
-    `is_zero` decides whether an element is zero. Raises SingularStep where a pole is met before `n`, as far as the orbit is stepped (a
-    few points from the start); NoTranslation where the orbit is periodic with a small period or meets too many special positions.
+    `is_zero` decides whether an element is zero. Raises SingularStep where a pole is met before `n`, as far as the
+    orbit is stepped (a few points from the start); NoTranslation where the orbit is periodic with a small period or
+    meets too many special positions.
 
     >>> from kahanmaps.algebra.fields import GF
     >>> F = GF(10007)
