@@ -101,7 +101,9 @@ _PRIME = 2**61 - 1
 
 def _divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
     """The solution of matrix x = right in lowest terms; `likely` is an integer whose powers may divide the minors."""
-    if 2 < matrix.nrows() <= _ELIMINATION_DIMENSION and likely.bit_length() >= _ELIMINATION_BITS:
+    if matrix.nrows() <= 3:
+        return _cramer(matrix, right)
+    if matrix.nrows() <= _ELIMINATION_DIMENSION and likely.bit_length() >= _ELIMINATION_BITS:
         found = _eliminate(matrix, right, likely)
         # The elimination assumes that certain divisions are exact. What makes the result certain is this: it is a
         # solution, and there is no other, since the determinant does not vanish modulo a prime.
@@ -117,6 +119,37 @@ def _divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | N
     except ZeroDivisionError:
         return None
     return IntegerPoint(tuple(column.entries()), denominator)
+
+
+def _cramer(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
+    """The solution in dimension 1, 2 or 3 by Cramer's rule; its common factor is found by gcds, with few numbers."""
+    n = matrix.nrows()
+    rows, sides = matrix.tolist(), right.entries()
+    if n == 1:
+        numerators, denominator = sides, rows[0][0]
+    elif n == 2:
+        (a, b), (c, d) = rows
+        numerators, denominator = [sides[0] * d - sides[1] * b, a * sides[1] - c * sides[0]], a * d - b * c
+    else:
+        (a, b, c), (d, e, f), (g, h, i) = rows
+        cofactors = (e * i - f * h, f * g - d * i, d * h - e * g)
+        denominator = a * cofactors[0] + b * cofactors[1] + c * cofactors[2]
+        r, s, t = sides
+        numerators = [
+            r * cofactors[0] + s * (c * h - b * i) + t * (b * f - c * e),
+            r * cofactors[1] + s * (a * i - c * g) + t * (c * d - a * f),
+            r * cofactors[2] + s * (b * g - a * h) + t * (a * e - b * d),
+        ]
+    if denominator == 0:
+        return None
+    common = denominator if denominator > 0 else -denominator
+    for numerator in numerators:
+        if common == 1:
+            break
+        common = common.gcd(numerator % common)
+    if denominator < 0:
+        common = -common
+    return IntegerPoint(tuple(numerator // common for numerator in numerators), denominator // common)
 
 
 def _eliminate(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
