@@ -35,6 +35,7 @@ SOURCES: dict[str, str] = {
     "sanz-serna-1994": (
         "J. M. Sanz-Serna. An unconventional symplectic integrator of W. Kahan. Appl. Numer. Math. 16 (1994), 245-250"
     ),
+    "ward-1948": "M. Ward. Memoir on elliptic divisibility sequences. Amer. J. Math. 70 (1948), 31-74",
     "fassbender-1999": (
         "H. Fassbender, D. S. Mackey, N. Mackey, H. Xu. Hamiltonian square roots of skew-Hamiltonian matrices. "
         "Linear Algebra Appl. 287 (1999), 125-159"
