@@ -1,0 +1,149 @@
+"""The number of points of an elliptic curve modulo small primes, by Schoof's algorithm, over a field of any size.
+
+For a curve y^2 = c(x) over q elements with q + 1 - t points the Frobenius map F, (x, y) -> (x^q, y^q), satisfies
+F^2 - t F + q = 0. This holds on the points of order l, whose x are the roots of the division polynomial f of degree
+(l^2 - 1)/2: one computes with (x, y) modulo f and y^2 = c, and tries t = 0, ..., l - 1. A number that has no inverse
+modulo f gives a divisor of f, which serves as well. FLINT's polynomials make it fast enough as it is.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flint import fmpz, fq_default_ctx, fq_default_poly_ctx
+
+Poly = Any
+Point = tuple[Poly, Poly] | None
+
+
+class _Divisor(Exception):
+    """A proper divisor of the modulus. Attribute: `divisor`."""
+
+    def __init__(self, divisor: Poly) -> None:
+        self.divisor = divisor
+        super().__init__()
+
+
+class _Torsion:
+    """Points (X, y Y) of y^2 = c = x^3 + A x + B with X and Y modulo f."""
+
+    def __init__(self, f: Poly, c: Poly, A: Any) -> None:
+        self.f, self.c, self.A = f, c % f, A
+
+    def inverse(self, value: Poly) -> Poly:
+        """1/value. Raises _Divisor."""
+        common, inverse, _ = value.xgcd(self.f)
+        if common.degree() > 0:
+            raise _Divisor(common)
+        return inverse % self.f
+
+    def add(self, P: Point, Q: Point) -> Point:
+        """P + Q. Raises _Divisor."""
+        if P is None or Q is None:
+            return Q if P is None else P
+        (X, Y), (Z, T), f = P, Q, self.f
+        if X != Z:
+            slope = (Y - T) * self.inverse((X - Z) % f) % f
+        elif Y == T:
+            slope = (3 * X * X + self.A) * self.inverse(2 * self.c * Y % f) % f
+        elif (Y + T) % f == 0 * f:
+            return None
+        else:
+            raise _Divisor((Y - T).gcd(f))
+        above = (slope * slope % f * self.c - X - Z) % f
+        return above, (slope * (X - above) - Y) % f
+
+    def multiple(self, n: int, P: Point) -> Point:
+        """n P for n >= 0. Raises _Divisor."""
+        total: Point = None
+        for bit in bin(n)[2:]:
+            total = self.add(total, total)
+            if bit == "1":
+                total = self.add(total, P)
+        return total
+
+
+def trace_modulo(a2: Any, a4: Any, a6: Any, context: fq_default_ctx, bound: int) -> tuple[int, int]:
+    """(t, M): the trace t modulo M of y^2 = x^3 + a2 x^2 + a4 x + a6, M the first product 2 3 5 7 ... >= `bound`.
+
+    The field has characteristic at least 5.
+
+    >>> K = fq_default_ctx(10007, 1)
+    >>> trace_modulo(K(0), K(1), K(1), K, 100)
+    (153, 210)
+    """
+    q = int(context.order())
+    A = a4 - a2 * a2 / 3
+    B = a6 - a2 * a4 / 3 + 2 * a2 * a2 * a2 / 27
+    ring = fq_default_poly_ctx(context)
+    x = ring([0, 1])  # type: ignore[arg-type]
+    c = x * x * x + A * x + B
+    divisions = _DivisionPolynomials(x, c, A, B)
+    odd = (pow(x, q, c) - x).gcd(c).degree() == 0
+    trace, modulus, prime = int(odd), 2, 2
+    while modulus < bound:
+        prime = next(n for n in range(prime + 1, 2 * prime) if fmpz(n).is_prime())
+        if q % prime == 0:
+            continue
+        found = _trace_at(prime, divisions[prime], x, c, A, q)
+        trace += modulus * ((found - trace) * pow(modulus, -1, prime) % prime)
+        modulus *= prime
+    return trace, modulus
+
+
+def _trace_at(prime: int, f: Poly, x: Poly, c: Poly, A: Any, q: int) -> int:
+    """The trace modulo an odd prime; f is its division polynomial."""
+    while True:
+        torsion = _Torsion(f, c, A)
+        try:
+            return _matching_trace(prime, torsion, x, q)
+        except _Divisor as found:
+            f = found.divisor
+
+
+def _matching_trace(prime: int, torsion: _Torsion, x: Poly, q: int) -> int:
+    """The t that fits on the points where f is 0. Raises _Divisor."""
+    f = torsion.f
+    one = 0 * x + 1
+    once = (pow(x % f, q, f), pow(torsion.c, (q - 1) // 2, f))
+    twice = (pow(once[0], q, f), once[1] * pow(once[1], q, f) % f)
+    wanted = torsion.add(twice, torsion.multiple(q % prime, (x % f, one)))
+    if wanted is None:
+        return 0
+    image: Point = None
+    for trace in range(1, prime // 2 + 1):
+        image = torsion.add(image, once)
+        assert image is not None
+        if image[0] == wanted[0]:
+            return trace if image[1] == wanted[1] else prime - trace
+    raise AssertionError("no trace of Frobenius fits: it would be a mistake of ours")
+
+
+class _DivisionPolynomials:
+    """psi_n for odd n, psi_n / (2y) for even n, as polynomials in x."""
+
+    def __init__(self, x: Poly, c: Poly, A: Any, B: Any) -> None:
+        xx = x * x
+        xxx = xx * x
+        self._square = 16 * c * c
+        self._known: dict[int, Poly] = {
+            -1: 0 * x - 1,
+            0: 0 * x,
+            1: 0 * x + 1,
+            2: 0 * x + 1,
+            3: 3 * xx * xx + 6 * A * xx + 12 * B * x - A * A,
+            4: 2
+            * (xxx * xxx + 5 * A * xx * xx + 20 * B * xxx - 5 * A * A * xx - 4 * A * B * x - 8 * B * B - A * A * A),
+        }
+
+    def __getitem__(self, n: int) -> Poly:
+        if n not in self._known:
+            m, odd = divmod(n, 2)
+            if odd:
+                left = self[m + 2] * self[m] * self[m] * self[m]
+                right = self[m - 1] * self[m + 1] * self[m + 1] * self[m + 1]
+                self._known[n] = left - right * self._square if m % 2 else left * self._square - right
+            else:
+                bracket = self[m + 2] * self[m - 1] * self[m - 1] - self[m - 2] * self[m + 1] * self[m + 1]
+                self._known[n] = self[m] * bracket
+        return self._known[n]

@@ -1,0 +1,337 @@
+"""Many orbits modulo a prime at once, and long single ones.
+
+Specified here: points, and where orbits end, are those of the exact orbit over GF(p), for every kernel and both ways of
+stepping; the arithmetic under it is right at the edges of what its doubles can hold; single orbits, and their periods.
+"""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+from flint import fmpq_poly
+from helpers import EULER_TOP, FORCED_PLANE, HENON_HEILES, LORENZ, LOTKA_VOLTERRA
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.planar import normal_form
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.modular import Arithmetic, ModularEnsemble, modular_orbit
+from kahanmaps.maps.modular_numba import kernels
+from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.periods import orbit_period
+
+MERSENNE = 2**61 - 1
+over_kernels = pytest.mark.parametrize("kernel", ["numpy", "numba"])
+
+
+@pytest.fixture(autouse=True)
+def _numba_where_it_is_asked_for(request):
+    if "numba" in request.node.name:
+        pytest.importorskip("numba")
+
+
+SPLIT = draw_with_eigenvalues([1, -2], seed=7)
+MEMBERS = {
+    "1,-2": SPLIT,
+    "1,-2,3": draw_with_eigenvalues([1, -2, 3], seed=3),
+    "t^2 + 1": draw_with_chi(fmpq_poly([1, 0, 1]), seed=5),
+}
+FORMS = {name: normal_form(member) for name, member in MEMBERS.items()}
+
+
+def exact(system, eps, start, prime, steps, backward=False):
+    """The last point, its index and whether the orbit ended there, by exact steps over GF(p)."""
+    orbit = Orbit(KahanMap(system, eps, GF(prime)), start, steps, backward=backward)
+    *_, last = orbit
+    return [int(entry) for entry in last.x], last.step, orbit.end.status == "singular"
+
+
+def assert_exact(ensemble, system, eps, starts, steps, backward=False):
+    x, at, counts = ensemble.x.tolist(), ensemble.singular_at.tolist(), ensemble.step_counts.tolist()
+    ended = 0
+    for i, start in enumerate(starts):
+        point, index, singular = exact(system, eps, start, ensemble.prime, steps, backward)
+        assert (x[i], counts[i]) == (point, index)
+        assert at[i] == (index if singular else -1)
+        assert ensemble.status[i] == ("singular" if singular else "completed")
+        ended += singular
+    return ended
+
+
+def random_starts(rng, prime, dim, count):
+    return [[rng.randrange(prime) for _ in range(dim)] for _ in range(count)]
+
+
+@over_kernels
+@pytest.mark.parametrize("prime", [3, 5, 7, 31, 101, 65_537, 2**31 - 1, 2**31 + 11, 2**60 + 33, MERSENNE])
+@pytest.mark.parametrize("name", MEMBERS)
+def test_orbits_of_members_are_the_exact_ones_and_end_where_those_end(name, prime, kernel):
+    system, form, rng = MEMBERS[name].chosen.system, FORMS[name], random.Random(prime)
+    try:
+        KahanMap(system, "1/11", GF(prime))
+    except BadPrime:
+        pytest.skip("no reduction")
+    starts = random_starts(rng, prime, form.dim, 40)
+    for given in (form, None):
+        ensemble = ModularEnsemble(system, "1/11", starts, prime, form=given, kernel=kernel)
+        ensemble.advance(3)
+        ensemble.advance(9)
+        ended = assert_exact(ensemble, system, "1/11", starts, 12)
+        assert ended > 0 or prime > 101
+        assert ended < 40 or prime < 7
+        assert (ensemble.steps, ensemble.kernel, len(ensemble)) == (12, kernel, 40)
+
+
+@over_kernels
+@pytest.mark.parametrize(
+    "system", [LOTKA_VOLTERRA, LORENZ, HENON_HEILES, EULER_TOP, FORCED_PLANE], ids=["LV", "L", "HH", "ET", "FP"]
+)
+@pytest.mark.parametrize("prime", [11, 101, 2**31 - 1, MERSENNE])
+def test_orbits_of_any_quadratic_system_are_the_exact_ones_forward_and_backward(system, prime, kernel):
+    starts = random_starts(random.Random(prime), prime, system.dim, 30)
+    for backward in (False, True):
+        ensemble = ModularEnsemble(system, "1/7", starts, prime, kernel=kernel, backward=backward)
+        ensemble.advance(10)
+        assert ensemble.method == "elimination"
+        assert_exact(ensemble, system, "1/7", starts, 10, backward)
+
+
+@over_kernels
+def test_a_step_back_undoes_a_step_in_the_planes(kernel):
+    system, form = SPLIT.chosen.system, FORMS["1,-2"]
+    starts = random_starts(random.Random(1), MERSENNE, 4, 20)
+    there = ModularEnsemble(system, "1/10", starts, MERSENNE, form=form, kernel=kernel)
+    there.advance(50)
+    back = ModularEnsemble(system, "1/10", there.x, MERSENNE, form=form, kernel=kernel, backward=True)
+    back.advance(50)
+    assert back.x.tolist() == starts
+    back.advance(1)
+    assert back.x.tolist() != starts
+
+
+def test_the_planes_are_used_where_chi_splits_and_else_the_elimination():
+    system, form = MEMBERS["t^2 + 1"].chosen.system, FORMS["t^2 + 1"]
+    starts = random_starts(random.Random(1), 29, 4, 3)
+    assert ModularEnsemble(system, 1, starts, 29, form=form, kernel="numpy").method == "planes"
+    assert ModularEnsemble(system, 1, starts, 31, form=form, kernel="numpy").method == "elimination"
+    # 1 = -2 modulo 3.
+    assert (
+        ModularEnsemble(SPLIT.chosen.system, 1, starts, 3, form=FORMS["1,-2"], kernel="numpy").method == "elimination"
+    )
+
+
+def test_modulo_2_there_is_one_kernel():
+    system = LORENZ.scaled(3)
+    starts = [[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)]
+    ensemble = ModularEnsemble(system, 3, starts, 2)
+    ensemble.advance(4)
+    assert ensemble.kernel == "numpy"
+    assert_exact(ensemble, system, 3, starts, 4)
+
+
+@over_kernels
+def test_large_ensembles_go_in_pieces_with_the_same_result(kernel):
+    system, form = SPLIT.chosen.system, FORMS["1,-2"]
+    x = np.random.default_rng(1).integers(0, 97, (9001, 4))
+    whole = ModularEnsemble(system, "1/10", x, 97, form=form, kernel=kernel)
+    whole.advance(20)
+    part = ModularEnsemble(system, "1/10", x[8000:], 97, kernel="numpy")
+    part.advance(20)
+    assert whole.x[8000:].tolist() == part.x.tolist()
+    assert whole.singular_at[8000:].tolist() == part.singular_at.tolist()
+    assert 0 < (whole.singular_at < 0).sum() < 9001
+
+
+def test_threads_share_the_orbits_among_them_numba():
+    system, form = SPLIT.chosen.system, FORMS["1,-2"]
+    x = np.random.default_rng(1).integers(0, 97, (101, 4))
+    for given in (form, None):
+        one = ModularEnsemble(system, "1/10", x, 97, form=given, kernel="numba")
+        three = ModularEnsemble(system, "1/10", x, 97, form=given, kernel="numba", threads=3)
+        for ensemble in (one, three):
+            ensemble.advance(4)
+            ensemble.advance(5)
+        assert one.x.tolist() == three.x.tolist()
+        assert one.singular_at.tolist() == three.singular_at.tolist()
+    with pytest.raises(InputError, match="0 threads"):
+        ModularEnsemble(system, "1/10", x, 97, threads=0)
+
+
+def test_starts_are_exact_numbers_or_integers_of_any_sign():
+    system = SPLIT.chosen.system
+    numbers = ModularEnsemble(system, "1/10", [["1/2", -3, 0, 1]], 101, kernel="numpy")
+    integers = ModularEnsemble(system, "1/10", np.array([[51, -3, 101, -100]]), 101, kernel="numpy")
+    assert numbers.x.tolist() == integers.x.tolist() == [[51, 98, 0, 1]]
+    assert numbers.x.dtype == np.int64
+
+
+def test_no_orbit_at_all_is_an_ensemble_too():
+    ensemble = ModularEnsemble(LORENZ, "1/10", [], 101, kernel="numpy")
+    ensemble.advance(2)
+    assert ensemble.x.shape == (0, 3)
+
+
+WRONG = [
+    ({"prime": 2**61 + 15}, "62 bits"),
+    ({"prime": 91}, "composite"),
+    ({"kernel": "fortran"}, "numpy or numba"),
+    ({"starts": [[1, 2]]}, "2 coordinates"),
+    ({"starts": np.array([[1, 2]])}, "shape"),
+    ({"form": FORMS["1,-2,3"]}, "another system"),
+    ({"eps": 0}, "eps = 0"),
+    ({"eps": 101}, "divides"),
+    ({"eps": 0.5}, "0.5"),
+]
+
+
+@pytest.mark.parametrize(("change", "sentence"), WRONG)
+def test_what_cannot_be_done_is_refused_with_a_reason(change, sentence):
+    given = {"starts": [[1, 2, 3, 4]], "eps": "1/10", "prime": 101, "form": None, "kernel": "numpy"} | change
+    with pytest.raises(InputError, match=sentence):
+        ModularEnsemble(
+            SPLIT.chosen.system,
+            given["eps"],
+            given["starts"],
+            given["prime"],
+            form=given["form"],
+            kernel=given["kernel"],
+        )
+
+
+# Arithmetic.
+
+PRIMES = [
+    3,
+    101,
+    2**31 - 1,
+    2**31 + 11,
+    2**32 - 5,
+    2**45 - 55,
+    2**52 - 47,
+    2**53 - 111,
+    2**60 - 93,
+    2**61 - 31,
+    MERSENNE,
+]
+
+
+def hard(prime, rng, count):
+    """Residues, many of them near the ends, near p/2, and near multiples of 2^31."""
+    near = [0, prime - 1, prime // 2, 2**31, 2**31 - 1, (prime >> 31) << 31, ((prime >> 31) << 31) - 1, 2**52, 2**53]
+    chosen = [(rng.choice(near) + rng.randint(-2, 2)) % prime if rng.random() < 0.6 else rng.randrange(prime)]
+    for _ in range(count - 1):
+        chosen.append((rng.choice(near) + rng.randint(-2, 2)) % prime if rng.random() < 0.6 else rng.randrange(prime))
+    return chosen
+
+
+@pytest.mark.parametrize("prime", PRIMES)
+def test_sums_of_products_are_exact_also_at_the_ends(prime):
+    rng, arithmetic = random.Random(prime), Arithmetic(prime)
+    for terms in (1, 2, 3, 4):
+        columns = [hard(prime, rng, 20_000) for _ in range(2 * terms)]
+        arrays = [arithmetic.array(column) for column in columns]
+        lefts, rights = map(arithmetic.left, arrays[::2]), map(arithmetic.right, arrays[1::2])
+        found = arithmetic.dot(*zip(lefts, rights, strict=True)).tolist()
+        pairs = list(zip(columns[::2], columns[1::2], strict=True))
+        expected = [sum(a[i] * b[i] for a, b in pairs) % prime for i in range(20_000)]
+        assert found == expected
+
+
+@pytest.mark.parametrize("prime", PRIMES)
+def test_a_product_next_to_a_multiple_of_p_is_reduced_rightly(prime):
+    rng, arithmetic = random.Random(prime), Arithmetic(prime)
+    a = [rng.randrange(1, prime) for _ in range(3000)]
+    # The products are -2, ..., 2 modulo p.
+    b = [pow(entry, -1, prime) * rng.randint(-2, 2) % prime for entry in a]
+    found = arithmetic.mul(arithmetic.array(a), arithmetic.array(b)).tolist()
+    assert found == [x * y % prime for x, y in zip(a, b, strict=True)]
+
+
+@pytest.mark.parametrize("prime", PRIMES)
+def test_many_inverses_from_one_division(prime):
+    arithmetic, rng = Arithmetic(prime), random.Random(1)
+    for count in (1, 2, 3, 7, 1000):
+        values = [rng.randrange(1, prime) for _ in range(count)]
+        found = arithmetic.inverses(arithmetic.array(values)).tolist()
+        assert [a * b % prime for a, b in zip(values, found, strict=True)] == [1 % prime] * count
+
+
+@pytest.mark.parametrize("prime", PRIMES)
+def test_sums_and_negatives_stay_below_p(prime):
+    arithmetic, values = Arithmetic(prime), hard(prime, random.Random(1), 1000)
+    a, b = arithmetic.array(values), arithmetic.array(values[::-1])
+    assert arithmetic.add(a, b).tolist() == [(x + y) % prime for x, y in zip(values, values[::-1], strict=True)]
+    assert arithmetic.negative(a).tolist() == [-x % prime for x in values]
+
+
+@pytest.mark.parametrize("prime", PRIMES)
+def test_compiled_products_are_exact_too_numba(prime):
+    _, _, inner_product = kernels()
+    rng = random.Random(prime)
+    n, R = np.uint64(-pow(prime, -1, 2**64) % 2**64), 2**64
+    rows, x = hard(prime, rng, 4000), hard(prime, rng, 4)
+    for first in range(0, 4000, 4):
+        row = rows[first : first + 4]
+        found = int(inner_product(np.array(row, np.uint64), np.array(x, np.uint64), np.uint64(prime), n))
+        assert found * R % prime == sum(a * b for a, b in zip(row, x, strict=True)) % prime
+        assert found < prime
+
+
+# One orbit.
+
+
+@pytest.mark.parametrize("kernel", ["python", "numba"])
+@pytest.mark.parametrize("prime", [101, 2**31 - 1, MERSENNE])
+def test_a_single_orbit_ends_at_the_point_of_the_exact_orbit(kernel, prime):
+    form, system = FORMS["1,-2,3"], MEMBERS["1,-2,3"].chosen.system
+    for start in random_starts(random.Random(prime), prime, 6, 8):
+        found = modular_orbit(form, "1/10", start, prime, 40, kernel=kernel)
+        point, index, singular = exact(system, "1/10", start, prime, 40)
+        assert (list(found.x), found.steps, found.status == "singular") == (point, index, singular)
+        assert found.kernel == kernel
+
+
+@pytest.mark.parametrize("prime", [31, 2**89 - 1])
+def test_a_single_orbit_needs_no_split_chi_and_no_small_prime(prime):
+    form, system = FORMS["t^2 + 1"], MEMBERS["t^2 + 1"].chosen.system
+    for start in random_starts(random.Random(prime), prime, 4, 8):
+        found = modular_orbit(form, "1/10", start, prime, 20)
+        point, index, singular = exact(system, "1/10", start, prime, 20)
+        assert (list(found.x), found.steps, found.status == "singular") == (point, index, singular)
+        assert found.kernel == "python"
+        if singular:
+            assert found.message == f"det(I - eps f'(x)) = 0 at step {index}: the map has no value there"
+
+
+def test_what_a_single_orbit_cannot_have_is_refused():
+    with pytest.raises(InputError, match="python or numba"):
+        modular_orbit(FORMS["1,-2"], 1, [1, 2, 3, 4], 101, 5, kernel="numpy")
+    with pytest.raises(InputError, match="splits"):
+        modular_orbit(FORMS["t^2 + 1"], 1, [1, 2, 3, 4], 31, 5, kernel="numba")
+    with pytest.raises(InputError, match="steps"):
+        modular_orbit(FORMS["1,-2"], 1, [1, 2, 3, 4], 101, -5)
+
+
+def test_a_million_steps_with_numba_end_where_two_halves_end_numba():
+    form, start = FORMS["1,-2"], ["1/2", "-1/3", 0, 1]
+    whole = modular_orbit(form, "1/10", start, MERSENNE, 10**6)
+    assert (whole.kernel, whole.status) == ("numba", "completed")
+    half = modular_orbit(form, "1/10", start, MERSENNE, 5 * 10**5)
+    assert modular_orbit(form, "1/10", half.x, MERSENNE, 5 * 10**5).x == whole.x
+
+
+def test_a_period_found_without_walking_is_walked_numba():
+    form, prime, rng, walked = FORMS["1,-2"], 2003, random.Random(6), 0
+    for start in random_starts(rng, prime, 4, 40):
+        found = orbit_period(form, "1/10", start, prime)
+        if found.meets_pole is not False or found.period is None:
+            continue
+        orbit = modular_orbit(form, "1/10", start, prime, found.period, kernel="numba")
+        assert (list(orbit.x), orbit.status) == (start, "completed")
+        for divisor in {p for p in (2, 3, 5, 7) if found.period % p == 0}:
+            assert list(modular_orbit(form, "1/10", start, prime, found.period // divisor).x) != start
+        walked += 1
+    assert walked > 2
