@@ -1,7 +1,7 @@
 """The n-th iterate of a Kahan map directly, without the iterates before it, for members of the family.
 
 In every plane of the normal form the map is a translation on a plane cubic, so n takes about log2(n) doublings: over
-Q in integers (`doubling`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles on the way are
+Q in integers (`tau_table`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles on the way are
 passed over, except over Q, where none goes unnoticed.
 """
 
@@ -18,7 +18,7 @@ from flint import fmpq, fmpz
 from kahanmaps.algebra.fields import QQ, BallField, Field, PrimeField
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep
 from kahanmaps.family.structure import Structure
-from kahanmaps.maps import doubling, tau, translation
+from kahanmaps.maps import tau_table, translation
 from kahanmaps.maps.normal_steps import NormalSteps, splits
 from kahanmaps.maps.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.planar_integers import IntegerBlock, IntegerTriple, primitive
@@ -130,7 +130,7 @@ class Jump:
 
 def _stepped(block: IntegerBlock, n: int) -> IntegerTriple:
     """P_n by steps. Raises SingularStep."""
-    points = list(islice(tau.triples(block), n + 1))
+    points = list(islice(tau_table.triples(block), n + 1))
     if len(points) <= n:
         raise SingularStep(f"the map has no value at step {len(points) - 1}")
     return points[n]
@@ -142,7 +142,7 @@ def _rational_iterate(block: IntegerBlock, n: int) -> IntegerTriple:
         return block.start
     if n <= _SHORT or block.level is None:
         return _stepped(block, n)
-    found = doubling.iterate(block, n)
+    found = tau_table.iterate(block, n)
     if found is None:
         cubic = block.block
         over_field = PlanarBlock(*(fmpq(entry) for entry in (cubic.a, cubic.b, cubic.c, cubic.d)))
@@ -172,7 +172,7 @@ def _require_orbit(block: IntegerBlock, n: int, found: IntegerTriple) -> None:
             if not same_point([entry % prime for entry in found], point, prime):
                 raise ArithmeticError("the n-th iterate disagrees with the orbit modulo a prime: please report this")
             return
-        exact = doubling.iterate(block, pole) if pole > _SHORT else _stepped(block, pole)
+        exact = tau_table.iterate(block, pole) if pole > _SHORT else _stepped(block, pole)
         if exact is not None and exact[2] == 0:
             raise SingularStep(f"the map has no value at step {pole - 1}")
     raise ArithmeticError("the orbit modulo eight primes met a pole: please report this")

@@ -13,7 +13,7 @@ from kahanmaps.family.structure import Structure
 from kahanmaps.maps.planar_integers import IntegerBlock
 from kahanmaps.maps.planes_point import Assembly, PlanesPoint
 from kahanmaps.maps.splitting import Splitting
-from kahanmaps.maps.tau import triples
+from kahanmaps.maps.tau_table import triples
 
 
 class NormalSteps:

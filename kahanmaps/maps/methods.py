@@ -1,0 +1,85 @@
+"""Which way an orbit is computed: generic, in normal form, or by jumps; chosen from what is asked for, with the reason.
+
+* generic: linear solves; for every quadratic system.
+* normal-form: plane by plane, for members of the family with distinct roots; over Q where chi splits there.
+* jump: each point wanted directly, by doublings; the same members, any chi.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kahanmaps.algebra.fields import QQ, Field
+from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.maps.splitting import Splitting
+
+METHODS = ("generic", "normal-form", "jump")
+# From here on a jump is faster than steps: over Q, and modulo p, where steps do not pass poles silently.
+_JUMP_FROM = {"exact": 24, "mod": 10_000, "ball": 1}
+
+
+@dataclass(frozen=True)
+class Method:
+    """The name of a method and, in a sentence, why it was taken."""
+
+    name: str
+    reason: str
+
+    @property
+    def text(self) -> str:
+        """One line for people."""
+        return f"method {self.name}: {self.reason}"
+
+
+def choose_method(
+    wish: str | None, arithmetic: str, structure: Structure | NoStructure, at: Sequence[int] | None
+) -> Method:
+    """The method for an orbit in "exact", "mod", "ball" or "float" arithmetic; `at` has the steps, if only some count.
+
+    Raises InputError where the wish cannot be met.
+
+    >>> choose_method(None, "exact", NoStructure("H is not a homogeneous cubic"), None).text
+    'method generic: no normal form (H is not a homogeneous cubic)'
+    """
+    if wish is not None and wish not in METHODS:
+        raise InputError(f"found the method {wish!r}, expected one of {', '.join(METHODS)}")
+    if wish == "generic":
+        return Method("generic", "as asked for")
+    if isinstance(structure, NoStructure):
+        if wish is not None:
+            raise InputError(f"the method {wish} needs a normal form, and there is none: {structure.reason}")
+        return Method("generic", f"no normal form ({structure.reason})")
+    if wish == "jump" and (at is None or arithmetic == "float"):
+        raise InputError("the method jump is for --at N1,N2,... in exact, mod:P or ball arithmetic")
+    over_Q = "" if arithmetic != "exact" else _why_not_over_Q(structure)
+    if wish == "normal-form" and over_Q:
+        raise InputError(f"the method normal-form needs planes over Q, and {over_Q}: take generic, or jump with --at")
+    if wish == "normal-form" and arithmetic == "mod":
+        raise InputError("modulo P there are the methods generic and jump")
+    if wish is not None:
+        return Method(wish, structure.text)
+    if arithmetic == "float":
+        return Method("normal-form", structure.text)
+    if at is not None and max(at, default=0) >= _JUMP_FROM[arithmetic]:
+        return Method("jump", f"{structure.text}; each iterate by doublings")
+    if arithmetic == "mod":
+        return Method("generic", "few steps modulo P")
+    if over_Q:
+        return Method("generic", over_Q)
+    return Method("normal-form", structure.text)
+
+
+def _why_not_over_Q(structure: Structure) -> str:
+    degrees = [plane.degree for plane in Splitting(structure.form, QQ, 1, structure.T).planes]
+    return "" if max(degrees) == 1 else f"chi does not split over Q (a factor has degree {max(degrees)})"
+
+
+def why_no_reduction(structure: Structure, field: Field, eps: object) -> str:
+    """Empty where the structure can be used over the field, otherwise the reason (a bad prime)."""
+    try:
+        Splitting(structure.form, field, eps, structure.T)
+    except BadPrime as error:
+        return str(error)
+    return ""
