@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from flint import fmpq, fmpz
 
 from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.planar_integers import IntegerBlock, IntegerTriple, content, radical
+from kahanmaps.maps.planar_integers import IntegerBlock, IntegerTriple, content, radical, without
 
 # Powers of the fixed primes up to this one are found in one residue.
 _POWER = 3
@@ -30,6 +30,14 @@ class _Row:
     below: fmpz
     fixed: fmpz
     dividing: tuple[int, ...]  # the planes whose h the form divides
+
+    def over(self, scaled: dict[int, tuple[fmpz, fmpz]], product: fmpz) -> tuple[fmpz, fmpz]:
+        """Numerator and denominator, from U_i and V_i times the other W of the support, and the product of all."""
+        above = fmpz(0)
+        for i, (alpha, beta) in zip(self.support, self.forms, strict=True):
+            U, V = scaled[i]
+            above += alpha * U + beta * V
+        return above, self.below * product
 
 
 class Assembly:
@@ -102,7 +110,7 @@ class PlanesPoint:
         for row in self._assembly.rows:
             below = below.lcm(row.below)
         everything = tuple(range(len(self.triples)))
-        scaled, product = self._scaled(everything)
+        scaled, product = _scaled(self.triples, everything)
         numerators = []
         for row in self._assembly.rows:
             factor = below // row.below
@@ -124,31 +132,33 @@ class PlanesPoint:
     def lowest_terms(self) -> list[tuple[fmpz, fmpz]]:
         """Numerator and denominator of each coordinate, reduced, denominators positive."""
         modulus = (self._assembly.fixed * _shared([W for _, _, W in self.triples])) ** _POWER
+        residues = [(U % modulus, V % modulus, W % modulus) for U, V, W in self.triples]
         sets: dict[tuple[int, ...], tuple[dict[int, tuple[fmpz, fmpz]], fmpz]] = {}
+        small: dict[tuple[int, ...], tuple[dict[int, tuple[fmpz, fmpz]], fmpz]] = {}
         divisors: dict[tuple[int, fmpq], fmpz] = {}
-        quotients: dict[tuple[tuple[int, ...], fmpz], fmpz] = {}
         pairs = []
         for row in self._assembly.rows:
             if row.support not in sets:
-                sets[row.support] = self._scaled(row.support)
-            scaled, product = sets[row.support]
-            above, common = fmpz(0), fmpz(1)
-            for i, (alpha, beta) in zip(row.support, row.forms, strict=True):
-                U, V = scaled[i]
-                above += alpha * U + beta * V
-                if i in row.dividing:
-                    common = common * self._divisor(i, alpha, beta, divisors)
+                sets[row.support] = _scaled(self.triples, row.support)
+                small[row.support] = _scaled(residues, row.support)
+            above, below = row.over(*sets[row.support])
             if above == 0:
                 pairs.append((above, fmpz(1)))
                 continue
+            common = fmpz(1)
+            for i, (alpha, beta) in zip(row.support, row.forms, strict=True):
+                if i in row.dividing:
+                    common = common * self._divisor(i, alpha, beta, divisors)
             if common != 1:
-                above = above // common
-            key = (row.support, common)
-            if key not in quotients:
-                quotients[key] = product // common if common != 1 else product
-            below = row.below * quotients[key]
-            while (common := _common_part(above, below, modulus)) != 1:
                 above, below = above // common, below // common
+                common = _common_part(above, below, modulus)
+            else:
+                common = _common_part(*row.over(*small[row.support]), modulus)
+            while common != 1:
+                above, below = above // common, below // common
+                if without(common, modulus // common) == 1:  # no prime of it is there to the highest power
+                    break
+                common = _common_part(above, below, modulus)
             pairs.append((above, below) if below > 0 else (-above, -below))
         return pairs
 
@@ -165,32 +175,33 @@ class PlanesPoint:
         """The coordinates as fmpq (whose constructor runs a gcd of its own)."""
         return tuple(fmpq(above, below) for above, below in self.lowest_terms())
 
-    def _scaled(self, support: tuple[int, ...]) -> tuple[dict[int, tuple[fmpz, fmpz]], fmpz]:
-        """U_i and V_i times the other W of the support, and the product of all."""
-        # Products of all but one, from both ends.
-        count = len(support)
-        left, right = [fmpz(1)], [fmpz(1)]
-        for i in support:
-            left.append(left[-1] * self.triples[i][2])
-        for i in reversed(support[1:]):
-            right.append(right[-1] * self.triples[i][2])
-        scaled = {}
-        for k, i in enumerate(support):
-            others = left[k] * right[count - 1 - k]
-            U, V, _ = self.triples[i]
-            scaled[i] = (U * others, V * others)
-        return scaled, left[-1]
+
+def _scaled(triples: Sequence[IntegerTriple], support: tuple[int, ...]) -> tuple[dict[int, tuple[fmpz, fmpz]], fmpz]:
+    """U_i and V_i times the other W of the support, and the product of all."""
+    # Products of all but one, from both ends.
+    count = len(support)
+    left, right = [fmpz(1)], [fmpz(1)]
+    for i in support:
+        left.append(left[-1] * triples[i][2])
+    for i in reversed(support[1:]):
+        right.append(right[-1] * triples[i][2])
+    scaled = {}
+    for k, i in enumerate(support):
+        others = left[k] * right[count - 1 - k]
+        U, V, _ = triples[i]
+        scaled[i] = (U * others, V * others)
+    return scaled, left[-1]
 
 
 def _common_part(above: fmpz, below: fmpz, modulus: fmpz) -> fmpz:
     """What two numbers and the modulus have in common: all of it, unless one of its primes is there to a high power."""
-    residue = above % modulus
-    common = modulus.gcd(residue) if residue != 0 else modulus
+    common = modulus.gcd(above % modulus)
     return common if common == 1 else common.gcd(below % common)
 
 
 def _shared(numbers: Sequence[fmpz]) -> fmpz:
     """A number with all primes that divide two of these."""
+    numbers = sorted(numbers, key=fmpz.bit_length)  # the longest one is only reduced modulo others
     shared, product = fmpz(1), numbers[-1]
     for number in reversed(numbers[:-1]):
         if number == 0:
