@@ -32,10 +32,17 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import AssociatedSystem, FamilyMember
     from kahanmaps.family.cubics import cubic_space
     from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
+    from kahanmaps.family.hidden import HiddenMember, hidden_member, hidden_member_of
     from kahanmaps.family.planar import NormalForm, normal_form
+    from kahanmaps.family.structure import Structure, structure_of
     from kahanmaps.maps.fast import FloatOrbit, to_floats
+    from kahanmaps.maps.float_ensemble import FloatEnsemble
+    from kahanmaps.maps.jump import Jump
     from kahanmaps.maps.kahan import KahanMap
-    from kahanmaps.maps.orbits import Orbit
+    from kahanmaps.maps.modular import ModularEnsemble
+    from kahanmaps.maps.normal_steps import NormalSteps
+    from kahanmaps.maps.orbits import Iterates, Orbit
+    from kahanmaps.maps.periods import orbit_period, period_over_rationals
     from kahanmaps.paper.examiner import VerifyOptions
     from kahanmaps.paper.verify import verify, verify_universal
     from kahanmaps.systems.catalog import load, names
@@ -54,9 +61,16 @@ _HOME = {
     "family.cubics": ("cubic_space",),
     "family.draw": ("draw_generic", "draw_with_chi", "draw_with_eigenvalues"),
     "family.planar": ("NormalForm", "normal_form"),
+    "family.hidden": ("HiddenMember", "hidden_member", "hidden_member_of"),
+    "family.structure": ("Structure", "structure_of"),
     "maps.kahan": ("KahanMap",),
-    "maps.orbits": ("Orbit",),
+    "maps.orbits": ("Iterates", "Orbit"),
+    "maps.jump": ("Jump",),
+    "maps.normal_steps": ("NormalSteps",),
+    "maps.periods": ("orbit_period", "period_over_rationals"),
     "maps.fast": ("FloatOrbit", "to_floats"),
+    "maps.float_ensemble": ("FloatEnsemble",),
+    "maps.modular": ("ModularEnsemble",),
     "checks.claims": ("Finding", "Report", "Verdict"),
     "checks.settings": ("Settings",),
     "checks.commute": ("check_commute",),
@@ -92,9 +106,21 @@ __all__ = [
     "draw_with_eigenvalues",
     "NormalForm",
     "normal_form",
+    "HiddenMember",
+    "hidden_member",
+    "hidden_member_of",
+    "Structure",
+    "structure_of",
     "KahanMap",
     "Orbit",
+    "Iterates",
+    "Jump",
+    "NormalSteps",
+    "orbit_period",
+    "period_over_rationals",
     "FloatOrbit",
+    "FloatEnsemble",
+    "ModularEnsemble",
     "to_floats",
     "Finding",
     "Report",

@@ -156,7 +156,14 @@ class Npz(Writer):
             cells = [[convert(cell) for cell in row] for row in part]
             return np.array(cells, dtype=dtypes[kind]).reshape(len(part), width)
 
-        arrays = {"step": np.array(self._steps, dtype=np.int64), "x": array([row[:n] for row in self._rows], n)}
+        # Steps that were jumped to may be longer than machine integers.
+        steps = (
+            np.array(self._steps) if max(self._steps, default=0) < 2**63 else np.array([b"%d" % k for k in self._steps])
+        )
+        arrays = {
+            "step": steps.astype(np.int64) if steps.dtype.kind in "if" else steps,
+            "x": array([row[:n] for row in self._rows], n),
+        }
         if self.integrals:
             arrays["integrals"] = array([row[n:] for row in self._rows], len(self.integrals))
         meta = {"header": self._header, "columns": self.columns, "integrals": self.integrals, "end": end}

@@ -66,7 +66,7 @@ class NameValue(_ParamType):
 
 
 class Arithmetic(_ParamType):
-    """exact, float, mod:P (P a prime) or ball:BITS; gives the pair (kind, number)."""
+    """exact, float, mod:P (P a prime), ball:BITS or ball:auto; gives the pair (kind, number), 0 for auto."""
 
     name = "kind"
 
@@ -76,9 +76,19 @@ class Arithmetic(_ParamType):
         kind, colon, number = value.partition(":")
         if kind in ("exact", "float") and not colon:
             return kind, 0
-        if kind in ("mod", "ball") and number.isascii() and number.isdigit() and len(number) <= 4000:
+        if value == "ball:auto":
+            return "ball", 0
+        if (
+            kind in ("mod", "ball")
+            and number.isascii()
+            and number.isdigit()
+            and len(number) <= 4000
+            and int(number) > 0
+        ):
             return kind, int(number)
-        self.fail(f"found {_shorten(value)}, expected exact, float, mod:P with a prime P, or ball:BITS", param, ctx)
+        self.fail(
+            f"found {_shorten(value)}, expected exact, float, mod:P with a prime P, ball:BITS or ball:auto", param, ctx
+        )
 
 
 class Steps(_ParamType):
@@ -92,7 +102,7 @@ class Steps(_ParamType):
         steps = []
         for piece in value.split(","):
             piece = piece.strip()
-            if not (piece.isascii() and piece.isdigit()) or len(piece) > 18:
+            if not (piece.isascii() and piece.isdigit()) or len(piece) > 40:
                 self.fail(
                     f"found {_shorten(piece)}, expected step numbers 0, 1, 2, ... separated by commas", param, ctx
                 )

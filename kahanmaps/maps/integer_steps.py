@@ -91,7 +91,7 @@ class IntegerSteps:
         return matrix
 
 
-# Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact_steps.py).
+# Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact.py).
 _ELIMINATION_BITS = 4000
 _ELIMINATION_DIMENSION = 16  # and above this dimension as well
 # A common divisor shorter than this is not worth a division of every entry.

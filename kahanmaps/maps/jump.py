@@ -8,15 +8,15 @@ passed over, except over Q, where none goes unnoticed.
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import islice
 from typing import Any
 
 from flint import fmpq, fmpz
 
-from kahanmaps.algebra.fields import QQ, BallField, Field, PrimeField
-from kahanmaps.errors import InputError, PrecisionLost, SingularStep
+from kahanmaps.algebra.fields import GF, QQ, BallField, Field, PrimeField
+from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
 from kahanmaps.family.structure import Structure
 from kahanmaps.maps import tau_table, translation
 from kahanmaps.maps.normal_steps import NormalSteps, splits
@@ -27,6 +27,7 @@ from kahanmaps.maps.splitting import Splitting
 
 _SHORT = 24  # up to here one steps, and from here heights are extrapolated
 _GUARDED = 10**7  # beyond it nobody has the memory for the iterate over Q
+_PRIMES = 20
 _CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is walked around
 
 
@@ -119,7 +120,46 @@ class Jump:
         if n > _SHORT:
             bits = max(max(abs(entry.p).bit_length(), entry.q.bit_length()) for entry in point(_SHORT))
             self._require_budget(bits, n, max_bits)
-        return point(n)
+        try:
+            found = point(n)
+        except SingularStep:
+            self._require_orbit(x, n, None, point)
+            raise
+        self._require_orbit(x, n, found, point)
+        return found
+
+    def _require_orbit(
+        self, x: Sequence[fmpq], n: int, found: tuple[Any, ...] | None, point: Callable[[int], tuple[Any, ...]]
+    ) -> None:
+        """As `_require_orbit` below, for planes over extensions: the orbit is stepped modulo a prime in all planes.
+
+        None stands for an iterate at a pole; then the pole met first is what is to be told.
+        """
+        generator = random.Random()
+        for _ in range(_PRIMES):
+            field = GF(_random_prime(generator))
+            try:
+                jump = Jump(self.structure, self.eps, field)
+                expected = None if found is None else tuple(field.convert(entry) for entry in found)
+                planes = list(jump.splitting.planes)
+                triples = jump.splitting.triples([field.convert(entry) for entry in x])
+            except BadPrime:
+                continue
+            pole = None
+            for step in range(1, n + 1):
+                triples = [plane.block.image(triple) for plane, triple in zip(planes, triples, strict=True)]
+                if any(W == 0 for _, _, W in triples):
+                    pole = step
+                    break
+            if pole is None:
+                if expected is not None and jump.splitting.point(triples) != expected:
+                    raise ArithmeticError("the iterate disagrees with the orbit modulo a prime: please report this")
+                return
+            try:
+                point(pole)
+            except SingularStep:  # a pole over Q, too
+                raise SingularStep(f"the map has no value at step {pole - 1}") from None
+        raise ArithmeticError("the orbit modulo many primes met a pole that it has not: please report this")
 
     def _require_budget(self, bits: int, n: int, max_bits: int | None) -> None:
         """Heights grow like n^2 (or less), so those of an early iterate tell that of the n-th."""
@@ -142,40 +182,45 @@ def _rational_iterate(block: IntegerBlock, n: int) -> IntegerTriple:
         return block.start
     if n <= _SHORT or block.level is None:
         return _stepped(block, n)
-    found = tau_table.iterate(block, n)
-    if found is None:
-        cubic = block.block
-        over_field = PlanarBlock(*(fmpq(entry) for entry in (cubic.a, cubic.b, cubic.c, cubic.d)))
-        U, V, W = block.start
-        try:
-            triple = translation.iterate(over_field, (fmpq(U, W), fmpq(V, W), fmpq(1)), n, lambda element: element == 0)
-        except translation.NoTranslation:
-            return _stepped(block, n)
-        below = fmpz(1)
-        for entry in triple:
-            below = below.lcm(entry.q)
-        found = primitive([(entry * below).p for entry in triple])
+    found = _reached(block, n)
     _require_orbit(block, n, found)
     return found
+
+
+def _reached(block: IntegerBlock, n: int) -> IntegerTriple:
+    """P_n, primitive; poles on the way are passed over, unless it has to be stepped."""
+    found = tau_table.iterate(block, n)
+    if found is not None:
+        return found
+    cubic = block.block
+    over_field = PlanarBlock(*(fmpq(entry) for entry in (cubic.a, cubic.b, cubic.c, cubic.d)))
+    U, V, W = block.start
+    try:
+        triple = translation.iterate(over_field, (fmpq(U, W), fmpq(V, W), fmpq(1)), n, lambda element: element == 0)
+    except translation.NoTranslation:
+        return _stepped(block, n)
+    below = fmpz(1)
+    for entry in triple:
+        below = below.lcm(entry.q)
+    return primitive([(entry * below).p for entry in triple])
 
 
 def _require_orbit(block: IntegerBlock, n: int, found: IntegerTriple) -> None:
     """That P_n is right modulo a random prime of 61 bits, by stepping there, and that there was no pole on the way.
 
-    Raises SingularStep where there was one. The doubling divides exactly where theory says so; this is the guard.
+    Raises SingularStep where there was one. The table divides exactly where theory says so; this is the guard.
     """
     generator = random.Random()
-    for _ in range(8):
+    for _ in range(_PRIMES):
         prime = _random_prime(generator)
         pole, point = _steps_modulo(block, n, prime)
         if pole is None:
             if not same_point([entry % prime for entry in found], point, prime):
                 raise ArithmeticError("the n-th iterate disagrees with the orbit modulo a prime: please report this")
             return
-        exact = tau_table.iterate(block, pole) if pole > _SHORT else _stepped(block, pole)
-        if exact is not None and exact[2] == 0:
+        if (_stepped(block, pole) if pole <= _SHORT else _reached(block, pole))[2] == 0:
             raise SingularStep(f"the map has no value at step {pole - 1}")
-    raise ArithmeticError("the orbit modulo eight primes met a pole: please report this")
+    raise ArithmeticError("the orbit modulo many primes met a pole that it has not: please report this")
 
 
 def _steps_modulo(block: IntegerBlock, n: int, prime: int) -> tuple[int | None, tuple[int, int, int]]:
@@ -225,3 +270,20 @@ def _around_cycle(block: PlanarBlock, start: Triple, n: int) -> Triple:
         if same_point(point, start):
             return _stepped_over(block, start, n % k)
     return point
+
+
+def special_start(structure: Structure, eps: Any, start: Sequence[Any]) -> str:
+    """Empty, or why the orbit of a rational start is special in a plane, which balls cannot decide.
+
+    Special are planes in which the start is at rest, or on a singular level cubic (delta is 0 or 1).
+    """
+    splitting = Splitting(structure.form, QQ, eps, structure.T)
+    for plane, (U, V, W) in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):
+        above, below = plane.block.level((U, V, W))
+        if plane.block.is_zero or (U == 0 and V == 0):
+            return f"the start is at rest in the plane {plane.name}"
+        if below == 0 or above == 0 or plane.block.discriminant == 0:
+            return f"the start is on a singular level in the plane {plane.name}"
+        if plane.block.discriminant * above * above == below * below:
+            return f"the start is on three lines in the plane {plane.name}"
+    return ""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from flint import fmpq, fmpz
 
 from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.planar_integers import IntegerBlock, IntegerTriple, content, radical, without
+from kahanmaps.maps.planar_integers import IntegerBlock, IntegerTriple, content, divide_exactly, radical, without
 
 # Powers of the fixed primes up to this one are found in one residue.
 _POWER = 3
@@ -135,7 +135,7 @@ class PlanesPoint:
         residues = [(U % modulus, V % modulus, W % modulus) for U, V, W in self.triples]
         sets: dict[tuple[int, ...], tuple[dict[int, tuple[fmpz, fmpz]], fmpz]] = {}
         small: dict[tuple[int, ...], tuple[dict[int, tuple[fmpz, fmpz]], fmpz]] = {}
-        divisors: dict[tuple[int, fmpq], fmpz] = {}
+        divisors: dict[tuple[int, fmpz, fmpz], fmpz] = {}
         pairs = []
         for row in self._assembly.rows:
             if row.support not in sets:
@@ -150,7 +150,7 @@ class PlanesPoint:
                 if i in row.dividing:
                     common = common * self._divisor(i, alpha, beta, divisors)
             if common != 1:
-                above, below = above // common, below // common
+                above, below = divide_exactly((above, below), common)
                 common = _common_part(above, below, modulus)
             else:
                 common = _common_part(*row.over(*small[row.support]), modulus)
@@ -162,13 +162,13 @@ class PlanesPoint:
             pairs.append((above, below) if below > 0 else (-above, -below))
         return pairs
 
-    def _divisor(self, i: int, alpha: fmpz, beta: fmpz, known: dict[tuple[int, fmpq], fmpz]) -> fmpz:
+    def _divisor(self, i: int, alpha: fmpz, beta: fmpz, known: dict[tuple[int, fmpz, fmpz], fmpz]) -> fmpz:
         """gcd(alpha U + beta V, W) but for fixed primes, where alpha U + beta V divides h: one gcd for all rows."""
-        key = (i, fmpq(alpha, beta) if beta != 0 else fmpq(0))
+        common = content((alpha, beta))
+        key = (i, alpha // common, beta // common)
         if key not in known:
             U, V, W = self.triples[i]
-            form = content((alpha, beta))
-            known[key] = ((alpha // form) * U + (beta // form) * V).gcd(W)
+            known[key] = (key[1] * U + key[2] * V).gcd(W)
         return known[key]
 
     def rationals(self) -> tuple[fmpq, ...]:

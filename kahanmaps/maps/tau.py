@@ -27,7 +27,7 @@ formed: only t_n = s_{n+1} s_{n-1} / s_n^2 is needed, a small rational number. d
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -43,7 +43,6 @@ from kahanmaps.maps.planar_integers import (
     strip,
 )
 
-_LOW = (fmpz(1) << 64) - 1
 _BASES = 3
 
 
@@ -69,10 +68,6 @@ class Window:
     def scale(self, n: int) -> fmpq:
         """s_n."""
         return self.scales[n - self.first]
-
-    def after(self, first: int) -> Window:
-        """The part from index `first` on."""
-        return Window(first, self.values[first - self.first :], self.scales[first - self.first :])
 
 
 class TauStart:
@@ -116,7 +111,6 @@ class TauStart:
         self._one = P[1]
         self._minus, self._minus_scale = P[-1], scales[-1]
         self._divisor = abs(self.chi[0])
-        self.third = P[3]
 
     def point(self, chi: Sequence[fmpz], products: Sequence[fmpz], ratio: fmpq, next_ratio: fmpq) -> IntegerTriple:
         """P_n, primitive, from chi at n-1, n, n+1 and products of psi.
@@ -144,19 +138,6 @@ def _window(first: int, values: Sequence[fmpq], bad: fmpz) -> Window:
     return Window(first, integers, scales)
 
 
-def triples(block: IntegerBlock) -> Iterator[IntegerTriple]:
-    """P_0, P_1, ... as `IntegerBlock.triples` gives them, up to signs, two to three times as fast."""
-    if block.is_constant or block.level is None or block.is_degenerate:
-        yield from block.triples()
-        return
-    start = start_near(block)
-    if start is None:
-        yield from block.triples()
-        return
-    yield from islice(block.triples(), start.base + 4)
-    yield from _steps(block, start)
-
-
 def start_near(block: IntegerBlock) -> TauStart | None:
     """A base point P_0, P_1 or P_2 around which no value is zero; None where there is none, or a pole is near.
 
@@ -182,67 +163,3 @@ def _before(block: IntegerBlock, point: IntegerTriple) -> list[IntegerTriple]:
         point = primitive(raw)
         found.insert(0, point)
     return found
-
-
-def _steps(block: IntegerBlock, start: TauStart) -> Iterator[IntegerTriple]:
-    """P_4, P_5, ... of the base point."""
-    psi_steps = somos(start.psi, start.bad, start.gamma)
-    chi_steps = somos(start.chi.after(-1), start.bad, start.gamma)
-    # chi_3 and chi_4, before psi has its first new value.
-    chi, t_chi = list(start.chi.values), {}
-    for n in (3, 4):
-        value, t_chi[n - 1] = next(chi_steps)
-        chi.append(value)
-    growth_chi = start.chi.scale(2) / start.chi.scale(1)
-    for n in (2, 3):
-        growth_chi = growth_chi * t_chi[n]
-    ratio = start.psi.scale(4) / start.psi.scale(3) / growth_chi
-    psi_values = [start.psi[3], start.psi[4]]
-    chi_values = [chi[-2], chi[-1]]
-    product = psi_values[0] * psi_values[1]
-    previous = start.third
-    try:
-        while True:
-            psi, t_psi = next(psi_steps)
-            chi_next, t_next = next(chi_steps)
-            next_product = psi_values[1] * psi
-            next_ratio = ratio * t_psi / t_next
-            point = start.point(
-                [*chi_values, chi_next],
-                [psi_values[0] * psi, next_product, product],
-                ratio,
-                next_ratio,
-            )
-            yield point
-            if point[2] == 0:
-                raise AssertionError("a pole that the recursion did not announce")
-            psi_values = [psi_values[1], psi]
-            chi_values = [chi_values[1], chi_next]
-            product, ratio, previous = next_product, next_ratio, point
-    except ZeroDivisionError:
-        yield from islice(block.triples_from(previous, primitive(block.block.preimage(previous))), 1, None)
-
-
-def somos(window: Window, bad: fmpz, gamma: fmpq) -> Iterator[tuple[fmpz, fmpq]]:
-    """phi_{n+2} and t_{n+1}, from the last index but one of a window of four on: the Somos-4 recursion."""
-    first, second, third, fourth = window.values
-    n = window.first + 2
-    t_before, t = window.t(n - 1), window.t(n)
-    special, below = 3 * gamma.p, gamma.q
-    while True:
-        if first == 0:
-            raise ZeroDivisionError
-        if n % 3 == 0:
-            denominator = t.q * below
-            raw = (4 * t.p * below) * (fourth * second) - (t.q * special) * (third * third)
-        else:
-            denominator = t.q
-            raw = (4 * t.p) * (fourth * second) - (3 * t.q) * (third * third)
-        quotient = raw // first
-        if ((quotient & _LOW) * (first & _LOW) - raw) & _LOW != 0:
-            raise ArithmeticError("a division that should be exact left a remainder: please report this")
-        value, part = bad_part(quotient, bad)
-        t_before, t = t, fmpq(part, denominator) / (t * t * t_before)
-        first, second, third, fourth = second, third, fourth, value
-        n += 1
-        yield value, t

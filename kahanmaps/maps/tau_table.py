@@ -93,12 +93,15 @@ class TauTable:
         self._chi_around: dict[int, fmpz] = {}
 
     def points(self) -> Iterator[IntegerTriple]:
-        """P_4, P_5, ..., primitive."""
+        """P_4, P_5, ..., primitive, as long as the map has a value."""
         n, before = _FIRST, self.psi(_FIRST - 1) * self.psi(_FIRST)
         while True:
             after = self.psi(n) * self.psi(n + 1)
             chi = [self.chi(n - 1), self.chi(n), self.chi(n + 1)]
-            yield self._start.point(chi, [self.psi_around(n), after, before], self.r(n), self.r(n + 1))
+            point = self._start.point(chi, [self.psi_around(n), after, before], self.r(n), self.r(n + 1))
+            if point[2] == 0:
+                return
+            yield point
             n, before = n + 1, after
             for products in (self._psi_square, self._psi_around, self._chi_square, self._chi_around):
                 products.pop(n // 2 - 4, None)

@@ -338,3 +338,34 @@ def test_random_elements_are_determined_by_the_seed_and_bounded_by_the_height():
     assert drawn[0] == drawn[1] != drawn[2]
     assert max(max(abs(c.p), c.q) for element in drawn for c in element.coefficients) == 4
     assert all(element.polynomial.degree() <= 2 for element in drawn)
+
+
+# Long coefficients: quotients by a linear system.
+
+
+def long_elements(field: EtaleAlgebra, count: int) -> list:
+    rng = random.Random(f"{field}")
+    return [
+        field.convert(fmpq_poly([field.random(rng, 10**700).polynomial[k] for k in range(field.degree)]))
+        for _ in range(count)
+    ]
+
+
+@pytest.mark.parametrize("field", [GOLDEN, CUBIC, SPLIT], ids=repr)
+def test_quotients_of_long_elements_undo_products(field):
+    for a, b in zip(long_elements(field, 6), reversed(long_elements(field, 6)), strict=True):
+        assert (a * b) / b == a
+        assert 1 / (1 / b) == b
+
+
+@pytest.mark.parametrize("field", [GOLDEN, CUBIC, SPLIT], ids=repr)
+def test_both_ways_to_a_quotient_lead_to_the_same(field, monkeypatch):
+    elements = long_elements(field, 4)
+    quotients = [a / b for a in elements for b in elements]
+    monkeypatch.setattr("kahanmaps.algebra.etale._LONG", 10**9)
+    assert [a / b for a in elements for b in elements] == quotients
+
+
+def test_a_long_zero_divisor_is_refused_too():
+    with pytest.raises(ZeroDivisionError, match="zero divisor"):
+        SPLIT.one / ((SPLIT.generator - 1) * 10**1000)

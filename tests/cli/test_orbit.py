@@ -65,6 +65,7 @@ def test_the_header_has_the_documented_shape(kahanmaps):
         "time_step": "1/5",
         "convention": "eps is the paper's epsilon, the time step is 2 eps",
         "arithmetic": "exact",
+        "method": "generic",
         "start": ["1", "1/2", "-1/3"],
         "direction": "forward",
         "steps": 3,
@@ -564,12 +565,122 @@ def test_an_interrupted_npz_file_can_be_read(kahanmaps, npz, monkeypatch):
     class Interrupted(Orbit):
         """An orbit during whose third step Ctrl-C is pressed."""
 
-        def _next(self, value):
-            if value.bits > 15:
-                signal.raise_signal(signal.SIGINT)
-            return super()._next(value)
+        def _images(self):
+            for value in super()._images():
+                if value.bits > 15:
+                    signal.raise_signal(signal.SIGINT)
+                yield value
 
     monkeypatch.setattr("kahanmaps.maps.orbits.Orbit", Interrupted)
     found = npz(f"{TOP} --steps 100")
     assert (found.status, found.meta["end"]["status"]) == (130, "interrupted")
     assert found.step.tolist() == list(range(found.meta["end"]["steps"] + 1))
+
+
+# Methods.
+
+
+MEMBER = "orbit paper_m3 --start 1,2,3,4,5,6 --eps 1/10"
+IRREDUCIBLE = "orbit paper_m3_irreducible --start 1,2,3,4,5,6 --eps 1/10"
+
+
+def points(run) -> list:
+    return [record for record in run.records if record["record"] == "point"]
+
+
+@pytest.mark.parametrize("extra", ["", " --backward", " --every 5", " --integral known"])
+def test_all_methods_print_the_same_points(kahanmaps, extra):
+    generic = kahanmaps(f"{MEMBER} --steps 20 --format jsonl --method generic{extra}")
+    normal = kahanmaps(f"{MEMBER} --steps 20 --format jsonl --method normal-form{extra}")
+    assert len(points(generic)) > 3
+    assert points(generic) == points(normal)
+
+
+@pytest.mark.parametrize("system", [MEMBER, IRREDUCIBLE])
+@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007", "mod:2305843009213693951"])
+def test_a_jump_prints_what_stepping_does(kahanmaps, system, arithmetic):
+    line = f"{system} --at 0,3,30 --format jsonl --arithmetic {arithmetic}"
+    assert points(kahanmaps(f"{line} --method jump")) == points(kahanmaps(f"{line} --method generic"))
+
+
+@pytest.mark.parametrize(
+    ("line", "method"),
+    [
+        (f"{MEMBER} --steps 20", "normal-form"),
+        (f"{MEMBER} --steps 2", "generic"),  # looking for a structure costs more
+        (f"{MEMBER} --at 30", "jump"),
+        (f"{IRREDUCIBLE} --steps 20", "generic"),
+        (f"{IRREDUCIBLE} --at 30", "jump"),
+        (f"{MEMBER} --steps 20 --arithmetic mod:10007", "generic"),
+        (f"{MEMBER} --at 100000 --arithmetic mod:10007", "jump"),
+        (f"{MEMBER} --steps 20 --arithmetic ball:200", "normal-form"),
+        (f"{MEMBER} --steps 20 --arithmetic float", "normal-form"),
+        ("orbit lotka_volterra --start 1,2 --eps 1/10 --steps 8", "generic"),
+    ],
+)
+def test_the_method_is_chosen_from_what_is_asked_for(kahanmaps, line, method):
+    run = kahanmaps(f"{line} --format jsonl -v")
+    assert run.records[0]["method"] == method
+    assert f"method {method}: " in run.err
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("orbit lotka_volterra --start 1,2 --eps 1/10 --steps 8 --method normal-form", "there is none"),
+        (f"{IRREDUCIBLE} --steps 20 --method normal-form", "does not split over Q"),
+        (f"{MEMBER} --steps 20 --method jump", "--at N1,N2"),
+        (f"{MEMBER} --at 20 --method jump --arithmetic float", "--at N1,N2"),
+        (f"{MEMBER} --steps 20 --accuracy 20", "ball:auto"),
+        (f"{MEMBER} --steps 20 --kernel numpy", "--arithmetic float"),
+        (f"orbit lotka_volterra --start 1,2 --eps 1/10 --at {10**20}", "too far"),
+    ],
+)
+def test_a_method_that_cannot_be_is_refused_with_the_reason(kahanmaps, line, said):
+    run = kahanmaps(line)
+    assert run.status == 2
+    assert said in run.err
+
+
+def test_an_iterate_modulo_p_may_have_a_number_of_thirty_digits(kahanmaps):
+    # P_{a+b} is the b-th iterate of P_a
+    p = "mod:2305843009213693951"
+    whole = points(kahanmaps(f"{MEMBER} --at {10**30} --arithmetic {p} --format jsonl"))[0]
+    half = points(kahanmaps(f"{MEMBER} --at {10**29} --arithmetic {p} --format jsonl"))[0]
+    rest = f"orbit paper_m3 --start {','.join(half['x'])} --eps 1/10 --at {10**30 - 10**29}"
+    assert points(kahanmaps(f"{rest} --arithmetic {p} --format jsonl"))[0]["x"] == whole["x"]
+    assert whole["step"] == 10**30
+
+
+@pytest.mark.parametrize("suffix", ["jsonl", "csv", "npz"])
+def test_steps_beyond_machine_integers_are_written_in_every_format(kahanmaps, tmp_path, suffix):
+    path = tmp_path / f"far.{suffix}"
+    line = f"{MEMBER} --at 5,{10**30} --arithmetic mod:10007 --method jump -o {path}"
+    assert kahanmaps(line).status == 0
+    assert path.stat().st_size > 0
+
+
+def test_an_iterate_that_would_be_too_long_is_not_begun(kahanmaps):
+    run = kahanmaps(f"{MEMBER} --at 5,100000 --format jsonl")
+    assert run.status == 3
+    assert [point["step"] for point in points(run)] == [5]
+    assert run.records[-1]["status"] == "budget"
+
+
+@pytest.mark.parametrize("line", ["--steps 60", "--at 60", "--at 1000"])
+def test_automatic_balls_are_as_accurate_as_asked_for(kahanmaps, line):
+    run = kahanmaps(f"{MEMBER} {line} --arithmetic ball:auto --accuracy 40 --format jsonl")
+    assert run.status == 0
+    for text in points(run)[-1]["x"]:
+        middle, _, radius = text.strip("[]").partition(" +/- ")
+        assert float(radius) <= 1e-40 * 2 * max(
+            1, *(abs(float(x.strip("[]").split(" ")[0])) for x in points(run)[-1]["x"])
+        )
+        assert len(middle) >= 40
+
+
+def test_automatic_balls_work_without_a_normal_form(kahanmaps):
+    start = "--start 1/10,1/10,1/10,1/10 --eps 1/10 --steps 100 --every 100"
+    run = kahanmaps(f"orbit henon_heiles {start} --arithmetic ball:auto --format jsonl")
+    assert (run.status, run.records[-1]["status"]) == (0, "completed")
+    assert run.records[0]["arithmetic"].startswith("ball:")

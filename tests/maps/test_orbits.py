@@ -2,7 +2,8 @@
 
 Specified here: the points are those of the map, one after the other and only when asked for; each way to end
 (completed, periodic, singular, budget, precision, interrupted) with its step and its sentence, and that all before it
-is delivered.
+is delivered. With a structure, walked in normal form, all that is the same, and balls stay narrow; iterates that are
+reached directly are points of the orbit.
 """
 
 from __future__ import annotations
@@ -23,13 +24,21 @@ from helpers import (
     systems_with_points,
 )
 from hypothesis import assume, given, settings
+from planar_helpers import (
+    STARTS,
+    before,
+    over_members,
+    over_split,
+    side_by_side,
+    structure_and_system,
+)
 
 from kahanmaps.algebra.fields import GF, QQ, RR
 from kahanmaps.algebra.text import parse_number
-from kahanmaps.errors import InexactNumber, InputError
+from kahanmaps.errors import BadPrime, InexactNumber, InputError
 from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Orbit, OrbitEnd, OrbitPoint, digits_of
+from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, digits_of
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 RICCATI = QuadraticSystem.from_text(["x"], ["x^2"])
@@ -401,3 +410,184 @@ def test_a_start_of_another_dimension_is_refused():
 def test_a_machine_number_in_the_start_is_refused(field):
     with pytest.raises(InexactNumber):
         Orbit(KahanMap(RICCATI, 3, field), [0.5], 3)
+
+
+# In normal form.
+
+
+def both(system, structure, eps, start, steps, field=QQ, **options):
+    """Points and end of an orbit walked without and with a structure."""
+    answers = []
+    for known in (None, structure):
+        orbit = Orbit(KahanMap(system, eps, field), start, steps, structure=known, **options)
+        answers.append(([point.text for point in orbit], orbit.end))
+    return answers
+
+
+@over_members
+@pytest.mark.parametrize("backward", [False, True], ids=["forward", "backward"])
+def test_with_a_structure_the_points_and_the_end_are_the_same(name, backward):
+    structure, system = structure_and_system(name)
+    if len(structure.form.chi.factor()[1]) < structure.form.m:
+        with pytest.raises(InputError, match="does not split over Q"):
+            list(Orbit(KahanMap(system, "1/10"), random_point(system.dim, 3), 3, structure=structure))
+        return
+    plain, fast = both(system, structure, "1/10", random_point(system.dim, 3), 9, backward=backward)
+    assert fast == plain
+
+
+ENDS = [
+    (("delta = 1, a vertex", "h = 0"), "periodic"),
+    (("delta = 1, a vertex", "the origin"), "periodic"),
+    (("h = 0", "the origin"), "periodic"),
+    (("delta = 1, a vertex", "a double root"), "completed"),
+    (("three real roots, irrational", "the origin"), "completed"),
+    (("level 0", "a triple root, level 0"), "completed"),
+    (("no value at the start", "level 0"), "singular"),
+    (("a pole at step 2", "level 0"), "singular"),
+    (("a pole at step 3", "a pole at step 2"), "singular"),
+    (("period 5 but for a pole", "delta = 1"), "singular"),
+    (("delta = 1, a pole at step 3", "a double root"), "singular"),
+    (("a pole at step 6", "level 0"), "singular"),
+]
+
+
+@pytest.mark.parametrize(("names", "status"), ENDS, ids=str)
+@pytest.mark.parametrize("backward", [False, True], ids=["forward", "backward"])
+def test_with_a_structure_every_end_is_the_same(names, status, backward):
+    system, structure, start = side_by_side(*names)
+    # -eps and backward is forward.
+    eps = fmpq(-1, 2) if backward else fmpq(1, 2)
+    (plain, end), (fast, fast_end) = both(system, structure, eps, start, 10, backward=backward)
+    assert fast_end == end
+    assert end.status == status
+    assert fast == plain
+
+
+@pytest.mark.parametrize("more", [2, 3, 10, 20])
+def test_with_a_structure_a_late_pole_ends_the_orbit_at_the_same_step(more):
+    cubic, start = STARTS["a pole at step 5"]
+    U, V, W = before(cubic, start, more)
+    system, structure, (_, u, _, v) = side_by_side("a pole at step 5", "level 0")
+    (_, end), (_, fast_end) = both(system, structure, "1/2", (fmpq(U, W), u, fmpq(V, W), v), 40)
+    assert fast_end == end
+    assert (end.status, end.steps) == ("singular", more + 4)
+
+
+@over_split
+def test_with_a_structure_the_budget_ends_at_about_the_same_step(name):
+    structure, system = structure_and_system(name)
+    orbits = [
+        Orbit(KahanMap(system, "1/10"), random_point(system.dim, 3), 100, structure=known, max_digits=300)
+        for known in (None, structure)
+    ]
+    ends = [ended(orbit) for orbit in orbits]
+    assert ends[0].status == ends[1].status == "budget"
+    assert abs(ends[0].steps - ends[1].steps) <= 1  # digits are counted before common factors are taken out
+    assert "more than the budget of 300 (--max-digits)" in ends[1].message
+
+
+@pytest.mark.parametrize("name", ["m = 2", "m = 3", "m = 2, sqrt 2", "m = 2, i", "m = 3, partly split"])
+@pytest.mark.parametrize("backward", [False, True], ids=["forward", "backward"])
+def test_balls_with_a_structure_enclose_the_orbit_and_stay_narrow(name, backward):
+    structure, system = structure_and_system(name)
+    start = tuple(fmpq(k + 1, 7) for k in range(system.dim))
+    bits = 500
+    phi = KahanMap(system, "1/10", RR(bits))
+    balls = [point.x for point in Orbit(phi, start, 100, structure=structure, backward=backward)]
+    assert len(balls) == 101
+    assert min(ball.rel_accuracy_bits() for x in balls[1:] for ball in x) > bits / 2
+    for point in Orbit(KahanMap(system, "1/10"), start, 30, backward=backward, max_digits=2000):
+        assert all(encloses(ball, number) for ball, number in zip(balls[point.step], point.x, strict=True))
+
+
+@pytest.mark.parametrize("name", ["m = 2", "m = 3"])
+def test_balls_without_it_lose_all_their_bits(name):
+    structure, system = structure_and_system(name)
+    start = tuple(fmpq(k + 1, 7) for k in range(system.dim))
+    orbit = Orbit(KahanMap(system, "1/10", RR(300)), start, 300)
+    points = [point.x for point in orbit]
+    assert len(points) < 301 or min(ball.rel_accuracy_bits() for ball in points[-1]) < 100
+    assert ended(Orbit(KahanMap(system, "1/10", RR(300)), start, 300, structure=structure)).status == "completed"
+
+
+def test_modulo_a_prime_a_structure_changes_nothing():
+    structure, system = structure_and_system("m = 2")
+    plain, fast = both(system, structure, "1/10", [1, 2, 3, 4], 50, field=GF(10007))
+    assert fast == plain
+
+
+def test_an_orbit_in_normal_form_is_interrupted_like_any_other():
+    structure, system = structure_and_system("m = 2")
+    orbit = Orbit(KahanMap(system, "1/10"), [1, 2, 3, 4], 100, structure=structure)
+    for point in orbit:
+        if point.step == 7:
+            orbit.interrupt()
+    assert (orbit.end.status, orbit.end.steps) == ("interrupted", 7)
+
+
+# Iterates reached directly.
+
+
+@pytest.mark.parametrize("field", [QQ, GF(10007), GF(2**89 - 1)], ids=repr)
+@pytest.mark.parametrize("name", ["m = 1", "m = 2", "m = 3, another J", "m = 2, sqrt 2"])
+@pytest.mark.parametrize("backward", [False, True], ids=["forward", "backward"])
+def test_iterates_are_points_of_the_orbit(name, field, backward):
+    structure, system = structure_and_system(name)
+    phi, start = KahanMap(system, "1/10", field), random_point(system.dim, 3, height=3)
+    points = [point.text for point in Orbit(phi, start, 27, backward=backward)]
+    iterates = Iterates(phi, start, [27, 0, 3, 26, 3], structure=structure, backward=backward)
+    assert [(point.step, point.text) for point in iterates] == [(n, points[n]) for n in (0, 3, 26, 27)]
+    assert iterates.end == OrbitEnd("completed", 27, "4 iterates reached directly")
+
+
+def test_iterates_of_balls_enclose_the_orbit():
+    structure, system = structure_and_system("m = 2")
+    start = [1, "1/2", "1/3", 2]
+    exact = [point.x for point in Orbit(KahanMap(system, "1/10"), start, 30)]
+    for point in Iterates(KahanMap(system, "1/10", RR(300)), start, [1, 20, 30], structure=structure):
+        assert all(encloses(ball, number) for ball, number in zip(point.x, exact[point.step], strict=True))
+
+
+def test_iterates_stop_at_a_pole_on_the_way_over_q():
+    system, structure, start = side_by_side("a pole at step 3", "level 0")
+    iterates = Iterates(KahanMap(system, "1/2"), start, [0, 2, 30, 40], structure=structure)
+    assert [point.step for point in iterates] == [0, 2]
+    assert iterates.end == OrbitEnd("singular", 2, "step 30 cannot be reached: the map has no value at step 2")
+
+
+def test_iterates_stop_where_numbers_would_be_too_long():
+    structure, system = structure_and_system("m = 2")
+    iterates = Iterates(KahanMap(system, "1/10"), [1, 2, 3, 4], [5, 10**5, 10**6], structure=structure, max_digits=1000)
+    assert [point.step for point in iterates] == [5]
+    assert (iterates.end.status, iterates.end.steps) == ("budget", 5)
+    assert "step 100000 would have numbers of about" in iterates.end.message
+    assert "more than the budget of 1000 (--max-digits)" in iterates.end.message
+
+
+def test_iterates_of_balls_too_wide_say_so():
+    structure, system = structure_and_system("m = 2")
+    iterates = Iterates(KahanMap(system, "1/10", RR(10)), [1, "1/3", 3, "1/7"], [1, 10**12], structure=structure)
+    assert [point.step for point in iterates] == [1]
+    assert (iterates.end.status, iterates.end.steps) == ("precision", 1)
+
+
+def test_iterates_are_interrupted_between_two():
+    structure, system = structure_and_system("m = 2")
+    iterates = Iterates(KahanMap(system, "1/10", GF(101)), [1, 2, 3, 4], [1, 2, 3], structure=structure)
+    for point in iterates:
+        if point.step == 2:
+            iterates.interrupt()
+    assert (iterates.end.status, iterates.end.steps) == ("interrupted", 2)
+
+
+def test_iterates_before_the_start_are_refused():
+    structure, system = structure_and_system("m = 2")
+    with pytest.raises(InputError, match="found -3 steps"):
+        Iterates(KahanMap(system, "1/10"), [1, 2, 3, 4], [1, -3], structure=structure)
+
+
+def test_iterates_modulo_a_prime_without_planes_are_refused():
+    structure, system = structure_and_system("m = 3")
+    with pytest.raises(BadPrime):
+        Iterates(KahanMap(system, 3, GF(2)), [1] * 6, [5], structure=structure)

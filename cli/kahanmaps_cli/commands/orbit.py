@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from shutil import get_terminal_size
@@ -12,17 +11,18 @@ from typing import IO, TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps_cli.numbers import json_float, short_float
 from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
 from kahanmaps_cli.orbit_formats import Csv, JsonLines, Npz, OutputFull, Text, Writer
+from kahanmaps_cli.orbit_run import OrbitRun
 from kahanmaps_cli.params import Arithmetic, NameValue, PointText, Steps
 from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
-    from kahanmaps.algebra.polynomials import RationalFunction
     from kahanmaps.maps.orbits import OrbitEnd
-    from kahanmaps.systems.files import SystemFile
 
-_FORMATS = ("text", "jsonl", "csv", "npz")
+_FORMATS = ("text", "jsonl", "csv", "npz", "npy")
 _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 
 
@@ -39,8 +39,15 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
     type=Arithmetic(),
     default="exact",
     show_default=True,
-    help="exact, float, mod:P or ball:BITS.",
+    help="exact, float, mod:P, ball:BITS or ball:auto.",
 )
+@click.option(
+    "--method",
+    type=click.Choice(("generic", "normal-form", "jump")),
+    help="How to compute it; chosen by itself unless given (-v says which and why).",
+)
+@click.option("--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="For ball:auto; default 15.")
+@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="What computes float orbits; numba needs [fast].")
 @click.option(
     "--integral",
     "integrals",
@@ -53,19 +60,27 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 @click.option("--max-digits", type=int, help="Digit budget (exact arithmetic; default 200000).")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="Default text, or what the name of FILE says.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
+@click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no talk on standard error.")
-def command(system: str | None, form: str | None, output: str | None, quiet: bool, **options: Any) -> int:
+def command(
+    system: str | None, form: str | None, output: str | None, verbose: bool, quiet: bool, **options: Any
+) -> int:
     """Iterate the Kahan map of SYSTEM from a start.
 
     \b
       kahanmaps orbit pair.toml --start 1/2,-1/3,0,1,2/5,-1 --eps 1/10 --steps 20
       kahanmaps orbit lotka_volterra --start 1,2 --time-step 1/5 --steps 1000 --arithmetic float -o lv.npz
       kahanmaps orbit --vars x,y,z --rhs y*z --rhs=-2*z*x --rhs x*y --start 1,1/2,1/3 --eps 1/10 --steps 5
-      kahanmaps orbit pair.toml --start 1,2,3,4,5,6 --eps 1/10 --at 1000 --arithmetic mod:2305843009213693951
+      kahanmaps orbit pair.toml --start 1,2,3,4,5,6 --eps 1/10 --at 1000000000000 --arithmetic mod:2305843009213693951
+      kahanmaps orbit pair.toml --start 1,2,3,4,5,6 --eps 1/10 --at 10,1000000 --arithmetic ball:auto --accuracy 30
+      kahanmaps orbit pair.toml --start 1,2,3,4,5,6 --eps 1/10 --steps 1000000 --arithmetic float --every 100 -o x.npy
       kahanmaps orbit pair.toml --start 1,2,3,4,5,6 --eps 1/10 --steps 5 --integral known --format jsonl
 
     SYSTEM is a file, a name of the catalogue, or - for standard input. A right-hand side that starts with - is written
     --rhs=-x. Numbers are exact: integers, p/q, decimals. Ctrl-C ends after the step in flight and leaves a valid file.
+
+    Members of the commuting family are stepped in their normal form, and --at reaches an iterate directly, by
+    doublings: modulo P and in balls for steps of thirty digits. Poles on the way are passed over then, except over Q.
 
     Exit status: 0 done, 2 wrong use, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
     """
@@ -84,177 +99,84 @@ def command(system: str | None, form: str | None, output: str | None, quiet: boo
     from kahanmaps.maps.orbits import OrbitEnd
 
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
-    run = _Run(file, eps, options)
+    if options["accuracy"] is not None and options["arithmetic"] != ("ball", 0):
+        raise click.UsageError("--accuracy is for --arithmetic ball:auto")
+    if options["kernel"] is not None and options["arithmetic"][0] != "float":
+        raise click.UsageError("--kernel is for --arithmetic float")
+    options["accuracy"] = options["accuracy"] or 15
     output = None if output == "-" else output
     form = form or _form_from_name(output)
-    wanted = set(at) if at is not None else None
+    if form == "npy":
+        _require_npy(options, output)
     hidden = quiet or (output is None and sys.stdout.isatty())  # the points themselves show the progress
-    with _opened(output, form) as stream, _signals(run.interrupt), Progress(hidden) as progress:
+    with Progress(quiet) as progress:
+        run = OrbitRun(file, eps, {**options, "progress": progress})
+    if verbose and not quiet:
+        say(run.method.text)
+    if form == "npy" and output is not None:
+        return _stream(run, output, quiet)
+    with _opened(output, form) as stream, interruptible(run.interrupt), Progress(hidden) as progress:
         writer = _writer(form, stream, run, to_file=output is not None)
         writer.header(run.header())
         try:
-            for step, texts, values in run.points(lambda k: k in wanted if wanted is not None else k % every == 0):
+            for step, texts, values in run.points():
                 progress(f"step {step} of {run.steps}")
                 if texts is not None:
                     writer.point(step, texts, values)
             end = run.end
         except OutputFull as full:
             end = OrbitEnd("budget", full.steps, str(full))
-        writer.end(_end_record(end))
+        record = _end_record(end, run)
+        writer.end(record)
     told = output is None and form == "text" and sys.stdout.isatty()  # the last line says how it ended
     if not quiet and not told and (output is not None or end.status not in _STATUS):
         where = f"{output}: " if output is not None else ""
-        say(f"{where}{end.status}: {end.message}")
+        say(f"{where}{end.status}: {record['message']}")
     return _STATUS.get(end.status, 3)
 
 
-class _Run:
-    """One orbit in the arithmetic that was asked for: its points as text, its integrals, its end."""
-
-    def __init__(self, file: SystemFile, eps: Any, options: dict[str, Any]) -> None:
-        from kahanmaps.algebra.fields import GF, QQ, RR
-        from kahanmaps.maps.kahan import KahanMap
-        from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Orbit
-
-        self.file = file
-        self.eps = eps
-        self.steps = options["steps"] if options["steps"] is not None else max(options["at"])
-        self.start = options["start"]
-        self.backward = options["backward"]
-        self.kind, number = options["arithmetic"]
-        self.arithmetic = self.kind if self.kind in ("exact", "float") else f"{self.kind}:{number}"
-        self.columns: list[tuple[str, Callable[[Sequence[Any]], str | None]]] = []
-        self.orbit: Any
-        if self.kind == "float":
-            from kahanmaps.maps.fast import FloatOrbit
-
-            self.orbit = FloatOrbit(file.system, eps, self.start, self.steps, backward=self.backward)
-            self.storage = "float"
-        else:
-            field = QQ if self.kind == "exact" else GF(number) if self.kind == "mod" else RR(number)
-            kahan = KahanMap(file.system, eps, field)
-            budget = options["max_digits"] or DEFAULT_MAX_DIGITS
-            self.orbit = Orbit(kahan, self.start, self.steps, backward=self.backward, max_digits=budget)
-            self.storage = "int" if self.kind == "mod" and number < 2**63 else "text"
-            self.field = field
-        self._add_integrals(options["integrals"])
-        names = ["step", *file.variables, *(name for name, _ in self.columns)]
-        for name in names:
-            if names.count(name) > 1:
-                raise click.UsageError(f"found two columns of the name {name}: write --integral NAME=EXPR")
-
-    def interrupt(self) -> None:
-        self.orbit.interrupt()
-
-    @property
-    def end(self) -> OrbitEnd:
-        end: OrbitEnd = self.orbit.end
-        return end
-
-    def header(self) -> dict[str, Any]:
-        from kahanmaps.algebra.text import format_number, format_polynomial
-        from kahanmaps.checks.settings import CONVENTION
-        from kahanmaps.version import __version__
-
-        return {
-            "system": self.file.name,
-            "variables": list(self.file.variables),
-            "rhs": [format_polynomial(polynomial) for polynomial in self.file.system.rhs],
-            "eps": format_number(self.eps),
-            "time_step": format_number(2 * self.eps),
-            "convention": CONVENTION,
-            "arithmetic": self.arithmetic,
-            "start": [format_number(entry) for entry in self.start],
-            "direction": "backward" if self.backward else "forward",
-            "steps": self.steps,
-            "seed": None,
-            "version": __version__,
-        }
-
-    def points(self, wanted: Callable[[int], bool]) -> Iterator[tuple[int, list[str] | None, list[str | None]]]:
-        """Every step; coordinates and integrals as text for the wanted ones only, for making them costs time."""
-        if self.kind == "float":
-            for step, x in self.orbit:
-                if wanted(step):
-                    yield step, [repr(float(entry)) for entry in x], [value(x) for _, value in self.columns]
-                else:
-                    yield step, None, []
-            return
-        for point in self.orbit:
-            if wanted(point.step):
-                yield point.step, point.text, [value(point.x) for _, value in self.columns]
-            else:
-                yield point.step, None, []
-
-    def _add_integrals(self, requests: Sequence[tuple[str, str]]) -> None:
-        from kahanmaps.algebra.text import parse_rational_function
-
-        for k, (name, text) in enumerate(requests, start=1):
-            if text == "known" and not name:
-                self._add_known()
-                continue
-            if text in self.file.integrals:
-                name, function = name or text, self.file.integrals[text]
-            else:
-                name = name or (text if len(text) <= 30 else f"I{k}")
-                function = parse_rational_function(text, (*self.file.variables, "eps"), self.file.parameters)
-            self._add_function(name, function)
-
-    def _add_known(self) -> None:
-        from kahanmaps.checks.conserve import known_integrals
-        from kahanmaps.errors import InputError
-
-        known = [integral for integral, _, _ in known_integrals(self.file)]
-        if not known and not self.file.integrals:
-            raise InputError(f"--integral known: no integral of {self.file.name} is known or claimed")
-        if known and self.kind == "float":
-            raise InputError(
-                "--integral known needs exact, mod:P or ball:BITS arithmetic; give an expression for float"
-            )
-        for integral in known:
-            self.columns.append((integral.name, self._exact_column(integral)))
-        for name, function in self.file.integrals.items():
-            self._add_function(name, function)
-
-    def _add_function(self, name: str, function: RationalFunction) -> None:
-        from kahanmaps.invariants.integrals import ClaimedIntegral
-
-        if self.kind == "float":
-            from kahanmaps.maps.fast import float_function
-
-            self.columns.append((name, _float_column(float_function(function), float(self.orbit.map.eps))))
-        else:
-            self.columns.append((name, self._exact_column(ClaimedIntegral(name, function))))
-
-    def _exact_column(self, integral: Any) -> Callable[[Sequence[Any]], str | None]:
-        from kahanmaps.errors import KahanmapsError
-
-        def value(x: Sequence[Any]) -> str | None:
-            try:
-                found = integral.value(self.field, self.eps, x)
-            except KahanmapsError:  # the integral is not defined where the map is not
-                return None
-            return None if found is None else self.field.format(found)
-
-        return value
+def _require_npy(options: dict[str, Any], output: str | None) -> None:
+    """The points of a float orbit and nothing else go to a .npy file."""
+    if options["arithmetic"][0] != "float":
+        raise click.UsageError("npy is for --arithmetic float: take npz, or jsonl, which holds numbers of any length")
+    if output is None:
+        raise click.UsageError("npy grows in a file: add -o FILE.npy")
+    if options["at"] is not None or options["integrals"]:
+        raise click.UsageError("npy holds the points of --steps N --every K: for --at or --integral take npz")
 
 
-def _float_column(function: Callable[..., float | None], eps: float) -> Callable[[Sequence[Any]], str | None]:
-    def value(x: Sequence[Any]) -> str | None:
-        found = function([*map(float, x), eps])
-        return None if found is None else repr(found)
+def _stream(run: OrbitRun, output: str, quiet: bool) -> int:
+    """Float points, as fast as they come."""
+    from kahanmaps.maps.fast import stream_orbit
 
-    return value
+    try:
+        with interruptible(run.interrupt), Progress(quiet) as progress:
+            end = stream_orbit(run.orbit, output, progress=lambda step: progress(f"step {step} of {run.steps}"))
+    except OSError as error:  # a full disk comes without a name
+        error.filename = error.filename or output
+        raise
+    if not quiet:
+        say(f"{output}: {end.status}: {_end_record(end, run)['message']}")
+    return _STATUS.get(end.status, 3)
 
 
-def _end_record(end: OrbitEnd) -> dict[str, Any]:
+def _end_record(end: OrbitEnd, run: OrbitRun) -> dict[str, Any]:
     record: dict[str, Any] = {"status": end.status, "steps": end.steps, "message": end.message}
     if end.period is not None:
         record["period"] = end.period
+    if run.kind == "float":
+        record["near_singular"] = near = run.orbit.near_singular
+        drift = {drift.name: json_float(drift.largest) for drift in run.orbit.drift}
+        if drift:
+            record["drift"] = drift
+            largest = max(float(drift.largest) for drift in run.orbit.drift)
+            record["message"] += f"; block integrals moved by at most {short_float(largest)}"
+        if near:
+            record["message"] += f"; near-singular steps: {near}, the first from step {run.orbit.near_singular_at}"
     return record
 
 
-def _writer(form: str, stream: IO[Any], run: _Run, to_file: bool) -> Writer:
+def _writer(form: str, stream: IO[Any], run: OrbitRun, to_file: bool) -> Writer:
     columns, integrals = run.file.variables, [name for name, _ in run.columns]
     if form == "jsonl":
         return JsonLines(stream, columns, integrals)
@@ -292,19 +214,3 @@ def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
         buffer = io.BytesIO()  # a zip archive needs a stream that can seek
         yield buffer
         sys.stdout.buffer.write(buffer.getvalue())
-
-
-@contextmanager
-def _signals(interrupt: Callable[[], None]) -> Iterator[None]:
-    """The first Ctrl-C or SIGTERM ends the orbit after the step in flight, the second one at once."""
-
-    def handler(signum: int, frame: Any) -> None:
-        signal.signal(signum, signal.default_int_handler)
-        interrupt()
-
-    previous = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, action in previous.items():
-            signal.signal(number, action)

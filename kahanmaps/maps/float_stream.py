@@ -1,0 +1,115 @@
+"""Float orbits on disk: points appended to a .npy file as they are computed, which is valid at every moment.
+
+A .npy file is a header with the shape, then the numbers. numpy leaves room in the header for the first length to
+grow, so a portion is appended in two writes: first the numbers, then the header with the new length, in place. Whoever
+reads in between, or after the program was killed, finds a file that is complete up to the last portion (a few numbers
+may follow that the header does not count yet, and readers ignore them). Compared with a file of full size filled with
+NaN beforehand there is nothing to fill, no disk used for steps that are never taken, and no doubt about what was
+computed: the length says it. Memory needed is that of a portion. Against a crash of the machine itself nothing is done
+(fsync).
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
+
+from kahanmaps.errors import InputError
+from kahanmaps.maps.float_numbers import FloatArray
+
+if TYPE_CHECKING:
+    from kahanmaps.maps.fast import FloatOrbit
+    from kahanmaps.maps.float_ensemble import FloatEnsemble
+    from kahanmaps.maps.orbits import OrbitEnd
+
+
+class NpyFile:
+    """A .npy file of doubles of shape (rows, *shape) whose rows are appended; `rows` counts them.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder, NpyFile(Path(folder) / "x.npy", (2,)) as file:
+    ...     file.append(np.array([[1.0, 2.0], [3.0, 4.0]]))
+    ...     np.load(Path(folder) / "x.npy").shape
+    (2, 2)
+    """
+
+    def __init__(self, path: str | Path, shape: tuple[int, ...]) -> None:
+        self.shape = shape
+        self.rows = 0
+        self._room = len(_header(0, shape))
+        self._stream: IO[bytes] = open(path, "wb", buffering=0)  # noqa: SIM115 (closed by `close`)
+        self._stream.write(_header(0, shape))
+
+    def append(self, rows: FloatArray) -> None:
+        """Write more rows (count, *shape), and count them in the header when they are there."""
+        if rows.shape[1:] != self.shape:
+            raise InputError(f"found rows of shape {rows.shape[1:]}, expected {self.shape}")
+        header = _header(self.rows + len(rows), self.shape)
+        if len(header) != self._room:
+            raise InputError(f"{self.rows + len(rows)} rows are more than the header of a .npy file has room for")
+        self._stream.seek(0, io.SEEK_END)
+        left = memoryview(np.ascontiguousarray(rows, dtype="<f8").tobytes())
+        while left:  # a single write may take less than everything
+            left = left[self._stream.write(left) :]
+        self._stream.seek(0)
+        self._stream.write(header)
+        self.rows += len(rows)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+
+    def __enter__(self) -> NpyFile:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def stream_orbit(orbit: FloatOrbit, path: str | Path, *, progress: Callable[[int], None] | None = None) -> OrbitEnd:
+    """Walk an orbit into a .npy file of shape (points, dim): the start and every `orbit.every`-th iterate.
+
+    `progress` is called with the index of the step reached, about ten times a second; `orbit.interrupt()` ends the walk
+    after the portion in hand.
+    """
+    with NpyFile(path, (orbit.dim,)) as file:
+        for step, x in orbit.portions():
+            file.append(x)
+            if progress is not None:
+                progress(step)
+    if orbit.end is None:
+        raise AssertionError("an orbit has run out of portions without an end")
+    return orbit.end
+
+
+def stream_ensemble(
+    ensemble: FloatEnsemble,
+    path: str | Path,
+    steps: int,
+    every: int,
+    *,
+    progress: Callable[[int], None] | None = None,
+) -> int:
+    """Advance an ensemble into a .npy file of shape (records, n, dim), and return how many records were written.
+
+    Recorded are the points at multiples of `every`, the start among them; orbits that have ended are NaN.
+    """
+    with NpyFile(path, (ensemble.n, ensemble.system.dim)) as file:
+        for x in ensemble.records(steps, every, progress=progress):
+            file.append(x)
+        return file.rows
+
+
+def _header(rows: int, shape: tuple[int, ...]) -> bytes:
+    """The header of a .npy file; numpy pads it so that its length does not depend on the number of rows."""
+    stream = io.BytesIO()
+    what = {"descr": "<f8", "fortran_order": False, "shape": (rows, *shape)}
+    np.lib.format.write_array_header_1_0(stream, what)
+    return stream.getvalue()

@@ -1,0 +1,143 @@
+"""The normal form of a system, declared or found.
+
+Specified here: what is declared is taken as it is, what is not is looked for; the structure steps like the system, also
+for another J; and where there is none the reason is said.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flint import fmpq, fmpq_poly
+from helpers import EULER_TOP, HENON_HEILES, LORENZ, LOTKA_VOLTERRA, random_point
+from planar_helpers import diagonal, invertible, moved, over_members, structure_and_system
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.cubics import default_variables
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.splitting import Splitting
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+t = fmpq_poly([0, 1])
+
+
+def hamiltonian(text: str, n: int) -> CubicHamiltonian:
+    return CubicHamiltonian(parse_polynomial(text, default_variables(n)), standard_structure(n))
+
+
+def steps_like(structure: Structure, system: QuadraticSystem) -> bool:
+    """Whether one step in the planes is a step of the system."""
+    splitting, x = Splitting(structure.form, QQ, "1/10", structure.T), random_point(system.dim, 8)
+    images = [plane.block.image(P) for plane, P in zip(splitting.planes, splitting.triples(x), strict=True)]
+    return splitting.point(images) == KahanMap(system, "1/10").step(x)
+
+
+# Found.
+
+
+def test_a_declared_member_keeps_its_a():
+    member = draw_with_eigenvalues(["1/2", -7], 3)
+    found = structure_of(member.chosen.system, member=member)
+    assert (found.declared, found.T) == (True, None)
+    assert found.form.A == member.A
+    assert found.text == "a member of the family, chi = (t + 7)*(t - 1/2)"
+
+
+def test_the_same_member_not_declared_is_found_with_simpler_roots():
+    member = draw_with_eigenvalues(["1/2", -7], 3)
+    found = structure_of(member.chosen.system)
+    assert (found.declared, found.T) == (False, None)
+    assert found.text == "a hidden member of the family, chi = (t - 1)*(t - 2)"
+
+
+@pytest.mark.parametrize("chi", [t**2 - 2, t**2 + 1, (t - 1) * (t**2 + 1)], ids=str)
+def test_a_member_whose_chi_does_not_split_has_a_structure_too(chi):
+    found = structure_of(draw_with_chi(chi, 1).chosen.system)
+    assert isinstance(found, Structure)
+    assert found.form.chi.degree() == chi.degree()
+
+
+@over_members
+def test_the_structure_steps_like_the_system(name):
+    structure, system = structure_and_system(name)
+    assert steps_like(structure, system)
+    assert not structure.declared
+
+
+@pytest.mark.parametrize("n", [2, 4, 6])
+def test_with_another_J_there_is_a_change_of_coordinates(n):
+    member = draw_with_eigenvalues([1, -2, 3][: n // 2], 2)
+    other = moved(CubicHamiltonian(member.H, standard_structure(n)), invertible(n, 5))
+    found = structure_of(other.system, other)
+    assert found.T * standard_structure(n) * found.T.transpose() == other.J
+    assert steps_like(found, other.system)
+    # x = S z alone, without T, are other coordinates
+    assert not steps_like(Structure(found.form, None, False, ""), other.system)
+
+
+def test_with_the_standard_J_there_is_none():
+    member = draw_with_eigenvalues([1, -2], 2)
+    standard = CubicHamiltonian(member.H, standard_structure(4))
+    assert structure_of(standard.system, standard).T is None
+
+
+def test_a_hamiltonian_in_a_plane_has_the_plane_for_its_structure():
+    found = structure_of(hamiltonian("x1^3 + x1*x2^2", 2).system)
+    assert (found.form.m, found.T) == (1, None)
+
+
+@pytest.mark.parametrize("name", ["paper_m3", "paper_m3_irreducible"])
+def test_the_members_of_the_catalogue_have_a_structure(name):
+    entry = load(name)
+    declared = structure_of(entry.system, entry.hamiltonian, entry.member)
+    hidden = structure_of(entry.system)
+    assert (declared.declared, hidden.declared) == (True, False)
+    assert steps_like(declared, entry.system)
+    assert steps_like(hidden, entry.system)
+
+
+# None, with the reason.
+
+REASONS = [
+    (HENON_HEILES, "H is not a homogeneous cubic"),
+    (LORENZ, "x' is not J grad H"),
+    (EULER_TOP, "x' is not J grad H"),
+    (LOTKA_VOLTERRA, "x' is not J grad H"),
+    (hamiltonian("x1^3 + x2^3 + x3^3 + x4^3 + x1*x2*x3", 4).system, "only the multiples of I satisfy"),
+    (QuadraticSystem.from_text(["x", "y"], ["x", "-y"]), "H is not a homogeneous cubic"),
+]
+
+
+@pytest.mark.parametrize(("system", "reason"), REASONS)
+def test_without_a_structure_the_reason_is_said(system, reason):
+    found = structure_of(system)
+    assert isinstance(found, NoStructure)
+    assert found.reason.startswith(reason)
+
+
+def test_a_member_with_a_repeated_root_has_no_normal_form():
+    member = draw_with_eigenvalues([2, 2], 1)
+    assert structure_of(member.chosen.system, member=member) == NoStructure("chi has a repeated root")
+
+
+def test_a_hidden_member_with_a_repeated_root_has_none_either():
+    # H depends on x1 and x2 alone, and does not split: A is nilpotent or a multiple of I, up to the rest.
+    system = hamiltonian("x1^2*x2", 4).system
+    assert structure_of(system) == NoStructure("chi has a repeated root")
+
+
+def test_a_dimension_that_is_too_large_is_not_searched():
+    system = hamiltonian("x1^3", 34).system
+    assert structure_of(system) == NoStructure("the dimension 34 is above 32")
+
+
+def test_a_declared_member_need_not_be_the_simplest():
+    H = parse_polynomial("x1^3 + x3^3 + x2^3 + 2*x4^3", default_variables(4))
+    member = FamilyMember(diagonal([fmpq(5, 3), 7] * 2), H)
+    found = structure_of(hamiltonian("x1^3 + x3^3 + x2^3 + 2*x4^3", 4).system, member=member)
+    assert found.text == "a member of the family, chi = (t - 5/3)*(t - 7)"

@@ -1,0 +1,351 @@
+"""The normal form in machine numbers: right to the last digits, and the same numbers by whatever kernel.
+
+Specified here: orbits in normal form follow the exact ones, at real roots, complex ones and both; the kinds of block;
+which kernel, how many threads, how many orbits together, in what portions and with what records makes no difference, to
+the last bit; and each way in which an orbit can end has its status and its step, which the other orbits do not notice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from flint import fmpq, fmpq_mat, fmpq_poly
+from helpers import HENON_HEILES
+
+from kahanmaps.algebra.fields import RR
+from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.errors import InputError
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.planar import normal_form
+from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
+from kahanmaps.maps.float_blocks import CUBES, GENERAL, LINES, planar_blocks
+from kahanmaps.maps.float_ensemble import has_numba
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import Orbit
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+EPS = "1/10"
+MEMBERS = {
+    "one plane": draw_with_eigenvalues([1], seed=2),
+    "three real roots": draw_with_eigenvalues([1, -2, 3], seed=7),
+    "six real roots": draw_with_eigenvalues([1, -2, 3, 4, 5, -6], seed=9),
+    "a complex pair": draw_with_chi(fmpq_poly([1, 0, 1]), seed=1),
+    "real and complex": draw_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7),
+    "two complex pairs": draw_with_chi(fmpq_poly([1, 0, 0, 0, 1]), seed=4),
+    "irrational roots": draw_generic(4, seed=3),
+}
+FORMS = {name: normal_form(member) for name, member in MEMBERS.items()}
+
+over_members = pytest.mark.parametrize("name", MEMBERS)
+KERNELS = ["numpy", pytest.param("numba", marks=pytest.mark.skipif(not has_numba(), reason="numba is not installed"))]
+over_kernels = pytest.mark.parametrize("kernel", KERNELS)
+
+
+def member_of_repeated_factor():
+    """chi = t^2 - 1 and planar cubics u^2 v at -1, u^3 at 1, in coordinates of a shear."""
+    A = fmpq_mat(4, 4, [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1])
+    return FamilyMember(A, parse_polynomial("x1^2*x3 + x2^3", ["x1", "x2", "x3", "x4"]))
+
+
+def start_of(dim: int, scale: int = 20) -> list[fmpq]:
+    return [fmpq((-1) ** k * (k + 2), scale * (k + 1)) for k in range(dim)]
+
+
+def starts_of(dim: int, n: int, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-1, 1, (n, dim))
+
+
+def ensemble(name: str, starts: np.ndarray, **options: object) -> FloatEnsemble:
+    return FloatEnsemble(MEMBERS[name].chosen.system, EPS, starts, form=FORMS[name], **options)
+
+
+def same(one: FloatEnsemble, other: FloatEnsemble) -> None:
+    """Equal in everything that can be asked, NaN where NaN is."""
+    assert np.array_equal(one.x, other.x, equal_nan=True)
+    for name in ("status", "failed_at", "near_singular", "near_singular_at"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    for left, right in zip(one.drift, other.drift, strict=True):
+        assert np.array_equal(left.largest, right.largest), left.name
+        assert np.array_equal(left.last, right.last, equal_nan=True), left.name
+
+
+# Right numbers.
+
+
+@over_kernels
+@over_members
+def test_an_orbit_in_normal_form_follows_the_exact_one(name, kernel):
+    system = MEMBERS[name].chosen.system
+    start = start_of(system.dim)
+    balls = [point.x for point in Orbit(KahanMap(system, EPS, RR(2000)), start, 30)]
+    orbit = FloatOrbit(system, EPS, start, 30, form=FORMS[name], kernel=kernel)
+    blocks = planar_blocks(FORMS[name], EPS)
+    # Roundings in x are magnified by the change of coordinates and back, and by the derivatives of 30 steps, which add
+    # errors of their own: along these orbits by less than 1000 in all.
+    condition = np.linalg.cond(blocks.into)
+    largest = 0.0
+    for (step, x), exact in zip(orbit, balls, strict=True):
+        expected = np.array([float(entry.mid()) for entry in exact])
+        largest = max(largest, abs(expected).max())
+        assert abs(x - expected).max() <= 1000 * 2.0**-53 * condition * largest, step
+    assert orbit.end.status == "completed"
+
+
+@over_members
+def test_backward_undoes_forward(name):
+    system = MEMBERS[name].chosen.system
+    start = starts_of(system.dim, 5) / 50
+    there = ensemble(name, start, kernel="numpy")
+    there.advance(10)
+    back = FloatEnsemble(system, EPS, there.x, form=FORMS[name], backward=True, kernel="numpy")
+    back.advance(10)
+    assert abs(back.x - start).max() < 1e-9  # 20 steps, condition up to 1e4, roundings of 1e-16
+
+
+def test_both_methods_agree_where_steps_are_small():
+    # Generic elimination loses more digits; 5 steps near 0 leave at least ten of them.
+    system = MEMBERS["three real roots"].chosen.system
+    starts = starts_of(6, 50) / 200
+    one = FloatEnsemble(system, EPS, starts, form=FORMS["three real roots"], kernel="numpy")
+    other = FloatEnsemble(system, EPS, starts, kernel="numpy")
+    one.advance(5)
+    other.advance(5)
+    assert abs(one.x - other.x).max() < 1e-9 * abs(one.x).max()
+
+
+def test_the_normal_form_loses_fewer_digits_than_elimination():
+    system = MEMBERS["three real roots"].chosen.system
+    start = start_of(6, 200)
+    *_, last = Orbit(KahanMap(system, EPS, RR(3000)), start, 60)
+    expected = np.array([float(entry.mid()) for entry in last.x])
+    errors = []
+    for form in (FORMS["three real roots"], None):
+        *_, (_, x) = FloatOrbit(system, EPS, start, 60, form=form, kernel="numpy")
+        errors.append(abs(x - expected).max())
+    assert 10 * errors[0] < errors[1]
+
+
+# Blocks.
+
+
+def test_a_real_root_gives_one_real_block_and_a_pair_one_complex_block():
+    blocks = planar_blocks(FORMS["real and complex"], EPS)
+    assert (blocks.reals, len(blocks.kinds), blocks.rows) == (1, 2, 6)
+    assert blocks.labels == ("1.25992", "-0.629961+-1.09112i")
+
+
+def test_nearly_all_blocks_are_canonical():
+    kinds = np.concatenate([planar_blocks(form, EPS).kinds for form in FORMS.values()])
+    assert set(kinds.tolist()) == {LINES, CUBES}
+
+
+@over_members
+def test_there_and_back_between_x_and_the_rows_is_the_identity(name):
+    blocks = planar_blocks(FORMS[name], EPS)
+    error = abs(blocks.out @ blocks.into - np.eye(blocks.rows)).max()
+    assert error < 2 * blocks.rows * 2.0**-53 * np.linalg.cond(blocks.into)  # entries rounded once, sums of 2m terms
+
+
+@over_kernels
+def test_repeated_factors_of_h_have_blocks_too(kernel):
+    # x1' = x1^2, x3' = -2 x1 x3 at the root -1; x2' = 0, x4' = -3 x2^2 at 1
+    member = member_of_repeated_factor()
+    form = normal_form(member)
+    assert planar_blocks(form, EPS).kinds.tolist() == [GENERAL, GENERAL]
+    system, start = member.chosen.system, ["1/3", "1/2", "1/5", "-1/7"]
+    exact = [point.x for point in Orbit(KahanMap(system, EPS), start, 12)]
+    orbit = FloatOrbit(system, EPS, start, 12, form=form, kernel=kernel)
+    for (_, x), expected in zip(orbit, exact, strict=True):
+        assert x == pytest.approx(to_floats(expected), rel=1e-14, abs=1e-14)  # numbers of size 1, a dozen roundings
+
+
+@over_kernels
+def test_a_block_without_h_stands_still(kernel):
+    A = fmpq_mat(4, 4, [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1])
+    member = FamilyMember(A, parse_polynomial("x1^3 + x3^3", ["x1", "x2", "x3", "x4"]))
+    orbit = FloatOrbit(
+        member.chosen.system, EPS, ["1/3", "1/2", "1/5", "-1/7"], 50, form=normal_form(member), kernel=kernel
+    )
+    *_, (_, x) = orbit
+    assert x[[1, 3]] == pytest.approx([1 / 2, -1 / 7], rel=4 * 2.0**-53)  # in and out of the rows
+    assert abs(x[0] - 1 / 3) > 1e-3
+
+
+def test_the_normal_form_of_another_system_is_refused():
+    with pytest.raises(InputError, match="belongs to another system"):
+        FloatEnsemble(HENON_HEILES, EPS, np.zeros((1, 4)), form=FORMS["a complex pair"])
+
+
+# The same numbers, to the last bit.
+
+
+@over_members
+@pytest.mark.parametrize("threads", [1, 2])
+def test_kernels_give_the_same_numbers(name, threads):
+    pytest.importorskip("numba")
+    starts = starts_of(MEMBERS[name].chosen.system.dim, 600)
+    starts[5] *= 1e150  # overflows on the way
+    starts[6] *= 1e100
+    one = ensemble(name, starts, kernel="numpy", sampled=50)
+    other = ensemble(name, starts, kernel="numba", threads=threads, sampled=50)
+    for it in (one, other):
+        it.advance(300)
+    same(one, other)
+
+
+@over_kernels
+@over_members
+def test_orbits_do_not_depend_on_their_company(name, kernel):
+    starts = starts_of(MEMBERS[name].chosen.system.dim, 40)
+    starts[7] *= 1e160
+    together = ensemble(name, starts, kernel=kernel)
+    together.advance(150)
+    for orbit in (0, 6, 7, 8, 39):
+        alone = ensemble(name, starts[orbit : orbit + 1], kernel=kernel)
+        alone.advance(150)
+        assert np.array_equal(alone.x[0], together.x[orbit], equal_nan=True)
+        assert alone.end(0) == together.end(orbit)
+
+
+@over_kernels
+def test_portions_and_records_do_not_change_the_numbers(kernel):
+    starts = starts_of(6, 30)
+    whole = ensemble("three real roots", starts, kernel=kernel, sampled=70)
+    portions = ensemble("three real roots", starts, kernel=kernel, sampled=70)
+    recorded = ensemble("three real roots", starts, kernel=kernel, sampled=70)
+    whole.advance(500)
+    for steps in (1, 0, 69, 256, 3, 171):
+        portions.advance(steps)
+    points = recorded.run(500, 9)
+    same(whole, portions)
+    same(whole, recorded)
+    sparse = ensemble("three real roots", starts, kernel=kernel).run(500, 45)
+    assert np.array_equal(points[::5], sparse)
+
+
+@over_kernels
+def test_a_single_orbit_is_that_of_the_ensemble(kernel):
+    start = start_of(6)
+    points = dict(
+        FloatOrbit(
+            MEMBERS["three real roots"].chosen.system,
+            EPS,
+            start,
+            700,
+            form=FORMS["three real roots"],
+            every=7,
+            kernel=kernel,
+        )
+    )
+    recorded = ensemble("three real roots", [start, start_of(6, 33)], kernel="numpy").run(700, 7)
+    assert list(points) == list(range(0, 701, 7))
+    assert np.array_equal(np.array(list(points.values())), recorded[:, 0])
+
+
+# Ends.
+
+RICCATI_PLANE = FamilyMember(
+    fmpq_mat(2, 2, [1, 0, 0, 1]), parse_polynomial("x1*x2*(x1 + x2)", ["x1", "x2"])
+)  # in (U, V) = 2 eps x: U~ = U (1 + U + 2 V)/w, w = 1 - (U^2 + U V + V^2)
+
+
+@over_kernels
+def test_a_zero_denominator_is_singular_and_a_small_one_is_counted(kernel):
+    # 2 eps = 1, so U = x1 and V = x2 up to the choice of the two factors. On V = 0 the map is U~ = U/(1 - U).
+    starts = np.array([[1 / 2, 0.0], [1.0 - 2.0**-42, 0.0], [0.25, 0.0], [1e-3, 1e-3]])
+    orbits = FloatEnsemble(RICCATI_PLANE.chosen.system, "1/2", starts, form=normal_form(RICCATI_PLANE), kernel=kernel)
+    orbits.advance(2)
+    assert orbits.status.tolist() == ["singular", "completed", "completed", "completed"]
+    assert orbits.failed_at.tolist() == [2, -1, -1, -1]
+    assert orbits.near_singular.tolist() == [0, 1, 0, 0]
+    assert orbits.near_singular_at.tolist() == [-1, 0, -1, -1]
+    assert np.isnan(orbits.x[0]).all()
+    assert orbits.x[2, 0] == pytest.approx(0.5, rel=1e-15)
+    assert orbits.end(0).status == "singular"
+    assert orbits.end(0).steps == 1
+
+
+@over_kernels
+def test_an_ensemble_goes_on_without_the_orbits_that_have_ended(kernel):
+    starts = starts_of(6, 300)
+    starts[[3, 200]] = 1e200
+    orbits = ensemble("three real roots", starts, kernel=kernel)
+    orbits.advance(100)
+    ended = np.flatnonzero(orbits.status != "completed")
+    assert ended.tolist() == [3, 200]
+    assert np.isnan(orbits.x[ended]).all()
+    others = np.delete(starts, ended, axis=0)
+    without = ensemble("three real roots", others, kernel=kernel)
+    without.advance(100)
+    assert np.array_equal(np.delete(orbits.x, ended, axis=0), without.x)
+    frozen = orbits.failed_at.copy()
+    orbits.advance(300)
+    assert np.array_equal(orbits.failed_at[ended], frozen[ended])
+
+
+@over_kernels
+def test_an_overflow_names_the_step(kernel):
+    orbit = FloatOrbit(
+        MEMBERS["a complex pair"].chosen.system,
+        EPS,
+        ["1e200", 0, 0, "1e200"],
+        5,
+        form=FORMS["a complex pair"],
+        kernel=kernel,
+    )
+    assert [step for step, _ in orbit] == [0]
+    assert (orbit.end.status, orbit.end.steps, orbit.end.message) == (
+        "overflow",
+        0,
+        "step 1 leaves the range of machine floats",
+    )
+
+
+# Drift.
+
+
+@over_members
+def test_block_integrals_do_not_drift(name):
+    starts = starts_of(MEMBERS[name].chosen.system.dim, 20) / 40
+    orbits = ensemble(name, starts, kernel="numpy", sampled=20)
+    orbits.advance(400)
+    assert len(orbits.drift) == len(planar_blocks(FORMS[name], EPS).kinds)
+    for drift in orbits.drift:
+        # 400 steps of some roundings each are 1e-13. Where an orbit passes near infinity, the numerator and the
+        # denominator of the integral are larger than their quotient by the cube and the square of the distance.
+        assert (drift.largest <= 1e-8 * (1 + abs(drift.initial))).all()
+        assert (drift.last <= drift.largest).all()
+
+
+def test_block_integrals_are_those_of_the_exact_normal_form():
+    form = FORMS["three real roots"]
+    start = start_of(6)
+    X, Y = form.coordinates(start)
+    eps = fmpq(1, 10)
+    root = fmpq(-2)
+    value = form.h(X, Y)(root) / (1 + eps**2 * form.D(X, Y)(root))
+    drift = ensemble("three real roots", [start], kernel="numpy").drift[0]
+    assert drift.name == "h/(1 + eps^2 D) at t = -2"
+    assert drift.initial[0] == pytest.approx(to_floats([value])[0], rel=1e-11)
+
+
+@over_kernels
+def test_a_function_that_is_no_integral_drifts_and_one_that_is_does_not(kernel):
+    names = ["x", "y", "z"]
+    top = QuadraticSystem.from_text(names, ["y*z", "-2*z*x", "x*y"])
+    integrals = {
+        "of the map": float_function(parse_rational_function("(1 - 1/100*y^2)/(1 + 2/100*z^2)", names)),
+        "of the flow": float_function(parse_rational_function("x^2 + y^2/2", names)),
+    }
+    starts = np.array([[1, 1 / 2, 1 / 3], [1 / 2, 1, 1 / 4]])
+    orbits = FloatEnsemble(top, EPS, starts, integrals=integrals, kernel=kernel)
+    orbits.run(2000, 10)
+    of_map, of_flow = orbits.drift
+    assert (of_map.name, of_flow.name) == ("of the map", "of the flow")
+    assert (of_map.largest < 2000 * 4 * 2.0**-53).all()  # four roundings a step, all in one direction at worst
+    assert (of_flow.largest > 1e-4).all()  # about eps^2
+    orbit = FloatOrbit(top, EPS, ["1", "1/2", "1/3"], 2000, every=10, integrals=integrals, kernel=kernel)
+    for _ in orbit:
+        pass
+    assert orbit.drift[1].largest == of_flow.largest[0]

@@ -1,0 +1,123 @@
+"""Float orbits on disk: a .npy file that is complete and readable at every moment, also after the program was killed.
+
+Specified here: the points in the file are those of the orbit; the file grows by portions; an interrupted or killed run
+leaves what it had computed; an orbit that ends early leaves the points before that.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from helpers import EULER_TOP
+
+from kahanmaps.errors import InputError
+from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit, stream_ensemble, stream_orbit
+from kahanmaps.maps.float_stream import NpyFile
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+START = ["1", "1/2", "1/3"]
+
+
+def test_the_file_holds_the_points_of_the_orbit(tmp_path):
+    end = stream_orbit(FloatOrbit(EULER_TOP, "1/10", START, 100, every=7, kernel="numpy"), tmp_path / "x.npy")
+    points = dict(FloatOrbit(EULER_TOP, "1/10", START, 100, every=7, kernel="numpy"))
+    assert (end.status, end.steps) == ("completed", 100)
+    assert np.array_equal(np.load(tmp_path / "x.npy"), np.array(list(points.values())))
+
+
+def test_the_file_of_an_ensemble_holds_its_records(tmp_path):
+    starts = np.random.default_rng(0).uniform(-1, 1, (5, 3))
+    rows = stream_ensemble(FloatEnsemble(EULER_TOP, "1/10", starts, kernel="numpy"), tmp_path / "x.npy", 50, 5)
+    assert rows == 11
+    assert np.array_equal(
+        np.load(tmp_path / "x.npy"), FloatEnsemble(EULER_TOP, "1/10", starts, kernel="numpy").run(50, 5)
+    )
+
+
+def test_run_with_a_file_is_the_same(tmp_path):
+    orbits = FloatEnsemble(EULER_TOP, "1/10", [START], kernel="numpy")
+    assert orbits.run(20, 10, tmp_path / "x.npy") is None
+    assert np.load(tmp_path / "x.npy").shape == (3, 1, 3)
+
+
+def test_orbits_that_have_ended_are_nan_in_the_file(tmp_path):
+    riccati = QuadraticSystem.from_text(["x"], ["x^2"])
+    FloatEnsemble(riccati, "1/2", np.array([[1.0], [-1.0]]), kernel="numpy").run(2, 1, tmp_path / "x.npy")
+    assert np.isnan(np.load(tmp_path / "x.npy")[:, :, 0]).tolist() == [[False, False], [True, False], [True, False]]
+
+
+def test_an_orbit_that_ends_early_leaves_the_points_before(tmp_path):
+    tripled = QuadraticSystem.from_text(["x"], ["x"])  # x~ = 3 x: 3^646 is the last power in the range
+    end = stream_orbit(FloatOrbit(tripled, "1/2", [1], 1000, every=10, kernel="numpy"), tmp_path / "x.npy")
+    assert (end.status, end.steps) == ("overflow", 646)
+    assert np.load(tmp_path / "x.npy")[:, 0] == pytest.approx([3.0**k for k in range(0, 650, 10)], rel=650 * 2.0**-53)
+
+
+def test_an_interrupted_orbit_leaves_a_whole_file(tmp_path):
+    orbit = FloatOrbit(EULER_TOP, "1/10", START, None, every=100, kernel="numpy")
+    seen = []
+
+    def progress(step: int) -> None:
+        seen.append(step)
+        if len(seen) == 3:
+            orbit.interrupt()
+
+    end = stream_orbit(orbit, tmp_path / "x.npy", progress=progress)
+    assert (end.status, end.steps) == ("interrupted", seen[-1])
+    assert len(np.load(tmp_path / "x.npy")) == seen[-1] // 100 + 1
+
+
+def test_the_length_of_the_header_does_not_depend_on_the_number_of_rows(tmp_path):
+    with NpyFile(tmp_path / "x.npy", (2,)) as file:
+        before = (tmp_path / "x.npy").stat().st_size
+        for count in (9, 1, 990, 99_000):
+            file.append(np.zeros((count, 2)))
+    assert (tmp_path / "x.npy").stat().st_size == before + 100_000 * 16
+    assert np.load(tmp_path / "x.npy", mmap_mode="r").shape == (100_000, 2)
+
+
+def test_numbers_that_the_header_does_not_count_yet_are_ignored(tmp_path):
+    with NpyFile(tmp_path / "x.npy", (2,)) as file:
+        file.append(np.ones((3, 2)))
+    with open(tmp_path / "x.npy", "ab") as stream:
+        stream.write(b"half a row")
+    assert np.load(tmp_path / "x.npy").tolist() == [[1.0, 1.0]] * 3
+
+
+def test_rows_of_another_shape_are_refused(tmp_path):
+    with NpyFile(tmp_path / "x.npy", (2,)) as file, pytest.raises(InputError, match="expected"):
+        file.append(np.zeros((1, 3)))
+
+
+ENDLESS = """
+from kahanmaps.maps.fast import FloatOrbit, stream_orbit
+from kahanmaps.systems.quadratic import QuadraticSystem
+top = QuadraticSystem.from_text(["x1", "x2", "x3"], ["x2*x3", "-2*x3*x1", "x1*x2"])
+orbit = FloatOrbit(top, "1/10", ["1", "1/2", "1/3"], None, every=50, kernel="numpy")
+stream_orbit(orbit, {path!r}, progress=lambda step: print(step, flush=True))
+"""
+
+
+def test_a_killed_run_leaves_a_readable_file(tmp_path):
+    path = tmp_path / "x.npy"
+    process = subprocess.Popen(
+        [sys.executable, "-c", ENDLESS.format(path=str(path))], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        told = [int(process.stdout.readline()) for _ in range(4)]
+        time.sleep(0.05)
+    finally:
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        process.stdout.close()
+    points = np.load(path)
+    assert len(points) >= told[-1] // 50 + 1  # what was told is there, and perhaps a portion more
+    steps = 50 * (len(points) - 1)
+    expected = FloatEnsemble(EULER_TOP, "1/10", [START], kernel="numpy").run(steps, 50)
+    assert np.array_equal(points, expected[:, 0])

@@ -1,0 +1,388 @@
+"""The n-th iterate of a Kahan map directly.
+
+Specified here: over every field it is the point that the orbit comes to, or a singular step that is said as the orbit
+says it; over Q no pole on the way goes unnoticed, and what is too long is refused beforehand; iterates compose also
+where no orbit can be walked.
+"""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import arb, fmpq, fmpq_poly
+from helpers import encloses, random_point
+from planar_helpers import (
+    STARTS,
+    before,
+    over_members,
+    over_split,
+    over_unsplit,
+    side_by_side,
+    structure_and_system,
+)
+
+from kahanmaps.algebra.fields import GF, QQ, RR
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
+from kahanmaps.family.cubics import default_variables
+from kahanmaps.family.draw import draw_with_chi
+from kahanmaps.family.structure import structure_of
+from kahanmaps.maps import jump
+from kahanmaps.maps.jump import Jump, OverBudget
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.planes_point import PlanesPoint
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+
+NUMBERS = (0, 1, 2, 3, 5, 16, 17, 18, 23, 24, 25, 26, 33, 40)
+
+
+def coordinates(value):
+    """As a tuple; fractions from numerators over one denominator (lowest terms have tests of their own)."""
+    if not isinstance(value, PlanesPoint):
+        return tuple(value)
+    numerators, below = value.common()
+    return tuple(fmpq(above, below) for above in numerators)
+
+
+def walked(system, eps, field, start, steps):
+    """The generic orbit, without structure."""
+    orbit = Orbit(KahanMap(system, eps, field), start, steps, max_digits=None)
+    return [point.x for point in orbit], orbit.end
+
+
+def jumped(found, start, n):
+    """The n-th iterate, None where it is singular."""
+    try:
+        return coordinates(found.value(start, n))
+    except SingularStep:
+        return None
+
+
+# Over prime fields.
+
+
+@pytest.mark.parametrize("prime", [3, 5, 7, 11, 101, 10007, 2**61 - 1, 2**89 - 1])
+@over_members
+def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
+    structure, system = structure_and_system(name)
+    field, rng, eps = GF(prime), random.Random(prime), "3/13"
+    try:
+        found = Jump(structure, eps, field)
+    except BadPrime:
+        assert prime in (3, 5)  # of S or T
+        return
+    for _ in range(3):
+        start = [rng.randrange(prime) for _ in range(system.dim)]
+        points, _ = walked(system, eps, field, start, NUMBERS[-1])
+        for n in NUMBERS:
+            image = jumped(found, start, n)
+            if n < len(points):
+                assert image == points[n]
+            elif len(points) <= 16:  # a pole among the first steps
+                assert image is None or prime < 5
+
+
+@pytest.mark.parametrize("name", ["m = 1", "m = 2", "m = 3, a cubic field"])
+def test_modulo_two_it_is_the_point_of_the_orbit_or_refused(name):
+    structure, system = structure_and_system(name)
+    start = [1] * system.dim
+    points, _ = walked(system, 3, GF(2), start, 9)
+    try:
+        found = Jump(structure, 3, GF(2))
+    except BadPrime:
+        return
+    assert [jumped(found, start, n) for n in range(len(points))] == points
+
+
+@pytest.mark.parametrize("prime", [5, 7, 31, 10007, 2**61 - 1, 2**89 - 1])
+@pytest.mark.parametrize("name", ["m = 2", "m = 3, another J", "m = 2, sqrt 2", "m = 3, a cubic field"])
+def test_modulo_a_prime_huge_iterates_compose(name, prime):
+    structure, system = structure_and_system(name)
+    try:
+        found = Jump(structure, "3/13", GF(prime))
+    except BadPrime:
+        assert prime == 5
+        return
+    rng, passed = random.Random(prime), 0
+    for _ in range(12):
+        start = [rng.randrange(prime) for _ in range(system.dim)]
+        first = jumped(found, start, 10**15)
+        if first is None:
+            continue
+        second, whole = jumped(found, first, 10**30 - 10**15), jumped(found, start, 10**30)
+        if second is not None and whole is not None:
+            assert second == whole
+            passed += 1
+    assert passed > 0 or prime < 31  # small orbits meet their poles at once
+
+
+@pytest.mark.parametrize(("name", "prime"), [("m = 1", 43), ("m = 1", 61), ("m = 2", 31), ("m = 2, sqrt 2", 31)])
+def test_after_the_period_the_start_is_back(name, prime):
+    structure, system = structure_and_system(name)
+    found, rng, seen = Jump(structure, "3/13", GF(prime)), random.Random(prime), 0
+    for _ in range(40):
+        start = tuple(map(GF(prime).convert, [rng.randrange(prime) for _ in range(system.dim)]))
+        _, end = walked(system, "3/13", GF(prime), start, 2500)
+        if end.period is not None and end.period > 24:
+            for k in (1, 7, 10**20):
+                assert coordinates(found.value(start, k * end.period)) == start
+                assert coordinates(found.value(start, k * end.period + 1)) != start
+            seen += 1
+    assert seen > 0
+
+
+def test_with_minus_eps_the_way_leads_back():
+    structure, system = structure_and_system("m = 3")
+    field = GF(2**61 - 1)
+    start = tuple(map(field.convert, random_point(system.dim, 1)))
+    there = Jump(structure, "1/10", field).value(start, 10**9)
+    assert coordinates(Jump(structure, "-1/10", field).value(there, 10**9)) == start
+    assert coordinates(Jump(structure, "1/10", field).value(there, 10**9)) != start
+
+
+@pytest.mark.parametrize("prime", [3, 7, 11])
+def test_in_a_small_field_every_number_of_steps_has_an_answer(prime):
+    structure, system = structure_and_system("m = 2, undisguised")
+    found, answers = Jump(structure, 1, GF(prime)), 0
+    rng = random.Random(prime)
+    for _ in range(20):
+        start = [rng.randrange(prime) for _ in range(system.dim)]
+        points, end = walked(system, 1, GF(prime), start, 200)
+        if end.period is not None:
+            n = 10**12 * end.period + 5
+            assert coordinates(found.value(start, n)) == points[n % end.period]
+            answers += 1
+    assert answers > 0
+
+
+# Over Q.
+
+
+@over_split
+def test_over_q_it_is_the_point_of_the_orbit(name):
+    structure, system = structure_and_system(name)
+    start = random_point(system.dim, 6)
+    points, _ = walked(system, "1/10", QQ, start, 30)
+    found = Jump(structure, "1/10", QQ)
+    for n in (0, 1, 7, 24, 25, 26, 29, 30):
+        value = found.value(start, n)
+        assert isinstance(value, PlanesPoint)
+        assert coordinates(value) == points[n]
+
+
+@over_unsplit
+def test_where_chi_does_not_split_it_is_the_point_of_the_orbit_too(name):
+    structure, system = structure_and_system(name)
+    start = random_point(system.dim, 6, height=3)
+    points, _ = walked(system, "1/10", QQ, start, 27)
+    found = Jump(structure, "1/10", QQ)
+    for n in (0, 1, 7, 16, 17, 24, 25, 27):
+        assert found.value(start, n) == points[n]
+
+
+KINDS = [
+    ("three real roots, irrational", "level 0"),
+    ("delta = 1", "a double root"),
+    ("delta = 1, a vertex", "h = 0"),
+    ("delta = 1, irrational vertices", "the origin"),
+    ("a triple root", "a triple root, level 0"),
+    ("a double root, level 0", "a double root, and the factor 1"),
+    ("chi_7 = 0", "chi_9 = 0"),
+    ("chi_{-2} = 0", "P_{-1}, P_0, P_1 on a line"),
+    ("chi_3 = 0, P_1 a flex", "chi_5 = 0"),
+]
+
+
+@pytest.mark.parametrize("names", KINDS, ids=" | ".join)
+def test_over_q_every_kind_of_plane_has_its_iterates(names):
+    system, structure, start = side_by_side(*names)
+    points, _ = walked(system, "1/2", QQ, start, 40)
+    found = Jump(structure, "1/2", QQ)
+    assert [coordinates(found.value(start, n)) for n in range(20, 41)] == points[20:]
+
+
+@pytest.mark.parametrize("names", KINDS[:4], ids=" | ".join)
+def test_the_same_modulo_a_large_prime(names):
+    system, structure, start = side_by_side(*names)
+    points, _ = walked(system, "1/2", GF(2**61 - 1), start, 40)
+    found = Jump(structure, "1/2", GF(2**61 - 1))
+    assert [coordinates(found.value(start, n)) for n in range(41)] == points
+
+
+@pytest.mark.parametrize("n", [60, 100])
+def test_far_iterates_over_q_are_those_modulo_a_prime(n):
+    structure, system = structure_and_system("m = 3")
+    start, field = random_point(system.dim, 2), GF(2**89 - 1)
+    exact = coordinates(Jump(structure, "1/10", QQ).value(start, n))
+    modular = Jump(structure, "1/10", field).value(start, n)
+    assert tuple(map(field.convert, exact)) == coordinates(modular)
+    assert KahanMap(system, "1/10").step(exact) == coordinates(Jump(structure, "1/10", QQ).value(start, n + 1))
+
+
+# Singular orbits.
+
+
+def poles():
+    for name, step in (("a pole at step 2", 2), ("a pole at step 5", 5), ("delta = 1, a pole at step 3", 3)):
+        for more in (0, 1, 3, 8, 20, 24, 30):
+            yield pytest.param(name, more, step + more - 1, id=f"{name}, {more} steps before")
+
+
+@pytest.mark.parametrize(("name", "more", "last"), list(poles()))
+def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
+    cubic, start = STARTS[name]
+    U, V, W = before(cubic, start, more)
+    system, structure, (_, u, _, v) = side_by_side(name, "a double root")
+    start = (fmpq(U, W), u, fmpq(V, W), v)
+    points, end = walked(system, "1/2", QQ, start, 60)
+    assert (end.status, end.steps) == ("singular", last)
+    found = Jump(structure, "1/2", QQ)
+    for n in (last + 1, last + 2, last + 3, 57):
+        with pytest.raises(SingularStep, match=f"no value at step {last}$"):
+            found.value(start, n)
+    for n in (0, last):
+        assert coordinates(found.value(start, n)) == points[n]
+
+
+def test_a_start_without_an_image_is_singular_over_every_field():
+    _, structure, start = side_by_side("no value at the start", "a double root")
+    for field in (QQ, GF(10007), GF(2**89 - 1)):
+        found = Jump(structure, "1/2", field)
+        x = tuple(map(field.convert, start))
+        assert coordinates(found.value(x, 0)) == x
+        for n in (1, 2, 30, 10**6):
+            with pytest.raises(SingularStep, match="step 0"):
+                found.value(x, n)
+
+
+def test_modulo_a_prime_poles_on_the_way_are_passed_over():
+    structure, system = structure_and_system("m = 2")
+    field, rng, seen = GF(31), random.Random(4), 0
+    found = Jump(structure, "3/13", field)
+    for _ in range(60):
+        start = tuple(map(field.convert, [rng.randrange(31) for _ in range(system.dim)]))
+        points, end = walked(system, "3/13", field, start, 200)
+        beyond = None if end.status != "singular" or len(points) < 18 else jumped(found, start, len(points) + 20)
+        if beyond is not None:
+            back = jumped(Jump(structure, "-3/13", field), beyond, len(points) + 20)
+            assert back is None or back == start
+            seen += back == start
+    assert seen > 3
+
+
+# Balls.
+
+
+@over_members
+def test_balls_enclose_the_exact_iterate(name):
+    structure, system = structure_and_system(name)
+    # Large numbers, so that the sixteen steps before the doublings already cost some hundred bits.
+    start, field = random_point(system.dim, 6, height=3), RR(2000)
+    exact, found = Jump(structure, "1/10", QQ), Jump(structure, "1/10", field)
+    for n in (0, 1, 10, 24, 30):
+        try:
+            balls = found.value(start, n)
+        except PrecisionLost:  # balls cannot decide that a level is degenerate
+            assert "double root" in name
+            continue
+        value = coordinates(exact.value(start, n))
+        assert all(encloses(ball, number) for ball, number in zip(balls, value, strict=True))
+        assert all(ball.rad() < arb(2) ** -100 for ball in balls)
+
+
+@pytest.mark.parametrize("n", [10**3, 10**6, 10**12])
+def test_balls_stay_narrow_for_many_steps(n):
+    structure, system = structure_and_system("m = 2")
+    x = random_point(system.dim, 1)
+    wide, narrow = (Jump(structure, "1/10", RR(bits)).value(x, n) for bits in (400, 600))
+    assert all(a.overlaps(b) for a, b in zip(wide, narrow, strict=True))
+    assert min(ball.rel_accuracy_bits() for ball in wide) > 200
+
+
+def test_balls_too_wide_to_decide_say_so():
+    structure, system = structure_and_system("m = 2")
+    with pytest.raises(PrecisionLost):
+        Jump(structure, "1/10", RR(10)).value(random_point(system.dim, 1), 10**12)
+
+
+# What is refused.
+
+
+@pytest.mark.parametrize("field", [QQ, GF(101), RR(64)], ids=repr)
+def test_a_negative_number_of_steps_is_refused(field):
+    structure, system = structure_and_system("m = 2")
+    with pytest.raises(InputError, match="found the step -1, expected 0 or more"):
+        Jump(structure, "1/10", field).value([1] * system.dim, -1)
+
+
+@pytest.mark.parametrize("name", ["m = 2", "m = 2, sqrt 2"])
+def test_what_would_be_too_long_is_refused_beforehand(name):
+    structure, system = structure_and_system(name)
+    found, start = Jump(structure, "1/10", QQ), random_point(system.dim, 6, height=3)
+    value = found.value(start, 40)
+    bits = value.bits if isinstance(value, PlanesPoint) else max(entry.q.bit_length() for entry in value)
+    with pytest.raises(OverBudget) as refused:
+        found.value(start, 40, max_bits=bits // 2)
+    assert 0.7 * bits < refused.value.bits < 1.4 * bits
+    assert coordinates(found.value(start, 40, max_bits=2 * bits)) == coordinates(value)
+
+
+def test_without_a_budget_there_is_a_limit_all_the_same():
+    structure, _ = structure_and_system("m = 2")
+    with pytest.raises(OverBudget):
+        Jump(structure, "1/10", QQ).value([1, "1/2", 3, 4], 10**9)
+
+
+def test_modulo_a_prime_there_is_nothing_to_budget():
+    structure, _ = structure_and_system("m = 2")
+    assert Jump(structure, "1/10", GF(10007)).value([1, 2, 3, 4], 10**30, max_bits=1)
+
+
+def test_a_prime_without_reduction_is_refused():
+    structure, _ = structure_and_system("m = 3")
+    with pytest.raises(BadPrime):
+        Jump(structure, "1/10", GF(2))
+    with pytest.raises(BadPrime):
+        Jump(structure, "1/7", GF(7))
+
+
+# That the tests can fail.
+
+
+def test_a_wrong_doubling_is_noticed(monkeypatch):
+    # Every iterate over Q is compared with the orbit modulo a random prime.
+    structure, _ = structure_and_system("m = 2")
+    iterate = jump.tau_table.iterate
+    monkeypatch.setattr(jump.tau_table, "iterate", lambda block, n: iterate(block, n + 1))
+    with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
+        Jump(structure, "1/10", QQ).value([1, 2, 3, "1/4"], 40)
+
+
+# A rational plane beside one over Q(i).
+
+
+def beside_complex_planes(name: str, steps: int):
+    """A system with the plane of a named start, `steps` steps before it, and a plane over Q(i); the start for 1/2."""
+    x = ring(default_variables(6)).gens()
+    (a, b, c, d), triple = STARTS[name]
+    U, V, W = before((a, b, c, d), triple, steps)
+    H = draw_with_chi(fmpq_poly([1, 0, 1]), 1).H.compose(x[1], x[2], x[4], x[5], ctx=x[0].context())
+    H += a * x[0] ** 3 + b * x[0] ** 2 * x[3] + c * x[0] * x[3] ** 2 + d * x[3] ** 3
+    hamiltonian = CubicHamiltonian(H, standard_structure(6))
+    start = (fmpq(U, W), fmpq(1, 9), fmpq(0), fmpq(V, W), fmpq(0), fmpq(1, 7))
+    return hamiltonian.system, structure_of(hamiltonian.system, hamiltonian), start
+
+
+@pytest.mark.parametrize("steps", [2, 10, 17, 24])
+def test_over_q_poles_are_noticed_also_where_chi_does_not_split(steps):
+    system, structure, start = beside_complex_planes("a pole at step 2", steps)
+    last = steps + 1
+    points, end = walked(system, "1/2", QQ, start, last + 2)
+    assert (end.status, end.steps) == ("singular", last)
+    found = Jump(structure, "1/2", QQ)
+    assert coordinates(found.value(start, last)) == points[last]
+    for n in (last + 1, last + 2, last + 3, last + 4):
+        with pytest.raises(SingularStep, match=f"step {last}$"):
+            found.value(start, n)

@@ -1,0 +1,183 @@
+"""Rational points kept as triples in the planes.
+
+Specified here: put together they are the points of the Kahan map, reduced and with positive denominators, also where
+planes take no part in a coordinate or a coordinate's form divides h; the lengths are about right; points are equal if
+their triples are, up to signs.
+"""
+
+from __future__ import annotations
+
+from itertools import islice, pairwise
+from math import gcd
+
+import pytest
+from flint import fmpq, fmpz
+from helpers import random_point, step_or_none
+from planar_helpers import SPLIT, STARTS, side_by_side, structure_and_system
+
+from kahanmaps.maps import planes_point
+from kahanmaps.maps.integer_steps import IntegerPoint
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.normal_steps import NormalSteps
+from kahanmaps.maps.planes_point import PlanesPoint
+
+PAIRS = [
+    ("one rational root", "three rational roots"),
+    ("three rational roots", "three rational roots"),
+    ("a double root", "one real root, irrational"),
+    ("a double root, and the factor 1", "h = 0"),
+    ("level 0", "the origin"),
+    ("a triple root", "delta = 1"),
+    ("delta = 1, a vertex", "large coefficients"),
+    ("a triple root, level 0", "a double root, level 0"),
+    ("chi_5 = 0", "P_{-1}, P_0, P_1 on a line", "chi_3 = 0, P_1 a flex"),
+    ("one rational root", "one rational root", "after a pole"),
+]
+
+
+def walk(system, structure, eps, start, steps):
+    """Pairs of a point made of planes and the point of the Kahan map."""
+    phi, x = KahanMap(system, eps), tuple(map(fmpq, start))
+    for point in islice(NormalSteps(structure, fmpq(eps)).points(start), steps + 1):
+        yield point, x
+        x = step_or_none(phi, x)
+
+
+def cases():
+    for name in ("m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 2, another J", "m = 3, another J"):
+        structure, system = structure_and_system(name)
+        yield pytest.param(system, structure, fmpq(1, 10), random_point(system.dim, 3), id=name)
+        yield pytest.param(system, structure, fmpq(-6, 7), random_point(system.dim, 4), id=f"{name}, eps = -6/7")
+    for names in PAIRS:
+        system, structure, start = side_by_side(*names)
+        yield pytest.param(system, structure, fmpq(1, 2), start, id=" | ".join(names))
+    structure, system = structure_and_system("m = 3")
+    equal = [fmpq(1, 6)] * 6  # all W share their primes
+    yield pytest.param(system, structure, fmpq(1, 2), equal, id="the same denominators")
+
+
+over_cases = pytest.mark.parametrize(("system", "structure", "eps", "start"), list(cases()))
+
+
+@over_cases
+def test_the_points_are_those_of_the_kahan_map(system, structure, eps, start):
+    for point, x in walk(system, structure, eps, start, 9):
+        assert point.rationals() == x
+
+
+@over_cases
+def test_coordinates_are_reduced_with_positive_denominators(system, structure, eps, start):
+    for point, x in walk(system, structure, eps, start, 9):
+        assert point.lowest_terms() == [(entry.p, entry.q) for entry in x]
+
+
+@pytest.mark.parametrize(("system", "structure", "eps", "start"), [pytest.param(*p.values, id=p.id) for p in cases()])
+def test_numerators_over_one_denominator_are_the_same_point(system, structure, eps, start):
+    for point, x in walk(system, structure, eps, start, 6):
+        numerators, denominator = point.common()
+        assert tuple(fmpq(above, denominator) for above in numerators) == x
+
+
+@over_cases
+def test_the_integer_point_is_in_lowest_terms(system, structure, eps, start):
+    for point, x in walk(system, structure, eps, start, 6):
+        assert point.integer_point() == IntegerPoint.from_rationals(x)
+
+
+@pytest.mark.parametrize("name", SPLIT)
+def test_every_member_that_splits_steps_like_its_kahan_map(name):
+    structure, system = structure_and_system(name)
+    for seed in (11, 12):
+        for point, x in walk(system, structure, fmpq(3, 10), random_point(system.dim, seed), 6):
+            assert point.rationals() == x
+
+
+@pytest.mark.parametrize("name", ["m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 3, another J"])
+def test_the_bits_are_about_those_of_the_longest_integer(name):
+    structure, system = structure_and_system(name)
+    *_, (point, x) = walk(system, structure, fmpq(1, 10), random_point(system.dim, 3), 20)
+    # some per cent: what the W have in common, and the fixed numbers that x is put together with
+    assert 0.93 < point.bits / IntegerPoint.from_rationals(x).bits < 1.05
+
+
+# Equality.
+
+
+def negated(point: PlanesPoint, *which: int) -> PlanesPoint:
+    triples = [tuple(-e for e in P) if i in which else P for i, P in enumerate(point.triples)]
+    return PlanesPoint(point._assembly, triples)
+
+
+def points(count: int) -> list[PlanesPoint]:
+    structure, _ = structure_and_system("m = 2")
+    return list(islice(NormalSteps(structure, fmpq(1, 10)).points([1, "1/3", 0, -2]), count))
+
+
+@pytest.mark.parametrize("which", [(0,), (1,), (0, 1)], ids=str)
+def test_the_signs_of_triples_do_not_matter(which):
+    for point in points(6):
+        other = negated(point, *which)
+        assert other == point
+        assert hash(other) == hash(point)
+        assert other.lowest_terms() == point.lowest_terms()
+        assert other.integer_point() == point.integer_point()
+
+
+def test_different_points_are_different():
+    found = points(6)
+    assert all((a == b) == (i == j) for i, a in enumerate(found) for j, b in enumerate(found))
+    assert len(set(found)) == 6
+
+
+def test_one_sign_in_one_triple_makes_another_point():
+    point = points(3)[2]
+    (U, V, W), last = point.triples
+    assert PlanesPoint(point._assembly, [(-U, V, W), last]) != point
+    assert PlanesPoint(point._assembly, [(U, V, -W), last]) != point
+
+
+def test_a_point_is_not_equal_to_something_else():
+    point = points(1)[0]
+    assert point != point.rationals()
+    assert point != 0
+
+
+# What the reduction rests on.
+
+
+def test_in_a_coordinate_whose_form_divides_h_the_common_factor_is_long():
+    # h = U V (2 U + V) + ...: a gcd is needed there, the fixed primes alone do not do.
+    system, structure, start = side_by_side("one rational root", "three rational roots")
+    *_, (point, x) = walk(system, structure, fmpq(1, 2), start, 9)
+    factors = [
+        gcd(int(U if form[1] == 0 else V), int(W))
+        for row in point._assembly.rows
+        for i, form in zip(row.support, row.forms, strict=True)
+        if i in row.dividing
+        for U, V, W in [point.triples[i]]
+        if 0 in form
+    ]
+    assert max(factors) > 10**6
+    assert point.rationals() == x
+
+
+def test_undisguised_each_coordinate_has_one_plane():
+    _, structure, start = side_by_side("one rational root", "three rational roots")
+    _, assembly = NormalSteps(structure, fmpq(1, 2)).blocks(start)
+    assert [row.support for row in assembly.rows] == [(0,), (1,), (0,), (1,)]
+
+
+@pytest.mark.parametrize("name", ["one rational root", "three rational roots", "a double root"])
+def test_the_fixed_primes_are_needed(name, monkeypatch):
+    # That the tests can fail: without them fractions are not reduced.
+    system, structure, start = side_by_side(name, "one real root, irrational")
+    monkeypatch.setattr(planes_point, "_common_part", lambda above, below, modulus: fmpz(1))
+    found = [point.lowest_terms() for point, _ in walk(system, structure, fmpq(1, 2), start, 9)]
+    assert any(gcd(int(above), int(below)) > 1 for pairs in found for above, below in pairs)
+
+
+def test_all_starts_put_together_are_the_start():
+    names = [name for name in STARTS if not name.startswith("no value")]
+    for first, second in pairwise(names):
+        _, structure, start = side_by_side(first, second)
+        assert next(NormalSteps(structure, fmpq(1, 2)).points(start)).rationals() == start

@@ -1,0 +1,162 @@
+"""The planes of a normal form over Q, over prime fields and over real balls.
+
+Specified here: a point comes back from its triples, in every field, split or not, and also where J is not the standard
+one; one step in every plane is the step of the Kahan map; a prime at which chi has a repeated root is refused.
+"""
+
+from __future__ import annotations
+
+import pytest
+from flint import fmpq
+from helpers import random_point, step_or_none
+from planar_helpers import over_members, over_split, over_unsplit, structure_and_system
+
+from kahanmaps.algebra.fields import CC, GF, QQ, RR
+from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.normal_steps import NormalSteps, splits
+from kahanmaps.maps.splitting import Splitting, rational_factors
+
+FIELDS = [QQ, GF(11), GF(101), GF(10007), GF(2**61 - 1), GF(2**89 - 1), RR(128)]
+over_fields = pytest.mark.parametrize("field", FIELDS, ids=repr)
+
+
+def splitting_of(name, field, eps="1/10"):
+    structure, system = structure_and_system(name)
+    return Splitting(structure.form, field, eps, structure.T), system
+
+
+def same(field, left, right) -> bool:
+    with field.working():
+        return all(field.equal(a, b) for a, b in zip(left, right, strict=True))
+
+
+@over_members
+@over_fields
+def test_a_point_comes_back_from_its_triples(name, field):
+    splitting, _ = splitting_of(name, field)
+    for seed in range(3):
+        x = tuple(map(field.convert, random_point(splitting.dim, seed)))
+        assert same(field, splitting.point(splitting.triples(x)), x)
+
+
+@over_members
+@over_fields
+def test_a_step_in_every_plane_is_a_step_of_the_kahan_map(name, field):
+    splitting, system = splitting_of(name, field)
+    phi, stepped = KahanMap(system, "1/10", field), 0
+    for seed in range(4):
+        x = tuple(map(field.convert, random_point(splitting.dim, seed)))
+        expected = step_or_none(phi, x)
+        with field.working():
+            images = [plane.block.image(P) for plane, P in zip(splitting.planes, splitting.triples(x), strict=True)]
+        if expected is None:
+            with pytest.raises(SingularStep):
+                splitting.point(images)
+        else:
+            assert same(field, splitting.point(images), expected)
+            stepped += 1
+    assert stepped > 0
+
+
+@over_members
+@over_fields
+def test_any_lift_of_the_triples_is_the_same_point(name, field):
+    splitting, _ = splitting_of(name, field)
+    x = tuple(map(field.convert, random_point(splitting.dim, 5)))
+    with field.working():
+        lifts = [tuple(entry * (k + 3) for entry in P) for k, P in enumerate(splitting.triples(x))]
+    assert same(field, splitting.point(lifts), x)
+
+
+@over_members
+@over_fields
+def test_the_planes_have_the_whole_dimension(name, field):
+    splitting, _ = splitting_of(name, field)
+    assert 2 * sum(plane.degree for plane in splitting.planes) == splitting.dim
+    for i, plane in enumerate(splitting.planes):
+        rows = splitting.matrix(i)
+        assert (len(rows), {len(row) for row in rows}) == (splitting.dim, {2 * plane.degree})
+
+
+@over_split
+def test_over_q_a_point_is_the_sum_of_its_planes(name):
+    splitting, _ = splitting_of(name, QQ)
+    x = random_point(splitting.dim, 3)
+    total = [fmpq(0)] * splitting.dim
+    for i, (U, V, _) in enumerate(splitting.triples(x)):
+        u, v = U / fmpq(1, 5), V / fmpq(1, 5)
+        total = [entry + row[0] * u + row[1] * v for entry, row in zip(total, splitting.matrix(i), strict=True)]
+    assert tuple(total) == x
+    assert splits(splitting)
+
+
+@over_unsplit
+def test_where_chi_does_not_split_there_are_no_integer_planes(name):
+    structure, _ = structure_and_system(name)
+    assert not splits(Splitting(structure.form, QQ, 1, structure.T))
+    with pytest.raises(InputError, match="does not split over Q"):
+        NormalSteps(structure, fmpq(1))
+
+
+@pytest.mark.parametrize(
+    ("name", "field", "degrees"),
+    [
+        ("m = 2, sqrt 2", QQ, [2]),
+        ("m = 2, sqrt 2", GF(7), [1, 1]),  # 3^2 = 2 modulo 7
+        ("m = 2, sqrt 2", GF(11), [2]),
+        ("m = 2, sqrt 2", RR(64), [1, 1]),
+        ("m = 2, i", RR(64), [2]),
+        ("m = 2, i", GF(13), [1, 1]),
+        ("m = 3, partly split", QQ, [1, 2]),
+        ("m = 3, partly split", RR(64), [1, 2]),
+        ("m = 3, a cubic field", QQ, [3]),
+        ("m = 3, a cubic field", GF(5), [1, 2]),
+        ("m = 3, a cubic field", GF(3), [3]),
+        ("m = 3", RR(64), [1, 1, 1]),
+    ],
+    ids=str,
+)
+def test_planes_are_the_factors_of_chi_in_the_field(name, field, degrees):
+    splitting, _ = splitting_of(name, field, 1)
+    assert sorted(plane.degree for plane in splitting.planes) == degrees
+
+
+def test_planes_over_q_are_named_after_their_roots_in_increasing_order():
+    splitting, _ = splitting_of("m = 3", QQ)
+    assert [plane.name for plane in splitting.planes] == ["t = 1", "t = 2", "t = 3"]
+    chi = splitting.form.chi
+    assert [-factor[0] for factor in rational_factors(chi)] == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("name", "prime"), [("m = 2, sqrt 2", 2), ("m = 2, i", 2), ("m = 3", 2), ("m = 3, a cubic field", 23)]
+)
+def test_a_prime_at_which_chi_has_a_repeated_root_is_refused(name, prime):
+    with pytest.raises(BadPrime):
+        splitting_of(name, GF(prime), 1)
+
+
+@pytest.mark.parametrize(("field", "eps"), [(GF(7), "7/3"), (GF(7), "1/7"), (QQ, 0), (RR(64), 0)], ids=str)
+def test_an_eps_that_is_zero_or_has_no_value_is_refused(field, eps):
+    with pytest.raises(InputError):
+        splitting_of("m = 2", field, eps)
+
+
+def test_complex_balls_are_refused():
+    with pytest.raises(InputError, match="expected QQ, GF"):
+        splitting_of("m = 2", CC(64))
+
+
+def test_a_point_of_another_dimension_is_refused():
+    splitting, _ = splitting_of("m = 2", QQ)
+    with pytest.raises(InputError, match="3 coordinates, expected 4"):
+        splitting.triples([fmpq(1)] * 3)
+
+
+@over_fields
+def test_a_plane_at_infinity_is_a_pole(field):
+    splitting, _ = splitting_of("m = 2", field)
+    first, (U, V, W) = splitting.triples(list(map(field.convert, random_point(4, 1))))
+    with pytest.raises(SingularStep, match="at infinity"):
+        splitting.point([first, (U, V, W * 0)])

@@ -1,0 +1,251 @@
+"""Planes of the normal form for several test files: starts of every kind, and orbits by nothing but Python and gcds."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from math import gcd
+from typing import Any
+
+import pytest
+from flint import fmpq, fmpq_mat, fmpq_poly, fmpz
+
+from kahanmaps.algebra.matrices import det
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.cubics import default_variables
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.structure import Structure, structure_of
+from kahanmaps.maps.planar_integers import IntegerBlock
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+Cubic = tuple[int, int, int, int]
+Integers = tuple[int, int, int]
+
+# A cubic and a start (U : V : W) each, found by search; chi is that of maps/tau.py, chi_n = 0 for P_i, P_j, P_k on a
+# line, i + j + k = n.
+STARTS: dict[str, tuple[Cubic, Integers]] = {
+    "three real roots, irrational": ((1, 1, -3, -1), (3, 2, 5)),
+    "one real root, irrational": ((1, 2, 0, 5), (-1, 4, 7)),
+    "one rational root": ((0, 2, 1, 3), (1, -2, 3)),
+    "three rational roots": ((0, 1, -3, 2), (5, 3, 7)),
+    "large coefficients": ((10**6 + 3, -(10**6), 271828, 314159), (2, -3, 5)),
+    "P_{-1}, P_0, P_1 on a line": ((0, 1, -3, 3), (0, 1, 2)),
+    "chi_{-2} = 0": ((-3, -3, -2, 0), (1, 3, 5)),
+    "chi_{-1} = 0": ((-3, -3, -3, -2), (1, 0, 4)),
+    "chi_1 = 0": ((-3, -3, -3, -2), (-2, 0, 3)),
+    "chi_2 = 0": ((-3, -3, 1, 0), (-1, 6, 2)),
+    "chi_3 = 0, P_1 a flex": ((3, 0, 0, -2), (2, 1, 3)),
+    "chi_4 = 0": ((-1, 1, -2, -2), (5, -1, 8)),
+    "chi_5 = 0": ((2, -3, 3, -2), (-4, -3, 2)),
+    "chi_6 = 0": ((2, 1, 3, 3), (-1, 3, 9)),
+    "chi_7 = 0": ((-2, 12, -9, 1), (1, 5, 3)),
+    "chi_9 = 0": ((1, 0, 0, -3), (5, 3, 3)),
+    "delta = 1": ((-3, 2, 1, 0), (-9, -1, 8)),
+    "delta = 1, irrational vertices": ((1, 3, 2, 0), (-5, 4, 5)),
+    "delta = 1, a vertex": ((-3, -2, 3, 2), (-3, 2, 5)),
+    "level 0": ((-3, -3, -2, -2), (-5, 5, 2)),
+    "a double root": ((1, 0, -3, 2), (2, -3, 5)),
+    "a double root, and the factor 1": ((0, 0, 1, -3), (2, 3, 4)),
+    "a double root, level 0": ((0, 0, 1, -3), (3, 1, 2)),
+    "a triple root": ((1, 3, 3, 1), (2, 5, 3)),
+    "a triple root, level 0": ((1, 3, 3, 1), (2, -2, 3)),
+    "h = 0": ((0, 0, 0, 0), (1, 2, 3)),
+    "the origin": ((1, 2, 0, 5), (0, 0, 1)),
+    "no value at the start": ((-3, -3, -3, -2), (-2, 1, 3)),
+    "no value at the start, level 0": ((-3, -3, -2, -2), (-1, 1, 5)),
+    "a pole at step 2": ((0, 2, 1, 0), (5, -7, 4)),
+    "a pole at step 3": ((2, 3, -2, 0), (-1, 1, 9)),
+    "a pole at step 4": ((-1, -3, -1, 2), (3, 1, 9)),
+    "a pole at step 5": ((-2, 2, 1, 0), (-2, 3, 9)),
+    "a pole at step 6": ((1, 11, 2, -8), (1, 0, 9)),
+    "period 5 but for a pole": ((0, 2, -1, 2), (-1, -1, 3)),
+    "period 6 but for a pole": ((0, -1, -3, -3), (-3, 1, 3)),
+    "delta = 1, a pole at step 3": ((-3, -2, 3, 2), (-1, 3, 6)),
+    "after a pole": ((0, 2, 1, 0), (-5, 7, 4)),
+}
+
+over_starts = pytest.mark.parametrize(("cubic", "start"), STARTS.values(), ids=STARTS.keys())
+
+
+def integer_block(cubic: Sequence[int], start: Sequence[int]) -> IntegerBlock:
+    """The plane with 2 eps = 1, so that (U : V : W) is the start."""
+    U, V, W = start
+    return IntegerBlock([fmpq(entry) for entry in cubic], fmpq(1, 2), fmpq(U, W), fmpq(V, W))
+
+
+def image(cubic: Sequence[int], triple: Sequence[int]) -> Integers:
+    """(U W + h_V : V W - h_U : W^2 + det(Hess h)/4), spelled out."""
+    (a, b, c, d), (U, V, W) = cubic, triple
+    h_U, h_V = 3 * a * U * U + 2 * b * U * V + c * V * V, b * U * U + 2 * c * U * V + 3 * d * V * V
+    h_UU, h_UV, h_VV = 6 * a * U + 2 * b * V, 2 * b * U + 2 * c * V, 2 * c * U + 6 * d * V
+    return U * W + h_V, V * W - h_U, W * W + (h_UU * h_VV - h_UV * h_UV) // 4
+
+
+def preimage(cubic: Sequence[int], triple: Sequence[int]) -> Integers:
+    """The inverse step: that with -eps."""
+    U, V, W = image(cubic, (triple[0], triple[1], -triple[2]))
+    return -U, -V, W
+
+
+def reduced(triple: Sequence[Any]) -> Integers:
+    """A primitive triple of Python integers with W >= 0."""
+    U, V, W = (int(entry) for entry in triple)
+    common = gcd(U, V, W) * (-1 if W < 0 else 1)
+    return U // common, V // common, W // common
+
+
+def by_gcds(block: IntegerBlock, steps: int) -> list[Integers]:
+    """P_0, ..., P_steps, or up to the last before a pole, each image divided by its gcd."""
+    h = block.block
+    cubic = tuple(int(entry) for entry in (h.a, h.b, h.c, h.d))
+    points = [reduced(block.start)]
+    for _ in range(steps):
+        triple = image(cubic, points[-1])
+        if triple[2] == 0:
+            break
+        points.append(reduced(triple))
+    return points
+
+
+def before(cubic: Sequence[int], start: Sequence[int], steps: int) -> Integers:
+    """The point from which `steps` steps lead to the start."""
+    for _ in range(steps):
+        start = reduced(preimage(cubic, start))
+    return reduced(start)
+
+
+def random_cubic(rng: random.Random, kind: int) -> list[fmpq]:
+    """Four coefficients: of any kind, with rational roots, double and triple ones, with fractions, zero."""
+    size = rng.choice([1, 2, 3, 5, 20])
+    r, s, x, y, z = (rng.randint(-size, size) for _ in range(5))
+    found: list[Any] = {
+        4: [r * x, r * y + s * x, r * z + s * y, s * z],
+        5: [r * x * x, 2 * r * x * y + s * x * x, r * y * y + 2 * s * x * y, s * y * y],
+        6: [r * x**3, 3 * r * x * x * y, 3 * r * x * y * y, r * y**3],
+        7: [0, rng.choice([1, -1, 2]), r, 0],
+        8: [fmpq(entry, rng.randint(1, size)) for entry in (r, s, x, y)],
+        9: [rng.randint(-(10**6), 10**6) for _ in range(4)],
+        10: [0, 0, 0, 0],
+    }.get(kind, [r, s, x, y])
+    return [fmpq(entry) for entry in found]
+
+
+def random_blocks(seed: Any, count: int) -> Iterator[IntegerBlock]:
+    """Cubics of every kind with starts of few and of a hundred digits; every kind is among any 11 of them."""
+    rng = random.Random(seed)
+    for number in range(count):
+        cubic = random_cubic(rng, number % 11)
+        u, v = (fmpq(rng.randint(-4, 4), rng.randint(1, 4)) for _ in range(2))
+        match rng.randrange(8):
+            case 5:
+                u, v = (fmpq(rng.randint(-(10**100), 10**100), rng.randint(1, 10**100)) for _ in range(2))
+            case 6:
+                W = rng.randint(1, 30)
+                u, v = fmpq(rng.randint(-9, 9), W), fmpq(rng.randint(-9, 9), W)
+            case 7:
+                u = fmpq(0)
+        eps = rng.choice([fmpq(1, 2), fmpq(1, 10), fmpq(-3, 7), fmpq(1, 10**40 + 7), fmpq(2**40)])
+        yield IntegerBlock(cubic, eps, u, v)
+
+
+def planar_system(cubic: Sequence[Any]) -> QuadraticSystem:
+    """u' = h_v, v' = -h_u."""
+    a, b, c, d = (fmpq(entry) for entry in cubic)
+    u, v = ring(["u", "v"]).gens()
+    return CubicHamiltonian(a * u**3 + b * u**2 * v + c * u * v**2 + d * v**3, standard_structure(2)).system
+
+
+def moved(hamiltonian: CubicHamiltonian, R: fmpq_mat) -> CubicHamiltonian:
+    """The same system in the coordinates R x; J becomes R J R^T."""
+    context = ring(hamiltonian.variables)
+    H = hamiltonian.H.compose(*linear_combinations(R.inv(), context.gens()), ctx=context)
+    return CubicHamiltonian(H, R * hamiltonian.J * R.transpose())
+
+
+@lru_cache
+def invertible(n: int, seed: int) -> fmpq_mat:
+    """A random invertible integer matrix, far from symplectic."""
+    rng = random.Random(seed)
+    while True:
+        R = fmpq_mat(n, n, [rng.randint(-2, 2) for _ in range(n * n)])
+        if det(R) != 0:
+            return R
+
+
+def as_integers(triple: Sequence[Any]) -> tuple[fmpz, fmpz, fmpz]:
+    """The triple as FLINT's integers."""
+    U, V, W = triple
+    return fmpz(int(U)), fmpz(int(V)), fmpz(int(W))
+
+
+def structure_and_system(name: str) -> tuple[Any, QuadraticSystem]:
+    """The structure of a member of the table below and its system."""
+    system, hamiltonian = MEMBERS[name]
+    found = structure_of(system, hamiltonian)
+    assert isinstance(found, Structure)
+    return found, system
+
+
+def _plain(cubics: Sequence[Sequence[int]]) -> tuple[QuadraticSystem, CubicHamiltonian]:
+    """Several planes beside one another: every coordinate belongs to one plane."""
+    m = len(cubics)
+    x = ring(default_variables(2 * m)).gens()
+    H = sum(
+        (a * x[i] ** 3 + b * x[i] ** 2 * x[m + i] + c * x[i] * x[m + i] ** 2 + d * x[m + i] ** 3)
+        for i, (a, b, c, d) in enumerate(cubics)
+    )
+    hamiltonian = CubicHamiltonian(H, standard_structure(2 * m))
+    return hamiltonian.system, hamiltonian
+
+
+def _drawn(member: Any, R: fmpq_mat | None = None) -> tuple[QuadraticSystem, CubicHamiltonian]:
+    hamiltonian = CubicHamiltonian(member.H, standard_structure(member.dim))
+    if R is not None:
+        hamiltonian = moved(hamiltonian, R)
+    return hamiltonian.system, hamiltonian
+
+
+_t = fmpq_poly([0, 1])
+SPLIT: dict[str, tuple[QuadraticSystem, CubicHamiltonian]] = {
+    "m = 1": _drawn(draw_with_eigenvalues([2], 3)),
+    "m = 2": _drawn(draw_with_eigenvalues([1, -2], 7)),
+    "m = 3": _drawn(draw_with_eigenvalues([1, -2, 3], 7)),
+    "m = 3, fractions": _drawn(draw_with_eigenvalues(["1/2", "-2/3", 4], 1)),
+    "m = 2, another J": _drawn(draw_with_eigenvalues([1, -2], 5), invertible(4, 3)),
+    "m = 3, another J": _drawn(draw_with_eigenvalues([1, -2, 3], 2), invertible(6, 4)),
+    "m = 2, undisguised": _plain([(1, 2, 0, 5), (0, 2, 1, 3)]),
+    "m = 3, undisguised": _plain([(1, 2, 0, 5), (0, 2, 1, 0), (0, 1, -3, 2)]),
+    "m = 3, one plane at rest, one double root": _plain([(1, 1, -3, -1), (1, 0, -3, 2), (1, 0, 0, 0)]),
+}
+UNSPLIT: dict[str, tuple[QuadraticSystem, CubicHamiltonian]] = {
+    "m = 2, sqrt 2": _drawn(draw_with_chi(_t**2 - 2, 1)),
+    "m = 2, i": _drawn(draw_with_chi(_t**2 + 1, 1)),
+    "m = 3, partly split": _drawn(draw_with_chi((_t - 1) * (_t**2 + 1), 1)),
+    "m = 3, a cubic field": _drawn(draw_with_chi(_t**3 - _t - 1, 2)),
+    "m = 2, sqrt 2, another J": _drawn(draw_with_chi(_t**2 - 2, 4), invertible(4, 8)),
+}
+MEMBERS = {**SPLIT, **UNSPLIT}
+over_split = pytest.mark.parametrize("name", SPLIT)
+over_unsplit = pytest.mark.parametrize("name", UNSPLIT)
+over_members = pytest.mark.parametrize("name", MEMBERS)
+
+
+@lru_cache
+def side_by_side(*names: str) -> tuple[QuadraticSystem, Structure, tuple[fmpq, ...]]:
+    """A system made of the planes of these starts, its structure, and the start for eps = 1/2."""
+    system, hamiltonian = _plain([STARTS[name][0] for name in names])
+    member = FamilyMember(diagonal([*range(1, len(names) + 1)] * 2), hamiltonian.H)
+    structure = structure_of(system, member=member)
+    assert isinstance(structure, Structure)
+    triples = [STARTS[name][1] for name in names]
+    start = [fmpq(U, W) for U, _, W in triples] + [fmpq(V, W) for _, V, W in triples]
+    return system, structure, tuple(start)
+
+
+def diagonal(entries: Sequence[Any]) -> fmpq_mat:
+    """The diagonal matrix with these entries."""
+    n = len(entries)
+    return fmpq_mat(n, n, [fmpq(entries[i]) if i == j else fmpq(0) for i in range(n) for j in range(n)])
