@@ -130,27 +130,37 @@ def without(number: fmpz, bad: fmpz) -> fmpz:
 
 def bad_part(number: fmpz, bad: fmpz) -> tuple[fmpz, fmpz]:
     """The number as (coprime to `bad`) times (only primes of `bad`); zero as (0, 1)."""
-    part = fmpz(1)
+    part, power = fmpz(1), bad * bad * bad
     if number == 0:
         return number, part
-    while (common := (number % bad).gcd(bad)) != 1:
+    while (common := power.gcd(number % power)) != 1:
         number = number // common
         part = part * common
+        if _is_all(common, power):
+            break
     return number, part
 
 
-def strip(triple: Sequence[fmpz], bad: fmpz) -> IntegerTriple:
-    """The triple without the common factors that its entries have in the primes of `bad`."""
+def strip(triple: Sequence[fmpz], bad: fmpz, divisor: fmpz | None = None) -> IntegerTriple:
+    """The triple without the common factors that its entries have in the primes of `bad`; and divided by `divisor`.
+
+    The divisor has to divide all entries and to be coprime to `bad`.
+    """
     U, V, W = triple
-    while True:
-        common = bad.gcd(W % bad)
-        if common != 1:
-            common = common.gcd(U % bad)
-        if common != 1:
-            common = common.gcd(V % bad)
-        if common == 1:
-            return U, V, W
-        U, V, W = U // common, V // common, W // common
+    power = bad * bad * bad
+    common = power.gcd(W % power)
+    if common != 1:
+        common = common.gcd(U % power)
+    if common != 1:
+        common = common.gcd(V % power)
+    if common != 1 or divisor is not None:
+        U, V, W = divide_exactly((U, V, W), common if divisor is None else common * divisor)
+    return (U, V, W) if common == 1 or _is_all(common, power) else strip((U, V, W), bad)
+
+
+def _is_all(common: fmpz, power: fmpz) -> bool:
+    """Whether a common divisor with `power` is all there is: no prime is in it as often as in `power`."""
+    return bool(without(common, power // common) == 1)
 
 
 def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:

@@ -38,7 +38,6 @@ from kahanmaps.maps.planar_integers import (
     IntegerBlock,
     IntegerTriple,
     bad_part,
-    divide_exactly,
     primitive,
     strip,
 )
@@ -126,7 +125,7 @@ class TauStart:
             (common * zero) * A + (right * one) * B + (left * minus) * C
             for zero, one, minus in zip(self._zero, self._one, self._minus, strict=True)
         ]
-        return strip(divide_exactly(raw, self._divisor), self.bad)
+        return strip(raw, self.bad, self._divisor)
 
 
 def _window(first: int, values: Sequence[fmpq], bad: fmpz) -> Window:
