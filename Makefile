@@ -36,11 +36,9 @@ format: dev-venv  ## put all files into the layout that lint asks for
 	@$(python) -m ruff check --select I --fix .
 	@$(python) -m ruff format .
 
-bench: dev-venv  ## every benchmarks/bench_*.py, one after the other
-	@set -e; for file in benchmarks/bench_*.py; do \
-	    [ -e "$$file" ] || { echo "There are no benchmarks/bench_*.py yet."; break; }; \
-	    echo "== $$file"; $(python) "$$file"; \
-	done
+bench: dev-venv  ## ratios to other programs, also into docs/benchmarks.md; ARGS="--quick" or ARGS="--only exact"
+	@.ci/bootstrap peers
+	@$(python) benchmarks/run.py $(ARGS)
 
 docs:  ## say where the documentation is
 	@echo "The documentation is plain Markdown, to be read as it is; nothing is built:"

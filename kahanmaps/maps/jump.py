@@ -55,6 +55,8 @@ class Jump:
     def __init__(self, structure: Structure, eps: Any, field: Field) -> None:
         self.structure, self.field = structure, field
         self.eps = field.convert(eps)
+        if field.characteristic == 2:
+            raise BadPrime("2 eps = 0 modulo 2, where the coordinates are 2 eps (u, v): take another prime", 2)
         self.splitting = Splitting(structure.form, field, self.eps, structure.T)
 
     @cached_property

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.maps.jump import Jump
 from kahanmaps.maps.splitting import Splitting
 
 METHODS = ("generic", "normal-form", "jump")
@@ -77,9 +78,9 @@ def _why_not_over_Q(structure: Structure) -> str:
 
 
 def why_no_reduction(structure: Structure, field: Field, eps: object) -> str:
-    """Empty where the structure can be used over the field, otherwise the reason (a bad prime)."""
+    """Empty where jumps are possible over the field, otherwise the reason (a bad prime)."""
     try:
-        Splitting(structure.form, field, eps, structure.T)
+        Jump(structure, eps, field)
     except BadPrime as error:
         return str(error)
     return ""

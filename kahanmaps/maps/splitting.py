@@ -49,8 +49,8 @@ class Splitting:
         with field.working():
             self.eps = field.convert(eps)
             self._scale = 2 * self.eps
-            if self._scale == 0:
-                raise BadPrime(f"2 eps = 0 in {field}: take another prime", field.characteristic)
+            if self.eps == 0:
+                raise BadPrime(f"eps = 0 in {field}: take another prime", field.characteristic)
             self._inverse = field.convert_matrix(S.inv())
             planes, lifts = _planes(form, field)
             self.planes: tuple[Plane, ...] = tuple(planes)

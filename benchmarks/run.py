@@ -1,0 +1,260 @@
+"""All benchmarks (`make bench`): runs them, prints ratios, and writes results.json here and docs/benchmarks.md.
+
+    python benchmarks/run.py [--quick] [--only exact|iterate|float] [--page]
+
+--quick takes less than a minute, on shorter orbits, and writes nothing; --only runs one part, and leaves what is on
+record of the others as it is; --page runs nothing and writes the page anew from the record. Peers that are absent are
+left out with a word.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import datetime
+import importlib
+import importlib.metadata
+import json
+import platform
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bench_exact
+import bench_iterate
+import flint
+from work import Absent, Row, format_ratio, gp_version, say, table
+
+HERE = Path(__file__).resolve().parent
+RESULTS = HERE / "results.json"
+PAGE = HERE.parent / "docs" / "benchmarks.md"
+PARTS = ("exact", "iterate", "float")
+PACKAGES = ("python-flint", "numpy", "cypari", "gmpy2", "sympy", "scipy", "numba", "heyoka")
+FLOAT = "Float orbits"
+
+
+def machine() -> dict[str, Any]:
+    """What the figures were taken with."""
+    cpu = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists() and (found := re.search(r"model name\s*:\s*(.+)", info.read_text(encoding="utf-8"))):
+        cpu = found.group(1)
+    versions = {"FLINT": flint.__FLINT_VERSION__}
+    for package in PACKAGES:
+        try:
+            versions[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    with contextlib.suppress(Absent):
+        versions["PARI/GP"] = gp_version()
+    return {
+        "cpu": cpu,
+        "python": platform.python_version(),
+        "versions": versions,
+        "date": datetime.date.today().isoformat(),
+    }
+
+
+def measured(part: str, quick: bool) -> list[Row]:
+    """The rows of one part; none if a package that it cannot do without is missing."""
+    say(f"== {part}")
+    if part == "exact":
+        return bench_exact.measure(quick)
+    if part == "iterate":
+        return bench_iterate.measure(quick)
+    if quick:
+        say("  left out: there is no quick form of it")
+        return []
+    try:
+        bench_float = importlib.import_module("bench_float")
+    except ImportError as error:
+        say(f"  left out: {error}")
+        return []
+    return [{"group": FLOAT, **entry} for entry in bench_float.measure()]
+
+
+# Claims --------------------------------------------------------------------------------------------------------------
+
+
+def _value(rows: list[Row], contestant: str, work: str, key: str = "ratio") -> Any:
+    for entry in rows:
+        if entry["contestant"].startswith(contestant) and entry["work"].startswith(work):
+            return entry[key]
+    raise KeyError(contestant)
+
+
+def _least_of_peers(rows: list[Row]) -> float:
+    peers = [
+        entry["ratio"]
+        for entry in rows
+        if entry["work"].startswith("m = 3, N = 80,") and not entry["contestant"].startswith("kahanmaps")
+    ]
+    if not peers:
+        raise KeyError("peers")
+    return min(peers)
+
+
+def _multiplications(rows: list[Row]) -> float:
+    note = _value(rows, "kahanmaps: doublings", "m = 3, n = 640,", "note")
+    return float(note.split()[0])
+
+
+# What is claimed, the figure, and whether it is at least or at most that.
+CLAIMS: list[tuple[str, Callable[[list[Row]], float], str, float]] = [
+    (
+        "every peer takes so many times as long as kahanmaps with reduced rationals in x (m = 3, N = 80)",
+        _least_of_peers,
+        "at least",
+        20,
+    ),
+    (
+        "exponent of N in the time of a whole orbit, normal coordinates alone",
+        lambda rows: _value(rows, "kahanmaps, normal form: normal coordinates", "m = 3, N = 80 to 320"),
+        "below",
+        3.7,
+    ),
+    (
+        "exponent of N in the time of a whole orbit, reduced rationals in x",
+        lambda rows: _value(rows, "kahanmaps, normal form: reduced", "m = 3, N = 80 to 320"),
+        "below",
+        3.7,
+    ),
+    (
+        "stepping takes so many times as long as the iterate n = 640 alone",
+        lambda rows: _value(rows, "kahanmaps: stepping", "m = 3, n = 640,"),
+        "at least",
+        50,
+    ),
+    ("multiplications of the final size for the iterate n = 640 alone", _multiplications, "below", 25),
+    (
+        "milliseconds for the iterate n = 10^18 over GF(2^61 - 1) (the one claim on absolute time)",
+        lambda rows: _value(rows, "kahanmaps: doublings", "m = 3, n = 10^18", "seconds") * 1e3,
+        "below",
+        3,
+    ),
+]
+
+
+def claims(rows: list[Row]) -> list[tuple[str, str, str, bool]]:
+    """Every claim with its bound, the figure found and whether it holds; those without a figure are missing."""
+    found = []
+    for text, figure, how, bound in CLAIMS:
+        try:
+            value = figure(rows)
+        except KeyError:
+            continue
+        found.append(
+            (text, f"{how} {bound}", format_ratio(value), value >= bound if how == "at least" else value < bound)
+        )
+    return found
+
+
+# The page ------------------------------------------------------------------------------------------------------------
+
+HOW = """\
+# Benchmarks
+
+Written by `make bench`; `benchmarks/` has the scripts, `benchmarks/results.json` the figures with times.
+
+Every contestant gets the same work on the same machine, one after the other on one core where nothing else is said,
+and exact results have to be equal before a time counts: a disagreement stops the run. Short runs are repeated, and the
+best processor time is taken. What is printed are ratios, since they survive a change of machine better than times do.
+PARI/GP takes its own time, without start-up and output; finding the normal form (a fraction of a second, once a system)
+is in no figure. Peers were given the best formulation that was found, and those that are slower but more natural as
+well.
+
+The exact system is a member of the family with integer coefficients, hidden by a symplectic integer matrix;
+eps = 1/10.
+"""
+
+GROUPS = {
+    bench_exact.GROUP: (
+        "Time relative to kahanmaps with reduced rationals in x: more is slower. All other libraries solve the\n"
+        "linear system of each step; rationals are reduced there as well, integers stand over one denominator in\n"
+        "lowest terms. What is less work than that has a line of its own: one common denominator from which the\n"
+        "last few bits are not removed, and normal coordinates without x. `fractions.Fraction` is too slow for\n"
+        "N = 80: it runs up to N = 40, and is compared there."
+    ),
+    bench_exact.GROWTH: (
+        "The exponent e in time ~ N^e. The N-th iterate has about N^2 digits, so that the orbit as a whole has N^3."
+    ),
+    bench_iterate.OVER_Q: (
+        "Time relative to kahanmaps' doublings: more is slower. `ellmul` does the heart of the task only: it\n"
+        "multiplies the point T by n on each elliptic curve, and does not come back to x."
+    ),
+    bench_iterate.MODULO: (
+        "As above. Here `ellmul`, compiled from C, is faster than kahanmaps, which is Python around single\n"
+        "operations of FLINT."
+    ),
+    bench_iterate.BALLS: "No peer; the exact iterate n = 80 was found to be in the balls.",
+    FLOAT: (
+        "Speed relative to the first line of each block: **more is faster**. Integrators solve another problem,\n"
+        "the flow, and are what one would use instead."
+    ),
+}
+
+
+def page(record: dict[str, Any]) -> str:
+    """docs/benchmarks.md."""
+    rows: list[Row] = [entry for part in PARTS for entry in record["parts"].get(part, {}).get("rows", [])]
+    lines = [HOW]
+    held = claims(rows)
+    if held:
+        lines += ["## What is claimed", "", "| | claimed | here |", "|---|---:|---:|"]
+        lines += [f"| {text} | {bound} | {value}{'' if holds else ' (missed)'} |" for text, bound, value, holds in held]
+        lines.append("")
+    for group in dict.fromkeys(entry["group"] for entry in rows):
+        lines += [f"## {group}", "", GROUPS[group], ""]
+        members = [entry for entry in rows if entry["group"] == group]
+        for work in dict.fromkeys(entry["work"] for entry in members):
+            head = "exponent" if group == bench_exact.GROWTH else "ratio"
+            lines += [f"| {work} | {head} | |", "|---|---:|---|"]
+            for entry in members:
+                if entry["work"] == work:
+                    note = entry["note"].replace("|", "\\|")
+                    lines.append(
+                        f"| {entry['contestant']} | {format_ratio(entry['ratio'])} | {note} |".replace("|  |", "| |")
+                    )
+            lines.append("")
+    lines += ["## Measured with", ""]
+    for part in PARTS:
+        if part in record["parts"]:
+            told = record["parts"][part]["machine"]
+            versions = ", ".join(f"{name} {version}" for name, version in told["versions"].items())
+            versions = versions.replace("PARI/GP gp", "PARI/GP").replace("PARI/GP cypari with PARI", "PARI/GP (cypari)")
+            lines.append(f"* {part}: {told['cpu']}; Python {told['python']}, {versions}; {told['date']}")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Run, print, write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="short orbits, less than a minute; nothing is written")
+    parser.add_argument("--only", choices=PARTS, help="one part")
+    parser.add_argument("--page", action="store_true", help="run nothing, write docs/benchmarks.md from results.json")
+    options = parser.parse_args()
+    if options.page:
+        PAGE.write_text(page(json.loads(RESULTS.read_text(encoding="utf-8"))), encoding="utf-8")
+        return
+    parts = [options.only] if options.only else list(PARTS)
+    record: dict[str, Any] = {"parts": {}}
+    if not options.quick and RESULTS.exists():
+        record = json.loads(RESULTS.read_text(encoding="utf-8"))
+    rows: list[Row] = []
+    for part in parts:
+        found = measured(part, options.quick)
+        rows += found
+        if found:
+            record["parts"][part] = {"machine": machine(), "rows": found}
+    print(table(rows))
+    for text, bound, value, holds in claims(rows):
+        print(f"{'holds ' if holds else 'MISSED'} {text}: {value}, claimed {bound}")
+    if not options.quick:
+        RESULTS.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+        PAGE.write_text(page(record), encoding="utf-8")
+        say(f"Written: {RESULTS.relative_to(HERE.parent)} and {PAGE.relative_to(HERE.parent)}")
+
+
+if __name__ == "__main__":
+    main()

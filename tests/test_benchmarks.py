@@ -1,0 +1,93 @@
+"""The benchmarks measure the same thing: all contestants that are present compute the same numbers, on a tiny case."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from kahanmaps import KahanMap
+
+BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
+STEPS = 4
+
+
+@pytest.fixture(autouse=True)
+def _scripts(monkeypatch):
+    """The scripts import each other by name, as they do when they are run."""
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    yield
+    for name in ("work", "run", "bench_exact", "bench_iterate"):
+        sys.modules.pop(name, None)
+
+
+def stepped(work, steps):
+    """The last iterate by the definition of the map, as reduced pairs."""
+    phi, x = KahanMap(work.system, work.eps), work.start
+    for _ in range(steps):
+        x = phi.step(x)
+    return [(entry.p, entry.q) for entry in x]
+
+
+@pytest.mark.parametrize("m", [2, 3])
+@pytest.mark.parametrize("kind", ["KAHANMAPS", "PEERS", "FRACTION"])
+def test_contestants_of_the_exact_orbit_arrive_where_the_map_does(kind, m):
+    import bench_exact
+    import work
+
+    listed = getattr(bench_exact, kind)
+    present = []
+    for name, run in listed if isinstance(listed, list) else [listed]:
+        try:
+            _, last = run(work.work(m), STEPS)
+        except work.Absent:
+            continue
+        assert last == stepped(work.work(m), STEPS), name
+        present.append(name)
+    assert present
+
+
+def test_formulations_of_pari_that_lost_arrive_there_too():
+    import bench_exact
+    import work
+
+    try:
+        found = bench_exact.gp_others(work.work(), STEPS)
+    except work.Absent as reason:
+        pytest.skip(str(reason))
+    for name, _, last in found:
+        assert last == stepped(work.work(), STEPS), name
+
+
+def test_a_contestant_with_another_result_stops_the_run():
+    import bench_exact
+    import work
+
+    name, run = bench_exact.KAHANMAPS[0]
+
+    def wrong(work, steps):
+        return run(work, steps + 1)
+
+    with pytest.raises(work.Disagreement, match="the wrong one"):
+        bench_exact.contest(work.work(2), STEPS, [(name, run), ("the wrong one", wrong)])
+
+
+def test_the_jump_the_steps_and_nmod_mat_agree():
+    import bench_iterate
+    import work
+
+    # Long enough to be reached by doublings.
+    assert bench_iterate.jump(work.work(), 30)[1] == bench_iterate.step(work.work(), 30)[1]
+    assert bench_iterate.jump_modulo(work.work(), 50)[1] == bench_iterate.step_modulo(work.work(), 50)[1]
+    assert bench_iterate.in_balls(work.work(), n=100, bits=200, check=8)
+
+
+def test_the_page_is_what_the_record_says():
+    import run
+
+    if not run.RESULTS.exists():
+        pytest.skip("no record yet: make bench")
+    record = json.loads(run.RESULTS.read_text(encoding="utf-8"))
+    assert run.PAGE.read_text(encoding="utf-8") == run.page(record)
