@@ -22,6 +22,8 @@ HOLDS, REFUTED, WRONG_USE, UNDECIDED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 13
 # name -> (module in kahanmaps_cli.commands, one line for the list of commands)
 COMMANDS = {
     "orbit": ("orbit", "Iterate the Kahan map: exactly, modulo a prime, in balls or floats."),
+    "period": ("period", "The exact period of an orbit, modulo a prime or over the rationals."),
+    "ensemble": ("ensemble", "Many orbits at once, in machine numbers or modulo a prime."),
     "check-commute": ("check_commute", "Do two Kahan maps commute?"),
     "check-integrals": ("check_integrals", "Are the known or claimed integrals conserved?"),
     "check-measure": ("check_measure", "Is the measure dx/phi invariant?"),

@@ -23,6 +23,7 @@ Steps follow the recursion, the n-th iterate the doublings, from a window of psi
 to one around 2i or 2i + 1. Over Q the numbers would grow by powers of the bad primes like everything else here, with
 exponents quadratic in n. So a value is kept as an integer prime to the bad primes times a scale s_n that is never
 formed: only t_n = s_{n+1} s_{n-1} / s_n^2 is needed, a small rational number. docs/mathematics.md has the proofs.
+Source: ward-1948, for such sequences.
 """
 
 from __future__ import annotations
