@@ -241,9 +241,10 @@ class OrbitRun:
         from kahanmaps.invariants.integrals import ClaimedIntegral
 
         if self.kind == "float":
-            from kahanmaps.maps.fast import float_function
+            from kahanmaps.maps.fast import float_function, to_float
 
-            self.columns.append((name, _float_column(float_function(function), float(self.orbit.map.eps))))
+            # eps itself, also where the orbit steps by -eps: integrals are those of the map.
+            self.columns.append((name, _float_column(float_function(function), to_float(self.eps))))
         else:
             self.columns.append((name, self._exact_column(ClaimedIntegral(name, function))))
 

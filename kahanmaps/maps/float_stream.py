@@ -43,7 +43,11 @@ class NpyFile:
         self.rows = 0
         self._room = len(_header(0, shape))
         self._stream: IO[bytes] = open(path, "wb", buffering=0)  # noqa: SIM115 (closed by `close`)
-        self._stream.write(_header(0, shape))
+        try:
+            self._stream.write(_header(0, shape))
+        except BaseException:
+            self._stream.close()
+            raise
 
     def append(self, rows: FloatArray) -> None:
         """Write more rows (count, *shape), and count them in the header when they are there."""

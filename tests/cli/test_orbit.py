@@ -577,6 +577,12 @@ def test_an_interrupted_npz_file_can_be_read(kahanmaps, npz, monkeypatch):
     assert found.step.tolist() == list(range(found.meta["end"]["steps"] + 1))
 
 
+@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007", "float"])
+def test_integrals_are_those_of_eps_also_backward(kahanmaps, arithmetic):
+    run = kahanmaps(f"{TOP} --steps 1 --backward --integral e=10*eps --arithmetic {arithmetic} --format jsonl")
+    assert {float(record["integrals"]["e"]) for record in run.records if record["record"] == "point"} == {1.0}
+
+
 # Methods.
 
 
@@ -684,3 +690,68 @@ def test_automatic_balls_work_without_a_normal_form(kahanmaps):
     run = kahanmaps(f"orbit henon_heiles {start} --arithmetic ball:auto --format jsonl")
     assert (run.status, run.records[-1]["status"]) == (0, "completed")
     assert run.records[0]["arithmetic"].startswith("ball:")
+
+
+# Float orbits in .npy files, and what their end says.
+
+
+@pytest.mark.parametrize("every", [1, 7])
+def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path, every):
+    command = f"{MEMBER} --steps 30 --every {every} --arithmetic float"
+    outcome = kahanmaps(f"{command} -o", tmp_path / "x.npy")
+    points = [
+        [float(entry) for entry in record["x"]] for record in kahanmaps(f"{command} --format jsonl").records[1:-1]
+    ]
+    assert (outcome.status, outcome.out) == (0, "")
+    assert np.load(tmp_path / "x.npy").tolist() == points
+    assert outcome.err.startswith(f"{tmp_path / 'x.npy'}: completed: 30 steps; block integrals moved by at most ")
+
+
+def test_npy_holds_the_points_up_to_a_pole(kahanmaps, tmp_path):
+    command = "orbit --vars x --rhs x^2 --start 1/2 --eps 1/2 --steps 9 --arithmetic float"  # 1/2, 1, pole
+    outcome = kahanmaps(f"{command} -o", tmp_path / "x.npy")
+    assert (outcome.status, "x.npy: singular: " in outcome.err) == (3, True)
+    assert np.load(tmp_path / "x.npy").tolist() == [[0.5], [1.0]]
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ("--format npy --arithmetic float", "npy grows in a file: add -o FILE.npy"),
+        ("-o x.npy", "npy is for --arithmetic float: take npz, or jsonl"),
+        ("-o x.npy --arithmetic mod:7", "npy is for --arithmetic float"),
+        ("-o x.npy --arithmetic float --integral x1", "for --at or --integral take npz"),
+        ("-o no/such/folder/x.npy --arithmetic float", "No such file or directory: no/such/folder/x.npy"),
+    ],
+)
+def test_npy_is_for_float_points_in_a_file(kahanmaps, more, words):
+    outcome = kahanmaps(f"{MEMBER} --steps 3 {more}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err
+
+
+def test_an_interrupted_npy_file_is_valid(tmp_path):
+    path = tmp_path / "x.npy"
+    words = f"{TOP} --steps {10**10} --arithmetic float --every 10 --kernel numpy -o {path}"
+    process = subprocess.Popen([*COMMAND, *shlex.split(words)], stderr=subprocess.PIPE, text=True)
+    while not path.exists() or path.stat().st_size < 2000:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    err = process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    step = int(err.rpartition("interrupted after step ")[2])
+    assert np.load(path).shape == (step // 10 + 1, 3)
+
+
+def test_the_end_of_a_float_orbit_has_the_drift_of_its_integrals_and_near_singular_steps(kahanmaps):
+    end = kahanmaps(f"{MEMBER} --steps 30 --arithmetic float --format jsonl").records[-1]
+    assert list(end["drift"]) == [f"h/(1 + eps^2 D) at t = {root}" for root in (1, 2, 3)]
+    assert end["near_singular"] == 0
+    assert f"moved by at most {max(end['drift'].values()):.3g}" in end["message"]
+    end = kahanmaps(f"{TOP} --steps 5 --arithmetic float --format jsonl").records[-1]
+    assert (end["near_singular"], end["message"], "drift" in end) == (0, "5 steps", False)
+
+
+def test_a_near_singular_step_is_told(kahanmaps):
+    command = "orbit --vars x,y --rhs x^2 --rhs y --start 0.99999999999999,1 --eps 1/2 --steps 1 --arithmetic float"
+    assert kahanmaps(command).out.endswith("# completed: 1 step; near-singular steps: 1, the first from step 0\n")

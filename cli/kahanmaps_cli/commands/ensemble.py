@@ -1,0 +1,237 @@
+"""kahanmaps ensemble."""
+
+from __future__ import annotations
+
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, FloatRun, ModularRun, Run, structure_for
+from kahanmaps_cli.ensemble_starts import drawn, read_starts
+from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.params import Arithmetic, ExactNumber, NameValue
+from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.render import on_terminal, print_json
+from kahanmaps_cli.signals import interruptible
+
+if TYPE_CHECKING:
+    from kahanmaps.algebra.polynomials import RationalFunction
+    from kahanmaps.systems.files import SystemFile
+
+_MAX_STEPS = 10**13  # years
+_MAX_BITS = 61
+
+
+@click.command("ensemble")
+@system_options
+@click.option(
+    "--starts",
+    type=click.Path(),
+    metavar="FILE",
+    help="One point a line (text, csv) or a row (.npy); - standard input.",
+)
+@click.option("--random", "count", type=int, metavar="N", help="Instead: N starts drawn at random.")
+@click.option("--box", type=ExactNumber(), metavar="R", help="... with coordinates from -R to R (default 1).")
+@click.option("--seed", type=int, metavar="S", help="... with this seed (default 0).")
+@eps_options
+@click.option("--steps", type=int, required=True, help="How many steps to take.")
+@click.option("--backward", is_flag=True, help="Step by the inverse map, Phi(., -eps).")
+@click.option("--arithmetic", type=Arithmetic(), default="float", show_default=True, help="float or mod:P, P < 2^61.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE.npy", help="Write the points there.")
+@click.option("--every", type=int, metavar="K", help="Write every K-th iterate (default: the start and the last one).")
+@click.option(
+    "--integral",
+    "integrals",
+    type=NameValue(name_is_optional=True),
+    multiple=True,
+    metavar="[NAME=]EXPR",
+    help="Watch an expression in the variables and eps, or an integral of the file by its name.",
+)
+@click.option("--method", type=click.Choice(("generic", "normal-form")), help="Chosen by itself unless given.")
+@click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Makes no difference to numbers, only to speed.")
+@click.option("--threads", type=int, metavar="T", help="For the kernel numba (default: all processors).")
+@click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
+@output_options
+def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
+    """Many orbits of the Kahan map of SYSTEM at once: how many go through, and how well integrals are kept.
+
+    \b
+      kahanmaps ensemble pair.toml --random 1000 --box 1/2 --seed 1 --eps 1/10 --steps 10000
+      kahanmaps ensemble pair.toml --random 1000 --eps 1/10 --steps 10000 --every 100 -o orbits.npy
+      kahanmaps ensemble euler_top --starts starts.csv --eps 1/20 --steps 1000 --integral F1
+      kahanmaps ensemble pair.toml --random 100 --eps 1/10 --steps 100000 --arithmetic mod:2305843009213693951 --json
+
+    FILE.npy is an array (records, orbits, dimension): row k holds step k K. It grows while the orbits are walked, and
+    is valid at every moment, also after Ctrl-C. Orbits that have ended early are NaN there; residues stay at their last
+    point. Starts in text are exact numbers, separated by commas or blanks; # starts a comment, and a first line may
+    name the columns.
+
+    Exit status: 0 all orbits completed, 2 wrong use, 3 some ended early, 130 interrupted.
+    """
+    from kahanmaps.family.structure import NoStructure
+
+    eps = the_eps(options["eps"], options["time_step"])
+    _require_sense(system, options)
+    kind, prime = options["arithmetic"]
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    integrals = _integrals(options["integrals"], file)
+    _require_map(file, eps, kind, prime)
+    if options["starts"] is not None:
+        starts = read_starts(options["starts"], file.variables, prime if kind == "mod" else None)
+    else:
+        box = 1 if options["box"] is None else options["box"]
+        seed = options["seed"] or 0
+        starts = drawn(options["count"], file.system.dim, box, seed, prime if kind == "mod" else None)
+    structure = structure_for(file, options["method"])
+    form = None if isinstance(structure, NoStructure) else structure.form
+    made = ModularRun if kind == "mod" else FloatRun
+    run: Run = made(file, eps, starts, form, integrals, options["steps"], options)
+    if verbose and not quiet:
+        why = structure.reason if isinstance(structure, NoStructure) else structure.text
+        say(f"method {run.method}: {why}; kernel {run.kernel}")
+    steps, output = options["steps"], options["output"]
+    try:
+        with interruptible(run.interrupt), Progress(quiet) as progress:
+            run.walk(steps, options["every"] or 0, output, lambda k: progress(f"step {k} of {steps}"))
+    except OSError as error:  # a full disk comes without a name
+        error.filename = error.filename or output
+        raise
+    if as_json:
+        print_json(_record(file, eps, options, run))
+    else:
+        _print(file, eps, options, run)
+    interrupted = run.reached < steps
+    if not quiet and output is not None:
+        say(f"{output}: {_counted(run.records, 'record')} of {_counted(run.shape[0], 'orbit')}")
+    if not quiet and interrupted:
+        say(f"interrupted after step {run.reached}")
+    return 130 if interrupted else 0 if run.counts["completed"] == run.shape[0] else 3
+
+
+def _require_sense(system: str | None, options: dict[str, Any]) -> None:
+    """Options that contradict each other, or themselves."""
+    steps, every, output, threads = options["steps"], options["every"], options["output"], options["threads"]
+    kind, prime = options["arithmetic"]
+    if kind not in ("float", "mod"):
+        raise click.UsageError(f"found --arithmetic {kind}, expected float or mod:P (one orbit: kahanmaps orbit)")
+    if kind == "mod" and prime.bit_length() > _MAX_BITS:
+        raise click.UsageError(
+            f"found a modulus of {prime.bit_length()} bits, expected at most {_MAX_BITS} (one orbit: kahanmaps orbit)"
+        )
+    if (options["starts"] is None) == (options["count"] is None):
+        raise click.UsageError("give --starts FILE or --random N, one of the two")
+    if options["starts"] is not None and (options["box"] is not None or options["seed"] is not None):
+        raise click.UsageError("--box and --seed are for --random N")
+    if options["starts"] == "-" and system == "-":
+        raise click.UsageError("found - twice, and there is one standard input")
+    if kind == "mod" and options["box"] is not None:
+        raise click.UsageError("--box is for float arithmetic: residues are drawn from 0 to P - 1")
+    if steps < 0:
+        raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
+    if steps > _MAX_STEPS:
+        raise click.UsageError(f"found --steps {steps}, expected at most {_MAX_STEPS:.0e}: it would take years")
+    if every is not None and every < 1:
+        raise click.UsageError(f"found --every {every}, expected at least 1")
+    if every is not None and output is None:
+        raise click.UsageError("--every K is for -o FILE.npy")
+    if threads is not None and threads < 1:
+        raise click.UsageError(f"found --threads {threads}, expected at least 1")
+    if output is not None and not output.endswith(".npy"):
+        raise click.UsageError(f"found -o {output!r}, expected a name that ends with .npy")
+
+
+def _require_map(file: SystemFile, eps: Any, kind: str, prime: int) -> None:
+    """The demands of single orbits on eps and the prime, in the same words."""
+    from kahanmaps.algebra.fields import GF, QQ
+    from kahanmaps.maps.kahan import KahanMap
+
+    KahanMap(file.system, eps, GF(prime) if kind == "mod" else QQ)
+
+
+def _integrals(requests: tuple[tuple[str, str], ...], file: SystemFile) -> dict[str, RationalFunction]:
+    from kahanmaps.algebra.text import parse_rational_function
+
+    found: dict[str, RationalFunction] = {}
+    for k, (name, text) in enumerate(requests, start=1):
+        if text in file.integrals:
+            name, function = name or text, file.integrals[text]
+        else:
+            name = name or (text if len(text) <= 30 else f"I{k}")
+            function = parse_rational_function(text, (*file.variables, "eps"), file.parameters)
+        if name in found:
+            raise click.UsageError(f"found two integrals of the name {name}: write --integral NAME=EXPR")
+        found[name] = function
+    return found
+
+
+def _arithmetic(options: dict[str, Any]) -> str:
+    kind, number = options["arithmetic"]
+    return f"mod:{number}" if kind == "mod" else str(kind)
+
+
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> None:
+    """Tab-separated lines, aligned on a terminal."""
+    backward = ", backward" if options["backward"] else ""
+    arithmetic = _arithmetic(options)
+    click.echo(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic{backward}")
+    rows = [("orbits", str(run.shape[0])), ("steps", str(run.reached)), ("kernel", run.kernel)]
+    rows += [(word, str(number)) for word, number in run.counts.items()]
+    near = run.near()
+    if near is not None:
+        where = f", first in orbit {near['first']['orbit']} at step {near['first']['step']}" if near["first"] else ""
+        rows.append(
+            ("near-singular", f"{_counted(near['steps'], 'step')} in {_counted(near['orbits'], 'orbit')}{where}")
+        )
+    rows += [("drift", line) for line in run.moved_lines()]
+    shown = list(islice(run.failures(), FAILURES_SHOWN))
+    rows += [("ended early", f"orbit {end['orbit']}\t{end['status']}: {end['message']}") for end in shown]
+    more = run.shape[0] - run.counts["completed"] - len(shown)
+    if more:
+        rows.append(("ended early", f"and {_counted(more, 'more orbit')}"))
+    for name, text in rows:
+        click.echo(f"{name:<15}{text.replace(chr(9), ': ')}" if on_terminal() else f"{name}\t{text}")
+
+
+def _record(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> dict[str, Any]:
+    from kahanmaps.algebra.text import format_number
+    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.version import __version__
+
+    steps, output = options["steps"], options["output"]
+    drawn_at_random = options["starts"] is None
+    box = None
+    if drawn_at_random and options["arithmetic"][0] == "float":
+        box = "1" if options["box"] is None else format_number(options["box"])
+    every = options["every"] or max(1, steps)
+    return {
+        "command": "ensemble",
+        "version": __version__,
+        "system": file.name,
+        "variables": list(file.variables),
+        "eps": format_number(eps),
+        "time_step": format_number(2 * eps),
+        "convention": CONVENTION,
+        "arithmetic": _arithmetic(options),
+        "method": run.method,
+        "kernel": run.kernel,
+        "direction": "backward" if options["backward"] else "forward",
+        "starts": {"random": options["count"], "box": box} if drawn_at_random else {"file": options["starts"]},
+        "seed": (options["seed"] or 0) if drawn_at_random else None,
+        "orbits": run.shape[0],
+        "steps": steps,
+        "status": "interrupted" if run.reached < steps else "completed",
+        "steps_taken": run.reached,
+        "counts": run.counts,
+        "failures": list(islice(run.failures(), FAILURES_SHOWN)),
+        "near_singular": run.near(),
+        "drift": run.moved(),
+        "output": None
+        if output is None
+        else {"file": output, "shape": [run.records, *run.shape], "every": every, "axes": ["record", "orbit", "x"]},
+        "document": dict(file.document),
+    }

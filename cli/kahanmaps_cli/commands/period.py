@@ -1,0 +1,172 @@
+"""kahanmaps period."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.params import Arithmetic, PointText
+from kahanmaps_cli.progress import say
+from kahanmaps_cli.render import print_json
+
+if TYPE_CHECKING:
+    from kahanmaps.family.structure import Structure
+    from kahanmaps.maps.periods import OrbitPeriod
+    from kahanmaps.systems.files import SystemFile
+
+_STATUS = {"periodic": 0, "aperiodic": 0}
+_LONG_PRIME, _LONGEST_PRIME = 90, 192  # bits, between which it takes from seconds to minutes
+
+
+@click.command("period")
+@system_options
+@click.option("--start", type=PointText(), required=True, metavar="X", help="The start: 1/2,-1/3,0.25")
+@eps_options
+@click.option("--arithmetic", type=Arithmetic(), default="exact", show_default=True, help="exact or mod:P.")
+@click.option("-v", "--verbose", is_flag=True, help="Say on standard error what was found in the system.")
+@output_options
+def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
+    """The exact period of an orbit of a member of the commuting family, without walking it.
+
+    In every plane of its normal form the map is a translation on a cubic curve, and the period is the order of a point.
+    Modulo P it is computed; over Q the orbit is proved periodic or aperiodic.
+
+    \b
+      kahanmaps period pair.toml --start 1/2,-1/3,0,1 --eps 1/10 --arithmetic mod:2305843009213693951
+      kahanmaps period pair.toml --start 1/2,-1/3,0,1 --eps 1/10
+      kahanmaps period paper_m3 --start 1,2,3,4,5,6 --eps 1/10 --arithmetic mod:10007 --json
+
+    SYSTEM may be a member of the family without saying so. The translation goes on where the map does not, through
+    poles: if the orbit meets one, the period is that of the orbit continued, and the output says so.
+
+    Exit status: 0 found (or proved that there is none), 2 wrong use, also where there is no normal form, 3 undecided,
+    or the orbit comes to a point where it cannot be continued.
+    """
+    from kahanmaps.errors import InputError
+
+    eps = the_eps(options["eps"], options["time_step"])
+    kind, prime = options["arithmetic"]
+    if kind not in ("exact", "mod"):
+        raise click.UsageError(f"found --arithmetic {kind}, expected exact or mod:P: a period is exact")
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    _require_point(file, eps, options["start"], kind, prime)
+    structure = _structure(file)
+    if isinstance(structure, str):
+        raise InputError(
+            f"no period of {file.name} can be computed: {structure}. Looked for a matrix A that makes it a member of "
+            "the commuting family with distinct roots of chi, and so a translation. To walk instead: "
+            "kahanmaps orbit ... --steps N says when the start comes back"
+        )
+    if not quiet:
+        if verbose:
+            say(structure.text)
+        if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _LONGEST_PRIME:
+            say(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
+    found = _period(structure, eps, options["start"], prime if kind == "mod" else None)
+    if as_json:
+        print_json(_record(file, structure, eps, options, found))
+    else:
+        _print(file, eps, _arithmetic(options), found)
+    status = _STATUS.get(found.status, 3)
+    if status and not quiet and as_json:
+        say(f"{found.status}: {_message(found)}")
+    return status
+
+
+def _arithmetic(options: dict[str, Any]) -> str:
+    kind, number = options["arithmetic"]
+    return f"mod:{number}" if kind == "mod" else "exact"
+
+
+def _require_point(file: SystemFile, eps: Any, start: Any, kind: str, prime: int) -> None:
+    """The same demands on eps, prime and start as orbits make, in the same words."""
+    from kahanmaps.algebra.fields import GF, QQ
+    from kahanmaps.maps.kahan import KahanMap
+
+    KahanMap(file.system, eps, GF(prime) if kind == "mod" else QQ).point(start)
+
+
+def _structure(file: SystemFile) -> Structure | str:
+    """The normal form, or why there is none."""
+    from kahanmaps.family.structure import NoStructure, structure_of
+
+    structure = structure_of(file.system, file.hamiltonian, file.member)
+    return structure.reason if isinstance(structure, NoStructure) else structure
+
+
+def _period(structure: Structure, eps: Any, start: Any, prime: int | None) -> OrbitPeriod:
+    """The period, in the coordinates y of the normal form, x = T y."""
+    from kahanmaps.algebra.fields import GF, QQ
+    from kahanmaps.maps.periods import orbit_period, period_over_rationals
+
+    field = QQ if prime is None else GF(prime)
+    point = [field.convert(entry) for entry in start]
+    if structure.T is not None:
+        field.convert_matrix(structure.T)  # the prime may divide neither denominator
+        point = (field.convert_matrix(structure.T.inv()) * field.column(point)).entries()
+    if prime is None:
+        return period_over_rationals(structure.form, eps, point)
+    return orbit_period(structure.form, eps, point, prime)
+
+
+def _message(found: OrbitPeriod) -> str:
+    return found.text.splitlines()[0]
+
+
+def _print(file: SystemFile, eps: Any, arithmetic: str, found: OrbitPeriod) -> None:
+    click.echo(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic")
+    click.echo(f"period\t{_word(found)}")
+    for plane in found.planes:
+        click.echo("\t".join(["plane", plane.name, f"period {_word(plane)}", str(plane.kind), plane.reason]).rstrip())
+    poles = {True: "the orbit meets one", False: "the orbit meets none", None: "not known whether the orbit meets one"}
+    click.echo(f"poles\t{poles[found.meets_pole]}")
+    click.echo(f"# {found.status}: {_message(found)}")
+
+
+def _word(found: Any) -> str:
+    return "none" if found.status == "aperiodic" else found.status if found.period is None else str(found.period)
+
+
+def _text(number: int | None) -> str | None:
+    return None if number is None else str(number)
+
+
+def _record(
+    file: SystemFile, structure: Structure, eps: Any, options: dict[str, Any], found: OrbitPeriod
+) -> dict[str, Any]:
+    """Numbers are text: periods exceed what readers of JSON hold exactly."""
+    from kahanmaps.algebra.text import format_number
+    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.version import __version__
+
+    return {
+        "command": "period",
+        "version": __version__,
+        "system": file.name,
+        "structure": structure.text,
+        "eps": format_number(eps),
+        "time_step": format_number(2 * eps),
+        "convention": CONVENTION,
+        "arithmetic": _arithmetic(options),
+        "start": [format_number(entry) for entry in options["start"]],
+        "status": found.status,
+        "period": _text(found.period),
+        "meets_pole": found.meets_pole,
+        "planes": [
+            {
+                "name": plane.name,
+                "status": plane.status,
+                "period": _text(plane.period),
+                "meets_pole": plane.meets_pole,
+                "kind": plane.kind.name.lower(),
+                "kind_text": str(plane.kind),
+                "field_size": _text(plane.q or None),
+                "reason": plane.reason,
+            }
+            for plane in found.planes
+        ],
+        "message": _message(found),
+        "document": dict(file.document),
+    }

@@ -1,0 +1,363 @@
+"""Many orbits at once in the arithmetic that was asked for: how they went, what moved, and the records of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from kahanmaps.errors import InputError
+from kahanmaps_cli.numbers import json_float, json_number, short_float
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from kahanmaps.algebra.polynomials import RationalFunction
+    from kahanmaps.family.planar import NormalForm
+    from kahanmaps.family.structure import NoStructure, Structure
+    from kahanmaps.systems.files import SystemFile
+
+FAILURES_SHOWN = 20
+_WORTH_COMPILING = 5_000_000  # orbits times steps, below which numpy is done before compiled code is loaded
+_LOOKS = 100  # at integrals that were asked for, unless --every says when
+_VALUES = 200_000  # of them at most
+_PIECE = 0.1  # seconds between looks at Ctrl-C
+
+Told = Callable[[int], None]
+
+
+def structure_for(file: SystemFile, wish: str | None) -> Structure | NoStructure:
+    """The normal form that steps are made in, or why there is none."""
+    from kahanmaps.family.structure import NoStructure, structure_of
+
+    if wish == "generic":
+        return NoStructure("generic, as asked for")
+    structure = structure_of(file.system, file.hamiltonian, file.member)
+    if not isinstance(structure, NoStructure) and structure.T is not None:
+        structure = NoStructure("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
+    if isinstance(structure, NoStructure) and wish == "normal-form":
+        raise InputError(f"the method normal-form needs a normal form, and there is none: {structure.reason}")
+    return structure
+
+
+class Run:
+    """What both kinds of ensembles have in common: `counts`, `failures`, `moved` and `near` are for people and JSON."""
+
+    kernel: str
+    method: str
+    reached = 0
+    records = 0
+    interrupted = False
+
+    def interrupt(self) -> None:
+        """Ask to end after the portion in hand."""
+        self.interrupted = True
+
+    def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
+        """Take the steps; with `output` the starts and multiples of `every` go to that .npy file."""
+        raise NotImplementedError
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Orbits and dimension."""
+        raise NotImplementedError
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many orbits are how."""
+        raise NotImplementedError
+
+    def failures(self) -> Iterator[dict[str, Any]]:
+        """Orbits that ended early, in order."""
+        raise NotImplementedError
+
+    def moved(self) -> list[dict[str, Any]]:
+        """What became of the integrals."""
+        raise NotImplementedError
+
+    def moved_lines(self) -> list[str]:
+        """The same for people."""
+        raise NotImplementedError
+
+    def near(self) -> dict[str, Any] | None:
+        """Near-singular steps, None in exact arithmetic."""
+        return None
+
+
+class FloatRun(Run):
+    """In machine numbers."""
+
+    def __init__(
+        self,
+        file: SystemFile,
+        eps: Any,
+        starts: NDArray[Any],
+        form: NormalForm | None,
+        integrals: Mapping[str, RationalFunction],
+        steps: int,
+        options: dict[str, Any],
+    ) -> None:
+        from kahanmaps.maps.fast import FloatEnsemble, float_function, to_float
+
+        kernel = options["kernel"]
+        if kernel is None and len(starts) * steps < _WORTH_COMPILING:
+            kernel = "numpy"
+        value = to_float(eps)  # backward too: the inverse conserves what the map conserves
+
+        def of_point(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:
+            found = float_function(function)
+            return lambda x: found([*x, value])
+
+        self.asked = len(integrals)
+        self.ensemble = FloatEnsemble(
+            file.system,
+            eps,
+            starts,
+            backward=options["backward"],
+            form=form,
+            kernel=kernel,
+            threads=options["threads"],
+            integrals={name: of_point(function) for name, function in integrals.items()},
+        )
+        self.method = "generic" if form is None else "normal-form"
+        self.kernel = self.ensemble.kernel
+
+    def interrupt(self) -> None:
+        super().interrupt()
+        self.ensemble.interrupt()
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.ensemble.n, self.ensemble.system.dim
+
+    def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
+        from kahanmaps.maps.fast import stream_ensemble
+
+        def progress(step: int) -> None:
+            told(step)
+            if self.interrupted:
+                self.ensemble.interrupt()
+
+        looks = max(1, min(_LOOKS, _VALUES // self.ensemble.n))
+        look = every or max(1, -(-steps // looks))
+        if output is not None and (every or not self.asked):
+            self.records = stream_ensemble(self.ensemble, output, steps, every or max(1, steps), progress=progress)
+        elif output is not None:
+            self._first_and_last(steps, look, output, progress)
+        elif self.asked:
+            for _ in self.ensemble.records(steps, look, progress=progress):
+                pass
+        else:
+            self.ensemble.advance(steps, progress=progress)
+        self.reached = self.ensemble.step
+
+    def _first_and_last(self, steps: int, look: int, output: str, progress: Told) -> None:
+        """Look at integrals more often than points are kept."""
+        from kahanmaps.maps.float_stream import NpyFile
+
+        with NpyFile(output, self.shape) as file:
+            file.append(self.ensemble.x[None])
+            for _ in self.ensemble.records(steps, look, progress=progress):
+                pass
+            if steps and self.ensemble.step == steps:
+                file.append(self.ensemble.x[None])
+            self.records = file.rows
+
+    @property
+    def counts(self) -> dict[str, int]:
+        status = self.ensemble.status
+        return {word: int((status == word).sum()) for word in ("completed", "overflow", "singular")}
+
+    def failures(self) -> Iterator[dict[str, Any]]:
+        for orbit in (self.ensemble.failed_at >= 0).nonzero()[0].tolist():
+            end = self.ensemble.end(orbit)
+            yield {"orbit": orbit, "status": end.status, "steps": end.steps, "message": end.message}
+
+    def near(self) -> dict[str, Any]:
+        near = self.ensemble.near_singular
+        orbits = near.nonzero()[0].tolist()
+        first = None
+        if orbits:
+            at = self.ensemble.near_singular_at
+            orbit = min(orbits, key=lambda k: int(at[k]))
+            first = {"orbit": orbit, "step": int(at[orbit])}
+        return {"steps": int(near.sum()), "orbits": len(orbits), "first": first}
+
+    def moved(self) -> list[dict[str, Any]]:
+        going = (self.ensemble.failed_at < 0).nonzero()[0]
+        found = []
+        for drift in self.ensemble.drift:
+            record: dict[str, Any] = {"name": drift.name, "orbits": len(going)}
+            if len(going):
+                worst = int(going[drift.largest[going].argmax()])
+                record["largest"] = json_float(drift.largest[worst])
+                record["orbit"] = worst
+                record["initial"] = json_number(drift.initial[worst])
+            found.append(record)
+        return found
+
+    def moved_lines(self) -> list[str]:
+        lines = []
+        for record in self.moved():
+            if "largest" in record:
+                initial = record["initial"]
+                start = (
+                    short_float(initial)
+                    if not isinstance(initial, list)
+                    else "+-".join(map(short_float, initial)) + "i"
+                )
+                largest = short_float(record["largest"])
+                lines.append(f"{record['name']}\tat most {largest} (orbit {record['orbit']}, from {start})")
+            else:
+                lines.append(f"{record['name']}\tno orbit was completed")
+        return lines
+
+
+class ModularRun(Run):
+    """Modulo a prime, where an integral either holds or does not."""
+
+    def __init__(
+        self,
+        file: SystemFile,
+        eps: Any,
+        starts: NDArray[Any],
+        form: NormalForm | None,
+        integrals: Mapping[str, RationalFunction],
+        steps: int,
+        options: dict[str, Any],
+    ) -> None:
+        from kahanmaps.maps.modular import ModularEnsemble
+
+        kernel = options["kernel"]
+        if kernel is None and len(starts) * steps < _WORTH_COMPILING:
+            kernel = "numpy"
+        self.file = file
+        self.eps = eps
+        self.backward: bool = options["backward"]
+        self.ensemble = ModularEnsemble(
+            file.system,
+            eps,
+            starts,
+            options["arithmetic"][1],
+            form=form,
+            kernel=kernel,
+            threads=options["threads"] or 1,
+            backward=options["backward"],
+        )
+        if options["method"] == "normal-form" and self.ensemble.method != "planes":
+            raise InputError("the method normal-form needs a chi that splits modulo P: take generic, or another prime")
+        self.method = "normal-form" if self.ensemble.method == "planes" else "generic"
+        self.kernel = f"{self.ensemble.kernel} {self.ensemble.method}"
+        self._integrals = integrals
+        self._initial = self._values()
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return len(self.ensemble), self.ensemble.system.dim
+
+    def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
+        if output is None:
+            self._advance(steps, told)
+            return
+        every = every or max(1, steps)
+        with ResidueFile(output, self.shape) as file:
+            file.append(self.ensemble.x)
+            while self.reached + every <= steps and self._advance(self.reached + every, told):
+                file.append(self.ensemble.x)
+            self._advance(steps, told)
+            self.records = file.rows
+
+    def _advance(self, stop: int, told: Told) -> bool:
+        """To step `stop`, in pieces that take a moment; whether it was reached."""
+        piece = 1
+        while self.reached < stop and not self.interrupted:
+            began = time.monotonic()
+            count = min(piece, stop - self.reached)
+            self.ensemble.advance(count)
+            self.reached += count
+            if count == piece and time.monotonic() - began < _PIECE:
+                piece *= 2
+            told(self.reached)
+        return self.reached >= stop
+
+    def _values(self) -> dict[str, list[Any]]:
+        from kahanmaps.invariants.integrals import ClaimedIntegral
+
+        field = self.ensemble.field
+        claims = {name: ClaimedIntegral(name, function) for name, function in self._integrals.items()}
+        points = self.ensemble.x.tolist() if claims else []
+        return {
+            name: [claim.value(field, self.eps, [field.convert(entry) for entry in x]) for x in points]
+            for name, claim in claims.items()
+        }
+
+    @property
+    def counts(self) -> dict[str, int]:
+        singular = int((self.ensemble.singular_at >= 0).sum())
+        return {"completed": len(self.ensemble) - singular, "singular": singular}
+
+    def failures(self) -> Iterator[dict[str, Any]]:
+        sign = "+" if self.backward else "-"
+        for orbit in (self.ensemble.singular_at >= 0).nonzero()[0].tolist():
+            at = int(self.ensemble.singular_at[orbit])
+            message = f"det(I {sign} eps f'(x)) = 0 at step {at}: the map has no value there"
+            yield {"orbit": orbit, "status": "singular", "steps": at, "message": message}
+
+    def moved(self) -> list[dict[str, Any]]:
+        now = self._values()
+        found = []
+        for name, initial in self._initial.items():
+            pairs = list(zip(initial, now[name], strict=True))
+            defined = [k for k, (before, after) in enumerate(pairs) if before is not None and after is not None]
+            moved = [k for k in defined if pairs[k][0] != pairs[k][1]]
+            record = {"name": name, "orbits": len(defined), "changed": len(moved)}
+            found.append({**record, "orbit": moved[0] if moved else None})
+        return found
+
+    def moved_lines(self) -> list[str]:
+        lines = []
+        for record in self.moved():
+            first = f", the first of them orbit {record['orbit']}" if record["changed"] else ""
+            lines.append(f"{record['name']}\tchanged in {record['changed']} of {record['orbits']} orbits{first}")
+        return lines
+
+
+class ResidueFile:
+    """A .npy file of 64-bit integers of shape (rows, *shape) whose rows are appended one by one, valid after each."""
+
+    def __init__(self, path: str, shape: tuple[int, ...]) -> None:
+        self.shape = shape
+        self.rows = 0
+        self._stream = open(path, "wb", buffering=0)  # noqa: SIM115 (closed by __exit__)
+        try:
+            self._stream.write(self._header())
+        except OSError:
+            self._stream.close()
+            raise
+
+    def append(self, row: NDArray[Any]) -> None:
+        """First the numbers, then the header that counts them."""
+        self._stream.seek(0, 2)
+        left = memoryview(row.astype("<i8").tobytes())
+        while left:
+            left = left[self._stream.write(left) :]
+        self.rows += 1
+        self._stream.seek(0)
+        self._stream.write(self._header())
+
+    def _header(self) -> bytes:
+        """numpy pads it so that its length does not depend on the number of rows."""
+        import io
+
+        import numpy as np
+
+        stream = io.BytesIO()
+        what = {"descr": "<i8", "fortran_order": False, "shape": (self.rows, *self.shape)}
+        np.lib.format.write_array_header_1_0(stream, what)
+        return stream.getvalue()
+
+    def __enter__(self) -> ResidueFile:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stream.close()

@@ -1,0 +1,238 @@
+"""The starts of many orbits: from a .npy file, from text with a point in each line, or drawn at random.
+
+Text is exact: integers, p/q and decimals, separated by commas or blanks; # starts a comment. A first line with the
+names of the variables says which columns are meant. All mistakes of a file are told at once.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from kahanmaps.errors import BadPrime, ExpressionError, InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+MAX_TEXT_BYTES = 100_000_000
+MAX_NPY_BYTES = 2_000_000_000
+MAX_NUMBERS = 50_000_000  # of all starts together
+_MISTAKES_SHOWN = 20
+_MAGIC = b"\x93NUMPY"
+
+Convert = Callable[[str], "float | int"]
+
+
+def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> NDArray[Any]:
+    """Starts at random: doubles from -box to box, or residues modulo a prime; the same ones for the same seed."""
+    import numpy as np
+
+    from kahanmaps.algebra.fields import rational
+    from kahanmaps.maps.float_numbers import to_float
+
+    if count < 1:
+        raise InputError(f"found --random {count}, expected at least 1 start")
+    if count * dim > MAX_NUMBERS:
+        raise InputError(f"found --random {count}, expected at most {MAX_NUMBERS // dim} starts in dimension {dim}")
+    if seed < 0:
+        raise InputError(f"found --seed {seed}, expected 0 or more")
+    generator = np.random.default_rng(seed)
+    if prime is not None:
+        return generator.integers(0, prime, (count, dim), dtype=np.int64)
+    box = rational(box)
+    if box <= 0:
+        raise InputError(f"found --box {box}, expected a number above 0: coordinates are drawn from -R to R")
+    size = to_float(box)
+    if size == 0.0:
+        raise InputError("found a --box that is 0 in machine numbers, expected a larger one")
+    starts: NDArray[Any] = (2 * generator.random((count, dim)) - 1) * size
+    return starts
+
+
+def read_starts(path: str, variables: Sequence[str], prime: int | None) -> NDArray[Any]:
+    """The starts in a file, or on standard input for "-": an array (n, dim) of doubles, or of residues below the prime.
+
+    Raises InputError with file and line of every mistake.
+    """
+    where = "standard input" if path == "-" else path
+    if path == "-":
+        data = sys.stdin.buffer.read(MAX_NPY_BYTES + 1)
+    else:
+        with open(path, "rb") as stream:
+            data = stream.read(MAX_NPY_BYTES + 1)
+    if data.startswith(_MAGIC):
+        return _from_npy(data, where, variables, prime)
+    if path.endswith(".npy"):
+        raise InputError(f"{where}: found no .npy file (those start with \\x93NUMPY)")
+    if len(data) > MAX_TEXT_BYTES:
+        raise InputError(f"{where}: found more than {MAX_TEXT_BYTES} bytes of text, expected fewer: take a .npy file")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{where}: found neither a .npy file nor UTF-8 text with a point in each line") from None
+    return _Text(where, variables, prime).read(text)
+
+
+def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | None) -> NDArray[Any]:
+    """The array of a .npy file; no more memory is taken than there are bytes, and nothing is ever unpickled."""
+    import numpy as np
+
+    stream = io.BytesIO(data)
+    try:
+        version = np.lib.format.read_magic(stream)
+        if version not in ((1, 0), (2, 0)):
+            raise ValueError(f"version {version[0]}.{version[1]}")
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, fortran, dtype = read(stream)
+    except Exception as error:  # it is read like Python, and may go wrong like Python: in its tokens, its depth, ...
+        raise InputError(f"{where}: found a .npy file with a header that cannot be read: {_first(error)}") from None
+    if dtype.kind not in ("iu" if prime is not None else "fiu"):
+        hint = ": modulo P starts are integers, or text" if prime is not None and dtype.kind == "f" else ""
+        wanted = "integers" if prime is not None else "real numbers"
+        raise InputError(f"{where}: found an array of {_kind(dtype)}, expected {wanted}{hint}")
+    dim = len(variables)
+    if len(shape) != 2 or shape[1] != dim or shape[0] < 1:
+        raise InputError(
+            f"{where}: found an array of shape {_shape(shape)}, expected (n, {dim}): one row for each start, with "
+            f"columns {', '.join(variables)}"
+        )
+    if len(data) > MAX_NPY_BYTES or shape[0] * dim > MAX_NUMBERS:
+        raise InputError(f"{where}: found an array of shape {_shape(shape)}, expected at most {MAX_NUMBERS} numbers")
+    there = len(data) - stream.tell()
+    if there < shape[0] * dim * dtype.itemsize:
+        raise InputError(
+            f"{where}: found {there} bytes of numbers, expected {shape[0] * dim * dtype.itemsize}: it was cut"
+        )
+    flat = np.frombuffer(data, dtype=dtype, count=shape[0] * dim, offset=stream.tell())
+    rows = flat.reshape(shape, order="F" if fortran else "C")
+    if prime is not None:
+        unsigned = np.issubdtype(dtype, np.unsignedinteger)
+        residues: NDArray[Any] = rows.astype(np.uint64 if unsigned else np.int64) % (
+            np.uint64 if unsigned else np.int64
+        )(prime)
+        return residues.astype(np.int64)
+    with np.errstate(over="ignore"):
+        starts: NDArray[Any] = np.ascontiguousarray(rows, dtype=np.float64)
+    bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
+    if len(bad):
+        lines = [f"row {row}: found {starts[row][~np.isfinite(starts[row])][0]}" for row in bad[:_MISTAKES_SHOWN]]
+        raise _mistakes(where, [f"{line}, expected finite numbers" for line in lines], len(bad))
+    return starts
+
+
+class _Text:
+    """Reads text with a point in each line."""
+
+    def __init__(self, where: str, variables: Sequence[str], prime: int | None) -> None:
+        self.where = where
+        self.variables = list(variables)
+        self.prime = prime
+        self.convert = _to_residue(prime) if prime is not None else _to_double
+        self.columns: list[int] | None = None
+        self.width = len(self.variables)
+        self.mistakes: list[str] = []
+        self.wrong = 0
+
+    def read(self, text: str) -> NDArray[Any]:
+        import numpy as np
+
+        rows: list[list[float | int]] = []
+        fresh = True
+        for number, line in enumerate(text.split("\n"), start=1):
+            content = line.partition("#")[0].strip()
+            if not content:
+                continue
+            cells = [cell.strip() for cell in content.split(",")] if "," in content else content.split()
+            if fresh and self._is_header(cells):
+                fresh = False
+                continue
+            fresh = False
+            row = self._row(number, cells)
+            if row is not None and not self.mistakes:
+                rows.append(row)
+            if len(rows) * len(self.variables) > MAX_NUMBERS:
+                raise InputError(f"{self.where}:{number}: found more than {MAX_NUMBERS} numbers, expected fewer")
+        if self.mistakes:
+            raise _mistakes(self.where, self.mistakes, self.wrong)
+        if not rows:
+            raise InputError(
+                f"{self.where}: found no point, expected one a line: {', '.join(self.variables)}, e.g. 1/2,-1/3,..."
+            )
+        return np.array(rows, dtype=np.float64 if self.prime is None else np.int64)
+
+    def _is_header(self, cells: list[str]) -> bool:
+        """Whether this is a line of names; then the columns of the variables are looked up there."""
+        if not set(self.variables) <= set(cells):
+            return False
+        self.columns, self.width = [cells.index(name) for name in self.variables], len(cells)
+        return True
+
+    def _row(self, number: int, cells: list[str]) -> list[float | int] | None:
+        if len(cells) != self.width:
+            what = "1 number" if len(cells) == 1 else f"{len(cells)} numbers"
+            named = "" if self.columns is not None else f": {', '.join(self.variables)}"
+            self._wrong(number, f"found {what}, expected {self.width}{named}")
+            return None
+        row: list[float | int] = []
+        for k in range(len(cells)) if self.columns is None else self.columns:
+            try:
+                row.append(self.convert(cells[k]))
+            except ExpressionError as error:
+                self._wrong(number, f"entry {k + 1}: {error.message}")
+                return None
+            except InputError as error:
+                self._wrong(number, f"entry {k + 1}: {error}")
+                return None
+        return row
+
+    def _wrong(self, number: int, what: str) -> None:
+        self.wrong += 1
+        if len(self.mistakes) < _MISTAKES_SHOWN:
+            self.mistakes.append(f"{self.where}:{number}: {what}")
+
+
+def _mistakes(where: str, lines: Sequence[str], count: int) -> InputError:
+    head = f"{where}: {'1 mistake' if count == 1 else f'{count} mistakes'}"
+    more = [f"  and {count - len(lines)} more"] if count > len(lines) else []
+    return InputError("\n".join([head, *(f"  {line}" for line in lines), *more]))
+
+
+def _to_double(text: str) -> float:
+    from kahanmaps.algebra.text import parse_number
+    from kahanmaps.maps.float_numbers import to_float
+
+    return to_float(parse_number(text))
+
+
+def _to_residue(prime: int) -> Convert:
+    from kahanmaps.algebra.fields import GF
+    from kahanmaps.algebra.text import parse_number
+
+    field = GF(prime)
+
+    def residue(text: str) -> int:
+        try:
+            return int(field.convert(parse_number(text)))
+        except BadPrime:
+            raise InputError(f"the prime {prime} divides the denominator") from None
+
+    return residue
+
+
+def _kind(dtype: Any) -> str:
+    if dtype.hasobject:
+        return "Python objects"
+    kinds = {"f": "machine floats", "c": "complex numbers", "b": "truth values", "U": "text", "S": "text"}
+    return kinds.get(dtype.kind, f"the type {str(dtype)[:40]}")
+
+
+def _shape(shape: Sequence[int]) -> str:
+    text = str(tuple(shape))
+    return text if len(text) <= 60 else text[:60] + "..."
+
+
+def _first(error: Exception) -> str:
+    lines = str(error).splitlines()
+    return lines[0][:200] if lines else type(error).__name__

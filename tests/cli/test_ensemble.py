@@ -1,0 +1,553 @@
+"""kahanmaps ensemble: many orbits at once, each the same as alone, summed up and written where asked.
+
+Starts come from text, .npy files, standard input or a seed; whatever is wrong with them is told with its line. The
+.npy file that is written is valid at every moment, and what a row means follows from --every.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import shlex
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_helpers import COMMAND, shell, terminal
+
+from kahanmaps.maps.fast import FloatEnsemble
+from kahanmaps.systems.catalog import load
+from kahanmaps.version import __version__
+from kahanmaps_cli import ensemble_starts
+from kahanmaps_cli.ensemble_run import ResidueFile
+
+TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
+SQUARE = "ensemble --vars x --rhs x^2 --eps 1/2 --kernel numpy"  # the Kahan map x/(1 - x)
+PRIME = 2**61 - 1
+
+
+def summary(outcome):
+    """The lines of the table, by their first word; those of a word that comes twice in a list."""
+    found = {}
+    for name, *cells in outcome.rows:
+        found.setdefault(name, []).append("\t".join(cells))
+    return found
+
+
+def saved(path, array, **how):
+    np.save(path, array, **how)
+    return path
+
+
+# Starts
+
+
+STARTS = [[1.0, 0.5, -2.0], [0.25, 3.0, 1.0]]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1,1/2,-2\n0.25,3,1\n",
+        "1 1/2 -2\n0.25 3 1",
+        "# two points\n\n1\t0.5\t-2 # the first\n  25e-2 , 3 , 1  \n",
+        "x1,x2,x3\n1,1/2,-2\n0.25,3,1\n",
+        "step,x3,x1,x2\r\n0,-2,1,1/2\r\n5,1,0.25,3\r\n",
+        "\ufeff1,1/2,-2\n0.25,3,1\n",
+    ],
+    ids=["commas", "blanks", "comments", "names", "other columns", "byte order mark"],
+)
+def test_text_has_a_point_in_each_line(kahanmaps, tmp_path, text):
+    (tmp_path / "starts.csv").write_text(text, encoding="utf-8")
+    kahanmaps(f"{TOP} --steps 0 --starts", tmp_path / "starts.csv", "-o", tmp_path / "x.npy")
+    assert np.load(tmp_path / "x.npy").tolist() == [STARTS]
+
+
+@pytest.mark.parametrize("kind", ["<f8", ">f8", "<f4", ">f2"])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_npy_starts_are_taken_as_they_are(kahanmaps, tmp_path, kind, order):
+    path = saved(tmp_path / "starts.npy", np.array(STARTS, dtype=kind, order=order))
+    kahanmaps(f"{TOP} --steps 0 --starts", path, "-o", tmp_path / "x.npy")
+    assert np.load(tmp_path / "x.npy").tolist() == [STARTS]
+
+
+@pytest.mark.parametrize("kind", ["i1", "<i8", ">i4", "u1", "<u8"])
+@pytest.mark.parametrize("arithmetic", ["float", "mod:10007"])
+def test_integers_are_starts_in_both_arithmetics(kahanmaps, tmp_path, kind, arithmetic):
+    path = saved(tmp_path / "starts.npy", np.array([[1, 2, 3], [4, 5, 6]], dtype=kind))
+    kahanmaps(f"{TOP} --steps 0 --arithmetic {arithmetic} --starts", path, "-o", tmp_path / "x.npy")
+    assert np.load(tmp_path / "x.npy").tolist() == [[[1, 2, 3], [4, 5, 6]]]
+
+
+def test_starts_modulo_a_prime_are_reduced(kahanmaps, tmp_path):
+    (tmp_path / "s.txt").write_text("-1,1/2,10008\n")
+    kahanmaps(f"{TOP} --steps 0 --arithmetic mod:10007 --starts", tmp_path / "s.txt", "-o", tmp_path / "x.npy")
+    assert np.load(tmp_path / "x.npy").tolist() == [[[10006, 5004, 1]]]
+    path = saved(tmp_path / "s.npy", np.array([[-1, 2**62, 10008]]))
+    kahanmaps(f"{TOP} --steps 0 --arithmetic mod:10007 --starts", path, "-o", tmp_path / "x.npy")
+    assert np.load(tmp_path / "x.npy").tolist() == [[[10006, 2**62 % 10007, 1]]]
+
+
+def test_starts_come_from_standard_input(tmp_path):
+    script = "{} --json --steps 2 --starts - < starts"
+    (tmp_path / "starts").write_text("1,2,3\n4,5,6")
+    assert shell(f"kahanmaps {script.format(TOP)}", tmp_path).json["orbits"] == 2
+    np.save(tmp_path / "s.npy", np.ones((3, 3)))
+    (tmp_path / "s.npy").rename(tmp_path / "starts")
+    assert shell(f"kahanmaps {script.format(TOP)}", tmp_path).json["orbits"] == 3
+
+
+def test_orbits_in_csv_are_starts(tmp_path):
+    orbit = "kahanmaps orbit euler_top --start 1,2,3 --eps 1/10 --steps 4 --format csv"
+    outcome = shell(f"{orbit} | kahanmaps {TOP} --steps 2 --starts - --json", tmp_path)
+    assert outcome.json["orbits"] == 5
+
+
+def test_the_seed_settles_what_is_drawn(kahanmaps, tmp_path):
+    def drawn(more):
+        assert kahanmaps(f"{TOP} --steps 0 --random 50 {more} -q -o", tmp_path / "x.npy").status == 0
+        return np.load(tmp_path / "x.npy")[0]
+
+    assert (drawn("--seed 3") == drawn("--seed 3 --box 1")).all()
+    assert (drawn("") == drawn("--seed 0")).all()
+    assert (drawn("--seed 3") != drawn("--seed 4")).all()
+    assert (drawn("--seed 3 --box 1/4") == drawn("--seed 3") / 4).all()
+    assert np.abs(drawn("--box 1/4")).max() <= 0.25
+    residues = drawn("--arithmetic mod:7")
+    assert set(residues.ravel().tolist()) == set(range(7))
+    # so that a change of numpy or of ours does not go unnoticed
+    assert drawn("--seed 3")[0].tolist() == pytest.approx([-0.828701666, -0.526379, 0.602548930], abs=1e-6)
+
+
+# Orbits
+
+
+def test_every_orbit_is_the_one_it_would_be_alone(kahanmaps, tmp_path):
+    (tmp_path / "s.txt").write_text("1,2,3\n1/3,-1,1/7\n")
+    out = tmp_path / "x.npy"
+    assert kahanmaps(f"{TOP} --steps 20 --every 10 --starts", tmp_path / "s.txt", "-o", out).status == 0
+    for k, start in enumerate(("1,2,3", "1/3,-1,1/7")):
+        alone = kahanmaps(
+            f"orbit euler_top --eps 1/10 --start {start} --steps 20 --every 10 --arithmetic float --format jsonl"
+        ).records[1:-1]
+        assert np.load(out)[:, k].tolist() == [[float(entry) for entry in point["x"]] for point in alone]
+
+
+@pytest.mark.parametrize("prime", [7, 10007, PRIME])
+@pytest.mark.parametrize("backward", ["", " --backward"])
+def test_residues_are_those_of_single_orbits(kahanmaps, tmp_path, pair, prime, backward):
+    (tmp_path / "s.txt").write_text("1,2,3,4\n5,-1,1/11,0\n")
+    out = tmp_path / "x.npy"
+    rest = f"--eps 1/10 --arithmetic mod:{prime} --steps 9 --every 3{backward}"
+    outcome = kahanmaps("ensemble", pair, f"{rest} --kernel numpy --json --starts", tmp_path / "s.txt", "-o", out)
+    for k, start in enumerate(("1,2,3,4", "5,-1,1/11,0")):
+        *points, end = kahanmaps("orbit", pair, f"{rest} --start {start} --format jsonl").records[1:]
+        walked = np.load(out)[:, k].tolist()
+        assert walked[: len(points)] == [[int(entry) for entry in point["x"]] for point in points]
+        failures = {failure["orbit"]: failure for failure in outcome.json["failures"]}
+        assert (k in failures) == (end["status"] == "singular")
+        if k in failures:
+            assert (failures[k]["steps"], failures[k]["message"]) == (end["steps"], end["message"])
+
+
+def test_members_are_stepped_in_their_normal_form(kahanmaps, pair):
+    command = ("ensemble", pair, "--random 5 --eps 1/10 --steps 20 --kernel numpy --json")
+    chosen, generic = kahanmaps(*command).json, kahanmaps(*command, "--method generic").json
+    assert (chosen["method"], chosen["kernel"]) == ("normal-form", "numpy normal form")
+    assert (generic["method"], generic["kernel"]) == ("generic", "numpy generic")
+    assert [drift["name"] for drift in chosen["drift"]] == [
+        "h/(1 + eps^2 D) at t = -2",
+        "h/(1 + eps^2 D) at t = 1",
+    ]
+    assert generic["drift"] == []
+
+
+def test_modulo_a_prime_where_chi_does_not_split_there_is_elimination(kahanmaps):
+    command = "ensemble paper_m3_irreducible --random 5 --eps 1/10 --steps 5 --arithmetic mod:{} --kernel numpy --json"
+    splits = {prime: kahanmaps(command.format(prime)).json["method"] for prime in (101, 103, 107, 109, 113, 127)}
+    assert set(splits.values()) == {"generic", "normal-form"}
+    prime = next(prime for prime, method in splits.items() if method == "generic")
+    outcome = kahanmaps(command.format(prime) + " --method normal-form")
+    assert (outcome.status, "needs a chi that splits modulo P" in outcome.err) == (2, True)
+
+
+def test_verbose_says_how_and_quiet_nothing(kahanmaps, pair):
+    command = ("ensemble", pair, "--random 5 --eps 1/10 --steps 20 --kernel numpy -v")
+    assert kahanmaps(*command).err == (
+        "method normal-form: a member of the family, chi = (t + 2)*(t - 1); kernel numpy normal form\n"
+    )
+    assert kahanmaps(*command, "-q").err == ""
+
+
+@pytest.mark.parametrize("arithmetic", ["float", f"mod:{PRIME}"])
+def test_the_kernels_agree(kahanmaps, tmp_path, pair, arithmetic):
+    pytest.importorskip("numba")
+    command = ("ensemble", pair, f"--random 9 --eps 1/10 --steps 20 --every 5 --arithmetic {arithmetic}")
+    found = []
+    for kernel in ("--kernel numpy", "--kernel numba --threads 2"):
+        outcome = kahanmaps(*command, kernel, "--json -o", tmp_path / "x.npy")
+        assert outcome.status == 0
+        assert outcome.json["kernel"].startswith(kernel.split()[1])
+        found.append(np.load(tmp_path / "x.npy").tolist())
+    assert found[0] == found[1]
+
+
+# The summary
+
+
+def test_the_summary_is_a_table_of_lines(kahanmaps, tmp_path):
+    (tmp_path / "s.txt").write_text("1/2\n-1\n1/3\n")  # 1/2, 1, pole; 1/3, 1/2, 1, pole
+    outcome = kahanmaps(f"{SQUARE} --steps 9 --starts", tmp_path / "s.txt")
+    lines = outcome.out.splitlines()
+    assert outcome.status == 3
+    assert lines[0] == "# inline, eps = 1/2 (time step 2 eps = 1), float arithmetic"
+    assert lines[1:7] == [
+        "orbits\t3",
+        "steps\t9",
+        "kernel\tnumpy generic",
+        "completed\t2",
+        "overflow\t0",
+        "singular\t1",
+    ]
+    assert lines[-1] == "ended early\torbit 0\tsingular: I - eps f'(x) is singular in machine numbers at step 1"
+
+
+def test_the_table_is_aligned_on_a_terminal(pair):
+    out = terminal("ensemble", str(pair), "--random", "5", "--eps", "1/10", "--steps", "20", "--kernel", "numpy").out
+    assert "orbits         5\n" in out
+    assert "\t" not in out
+
+
+def test_the_json_has_the_documented_shape(kahanmaps, tmp_path):
+    path = tmp_path / "x.npy"
+    found = kahanmaps(f"{TOP} --random 4 --box 1/2 --steps 30 --every 10 --integral F1 --json -o", path).json
+    drift = found.pop("drift")
+    assert found.pop("document")["name"] == "euler_top"
+    assert [sorted(record) for record in drift] == [["initial", "largest", "name", "orbit", "orbits"]]
+    assert drift[0]["name"] == "F1"
+    assert 0 < drift[0]["largest"] < 1e-14  # thirty steps, each wrong by some 1e-16
+    assert found == {
+        "command": "ensemble",
+        "version": __version__,
+        "system": "euler_top",
+        "variables": ["x1", "x2", "x3"],
+        "eps": "1/10",
+        "time_step": "1/5",
+        "convention": "eps is the paper's epsilon, the time step is 2 eps",
+        "arithmetic": "float",
+        "method": "generic",
+        "kernel": "numpy generic",
+        "direction": "forward",
+        "starts": {"random": 4, "box": "1/2"},
+        "seed": 0,
+        "orbits": 4,
+        "steps": 30,
+        "status": "completed",
+        "steps_taken": 30,
+        "counts": {"completed": 4, "overflow": 0, "singular": 0},
+        "failures": [],
+        "near_singular": {"steps": 0, "orbits": 0, "first": None},
+        "output": {"file": str(path), "shape": [4, 4, 3], "every": 10, "axes": ["record", "orbit", "x"]},
+    }
+
+
+def test_at_most_twenty_failures_are_listed(kahanmaps):
+    command = "ensemble --vars x --rhs x^2 --eps 1/2 --kernel numpy --random 100 --arithmetic mod:7 --steps 9"
+    outcome = kahanmaps(f"{command} --json")
+    failed = outcome.json["counts"]["singular"]
+    assert failed > 20
+    assert len(outcome.json["failures"]) == 20
+    assert outcome.json["counts"]["completed"] == 100 - failed
+    assert f"ended early\tand {failed - 20} more orbits" in kahanmaps(command).out
+    for failure in outcome.json["failures"]:
+        assert failure["message"] == f"det(I - eps f'(x)) = 0 at step {failure['steps']}: the map has no value there"
+
+
+def test_near_singular_steps_are_counted(kahanmaps, tmp_path):
+    (tmp_path / "s.txt").write_text("1/3,1\n0.99999999999999,1\n")
+    command = "ensemble --vars x,y --rhs x^2 --rhs y --eps 1/2 --kernel numpy"
+    found = kahanmaps(f"{command} --steps 1 --json --starts", tmp_path / "s.txt").json
+    # I - eps f'(x) = diag(1 - x, 1/2), and 1 - x = 1e-14 is below 2^-40
+    assert found["near_singular"] == {"steps": 1, "orbits": 1, "first": {"orbit": 1, "step": 0}}
+
+
+def test_an_integral_that_is_none_is_seen_to_move(kahanmaps, pair):
+    outcome = kahanmaps("ensemble", pair, "--random 9 --eps 1/10 --steps 50 --kernel numpy --integral x1 --json")
+    last = outcome.json["drift"][-1]
+    assert last["name"] == "x1"
+    assert last["largest"] > 0.1
+    lines = summary(kahanmaps("ensemble", pair, "--random 9 --eps 1/10 --steps 50 --kernel numpy --integral x1"))
+    assert lines["drift"][-1].startswith("x1\tat most ")
+
+
+def test_modulo_a_prime_an_integral_holds_or_does_not(kahanmaps):
+    command = f"{TOP} --random 40 --steps 5 --arithmetic mod:{PRIME} --integral F1 --integral y=x1 --json"
+    first, second = kahanmaps(command).json["drift"]
+    assert first == {"name": "F1", "orbits": 40, "changed": 0, "orbit": None}
+    assert second == {"name": "y", "orbits": 40, "changed": 40, "orbit": 0}
+
+
+@pytest.mark.parametrize("backward", ["", " --backward"])
+def test_integrals_are_functions_of_eps_too_and_the_inverse_has_the_same(kahanmaps, backward):
+    drift = kahanmaps(f"{TOP} --random 3 --steps 10{backward} --integral e=eps --json").json["drift"][0]
+    assert (drift["initial"], drift["largest"]) == (0.1, 0)
+
+
+def test_json_has_no_infinities(kahanmaps, tmp_path):
+    (tmp_path / "s.txt").write_text("-1\n")
+    outcome = kahanmaps(f"{SQUARE} --steps 3 --integral 'I=1/(1+2*x)' --json --starts", tmp_path / "s.txt")
+    # -1, -1/2: a pole of I
+    assert outcome.json["drift"][0]["largest"] == "inf"
+    assert json.loads(outcome.out, parse_constant=pytest.fail)
+
+
+# The file
+
+
+def test_without_every_the_file_holds_the_starts_and_the_ends(kahanmaps, tmp_path):
+    path = tmp_path / "x.npy"
+    for more in ("", " --integral F1", " --arithmetic mod:10007"):
+        kahanmaps(f"{TOP} --random 3 --steps 1000{more} -o", path)
+        two = np.load(path)
+        kahanmaps(f"{TOP} --random 3 --steps 1000 --every 500{more} -o", path)
+        assert two.tolist() == np.load(path)[::2].tolist()
+        assert two.dtype == (np.int64 if "mod" in more else np.float64)
+
+
+def test_orbits_that_have_ended_are_nan(kahanmaps, tmp_path):
+    (tmp_path / "s.txt").write_text("1/2\n-1\n")
+    path = tmp_path / "x.npy"
+    outcome = kahanmaps(f"{SQUARE} --steps 4 --every 1 --starts", tmp_path / "s.txt", "-o", path)
+    assert np.isnan(np.load(path)[:, :, 0]).tolist() == [[False, False]] * 2 + [[True, False]] * 3
+    assert outcome.err == f"{path}: 5 records of 2 orbits\n"
+
+
+def test_the_file_may_be_the_starts_of_the_next_run(kahanmaps, tmp_path):
+    path = tmp_path / "x.npy"
+    kahanmaps(f"{TOP} --random 3 --steps 10 -o", path)
+    np.save(path, np.load(path)[-1])
+    assert kahanmaps(f"{TOP} --steps 10 --starts", path, "-o", path).status == 0
+    there = np.load(path)[-1]
+    kahanmaps(f"{TOP} --random 3 --steps 20 -o", path)
+    assert there.tolist() == np.load(path)[-1].tolist()
+
+
+def test_a_file_of_residues_is_valid_after_every_row(tmp_path):
+    with ResidueFile(str(tmp_path / "r.npy"), (2, 1)) as file:
+        assert np.load(tmp_path / "r.npy").shape == (0, 2, 1)
+        for k in range(12):
+            file.append(np.array([[k], [PRIME]]))
+            assert np.load(tmp_path / "r.npy").tolist() == [[[j], [PRIME]] for j in range(k + 1)]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("arithmetic", ["float", "mod:10007"])
+def test_a_full_disk_gives_2_and_names_the_file(kahanmaps, tmp_path, arithmetic):
+    (tmp_path / "full.npy").symlink_to("/dev/full")
+    outcome = kahanmaps(f"{TOP} --random 2 --steps 2 --arithmetic {arithmetic} -o", tmp_path / "full.npy")
+    assert (outcome.status, outcome.err) == (2, f"Error: No space left on device: {tmp_path / 'full.npy'}\n")
+
+
+# Interrupts
+
+
+@pytest.mark.parametrize("arithmetic", ["float", "mod:10007"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path, number, arithmetic):
+    path = tmp_path / "x.npy"
+    words = f"{TOP} --steps {10**9} --arithmetic {arithmetic} --random 5 --every 100 -o {path} --json"
+    process = subprocess.Popen(
+        [*COMMAND, *shlex.split(words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    while not path.exists() or path.stat().st_size < 2000:  # the first records are in the file
+        time.sleep(0.02)
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    found = json.loads(out)
+    assert (process.returncode, found["status"]) == (130, "interrupted")
+    assert f"interrupted after step {found['steps_taken']}" in err
+    assert np.load(path).shape == tuple(found["output"]["shape"]) == (found["steps_taken"] // 100 + 1, 5, 3)
+
+
+def test_progress_is_told(kahanmaps, slow_clock):
+    assert re.search(r"step \d+ of 50 \(", kahanmaps(f"{TOP} --random 3 --steps 50").err)
+    assert kahanmaps(f"{TOP} --random 3 --steps 50 -q").err == ""
+
+
+# Wrong use
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("ensemble", "Missing option '--steps'"),
+        ("ensemble --steps 1 --eps 1", "give --starts FILE or --random N"),
+        (f"{TOP} --steps 1 --random 3 --starts x", "give --starts FILE or --random N"),
+        (f"{TOP} --steps 1 --starts x --seed 1", "--box and --seed are for --random"),
+        (f"{TOP} --steps 1 --starts x --box 1", "--box and --seed are for --random"),
+        ("ensemble --random 3 --steps 1 --eps 1", "missing SYSTEM"),
+        ("ensemble euler_top --random 3 --steps 1", "missing --eps E"),
+        ("ensemble euler_top --random 3 --steps 1 --eps 0", "found eps = 0"),
+        ("ensemble euler_top --random 3 --steps 1 --eps 1e-400", "take a larger eps"),
+        ("ensemble euler_top --random 3 --steps 1 --eps 1e400", "beyond the range of machine floats"),
+        ("ensemble - --starts - --steps 1 --eps 1", "found - twice"),
+        (f"{TOP} --random 0 --steps 1", "found --random 0"),
+        (f"{TOP} --random -1 --steps 1", "found --random -1"),
+        (f"{TOP} --random {10**12} --steps 1", "expected at most"),
+        (f"{TOP} --random 3 --box 0 --steps 1", "found --box 0"),
+        (f"{TOP} --random 3 --box=-1 --steps 1", "found --box -1"),
+        (f"{TOP} --random 3 --box 1e400 --steps 1", "beyond the range of machine floats"),
+        (f"{TOP} --random 3 --box 1e-400 --steps 1", "0 in machine numbers"),
+        (f"{TOP} --random 3 --seed -1 --steps 1", "found --seed -1"),
+        (f"{TOP} --random 3 --seed x --steps 1", "'x' is not a valid integer"),
+        (f"{TOP} --random 3 --steps -1", "found --steps -1"),
+        (f"{TOP} --random 3 --steps {10**40}", "it would take years"),
+        (f"{TOP} --random 3 --steps 1 --every 0 -o x.npy", "found --every 0"),
+        (f"{TOP} --random 3 --steps 1 --every 1", "--every K is for -o"),
+        (f"{TOP} --random 3 --steps 1 --threads 0", "found --threads 0"),
+        (f"{TOP} --random 3 --steps 1 -o x.csv", "ends with .npy"),
+        (f"{TOP} --random 3 --steps 1 -o -", "ends with .npy"),
+        (f"{TOP} --random 3 --steps 1 -o no/such/folder/x.npy", "No such file or directory: no/such/folder/x.npy"),
+        (f"{TOP} --random 3 --steps 1 --method normal-form", "there is none"),
+        (f"{TOP} --random 3 --steps 1 --arithmetic exact", "expected float or mod:P"),
+        (f"{TOP} --random 3 --steps 1 --arithmetic ball:64", "expected float or mod:P"),
+        (f"{TOP} --random 3 --steps 1 --arithmetic mod:91", "91 is composite"),
+        (f"{TOP} --random 3 --steps 1 --arithmetic mod:2", "the prime 2 divides the denominator of 1/10"),
+        (f"{TOP} --random 3 --steps 1 --arithmetic mod:{2**89 - 1}", "found a modulus of 89 bits, expected at most 61"),
+        (f"{TOP} --random 3 --steps 1 --arithmetic mod:7 --box 1", "--box is for float"),
+        (f"{TOP} --random 3 --steps 1 --integral F1 --integral F1", "found two integrals of the name F1"),
+        (f"{TOP} --random 3 --steps 1 --integral q", "found the unknown name 'q'"),
+        (f"{TOP} --random 3 --steps 1 --integral 1/0", "found a division by 0"),
+        (f"{TOP} --starts nowhere.txt --steps 1", "No such file or directory: nowhere.txt"),
+        (f"{TOP} --starts . --steps 1", "s a directory"),
+        (f"{TOP} --starts '' --steps 1", "No such file or directory: ''"),
+    ],
+    ids=lambda text: text[:90],
+)
+def test_wrong_use_gives_2(kahanmaps, command, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    outcome = kahanmaps(command)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def npy(array) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, array, allow_pickle=True)
+    return stream.getvalue()
+
+
+HUGE = npy(np.ones((2, 3))).replace(b"(2, 3), }          ", b"(999999999999, 3), }")
+ABSURD = npy(np.ones((2, 3))).replace(b"(2, 3), }", b"(-2, 3),}")
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "found no point, expected one a line: x1, x2, x3"),
+        (b"# nothing\n\n", "found no point"),
+        (b"x1,x2,x3\n", "found no point"),
+        (b"1,2\n", "s:1: found 2 numbers, expected 3: x1, x2, x3"),
+        (b"1,2,3\n\n1,2,3,4\n", "s:3: found 4 numbers, expected 3"),
+        (b"1,2,3\nx1,x2,x3\n", "s:2: entry 1: found 'x1'"),
+        (b"1,nan,3\n", "s:1: entry 2: found 'nan', expected an integer, p/q or a decimal"),
+        (b"1,inf,3\n", "s:1: entry 2: found 'inf'"),
+        (b"1,,3\n", "s:1: entry 2: found nothing"),
+        (b"1,2/0,3\n", "s:1: entry 2: found the denominator 0"),
+        (b"1,1e400,3\n", "s:1: entry 2: found a number beyond the range of machine floats"),
+        (b"1,1e99999999,3\n", "s:1: entry 2: found the power of ten"),
+        (b"1,2,\x1b[31m\n", r"s:1: entry 3: found '\x1b[31m'"),
+        (b"1,2,3\x00\n", r"s:1: entry 3: found '3\x00'"),
+        (b"1" * 2_000_000 + b",2,3\n", "s:1: entry 1: found a number of 2000000 characters"),
+        (b"1," * 100_000 + b"1\n", "s:1: found 100001 numbers, expected 3"),
+        (bytes(range(256)), "neither a .npy file nor UTF-8 text"),
+        (b"\x93NUMPY", "header that cannot be read"),
+        (b"\x93NUMPY\x01\x00\xff\xff", "header that cannot be read"),
+        (b"\x93NUMPY\x09\x00" + b"x" * 100, "header that cannot be read: version 9.0"),
+        (b"\x93NUMPY\x01\x00\x10\x00" + b"((((((((((((((((", "header that cannot be read"),
+        (npy(np.ones(3)), "found an array of shape (3,), expected (n, 3)"),
+        (npy(np.ones((2, 2))), "found an array of shape (2, 2), expected (n, 3)"),
+        (npy(np.ones((0, 3))), "found an array of shape (0, 3)"),
+        (npy(np.ones((2, 3)))[:-1], "found 47 bytes of numbers, expected 48"),
+        (HUGE, "expected at most 50000000 numbers"),
+        (ABSURD, "found an array of shape (-2, 3)"),
+        (npy(np.array([[1, 2, None]])), "found an array of Python objects"),
+        (npy(np.array([["1", "2", "3"]])), "found an array of text"),
+        (npy(np.ones((1, 3), dtype=complex)), "found an array of complex numbers"),
+        (npy(np.ones((1, 3), dtype=bool)), "found an array of truth values"),
+        (npy(np.array([(1.0, 2)], dtype=[("a", "f8"), ("b", "i4")])), "found an array of the type"),
+        (npy(np.array([[1.0, 2, 3], [1, np.nan, 3], [np.inf, 1, 1]])), "2 mistakes\n  row 1: found nan"),
+    ],
+    ids=lambda data: repr(data[:30]),
+)
+@pytest.mark.parametrize("name", ["s", "s.npy"])
+def test_wrong_starts_give_2_and_say_where(kahanmaps, tmp_path, data, words, name):
+    path = tmp_path / name
+    path.write_bytes(data)
+    outcome = kahanmaps(f"{TOP} --steps 1 --starts", path)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err.startswith(f"Error: {path}: ")
+    assert len(outcome.err) < 600
+    if name.endswith(".npy") and not data.startswith(b"\x93NUMPY"):
+        words = "found no .npy file"
+    assert words in outcome.err.replace(str(path), "s")
+
+
+def test_all_mistakes_are_told_at_once(kahanmaps, tmp_path):
+    path = tmp_path / "s.txt"
+    path.write_text("1,2\n1,2,3\na,2,3\n" + "1\n" * 30)
+    lines = kahanmaps(f"{TOP} --steps 1 --starts", path).err.splitlines()
+    assert lines[0] == f"Error: {path}: 32 mistakes"
+    assert [line.split(":")[1] for line in lines[1:-1]] == ["1", "3", *map(str, range(4, 22))]
+    assert lines[-1] == "  and 12 more"
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"1,2,1/7\n", "entry 3: the prime 7 divides the denominator"),
+        (b"1,2,0.1e\n", "entry 3: found '0.1e'"),
+        (npy(np.ones((2, 3))), "found an array of machine floats, expected integers: modulo P starts are"),
+    ],
+)
+def test_wrong_starts_modulo_a_prime(kahanmaps, tmp_path, data, words):
+    (tmp_path / "s").write_bytes(data)
+    outcome = kahanmaps(f"{TOP} --steps 1 --arithmetic mod:7 --starts", tmp_path / "s")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err
+
+
+def test_text_and_numbers_are_bounded(kahanmaps, tmp_path, monkeypatch):
+    path = tmp_path / "s.txt"
+    path.write_text("1,2,3\n" * 10)
+    monkeypatch.setattr(ensemble_starts, "MAX_NUMBERS", 25)
+    assert "s.txt:9: found more than 25 numbers" in kahanmaps(f"{TOP} --steps 1 --starts", path).err
+    monkeypatch.setattr(ensemble_starts, "MAX_TEXT_BYTES", 50)
+    assert "found more than 50 bytes of text" in kahanmaps(f"{TOP} --steps 1 --starts", path).err
+    monkeypatch.setattr(ensemble_starts, "MAX_NPY_BYTES", 20)
+    assert kahanmaps(f"{TOP} --steps 1 --starts", saved(tmp_path / "s.npy", np.ones((1, 3)))).status == 2
+
+
+def test_a_normal_form_in_coordinates_of_its_own_is_for_single_orbits(kahanmaps, tmp_path):
+    path = tmp_path / "scaled.toml"
+    path.write_text('variables = ["x", "y"]\n[hamiltonian]\nH = "x^3/3 + x*y^2"\nJ = [["0", "3"], ["-3", "0"]]\n')
+    command = ("ensemble", path, "--random 3 --steps 5 --eps 1/10 --kernel numpy")
+    assert kahanmaps(*command, "--json").json["method"] == "generic"
+    outcome = kahanmaps(*command, "--method normal-form")
+    assert (outcome.status, "J = [[0, I], [-I, 0]] only" in outcome.err) == (2, True)
+
+
+def test_the_drift_is_that_of_the_library(kahanmaps, tmp_path):
+    system = load("paper_m3")
+    starts = saved(tmp_path / "s.npy", np.random.default_rng(1).random((7, 6)) / 4)
+    found = kahanmaps("ensemble paper_m3 --eps 1/50 --steps 500 --kernel numpy --json --starts", starts).json
+    from kahanmaps.family.planar import normal_form
+
+    ensemble = FloatEnsemble(system.system, "1/50", np.load(starts), form=normal_form(system.member), kernel="numpy")
+    ensemble.advance(500)
+    assert [drift["largest"] for drift in found["drift"]] == [float(d.largest.max()) for d in ensemble.drift]

@@ -1,0 +1,220 @@
+"""kahanmaps period: the order of the translation, told with its planes and poles, and never a traceback.
+
+Walking the orbit gives the same number where that is short enough; at a pole the walk stops and the period is that of
+the orbit continued.
+"""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from kahanmaps.errors import SingularStep
+from kahanmaps.version import __version__
+
+PAIR = "--start 1/2,-1/5,0,1 --eps 1/10"
+M3 = "paper_m3 --start 1,2,3,4,5,6 --eps 1/11"
+
+# H = x^3/3 + x y^2 with J = [[0, 3], [-3, 0]]: a member in coordinates of its own
+SCALED = 'variables = ["x", "y"]\n[hamiltonian]\nH = "x^3/3 + x*y^2"\nJ = [["0", "3"], ["-3", "0"]]\n'
+# Two planes whose coordinates are mixed by J.
+MIXED = """variables = ["a", "b", "c", "d"]
+[hamiltonian]
+H = "a^3 + 2*c^3 + a*b^2 + c*d^2 - c^2*d"
+J = [["0", "2", "0", "0"], ["-2", "0", "0", "0"], ["0", "0", "0", "1/5"], ["0", "0", "-1/5", "0"]]
+"""
+
+
+def walked(kahanmaps, command, steps=10_000):
+    """The record of the end of the orbit, step after step."""
+    return kahanmaps(*command, f"--steps {steps} --every {steps} --method generic --format jsonl").records[-1]
+
+
+@pytest.fixture
+def files(tmp_path):
+    for name, text in (("scaled", SCALED), ("mixed", MIXED)):
+        (tmp_path / f"{name}.toml").write_text(text)
+    return tmp_path
+
+
+# How many starts for each prime: in some systems most orbits meet a pole, and there is no period to compare.
+@pytest.mark.parametrize(("name", "starts"), [("pair", 4), ("paper_m3_irreducible", 8), ("scaled", 6), ("mixed", 24)])
+def test_the_period_is_that_of_the_orbit_walked(kahanmaps, pair, files, name, starts):
+    """Walks that end at a pole have to be told as such; enough others have to come back, or nothing was compared."""
+    system = {"pair": pair, "scaled": files / "scaled.toml", "mixed": files / "mixed.toml"}.get(name, name)
+    dim = {"pair": 4, "scaled": 2, "mixed": 4}.get(name, 6)
+    compared = 0
+    for prime in (7, 11, 13, 17, 19, 29, 31):
+        rng = random.Random(prime)
+        for _ in range(starts):
+            start = ",".join(str(rng.randrange(prime)) for _ in range(dim))
+            options = f"--start {start} --eps 1/25 --arithmetic mod:{prime}"
+            found = kahanmaps("period", system, options, "--json").json
+            end = walked(kahanmaps, ("orbit", system, options))
+            if end["status"] == "singular":
+                assert found["meets_pole"] is True
+            elif end["status"] == "periodic":
+                assert (found["period"], found["meets_pole"]) == (str(end["period"]), False)
+                compared += end["period"] > 1
+            else:
+                assert int(found["period"]) > end["steps"]
+    assert compared >= 10
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("paper_m2 --start 1,2,3,4 --eps 1/10 --arithmetic mod:5", "divides the denominator of 1/10"),
+        # chi = t^3 + t^2 - 1 has the discriminant -23
+        ("paper_m3_irreducible --start 1,2,3,4,5,6 --eps 1/25 --arithmetic mod:23", "a repeated root modulo 23"),
+    ],
+)
+def test_a_prime_without_a_normal_form_is_refused(kahanmaps, command, words):
+    outcome = kahanmaps(f"period {command}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err
+
+
+def test_the_period_is_printed_with_a_line_for_each_plane(kahanmaps, pair):
+    assert kahanmaps("period", pair, PAIR, "--arithmetic mod:10007").out.splitlines() == [
+        "# pair, eps = 1/10 (time step 2 eps = 1/5), mod:10007 arithmetic",
+        "period\t17121375",
+        "plane\tt = 10005 mod 10007\tperiod 5073\ta smooth level cubic",
+        "plane\tt = 1 mod 10007\tperiod 10125\ta smooth level cubic",
+        "poles\tthe orbit meets none",
+        "# periodic: the orbit has period 17121375 and meets no pole of the map",
+    ]
+
+
+def test_that_a_pole_is_met_is_told(kahanmaps, pair):
+    out = kahanmaps("period", pair, "--start 1/2,-1/3,0,1 --eps 1/10 --arithmetic mod:2305843009213693951").out
+    assert "period\t332306998856115862344354572863389520\n" in out
+    assert "poles\tthe orbit meets one\n" in out
+    assert "continued through its poles the orbit has period" in out.splitlines()[-1]
+
+
+def test_the_json_has_the_documented_shape_and_periods_are_text(kahanmaps, pair):
+    found = kahanmaps("period", pair, PAIR, "--arithmetic mod:10007 --json").json
+    document = found.pop("document")
+    assert document["name"] == "pair"
+    assert found.pop("planes")[0] == {
+        "name": "t = 10005 mod 10007",
+        "status": "periodic",
+        "period": "5073",
+        "meets_pole": False,
+        "kind": "smooth",
+        "kind_text": "a smooth level cubic",
+        "field_size": "10007",
+        "reason": "",
+    }
+    assert found == {
+        "command": "period",
+        "version": __version__,
+        "system": "pair",
+        "structure": "a member of the family, chi = (t + 2)*(t - 1)",
+        "eps": "1/10",
+        "time_step": "1/5",
+        "convention": "eps is the paper's epsilon, the time step is 2 eps",
+        "arithmetic": "mod:10007",
+        "start": ["1/2", "-1/5", "0", "1"],
+        "status": "periodic",
+        "period": "17121375",
+        "meets_pole": False,
+        "message": "the orbit has period 17121375 and meets no pole of the map",
+    }
+
+
+def test_over_the_rationals_an_orbit_is_proved_aperiodic(kahanmaps, pair):
+    outcome = kahanmaps("period", pair, PAIR, "--json")
+    assert (outcome.status, outcome.json["status"], outcome.json["period"]) == (0, "aperiodic", None)
+    assert [plane["reason"] for plane in outcome.json["planes"]] == [
+        "T has the orders 18 and 56 modulo 101 and 103",
+        "T has the orders 34 and 50 modulo 101 and 103",
+    ]
+    assert outcome.json["planes"][0]["field_size"] is None
+    assert "period\tnone\n" in kahanmaps("period", pair, PAIR).out
+
+
+def test_a_fixed_point_has_period_1(kahanmaps, pair):
+    outcome = kahanmaps("period", pair, "--start 0,0,0,0 --eps 1 --json")
+    assert (outcome.status, outcome.json["period"], outcome.json["meets_pole"]) == (0, "1", False)
+
+
+def test_modulo_two_the_map_is_the_identity(kahanmaps, pair):
+    options = "--start 1,0,1,1 --eps 1/7 --arithmetic mod:2"
+    assert walked(kahanmaps, ("orbit", pair, options), 9)["period"] == 1
+    outcome = kahanmaps("period", pair, options, "--json")
+    assert (outcome.status, outcome.json["period"]) == (0, "1")
+
+
+def test_a_field_too_large_gives_3_and_says_so(kahanmaps, pair):
+    outcome = kahanmaps("period", pair, f"--start 1,2,3,4 --eps 1 --arithmetic mod:{2**255 - 19} --json")
+    assert (outcome.status, outcome.json["status"], outcome.json["period"]) == (3, "undecided", None)
+    assert "more than about 2^192" in outcome.json["planes"][0]["reason"]
+    assert "undecided: the period was not found" in outcome.err
+
+
+def test_a_start_where_the_map_has_no_value_gives_3(kahanmaps):
+    # H = x y^2/2 with a repeated factor: at y = 1/eps = 1 a pole of the map that nothing leads on from
+    outcome = kahanmaps("period --vars x,y --rhs x*y --rhs=-y^2/2 --start 2,1 --eps 1 --json")
+    assert (outcome.status, outcome.json["status"], outcome.json["period"]) == (3, "undefined", None)
+    assert outcome.json["meets_pole"] is True
+    assert "cannot be continued" in outcome.err
+
+
+def test_hidden_members_have_periods(kahanmaps):
+    # the right-hand sides of paper_m3, with nothing said of A
+    rhs = kahanmaps("systems paper_m3 --json").json["rhs"]
+    words = " ".join(f"--rhs='{text}'" for text in rhs)
+    command = f"--vars x1,x2,x3,x4,x5,x6 {words} --start 1,2,3,4,5,6 --eps 1/11 --arithmetic mod:10007 --json"
+    hidden = kahanmaps(f"period {command}").json
+    assert hidden["structure"].startswith("a hidden member")
+    assert hidden["period"] == kahanmaps(f"period {M3} --arithmetic mod:10007 --json").json["period"]
+
+
+def test_verbose_says_what_was_found_and_quiet_says_nothing(kahanmaps, pair):
+    command = ("period", pair, PAIR, "--arithmetic mod:10007 -v")
+    assert kahanmaps(*command).err == "a member of the family, chi = (t + 2)*(t - 1)\n"
+    assert kahanmaps(*command, "-q").err == ""
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("period", "Missing option '--start'"),
+        ("period --start 1,2", "missing --eps E"),
+        ("period --start 1,2 --eps 1", "missing SYSTEM"),
+        ("period lorenz --start 1,2,3 --eps 1/10", "x' is not J grad H"),
+        ("period lorenz --start 1,2,3 --eps 1/10", "kahanmaps orbit ... --steps N"),
+        ("period henon_heiles --start 1,2,3,4 --eps 1/10", "H is not a homogeneous cubic"),
+        ("period paper_m2 --start 1,2 --eps 1/10", "with 2 coordinates, expected 4"),
+        ("period paper_m2 --start 1,2,3,4 --eps 0", "found eps = 0"),
+        ("period paper_m2 --start 1,2,3,x --eps 1", "found 'x'"),
+        ("period paper_m2 --start 1,2,3,4 --eps 1 --arithmetic float", "a period is exact"),
+        ("period paper_m2 --start 1,2,3,4 --eps 1 --arithmetic ball:64", "a period is exact"),
+        ("period paper_m2 --start 1,2,3,4 --eps 1 --arithmetic mod:91", "91 is composite"),
+        ("period paper_m2 --start 1,2,3,4 --eps 1 --arithmetic mod:0", "found 'mod:0'"),
+        ("period paper_m2 --start 1,2,3,4 --eps 1/2 --arithmetic mod:2", "the prime 2 divides the denominator of 1/2"),
+        ("period paper_m2 --start 1,2,3,4/7 --eps 1 --arithmetic mod:7", "divides the denominator of 4/7"),
+        (f"period paper_m2 --start 1,2,3,4 --eps 1 --arithmetic mod:{10**400}", "found a modulus of 1329 bits"),
+    ],
+)
+def test_wrong_use_gives_2(kahanmaps, command, words):
+    outcome = kahanmaps(command)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err
+
+
+def test_a_prime_that_the_coordinates_of_the_normal_form_do_not_have_is_refused(kahanmaps, files):
+    outcome = kahanmaps("period", files / "scaled.toml", "--start 1,2 --eps 1 --arithmetic mod:3")
+    assert (outcome.status, "the prime 3 divides" in outcome.err) == (2, True)
+
+
+def test_an_error_on_the_way_is_a_message(kahanmaps, pair, monkeypatch):
+    def fail(*_):
+        raise SingularStep("no value")
+
+    monkeypatch.setattr("kahanmaps.maps.periods.period_over_rationals", fail)
+    outcome = kahanmaps("period", pair, PAIR)
+    assert (outcome.status, outcome.err) == (3, "Error: no value\n")
