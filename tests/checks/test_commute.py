@@ -27,13 +27,14 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rationals, systems
 from hypothesis import assume, given, settings
 
+from kahanmaps.algebra.fields import GF
 from kahanmaps.checks import commute, judge, theorems
 from kahanmaps.checks import settings as settings_module
 from kahanmaps.checks.claims import Report, Verdict
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
@@ -351,9 +352,23 @@ def test_the_zero_system_commutes_with_everything():
     assert only(pair(zero, zero)).verdict is PROVED
 
 
+def goes_on(f: QuadraticSystem, first: Fraction, second: Fraction) -> bool:
+    """Whether two steps, one with each eps, have a value at some point: x' = x at eps = 1 has no map at all."""
+    field = GF(2**61 - 1)
+    for k in range(1, 9):
+        try:
+            image = KahanMap(f, first, field).step([k**j + j for j in range(3, 3 + f.dim)])
+            KahanMap(f, second, field).step(image)
+        except SingularStep:
+            continue
+        return True
+    return False
+
+
 @few
 @given(systems(dims=(1, 2)), nonzero)
 def test_every_map_commutes_with_itself_and_with_its_inverse(f, eps):
+    assume(goes_on(f, eps, eps) and goes_on(f, eps, -eps) and goes_on(f, -eps, eps))
     assert pair(f, f, Settings(eps=eps, steps=2)).verdict is PROVED
     assert pair(f, f, Settings(eps=eps, steps=2), eps2=-eps).verdict is PROVED
 

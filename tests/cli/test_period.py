@@ -39,7 +39,15 @@ def files(tmp_path):
 
 
 # How many starts for each prime: in some systems most orbits meet a pole, and there is no period to compare.
-@pytest.mark.parametrize(("name", "starts"), [("pair", 4), ("paper_m3_irreducible", 8), ("scaled", 6), ("mixed", 24)])
+@pytest.mark.parametrize(
+    ("name", "starts"),
+    [
+        pytest.param("pair", 4, marks=pytest.mark.slow),
+        pytest.param("paper_m3_irreducible", 8, marks=pytest.mark.slow),
+        ("scaled", 6),
+        pytest.param("mixed", 24, marks=pytest.mark.slow),
+    ],
+)
 def test_the_period_is_that_of_the_orbit_walked(kahanmaps, pair, files, name, starts):
     """Walks that end at a pole have to be told as such; enough others have to come back, or nothing was compared."""
     system = {"pair": pair, "scaled": files / "scaled.toml", "mixed": files / "mixed.toml"}.get(name, name)
