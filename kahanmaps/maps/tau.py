@@ -14,15 +14,14 @@ and for a + b and a - b everything is bilinear (phi is psi or chi; there are no 
 
     phi_{a+b} phi_{a-b} = phi_{a+1} phi_{a-1} psi_b^2 - psi_{b+1} psi_{b-1} phi_a^2.
 
-psi depends on delta = disc(h) level^2 alone: psi_1 = 1, psi_2 = 2, psi_3 = 3 gamma^(1/3), psi_4 = 4, gamma = 1 -
-delta. The cube roots are taken out: psi_n and chi_n are what is written here times gamma^(1/3) where 3 divides n, and
-then the square on the right is to be multiplied by gamma whose index alone of a, b is divisible by 3. For b = 2 this
-is a Somos-4 recursion, for a = b a doubling.
+psi depends on delta = disc(h) level^2 alone: psi_1 = 1, psi_2 = 2, psi_3 = 3 gamma^(1/3), psi_4 = 4 with
+gamma = 1 - delta. The cube roots are taken out: psi_n and chi_n are what is written here times gamma^(1/3) where 3
+divides n, and then the one square on the right whose index alone is divisible by 3 has to be multiplied by gamma. So
+all values follow from those of half the index (`tau_table`); here are the first ones, and how a point is put together.
 
-Steps follow the recursion, the n-th iterate the doublings, from a window of psi at i-3..i+4 and of chi at i-1, i, i+1
-to one around 2i or 2i + 1. Over Q the numbers would grow by powers of the bad primes like everything else here, with
-exponents quadratic in n. So a value is kept as an integer prime to the bad primes times a scale s_n that is never
-formed: only t_n = s_{n+1} s_{n-1} / s_n^2 is needed, a small rational number. docs/mathematics.md has the proofs.
+Over Q the numbers would grow by powers of the bad primes like everything else, with exponents quadratic in n. So a
+value is kept as an integer prime to the bad primes times a scale s_n that is never formed: only
+t_n = s_{n+1} s_{n-1} / s_n^2 is needed, a small rational number. docs/mathematics.md has the proofs.
 Source: ward-1948, for such sequences.
 """
 
@@ -35,23 +34,14 @@ from itertools import islice
 from flint import fmpq, fmpz
 
 from kahanmaps.maps.planar_block import determinant
-from kahanmaps.maps.planar_integers import (
-    IntegerBlock,
-    IntegerTriple,
-    bad_part,
-    primitive,
-    strip,
-)
+from kahanmaps.maps.planar_integers import IntegerBlock, IntegerTriple, bad_part, primitive, strip
 
 _BASES = 3
 
 
 @dataclass(frozen=True)
 class Window:
-    """Values of psi or chi from index `first` on: integers prime to the bad primes, their scales, and t in between.
-
-    `scales` holds s_n up to what the caller knows; `t` holds t_n for the inner indices, t[0] for first + 1.
-    """
+    """Values of psi or chi from index `first` on: integers prime to the bad primes, and their scales s_n."""
 
     first: int
     values: list[fmpz]
