@@ -93,7 +93,7 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | No
         wanted = "integers" if prime is not None else "real numbers"
         raise InputError(f"{where}: found an array of {_kind(dtype)}, expected {wanted}{hint}")
     dim = len(variables)
-    if len(shape) != 2 or shape[1] != dim or shape[0] < 1:
+    if any(isinstance(length, bool) for length in shape) or len(shape) != 2 or shape[1] != dim or shape[0] < 1:
         raise InputError(
             f"{where}: found an array of shape {_shape(shape)}, expected (n, {dim}): one row for each start, with "
             f"columns {', '.join(variables)}"

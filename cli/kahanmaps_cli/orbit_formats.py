@@ -95,7 +95,9 @@ class Text(Writer):
     def header(self, header: dict[str, Any]) -> None:
         self._line(
             f"# {header['system']}, eps = {header['eps']} (time step 2 eps = {header['time_step']}), "
-            f"{header['arithmetic']} arithmetic" + (", backward" if header["direction"] == "backward" else "")
+            f"{header['arithmetic']} arithmetic"
+            + (f" ({header['kernel']})" if "kernel" in header else "")
+            + (", backward" if header["direction"] == "backward" else "")
         )
         self._row("step", [*self.columns, *self.integrals])
 

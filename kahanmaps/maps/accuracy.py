@@ -34,8 +34,8 @@ def bits_for(
         orbit = orbit_with(bits)
         if told is not None:
             told(f"balls of {bits} bits")
-        enough = all(_accurate(point.x, digits) for point in orbit)
-        if orbit.end is None or (enough and orbit.end.status != "precision"):
+        enough = all(_accurate(point.x, digits) for point in orbit)  # stops at the first one that is not
+        if enough and orbit.end is not None and orbit.end.status != "precision":
             return bits
         bits *= 2
     return MAX_BALL_BITS

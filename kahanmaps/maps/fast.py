@@ -60,7 +60,7 @@ class FloatKahanMap:
         if self.eps == 0.0:
             raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
         forms = [2 * entry for form in system.Q for entry in form.entries()]
-        with np.errstate(over="ignore"):
+        with np.errstate(all="ignore"):
             self._tensor = to_floats(forms).reshape(n, n, n) * self.eps
             self._linear = to_floats(system.B.entries()).reshape(n, n) * self.eps
             self._constant = to_floats(system.c) * (2 * self.eps)

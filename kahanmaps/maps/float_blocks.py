@@ -83,9 +83,11 @@ class PlanarBlocks:
     @property
     def labels(self) -> tuple[str, ...]:
         """The roots as short text; a complex one stands for itself and its conjugate."""
-        return tuple(
-            f"{root.real:.6g}" if root.imag == 0 else f"{root.real:.6g}+-{root.imag:.6g}i" for root in self.roots
-        )
+        found = []
+        for root in self.roots:
+            real = 0.0 if abs(root.real) < 1e-30 * abs(root.imag) else root.real  # a ball around 0, rounded
+            found.append(f"{root.real:.6g}" if root.imag == 0 else f"{real:.6g}+-{root.imag:.6g}i")
+        return tuple(found)
 
 
 def planar_blocks(form: NormalForm, eps: Any) -> PlanarBlocks:

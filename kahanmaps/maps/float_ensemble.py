@@ -418,7 +418,8 @@ def _points(starts: Any, system: QuadraticSystem) -> FloatArray:
 
 def _product(matrix: FloatArray, columns: FloatArray) -> FloatArray:
     """matrix columns, every sum from left to right: BLAS orders them by the shape of the arrays."""
-    total: FloatArray = matrix[:, :1] * columns[0]
-    for j in range(1, len(columns)):
-        total += matrix[:, j, None] * columns[j]
+    with np.errstate(all="ignore"):  # what leaves the range of doubles is a status, not a warning
+        total: FloatArray = matrix[:, :1] * columns[0]
+        for j in range(1, len(columns)):
+            total += matrix[:, j, None] * columns[j]
     return total

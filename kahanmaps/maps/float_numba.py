@@ -475,19 +475,23 @@ def _alone(
     shift: Any,
     M: Any,
     right: Any,
+    sizes: Any,
 ) -> Any:
     """float_steps.PythonGeneric.step: the image of x into `right`; its status, and whether it was near-singular."""
     n = len(shift)
     near = 0
-    scale = 0.0
+    scale = 1.0
     for i in range(n):
+        sizes[i] = 1.0
         for j in range(n):
             total = constants[i, j]
             for t in range(first[i * n + j], first[i * n + j + 1]):
                 total -= factors[t] * x[columns[t]]
             M[i, j] = total
-            if abs(total) > scale:
-                scale = abs(total)
+            if abs(total) > sizes[i]:
+                sizes[i] = abs(total)
+        if sizes[i] > scale:
+            scale = sizes[i]
         total = x[i] + shift[i]
         for j in range(n):
             if linear[i, j] != 0.0:
@@ -501,11 +505,12 @@ def _alone(
                 for j in range(p, n):
                     M[p, j], M[i, j] = M[i, j], M[p, j]
                 right[p], right[i] = right[i], right[p]
+                sizes[p], sizes[i] = sizes[i], sizes[p]
         if M[p, p] == 0.0:
             return SINGULAR, near
         if not abs(M[p, p]) <= LARGEST:
             return OVERFLOW, near
-        if abs(M[p, p]) <= NEAR * scale:
+        if abs(M[p, p]) <= NEAR * sizes[p]:
             near = 1
         inverse = 1.0 / M[p, p]
         for i in range(p + 1, n):
@@ -547,7 +552,7 @@ def _together(
     """
     n = len(shift)
     for l in range(_GENERIC_WIDTH):
-        scale[l] = 0.0
+        scale[l] = 1.0
         fine[l] = 1.0
     for i in range(n):
         for j in range(n):
@@ -678,6 +683,7 @@ def _generic_kernel(stamp: int) -> Any:
         x_alone = np.zeros(n)
         M_alone = np.zeros((n, n))
         right_alone = np.zeros(n)
+        sizes = np.ones(n)
         for at in range(lo, hi, wide):
             width = min(wide, hi - at)
             for j in range(n):
@@ -701,7 +707,7 @@ def _generic_kernel(stamp: int) -> Any:
                             for j in range(n):
                                 x_alone[j] = x[j, i]
                             failed, close = _alone(
-                                x_alone, constants, terms, columns, factors, linear, shift, M_alone, right_alone
+                                x_alone, constants, terms, columns, factors, linear, shift, M_alone, right_alone, sizes
                             )
                             if failed != RUNNING:
                                 status[at + i] = failed

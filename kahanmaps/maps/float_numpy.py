@@ -208,7 +208,8 @@ class GenericNumpy:
             column = equation.linear[:, j]
             if column.any():
                 right += column[:, None] * x[j]
-        scale = np.fmax.reduce(np.abs(matrix).reshape(n * n, -1), axis=0)
+        # At least the row of the pivot, by which the single step judges: what may be near-singular is done again there.
+        scale = np.fmax(np.fmax.reduce(np.abs(matrix).reshape(n * n, -1), axis=0), 1.0)
         good = np.ones(x.shape[1], dtype=bool)
         for p in range(n):
             for i in range(p + 1, n):

@@ -14,10 +14,10 @@ counted, one for each block, and the orbit goes on. It ends *singular* where w i
 coordinate of the image is no finite number.
 
 The generic step eliminates in the matrix I - eps f'(x). Going down a column, a row whose entry is more than 8 times
-the pivot found so far becomes the pivot row; so no row is subtracted more than 8 times from another, and where
-eps f'(x) is small no rows are exchanged. Such a step is near-singular if a pivot is at most 2^-40 of the largest entry
-of the matrix. The orbit ends *singular* where a pivot is 0, and as an *overflow* where an entry, a pivot or a
-coordinate of the image is no finite number.
+the pivot found so far becomes the pivot row; so no row is subtracted more than 8 times from another, and where eps
+f'(x) is small no rows are exchanged. Such a step is near-singular if a pivot is at most 2^-40 of the largest of 1 and
+the entries of its row, as it was in the beginning. The orbit ends *singular* where a pivot is 0, and as an *overflow*
+where an entry, a pivot or a coordinate of the image is no finite number.
 """
 
 from __future__ import annotations
@@ -407,43 +407,45 @@ class PythonGeneric:
         """The image, the status code and whether the step is near-singular."""
         return _solved(*self._equation(x))
 
-    def _equation(self, x: list[float]) -> tuple[list[list[float]], list[float], float]:
-        matrix, scale = [], 0.0
+    def _equation(self, x: list[float]) -> tuple[list[list[float]], list[float], list[float]]:
+        matrix, sizes = [], []
         for row in self._entries:
-            entries = []
+            entries, size = [], 1.0
             for total, terms in row:
                 for k, factor in terms:
                     total -= factor * x[k]
                 entries.append(total)
-                if abs(total) > scale:
-                    scale = abs(total)
+                if abs(total) > size:
+                    size = abs(total)
             matrix.append(entries)
+            sizes.append(size)
         right = []
         for i, entries_of_B in enumerate(self._linear):
             total = x[i] + self._shift[i]
             for j, entry in entries_of_B:
                 total += entry * x[j]
             right.append(total)
-        return matrix, right, scale
+        return matrix, right, sizes
 
 
-def _solved(matrix: list[list[float]], right: list[float], scale: float) -> tuple[list[float], int, int]:
-    """The solution, its status code and whether a pivot was small; `scale` is the largest entry."""
+def _solved(matrix: list[list[float]], right: list[float], sizes: list[float]) -> tuple[list[float], int, int]:
+    """The solution, its status code and whether a pivot was small; `sizes` has the largest of 1 and each row."""
     n, near = len(right), 0
-    if not scale <= LARGEST:
+    if not max(sizes) <= LARGEST:
         return right, OVERFLOW, near
     for p in range(n):
         for i in range(p + 1, n):
             if abs(matrix[i][p]) > MUCH * abs(matrix[p][p]):
                 matrix[p], matrix[i] = matrix[i], matrix[p]
                 right[p], right[i] = right[i], right[p]
+                sizes[p], sizes[i] = sizes[i], sizes[p]
         upper = matrix[p]
         pivot = upper[p]
         if pivot == 0.0:
             return right, SINGULAR, near
         if not abs(pivot) <= LARGEST:
             return right, OVERFLOW, near
-        if abs(pivot) <= NEAR * scale:
+        if abs(pivot) <= NEAR * sizes[p]:
             near = 1
         inverse = 1.0 / pivot
         for i in range(p + 1, n):

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import count
+from threading import get_ident
 from typing import Any
 
 from kahanmaps.algebra.fields import QQ, BallField, Field
@@ -188,6 +189,10 @@ class Orbit:
         return f"det(I {sign} eps f'(x)) = 0 at step {step}: the map has no value there"
 
 
+class _GivenUp(Exception):
+    """Raised by `Iterates.interrupt` in the thread that computes."""
+
+
 class Iterates:
     """Some iterates of a start, each reached directly, not by way of those before it: iterate once, then look at `end`.
 
@@ -222,10 +227,13 @@ class Iterates:
         self.end: OrbitEnd | None = None
         self._jump = Jump(structure, self.map.eps, self.map.field)
         self._interrupted = False
+        self._busy_in: int | None = None
 
     def interrupt(self) -> None:
-        """Ask to end after the iterate in flight."""
+        """Ask to end; from a signal handler also the iterate in flight is given up, which may be a long one."""
         self._interrupted = True
+        if self._busy_in == get_ident():
+            raise _GivenUp
 
     def __iter__(self) -> Iterator[OrbitPoint]:
         done = 0
@@ -235,7 +243,11 @@ class Iterates:
                 self.end = OrbitEnd("interrupted", done, f"interrupted after step {done}")
                 return
             try:
+                self._busy_in = get_ident()
                 value = self._jump.value(self.start, step, max_bits)
+            except _GivenUp:
+                self.end = OrbitEnd("interrupted", done, f"interrupted after step {done}")
+                return
             except SingularStep as error:
                 self.end = OrbitEnd("singular", done, f"step {step} cannot be reached: {error}")
                 return
@@ -249,6 +261,8 @@ class Iterates:
                     message += f", more than the budget of {self.max_digits} (--max-digits)"
                 self.end = OrbitEnd("budget", done, message)
                 return
+            finally:
+                self._busy_in = None
             done = step
             yield OrbitPoint(step, self.map.field, value)
         self.end = OrbitEnd("completed", done, f"{counted(len(self.at), 'iterate')} reached directly")

@@ -330,10 +330,18 @@ def test_the_file_may_be_the_starts_of_the_next_run(kahanmaps, tmp_path):
     path = tmp_path / "x.npy"
     kahanmaps(f"{TOP} --random 3 --steps 10 -o", path)
     np.save(path, np.load(path)[-1])
-    assert kahanmaps(f"{TOP} --steps 10 --starts", path, "-o", path).status == 0
-    there = np.load(path)[-1]
+    assert kahanmaps(f"{TOP} --steps 10 --starts", path, "-o", tmp_path / "y.npy").status == 0
+    there = np.load(tmp_path / "y.npy")[-1]
     kahanmaps(f"{TOP} --random 3 --steps 20 -o", path)
     assert there.tolist() == np.load(path)[-1].tolist()
+
+
+def test_a_file_is_not_written_over_by_the_orbits_of_its_starts(kahanmaps, tmp_path):
+    path = tmp_path / "x.npy"
+    np.save(path, np.ones((2, 3)))
+    outcome = kahanmaps(f"{TOP} --steps 10 --starts", path, "-o", path)
+    assert (outcome.status, np.load(path).tolist()) == (2, np.ones((2, 3)).tolist())
+    assert "it would be written over" in outcome.err
 
 
 def test_a_file_of_residues_is_valid_after_every_row(tmp_path):

@@ -152,7 +152,7 @@ def test_each_way_to_end_has_its_status_and_step(kernel):
     orbits.advance(2)
     assert orbits.status.tolist() == ["completed", "singular", "singular", "completed", "completed"]
     assert orbits.failed_at.tolist() == [-1, 2, 1, -1, -1]
-    assert orbits.near_singular.tolist() == [0, 0, 0, 0, 0]  # in one dimension the pivot is the largest entry
+    assert orbits.near_singular.tolist() == [0, 0, 0, 1, 0]
     assert np.isnan(orbits.x[1:3]).all()
 
 
@@ -165,6 +165,15 @@ def test_a_small_pivot_is_counted(kernel):
     assert orbits.near_singular.tolist() == [1, 0]
     assert orbits.near_singular_at.tolist() == [0, -1]
     assert orbits.x[0] == pytest.approx([2.0**45, 1.0], rel=1e-12)
+
+
+@over_kernels
+def test_a_pivot_is_small_beside_its_own_row_only(kernel):
+    # I - eps f' = diag(1 - x, 1 - y/2) for eps = 1/2: large numbers in one row take no bits from another
+    system = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2/2"])
+    orbits = FloatEnsemble(system, "1/2", np.array([[2.0**60, 1.0], [2.0**60, 2 - 2.0**-45]]), kernel=kernel)
+    orbits.advance(1)
+    assert orbits.near_singular.tolist() == [0, 1]
 
 
 @over_kernels

@@ -8,6 +8,7 @@ reached directly are points of the orbit.
 
 from __future__ import annotations
 
+import signal
 from itertools import islice, product
 
 import pytest
@@ -591,3 +592,23 @@ def test_iterates_modulo_a_prime_without_planes_are_refused():
     structure, system = structure_and_system("m = 3")
     with pytest.raises(BadPrime):
         Iterates(KahanMap(system, 3, GF(2)), [1] * 6, [5], structure=structure)
+
+
+def test_an_iterate_in_flight_is_given_up_when_a_signal_asks_for_it():
+    structure, system = structure_and_system("m = 2")
+    orbit = Iterates(KahanMap(system, "1/10"), random_point(4, 3), [5, 3000], structure=structure, max_digits=10**9)
+    seen = []
+
+    def handler(signum, frame):
+        orbit.interrupt()
+
+    previous = signal.signal(signal.SIGALRM, handler)
+    try:
+        for point in orbit:
+            seen.append(point.step)
+            signal.setitimer(signal.ITIMER_REAL, 0.2)  # the iterate 3000 takes seconds
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+    assert seen == [5]
+    assert (orbit.end.status, orbit.end.steps) == ("interrupted", 5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -121,6 +122,9 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         )
     if (options["starts"] is None) == (options["count"] is None):
         raise click.UsageError("give --starts FILE or --random N, one of the two")
+    files = [options["starts"], options["output"]]
+    if not {None, "-"} & set(files) and Path(files[0]).resolve() == Path(files[1]).resolve():
+        raise click.UsageError(f"found {files[1]} both as --starts and as -o: it would be written over")
     if options["starts"] is not None and (options["box"] is not None or options["seed"] is not None):
         raise click.UsageError("--box and --seed are for --random N")
     if options["starts"] == "-" and system == "-":

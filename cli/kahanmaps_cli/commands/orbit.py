@@ -55,7 +55,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
     multiple=True,
     metavar="[NAME=]EXPR",
     help="A column beside the point: an expression in the variables and eps, the name of an integral of the file, or "
-    "the word known for all that theorems give.",
+    "the word known for all that theorems give (not in floats).",
 )
 @click.option("--max-digits", type=int, help="Digit budget (exact arithmetic; default 200000).")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="Default text, or what the name of FILE says.")
@@ -170,7 +170,7 @@ def _end_record(end: OrbitEnd, run: OrbitRun) -> dict[str, Any]:
         if drift:
             record["drift"] = drift
             largest = max(float(drift.largest) for drift in run.orbit.drift)
-            record["message"] += f"; block integrals moved by at most {short_float(largest)}"
+            record["message"] += f"; block integrals moved by at most {short_float(largest)} where looked at"
         if near:
             record["message"] += f"; near-singular steps: {near}, the first from step {run.orbit.near_singular_at}"
     return record
