@@ -19,6 +19,9 @@ Point = tuple[int, "list[str] | None", "list[str | None]"]
 
 _TOO_FAR = 10**13  # years
 _FEW_STEPS = 3  # for which looking for a structure does not pay
+_LONG_INPUT = 4000  # bits of start and eps, from which on setting up a normal form pays later
+_LARGE_DIMENSION = 16
+_BITS_AT_LEAST = 4096  # where no precision is enough
 
 
 class OrbitRun:
@@ -39,6 +42,7 @@ class OrbitRun:
         self.backward = options["backward"]
         self.kind, self.number = options["arithmetic"]
         self.columns: list[Column] = []
+        self._not_accurate = ""
         structure = self._structure(options["method"])
         self.method = choose_method(options["method"], self.kind, structure, self.at)
         if self.method.name != "jump" and self.steps > _TOO_FAR:
@@ -73,8 +77,10 @@ class OrbitRun:
     @property
     def end(self) -> OrbitEnd:
         """How it ended."""
+        from kahanmaps.maps.orbits import OrbitEnd
+
         end: OrbitEnd = self.orbit.end
-        return end
+        return OrbitEnd("precision", end.steps, self._not_accurate) if self._not_accurate and end.is_whole else end
 
     def header(self) -> dict[str, Any]:
         """What a result can be redone from."""
@@ -126,8 +132,8 @@ class OrbitRun:
 
         if wish == "generic":
             return NoStructure("not looked for")
-        if wish is None and self.steps <= _FEW_STEPS:
-            return NoStructure("not looked for, for so few steps")
+        if wish is None and (reason := self._why_not_to_look()):
+            return NoStructure(reason)
         structure = structure_of(self.file.system, self.file.hamiltonian, self.file.member)
         if isinstance(structure, NoStructure):
             return structure
@@ -147,6 +153,22 @@ class OrbitRun:
             if reason:
                 return NoStructure(reason)
         return structure
+
+    def _why_not_to_look(self) -> str:
+        """Empty, or why looking for a structure would cost more than it can save."""
+        from kahanmaps.maps.methods import JUMP_FROM
+
+        few = JUMP_FROM["mod"] - 1 if self.kind == "mod" else _FEW_STEPS
+        bits = max(max(abs(number.p).bit_length(), number.q.bit_length()) for number in (self.eps, *self.start))
+        if bits > _LONG_INPUT:
+            few = max(few, 24)
+        if self.steps <= few:
+            return "not looked for, for so few steps"
+        if self.eps == 0:
+            return "eps = 0"
+        if self.file.member is None and self.file.system.dim > _LARGE_DIMENSION:
+            return f"not looked for in dimension {self.file.system.dim}"
+        return ""
 
     def _float_orbit(self, options: dict[str, Any]) -> Any:
         from kahanmaps.maps.fast import FloatOrbit
@@ -174,13 +196,17 @@ class OrbitRun:
         if self.number != 0:
             self.field = RR(self.number)
             return self._orbit()
-        from kahanmaps.maps.accuracy import bits_for
+        from kahanmaps.maps.accuracy import NotAccurate, bits_for
 
         def orbit_with(bits: int) -> Any:
             self.number, self.field = bits, RR(bits)
             return self._orbit()
 
-        bits = bits_for(orbit_with, options["accuracy"], options["progress"])
+        try:
+            bits = bits_for(orbit_with, options["accuracy"], options["progress"])
+        except NotAccurate as error:
+            self._not_accurate = str(error)
+            return orbit_with(_BITS_AT_LEAST)
         return orbit_with(bits)
 
     def _orbit(self) -> Any:

@@ -12,13 +12,17 @@ from kahanmaps.maps.orbits import Iterates, Orbit
 _BITS_PER_DIGIT = 3.3219281
 
 
+class NotAccurate(Exception):
+    """No precision was enough."""
+
+
 def bits_for(
     orbit_with: Callable[[int], Orbit | Iterates], digits: int, told: Callable[[str], None] | None = None
 ) -> int:
     """The bits with which every point has `digits` correct digits of its largest coordinate; doubled in every trial.
 
     `orbit_with` makes the orbit over RR(bits). An orbit that ends for another reason than precision is taken as it
-    is, and so is one that not even the largest precision can follow. `told` hears of every trial.
+    is. `told` hears of every trial. Raises NotAccurate where not even the largest precision will do.
 
     >>> from kahanmaps.algebra.fields import RR
     >>> from kahanmaps.maps.kahan import KahanMap
@@ -38,7 +42,7 @@ def bits_for(
         if enough and orbit.end is not None and orbit.end.status != "precision":
             return bits
         bits *= 2
-    return MAX_BALL_BITS
+    raise NotAccurate(f"not even balls of {bits // 2} bits give {digits} digits at every point")
 
 
 def _accurate(x: Sequence[arb], digits: int) -> bool:

@@ -100,9 +100,14 @@ class Jump:
         if not splits(self.splitting):
             return self._over_algebras(start, n, max_bits)
         blocks, assembly = self._steps.blocks(start)
+        periods = [_small_period(block) if n > _SHORT else None for block in blocks]
+        steps = [n if period is None else n % period for period in periods]
         if n > _SHORT:
-            self._require_budget(PlanesPoint(assembly, [_stepped(block, _SHORT) for block in blocks]).bits, n, max_bits)
-        return PlanesPoint(assembly, [_rational_iterate(block, n) for block in blocks])
+            self._require_budget(sum(map(_expected_bits, blocks, steps)), max(steps), max_bits)
+        point = PlanesPoint(assembly, [_rational_iterate(*pair) for pair in zip(blocks, steps, strict=True)])
+        if max_bits is not None and point.bits > max_bits:
+            raise OverBudget(point.bits)
+        return point
 
     def _over_algebras(self, start: Sequence[Any], n: int, max_bits: int | None) -> tuple[Any, ...]:
         x = [QQ.convert(entry) for entry in start]
@@ -120,8 +125,12 @@ class Jump:
             return self.splitting.point(found)
 
         if n > _SHORT:
-            bits = max(max(abs(entry.p).bit_length(), entry.q.bit_length()) for entry in point(_SHORT))
-            self._require_budget(bits, n, max_bits)
+            half, whole = (
+                max(max(abs(entry.p).bit_length(), entry.q.bit_length()) for entry in point(k))
+                for k in (_SHORT // 2, _SHORT)
+            )
+            # Heights grow like n^2, unless the orbit is at rest or moves on lines.
+            self._require_budget(whole * n * n // _SHORT**2 if whole > 3 * half else whole * n // _SHORT, n, max_bits)
         try:
             found = point(n)
         except SingularStep:
@@ -164,10 +173,25 @@ class Jump:
         raise ArithmeticError("the orbit modulo many primes met a pole that it has not: please report this")
 
     def _require_budget(self, bits: int, n: int, max_bits: int | None) -> None:
-        """Heights grow like n^2 (or less), so those of an early iterate tell that of the n-th."""
-        expected = bits * n * n // (_SHORT * _SHORT)
-        if (max_bits is not None and expected > max_bits) or n > _GUARDED:
-            raise OverBudget(expected)
+        if (max_bits is not None and bits > max_bits) or n > _GUARDED:
+            raise OverBudget(bits)
+
+
+def _small_period(block: IntegerBlock) -> int | None:
+    """The period, if the orbit comes back in the first few steps (over Q it does then or never); 1 at rest."""
+    if block.is_constant:
+        return 1
+    start, *points = islice(tau_table.triples(block), _SHORT + 1)
+    return next((k for k, point in enumerate(points, start=1) if same_point(point, start)), None)
+
+
+def _expected_bits(block: IntegerBlock, n: int) -> int:
+    """About the length of P_n: heights grow like n^2, or like n where the level cubic is singular."""
+    *_, last = islice(tau_table.triples(block), min(n, _SHORT) + 1)
+    bits = max(abs(entry).bit_length() for entry in last)
+    if n <= _SHORT or block.is_constant or block.level is None:
+        return int(bits)
+    return int(bits * n // _SHORT if block.is_degenerate else bits * n * n // _SHORT**2)
 
 
 def _stepped(block: IntegerBlock, n: int) -> IntegerTriple:

@@ -18,7 +18,7 @@ from kahanmaps.maps.splitting import Splitting
 
 METHODS = ("generic", "normal-form", "jump")
 # From here on a jump is faster than steps: over Q, and modulo p, where steps do not pass poles silently.
-_JUMP_FROM = {"exact": 24, "mod": 10_000, "ball": 1}
+JUMP_FROM = {"exact": 24, "mod": 10_000, "ball": 1}
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,10 @@ def choose_method(
         return Method(wish, structure.text)
     if arithmetic == "float":
         return Method("normal-form", structure.text)
-    if at is not None and max(at, default=0) >= _JUMP_FROM[arithmetic]:
-        return Method("jump", f"{structure.text}; each iterate by doublings")
+    if at is not None and max(at, default=0) >= JUMP_FROM[arithmetic]:
+        dense = arithmetic == "exact" and len(at) * (2 if over_Q else 10) > max(at)
+        if not dense:
+            return Method("jump", f"{structure.text}; each iterate by doublings")
     if arithmetic == "mod":
         return Method("generic", "few steps modulo P")
     if over_Q:

@@ -160,8 +160,14 @@ class Orbit:
             yield from NormalSteps(self.structure, self.map.eps).points(self.start)
         elif self.structure is not None and isinstance(field, BallField):
             jump = Jump(self.structure, self.map.eps, field)
-            for step in count():
-                yield jump.value(self.start, step) if step else self.start
+            value: Any = self.start
+            yield value
+            for step in count(1):
+                try:
+                    value = jump.value(self.start, step)
+                except PrecisionLost:  # for tiny eps a step from the last point may need fewer bits
+                    value = self.map.step(value)
+                yield value
         elif field is QQ:
             point: IntegerPoint | None = IntegerPoint.from_rationals(self.start)
             while point is not None:
@@ -236,6 +242,15 @@ class Iterates:
             raise _GivenUp
 
     def __iter__(self) -> Iterator[OrbitPoint]:
+        self._done = 0
+        try:
+            yield from self._points()
+        except _GivenUp:
+            self.end = OrbitEnd("interrupted", self._done, f"interrupted after step {self._done}")
+        finally:
+            self._busy_in = None
+
+    def _points(self) -> Iterator[OrbitPoint]:
         done = 0
         max_bits = None if self.max_digits is None else int(self.max_digits / _DIGITS_PER_BIT)
         for step in self.at:
@@ -245,9 +260,6 @@ class Iterates:
             try:
                 self._busy_in = get_ident()
                 value = self._jump.value(self.start, step, max_bits)
-            except _GivenUp:
-                self.end = OrbitEnd("interrupted", done, f"interrupted after step {done}")
-                return
             except SingularStep as error:
                 self.end = OrbitEnd("singular", done, f"step {step} cannot be reached: {error}")
                 return
@@ -263,7 +275,7 @@ class Iterates:
                 return
             finally:
                 self._busy_in = None
-            done = step
+            self._done = done = step
             yield OrbitPoint(step, self.map.field, value)
         self.end = OrbitEnd("completed", done, f"{counted(len(self.at), 'iterate')} reached directly")
 

@@ -7,7 +7,7 @@ Psi(P_k) is W_{k-1}, the last coordinate of the point before P_k (docs/mathemati
 W_{k-1}, which is exact, and then strips the few bad primes, by residues: no gcd of large numbers. A division that
 leaves a remainder would be a mistake of ours; the lowest 64 bits are multiplied back each time.
 
-For disc(h) = 0 or level 0 the rule says nothing, but there numbers hardly grow, and gcds are cheap.
+For disc(h) = 0 the rule says nothing, but there numbers hardly grow, and gcds are cheap.
 """
 
 from __future__ import annotations
@@ -123,9 +123,7 @@ def primitive(triple: Sequence[fmpz]) -> IntegerTriple:
 
 def without(number: fmpz, bad: fmpz) -> fmpz:
     """The largest divisor of a number, not zero, that is coprime to `bad`."""
-    while (common := (number % bad).gcd(bad)) != 1:
-        number = number // common
-    return number
+    return bad_part(number, bad)[0]
 
 
 def bad_part(number: fmpz, bad: fmpz) -> tuple[fmpz, fmpz]:
@@ -136,18 +134,19 @@ def bad_part(number: fmpz, bad: fmpz) -> tuple[fmpz, fmpz]:
     while (common := power.gcd(number % power)) != 1:
         number = number // common
         part = part * common
-        if _is_all(common, power):
+        if is_all(common, power):
             break
+        power = power * power  # a prime may be there to a high power
     return number, part
 
 
-def strip(triple: Sequence[fmpz], bad: fmpz, divisor: fmpz | None = None) -> IntegerTriple:
+def strip(triple: Sequence[fmpz], bad: fmpz, divisor: fmpz | None = None, power: fmpz | None = None) -> IntegerTriple:
     """The triple without the common factors that its entries have in the primes of `bad`; and divided by `divisor`.
 
-    The divisor has to divide all entries and to be coprime to `bad`.
+    The divisor has to divide all entries and to be coprime to `bad`. `power` is a power of `bad` to begin with.
     """
     U, V, W = triple
-    power = bad * bad * bad
+    power = bad * bad * bad if power is None else power
     common = power.gcd(W % power)
     if common != 1:
         common = common.gcd(U % power)
@@ -155,12 +154,18 @@ def strip(triple: Sequence[fmpz], bad: fmpz, divisor: fmpz | None = None) -> Int
         common = common.gcd(V % power)
     if common != 1 or divisor is not None:
         U, V, W = divide_exactly((U, V, W), common if divisor is None else common * divisor)
-    return (U, V, W) if common == 1 or _is_all(common, power) else strip((U, V, W), bad)
+    return (U, V, W) if common == 1 or is_all(common, power) else strip((U, V, W), bad, None, power * power)
 
 
-def _is_all(common: fmpz, power: fmpz) -> bool:
+def is_all(common: fmpz, power: fmpz) -> bool:
     """Whether a common divisor with `power` is all there is: no prime is in it as often as in `power`."""
-    return bool(without(common, power // common) == 1)
+    rest = power // common
+    while common != 1:
+        shared = common.gcd(rest)
+        if shared == 1:
+            return False
+        common = common // shared
+    return True
 
 
 def divide_exactly(values: Sequence[fmpz], divisor: fmpz) -> list[fmpz]:
@@ -179,6 +184,8 @@ def radical(*numbers: fmpz) -> fmpz:
     """An integer with the primes of these numbers (not zero), small ones once, others to low powers."""
     product = fmpz(1)
     for number in numbers:
+        if number == 0:
+            raise ArithmeticError("zero has no radical: please report this")
         rest = abs(number)
         for prime in _SMALL_PRIMES:
             if rest % prime == 0:

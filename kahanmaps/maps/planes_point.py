@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from flint import fmpq, fmpz
 
 from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.planar_integers import IntegerBlock, IntegerTriple, content, divide_exactly, radical, without
+from kahanmaps.maps.planar_integers import IntegerBlock, IntegerTriple, content, divide_exactly, is_all, radical
 
 # Powers of the fixed primes up to this one are found in one residue.
 _POWER = 3
@@ -154,11 +154,13 @@ class PlanesPoint:
                 common = _common_part(above, below, modulus)
             else:
                 common = _common_part(*row.over(*small[row.support]), modulus)
+            power = modulus
             while common != 1:
                 above, below = above // common, below // common
-                if without(common, modulus // common) == 1:  # no prime of it is there to the highest power
+                if is_all(common, power):
                     break
-                common = _common_part(above, below, modulus)
+                power = power * power  # a prime may be there to a high power
+                common = _common_part(above, below, power)
             pairs.append((above, below) if below > 0 else (-above, -below))
         return pairs
 

@@ -755,3 +755,30 @@ def test_the_end_of_a_float_orbit_has_the_drift_of_its_integrals_and_near_singul
 def test_a_near_singular_step_is_told(kahanmaps):
     command = "orbit --vars x,y --rhs x^2 --rhs y --start 0.99999999999999,1 --eps 1/2 --steps 1 --arithmetic float"
     assert kahanmaps(command).out.endswith("# completed: 1 step; near-singular steps: 1, the first from step 0\n")
+
+
+def test_balls_that_no_precision_makes_accurate_end_with_that_status(kahanmaps):
+    # x~ = (1 - 1) x / (1 + 1): zero, but no ball around it is
+    run = kahanmaps("orbit --vars x --rhs=-3*x --start 1 --eps 1/3 --steps 3 --arithmetic ball:auto --format jsonl")
+    assert (run.status, run.records[-1]["status"]) == (3, "precision")
+    assert "give 15 digits at every point" in run.records[-1]["message"]
+
+
+@pytest.mark.parametrize("steps", [10**6, 10**30])
+def test_an_orbit_at_rest_is_at_rest_however_far(kahanmaps, steps):
+    run = kahanmaps(f"orbit paper_m3 --start 0,0,0,0,0,0 --eps 1/10 --at {steps} --format jsonl")
+    assert (run.status, points(run)[0]["x"]) == (0, ["0"] * 6)
+
+
+@pytest.mark.parametrize("method", ["generic", "normal-form", "jump"])
+def test_the_budget_is_kept_by_every_method(kahanmaps, method):
+    run = kahanmaps(f"{MEMBER} --at 0,5,30 --max-digits 10 --format jsonl --method {method}")
+    assert run.status == 3
+    assert ([point["step"] for point in points(run)], run.records[-1]["status"]) == ([0], "budget")
+
+
+def test_tiny_eps_in_balls_falls_back_to_steps(kahanmaps):
+    run = kahanmaps(
+        "orbit paper_m3 --start 1,2,3,4,5,6 --eps 1/10000000000 --steps 40 --arithmetic ball:128 --every 40"
+    )
+    assert run.status == 0

@@ -12,7 +12,7 @@ from flint import arb, fmpq
 from kahanmaps.algebra.fields import QQ, RR
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.structure import structure_of
-from kahanmaps.maps.accuracy import bits_for
+from kahanmaps.maps.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.jump import Jump
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Iterates, Orbit
@@ -62,13 +62,15 @@ def test_the_balls_contain_the_exact_point():
         assert all(ball.contains(arb(number)) for ball, number in zip(found, exact, strict=True))
 
 
-def test_an_orbit_that_ends_for_another_reason_is_taken_as_it_is():
+def test_where_no_precision_is_enough_that_is_said():
+    # 1/4, 1/3, 1/2, 1, and then a pole, which no ball can tell from a point near it
     riccati = QuadraticSystem.from_text(["x"], ["x^2"])
 
     def orbit_with(bits):
         return Orbit(KahanMap(riccati, "1/2", RR(bits)), ["1/4"], 9)
 
-    assert isinstance(bits_for(orbit_with, 15), int)
+    with pytest.raises(NotAccurate, match="give 15 digits"):
+        bits_for(orbit_with, 15)
 
 
 def test_every_trial_is_told():

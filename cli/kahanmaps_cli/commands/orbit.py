@@ -109,7 +109,7 @@ def command(
     if form == "npy":
         _require_npy(options, output)
     hidden = quiet or (output is None and sys.stdout.isatty())  # the points themselves show the progress
-    with Progress(quiet) as progress:
+    with interruptible(_stop), Progress(quiet) as progress:
         run = OrbitRun(file, eps, {**options, "progress": progress})
     if verbose and not quiet:
         say(run.method.text)
@@ -158,6 +158,11 @@ def _stream(run: OrbitRun, output: str, quiet: bool) -> int:
     if not quiet:
         say(f"{output}: {end.status}: {_end_record(end, run)['message']}")
     return _STATUS.get(end.status, 3)
+
+
+def _stop() -> None:
+    """While the way to compute is being chosen there is nothing yet to keep."""
+    raise KeyboardInterrupt
 
 
 def _end_record(end: OrbitEnd, run: OrbitRun) -> dict[str, Any]:
