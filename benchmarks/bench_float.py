@@ -170,7 +170,7 @@ def _every_point(table: Table, system: Any, form: Any) -> None:
 
 
 def _ensembles(table: Table, library: Any, system: Any, form: Any, blocks: Any, starts: Any) -> None:
-    steps = 1000
+    steps = 4000
     k = _planar_coefficients(blocks)
     z0 = np.ascontiguousarray(blocks.into @ starts.T)
     size = ctypes.c_size_t
