@@ -203,13 +203,13 @@ def _common_part(above: fmpz, below: fmpz, modulus: fmpz) -> fmpz:
 
 def _shared(numbers: Sequence[fmpz]) -> fmpz:
     """A number with all primes that divide two of these."""
-    numbers = sorted(numbers, key=fmpz.bit_length)  # the longest one is only reduced modulo others
-    shared, product = fmpz(1), numbers[-1]
-    for number in reversed(numbers[:-1]):
-        if number == 0:
-            continue
+    *others, product = sorted(numbers, key=fmpz.bit_length)  # the longest one is only reduced modulo others
+    shared = fmpz(1)
+    while others:
+        number = others.pop()
         common = number.gcd(product % number)
         if common != 1:
             shared = shared * common
-        product = product * number
+        if others:
+            product = product * number
     return shared
