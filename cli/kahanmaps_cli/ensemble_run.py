@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +41,7 @@ def structure_for(file: SystemFile, wish: str | None) -> Structure | NoStructure
     return structure
 
 
-class Run:
+class Run(ABC):
     """What both kinds of ensembles have in common: `counts`, `failures`, `moved` and `near` are for people and JSON."""
 
     kernel: str
@@ -53,31 +54,31 @@ class Run:
         """Ask to end after the portion in hand."""
         self.interrupted = True
 
+    @abstractmethod
     def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
         """Take the steps; with `output` the starts and multiples of `every` go to that .npy file."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def shape(self) -> tuple[int, int]:
         """Orbits and dimension."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def counts(self) -> dict[str, int]:
         """How many orbits are how."""
-        raise NotImplementedError
 
+    @abstractmethod
     def failures(self) -> Iterator[dict[str, Any]]:
         """Orbits that ended early, in order."""
-        raise NotImplementedError
 
+    @abstractmethod
     def moved(self) -> list[dict[str, Any]]:
         """What became of the integrals."""
-        raise NotImplementedError
 
+    @abstractmethod
     def moved_lines(self) -> list[str]:
         """The same for people."""
-        raise NotImplementedError
 
     def near(self) -> dict[str, Any] | None:
         """Near-singular steps, None in exact arithmetic."""

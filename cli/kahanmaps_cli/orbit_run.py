@@ -31,6 +31,7 @@ class OrbitRun:
     """
 
     def __init__(self, file: SystemFile, eps: Any, options: dict[str, Any]) -> None:
+        from kahanmaps.family.structure import NoStructure
         from kahanmaps.maps.methods import choose_method
 
         self.file = file
@@ -50,7 +51,9 @@ class OrbitRun:
                 f"step {self.steps} is too far to be reached one step after the other (more than {_TOO_FAR:.0e}), "
                 f"and there is no other way here: {self.method.reason}"
             )
-        self.structure: Structure | None = None if self.method.name == "generic" else structure  # type: ignore[assignment]
+        self.structure: Structure | None = None
+        if self.method.name != "generic" and not isinstance(structure, NoStructure):
+            self.structure = structure
         self.orbit: Any = self._float_orbit(options) if self.kind == "float" else self._exact_orbit(options)
         self._add_integrals(options["integrals"])
         names = ["step", *file.variables, *(name for name, _ in self.columns)]

@@ -61,6 +61,18 @@ class PlanarPart:
         """h as text."""
         return format_polynomial(self.h)
 
+    @property
+    def D(self) -> fmpq_mpoly:
+        """h_uu h_vv - h_uv^2; the Kahan map of this system conserves h/(1 + eps^2 D)."""
+        slope = self.h.derivative
+        mixed = slope(0).derivative(1)
+        return slope(0).derivative(0) * slope(1).derivative(1) - mixed * mixed
+
+    @property
+    def D_text(self) -> str:
+        """D as text."""
+        return format_polynomial(self.D)
+
 
 @dataclass(frozen=True, eq=False)
 class NormalForm:

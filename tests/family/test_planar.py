@@ -393,3 +393,13 @@ def times(element: fmpq_poly, *factors):
 
 def functional_of(*elements):
     return sum((high for _, high in elements), 0 * x1)
+
+
+def test_every_part_conserves_h_over_one_plus_eps_squared_D():
+    eps = fmpq(1, 7)
+    for part in normal_form(draw_with_eigenvalues([1, -2, 3], seed=5)).parts:
+        phi, point = KahanMap(part.hamiltonian.system, eps), (fmpq(1, 3), fmpq(-2, 5))
+        image = phi.step(point)
+        before, after = (part.h(*x) / (1 + eps * eps * part.D(*x)) for x in (point, image))
+        assert before == after
+        assert part.h(*point) / (1 + part.D(*point)) != part.h(*image) / (1 + part.D(*image))  # a wrong eps

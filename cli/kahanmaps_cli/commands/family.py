@@ -240,7 +240,7 @@ def _normal_form_data(form: NormalForm) -> dict[str, Any]:
         "S": _rows(form.S),
         "h_in_powers_of_t": [[format_number(c[k]) for k in range(form.m)] for c in form.coefficients],
         "parts": [
-            {"root": format_number(part.root), "weight": format_number(part.weight), "h": part.text}
+            {"root": format_number(part.root), "weight": format_number(part.weight), "h": part.text, "D": part.D_text}
             for part in form.parts
         ],
     }
@@ -257,9 +257,10 @@ def _print_normal_form(form: NormalForm, point: str) -> None:
     if form.parts:
         total = ", the Hamiltonian is the sum of weight * h" if len(form.parts) == form.m else ""
         click.echo(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
+        click.echo("the Kahan map conserves h/(1 + eps^2 D) at each of them")
     for part in form.parts:
         root, weight = _formula(format_number(part.root)), _formula(format_number(part.weight))
-        click.echo(f"t = {root}: h = {_formula(part.text)}, weight {weight}")
+        click.echo(f"t = {root}: h = {_formula(part.text)}, D = {_formula(part.D_text)}, weight {weight}")
     click.echo(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
     _print_matrix(form.S)
 
