@@ -33,7 +33,13 @@ def draw_member(
 ) -> FamilyMember:
     """The member that the options ask for."""
     from kahanmaps.algebra.text import parse_point
-    from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues, random_eigenvalues
+    from kahanmaps.family.draw import (
+        draw_generic,
+        draw_with_chi,
+        draw_with_eigenvalues,
+        parse_chi,
+        random_eigenvalues,
+    )
 
     if sum((eigenvalues is not None, generic, chi is not None)) > 1:
         raise click.UsageError("give one of --eigenvalues, --generic and --chi")
@@ -45,7 +51,7 @@ def draw_member(
             raise click.UsageError(f"found {len(values)} eigenvalues, expected m = {m}")
         return draw_with_eigenvalues(values, seed, size or 2)
     if chi is not None:
-        polynomial = _univariate(chi)
+        polynomial = parse_chi(chi)
         if m is not None and m != polynomial.degree():
             raise click.UsageError(f"chi has degree {polynomial.degree()}, expected m = {m}")
         return draw_with_chi(polynomial, seed, size or 1)
@@ -54,17 +60,3 @@ def draw_member(
     if generic:
         return draw_generic(m, seed, size or 1)
     return draw_with_eigenvalues(random_eigenvalues(m, seed), seed, size or 2)
-
-
-def _univariate(text: str) -> Any:
-    from flint import fmpq_poly
-
-    from kahanmaps.algebra.text import parse_polynomial
-    from kahanmaps.errors import InputError
-
-    polynomial = parse_polynomial(text, ["t"])
-    coefficients = {monomial[0]: coefficient for monomial, coefficient in polynomial.terms()}
-    top = max(coefficients, default=0)
-    if top < 1:
-        raise InputError(f"found chi = {text}, expected a polynomial in t of degree m >= 1")
-    return fmpq_poly([coefficients.get(k, 0) for k in range(top + 1)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -103,20 +103,29 @@ class OrbitRun:
         }
 
 
+def random_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
+    """Small rational points, one after the other, the same ones for the same seed.
+
+    No coordinate is 0: many systems leave x_i = 0 invariant, where a claim may hold for no good reason.
+
+    >>> next(random_starts(2, seed=0))
+    (1, -2/3)
+    """
+    rng = random.Random(f"start {seed}")
+    while True:
+        yield tuple(fmpq(rng.choice((-1, 1)) * rng.randint(1, 5), rng.randint(1, 5)) for _ in range(dim))
+
+
 def run_orbit(kahan: KahanMap, settings: Settings, is_integrable: bool = False) -> OrbitRun:
     """The exact orbit of the given start, or of random small rational starts until one has no singular point."""
     # A claim that takes two more steps of a map without structure multiplies the digits by dim^2, and elimination
     # by dim once more; for the family numbers hardly grow from one step to the next.
     by_dimension = 5_000 if is_integrable else max(100, 60_000 // kahan.dim**2)
     max_digits = by_dimension if settings.max_digits is None else settings.max_digits
-    rng = random.Random(f"start {settings.seed}")
+    draws = random_starts(kahan.dim, settings.seed)
     attempt = 0
     while True:
-        if settings.start is not None:
-            start = settings.start
-        else:
-            # No coordinate is 0: many systems leave x_i = 0 invariant, where a claim may hold for no good reason.
-            start = tuple(fmpq(rng.choice((-1, 1)) * rng.randint(1, 5), rng.randint(1, 5)) for _ in range(kahan.dim))
+        start = settings.start if settings.start is not None else next(draws)
         orbit = Orbit(kahan, start, settings.steps, max_digits=max_digits)
         points = []
         for point in orbit:

@@ -16,6 +16,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
@@ -103,6 +104,20 @@ def draw_generic(m: int, seed: int, size: int = 1) -> FamilyMember:
         chi = fmpq_poly([rng.choice((-3, -2, -1, 1, 2, 3)), *(rng.randint(-2, 2) for _ in range(m - 1)), 1])
         if all(multiplicity == 1 for _, multiplicity in chi.factor()[1]):
             return draw_with_chi(chi, seed, size)
+
+
+def parse_chi(text: str) -> fmpq_poly:
+    """A polynomial in t of degree at least 1, for `draw_with_chi`.
+
+    >>> parse_chi("(t - 1)*(t^2 - 2)")
+    x^3 + (-1)*x^2 + (-2)*x + 2
+    """
+    polynomial = parse_polynomial(text, ["t"])
+    coefficients = {monomial[0]: coefficient for monomial, coefficient in polynomial.terms()}
+    top = max(coefficients, default=0)
+    if top < 1:
+        raise InputError(f"found chi = {text}, expected a polynomial in t of degree m >= 1")
+    return fmpq_poly([coefficients.get(k, 0) for k in range(top + 1)])
 
 
 def random_eigenvalues(m: int, seed: int) -> list[int]:

@@ -32,6 +32,7 @@ from flint import (
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.family.planar import NormalForm
+from kahanmaps.family.structure import Structure
 from kahanmaps.maps.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.planar_block import PlanarBlock, Triple, same_point
 from kahanmaps.maps.splitting import Plane, Splitting
@@ -310,6 +311,28 @@ def _by_walking(block: PlanarBlock, point: Triple, q: int, name: str) -> PlanePe
 
 
 # Over the rationals.
+
+
+def period_of(structure: Structure, eps: Any, start: Sequence[Any], prime: int | None = None) -> OrbitPeriod:
+    """The period of the orbit of `start`, in the system's own coordinates, modulo a prime or (None) over Q.
+
+    `structure` is that of the system (family.structure.structure_of); otherwise like `orbit_period` and
+    `period_over_rationals`.
+
+    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.structure import structure_of
+    >>> structure = structure_of(draw_with_eigenvalues([1, -2], seed=7).chosen.system)
+    >>> period_of(structure, "1/10", ["1/2", "-1/3", 0, 1]).status
+    'aperiodic'
+    """
+    field = QQ if prime is None else GF(prime)
+    point = [field.convert(entry) for entry in start]
+    if structure.T is not None:  # x = T y with y the coordinates of the normal form
+        field.convert_matrix(structure.T)  # the prime may divide neither denominator
+        point = (field.convert_matrix(structure.T.inv()) * field.column(point)).entries()
+    if prime is None:
+        return period_over_rationals(structure.form, eps, point)
+    return orbit_period(structure.form, eps, point, prime)
 
 
 def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> OrbitPeriod:

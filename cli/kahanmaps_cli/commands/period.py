@@ -45,6 +45,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     or the orbit comes to a point where it cannot be continued.
     """
     from kahanmaps.errors import InputError
+    from kahanmaps.maps.periods import period_of
 
     eps = the_eps(options["eps"], options["time_step"])
     kind, prime = options["arithmetic"]
@@ -64,7 +65,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
             say(structure.text)
         if kind == "mod" and _LONG_PRIME < prime.bit_length() <= _LONGEST_PRIME:
             say(f"a prime of {prime.bit_length()} bits: this may take a while (Ctrl-C gives up)")
-    found = _period(structure, eps, options["start"], prime if kind == "mod" else None)
+    found = period_of(structure, eps, options["start"], prime if kind == "mod" else None)
     if as_json:
         print_json(_record(file, structure, eps, options, found))
     else:
@@ -94,21 +95,6 @@ def _structure(file: SystemFile) -> Structure | str:
 
     structure = structure_of(file.system, file.hamiltonian, file.member)
     return structure.reason if isinstance(structure, NoStructure) else structure
-
-
-def _period(structure: Structure, eps: Any, start: Any, prime: int | None) -> OrbitPeriod:
-    """The period, in the coordinates y of the normal form, x = T y."""
-    from kahanmaps.algebra.fields import GF, QQ
-    from kahanmaps.maps.periods import orbit_period, period_over_rationals
-
-    field = QQ if prime is None else GF(prime)
-    point = [field.convert(entry) for entry in start]
-    if structure.T is not None:
-        field.convert_matrix(structure.T)  # the prime may divide neither denominator
-        point = (field.convert_matrix(structure.T.inv()) * field.column(point)).entries()
-    if prime is None:
-        return period_over_rationals(structure.form, eps, point)
-    return orbit_period(structure.form, eps, point, prime)
 
 
 def _message(found: OrbitPeriod) -> str:
