@@ -29,12 +29,17 @@ if TYPE_CHECKING:
     from kahanmaps.checks.preserve import check_measure, check_poisson
     from kahanmaps.checks.settings import Settings
     from kahanmaps.errors import InputError, KahanmapsError, SingularStep, SystemFileError
+    from kahanmaps.experiments.records import Record, Task
+    from kahanmaps.experiments.run import run
+    from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
+    from kahanmaps.experiments.store import Store
     from kahanmaps.family.associated import AssociatedSystem, FamilyMember
     from kahanmaps.family.cubics import cubic_space
     from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
     from kahanmaps.family.hidden import HiddenMember, hidden_member, hidden_member_of
     from kahanmaps.family.planar import NormalForm, normal_form
     from kahanmaps.family.structure import Structure, structure_of
+    from kahanmaps.invariants.heights import HeightGrowth, height, height_growth
     from kahanmaps.maps.fast import FloatOrbit, to_floats
     from kahanmaps.maps.float_ensemble import FloatEnsemble
     from kahanmaps.maps.jump import Jump
@@ -71,6 +76,7 @@ _HOME = {
     "maps.fast": ("FloatOrbit", "to_floats"),
     "maps.float_ensemble": ("FloatEnsemble",),
     "maps.modular": ("ModularEnsemble",),
+    "invariants.heights": ("HeightGrowth", "height", "height_growth"),
     "checks.claims": ("Finding", "Report", "Verdict"),
     "checks.settings": ("Settings",),
     "checks.commute": ("check_commute",),
@@ -78,6 +84,10 @@ _HOME = {
     "checks.preserve": ("check_measure", "check_poisson"),
     "paper.examiner": ("VerifyOptions",),
     "paper.verify": ("verify", "verify_universal"),
+    "experiments.records": ("Record", "Task"),
+    "experiments.spec": ("Spec", "parse_spec", "read_spec"),
+    "experiments.store": ("Store",),
+    "experiments.run": ("run",),
     "errors": ("InputError", "KahanmapsError", "SingularStep", "SystemFileError"),
 }
 _MODULE_OF = {name: module for module, exported in _HOME.items() for name in exported}
@@ -122,6 +132,9 @@ __all__ = [
     "FloatEnsemble",
     "ModularEnsemble",
     "to_floats",
+    "HeightGrowth",
+    "height",
+    "height_growth",
     "Finding",
     "Report",
     "Verdict",
@@ -133,6 +146,13 @@ __all__ = [
     "verify",
     "verify_universal",
     "VerifyOptions",
+    "Record",
+    "Spec",
+    "Store",
+    "Task",
+    "parse_spec",
+    "read_spec",
+    "run",
     "InputError",
     "KahanmapsError",
     "SingularStep",

@@ -1,0 +1,1 @@
+"""Many experiments from one description: planned, run in child processes, stored, resumed."""

@@ -1,0 +1,347 @@
+"""Tasks in child processes on this machine: short ones in groups, each within its limits, and no child outlives us.
+
+A child is given one task after the other until it has worked for some seconds; then another one takes its place. What
+goes wrong in a child that has done other tasks before, or that somebody kills, is tried once more alone in a new
+child, and only that decides: so what is recorded does not depend on the order of tasks.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from signal import SIGKILL, Signals
+from typing import IO, Any
+
+from kahanmaps.errors import KahanmapsError
+from kahanmaps.experiments.executor import Documents
+from kahanmaps.experiments.options import OTHER
+from kahanmaps.experiments.records import Job, Outcome, Record, Task
+
+GROUP_SECONDS = 5.0  # of work for one child: starting it costs about a fifth of a second
+_STDERR_KEPT = 2000
+_READ = 1 << 16
+# Words with which Python, FLINT and GMP end where there is no memory.
+_NO_MEMORY = ("allocate memory", "out of memory", "memoryerror", "cannot reallocate", "bad_alloc")
+
+
+class ChildrenError(KahanmapsError):
+    """Child processes cannot be started here."""
+
+
+@dataclass
+class _Work:
+    """A job in flight; `alone` says that it is being tried once more, in a child of its own."""
+
+    job: Job
+    alone: bool = False
+    begun: float | None = None
+
+    def deadline(self) -> float | None:
+        limit = self.job.limits.time
+        return None if limit is None or self.begun is None else self.begun + limit
+
+
+class LocalChildren:
+    """An executor that runs at most `jobs` child processes on this machine.
+
+    `documents` gives the text of a system document by its digest. Raises ChildrenError where no child can be started.
+    """
+
+    def __init__(self, jobs: int, documents: Documents, *, group_seconds: float = GROUP_SECONDS) -> None:
+        self.jobs = jobs
+        self._documents = documents
+        self._group_seconds = group_seconds
+        self._selector = selectors.DefaultSelector()
+        self._children: list[_Child] = []
+        self._waiting: deque[_Work] = deque()
+        self._stillborn = 0
+
+    @property
+    def is_free(self) -> bool:
+        """Whether some child has nothing to do."""
+        return self.in_flight < self.jobs
+
+    @property
+    def in_flight(self) -> int:
+        """The number of jobs not yet handed back."""
+        return len(self._waiting) + sum(child.work is not None for child in self._children)
+
+    def submit(self, job: Job) -> None:
+        """Give a job to an idle child, or to a new one."""
+        self._give(_Work(job))
+
+    def wait(self, timeout: float) -> list[Record]:
+        """The records that came in, after at most `timeout` seconds."""
+        end = time.monotonic() + timeout
+        records: list[Record] = []
+        while self.in_flight and not records:
+            now = time.monotonic()
+            deadlines = [d for child in self._children if child.work and (d := child.work.deadline()) is not None]
+            pause = max(0.0, min([end, *deadlines]) - now)
+            for key, _ in self._selector.select(pause):
+                child, stream = key.data
+                if child in self._children:
+                    records += self._hear(child, stream)
+            records += self._late()
+            if time.monotonic() >= end:
+                break
+        return records
+
+    def close(self) -> None:
+        """Kill every child at once."""
+        for child in list(self._children):
+            self._bury(child)
+        self._waiting.clear()
+        self._selector.close()
+
+    def _give(self, work: _Work) -> None:
+        idle = [child for child in self._children if child.work is None]
+        fit = [child for child in idle if child.is_fresh] if work.alone else idle
+        if fit:
+            child = fit[0]
+        else:
+            if idle:  # only a new child will do, and there is no room for one more
+                self._bury(idle[0])
+            if len(self._children) >= self.jobs:
+                self._waiting.append(work)
+                return
+            child = self._new_child()
+        child.work = work
+        if child.is_ready:
+            self._send(child)
+
+    def _new_child(self) -> _Child:
+        child = _Child()
+        self._children.append(child)
+        for stream in (child.answers, child.talk):
+            self._selector.register(stream, selectors.EVENT_READ, (child, stream))
+        return child
+
+    def _send(self, child: _Child) -> None:
+        work = child.work
+        assert work is not None
+        child.read_the_rest()  # before the task is sent: what comes from now on is its own
+        child.stderr.clear()
+        try:
+            for key in _documents_of(work.job.task):
+                if key not in child.documents:
+                    child.write({"document": key, "text": self._documents(key)})
+                    child.documents.add(key)
+            child.write({"task": work.job.task.text, "memory": work.job.limits.memory})
+        except BrokenPipeError:
+            pass  # it has died; its end of file will tell
+        work.begun = time.monotonic()
+
+    def _hear(self, child: _Child, stream: Any) -> list[Record]:
+        """What a child has to say: answers, talk, or the end of file that means its death."""
+        try:
+            data = os.read(stream.fileno(), _READ)
+        except BlockingIOError:
+            return []
+        if stream is child.talk:
+            if data:
+                child.stderr.append(data)
+            else:
+                self._selector.unregister(stream)
+            return []
+        if not data:
+            return self._died(child)
+        records = []
+        for line in child.lines(data):
+            message = json.loads(line)
+            if "ready" in message:
+                child.ready = message["ready"]
+                self._stillborn = 0
+                if child.work is not None:
+                    self._send(child)
+            else:
+                records += self._finished(child, message)
+        return records
+
+    def _finished(self, child: _Child, message: dict[str, Any]) -> list[Record]:
+        work = child.work
+        assert work is not None
+        child.work = None
+        child.seconds += message.get("seconds", 0.0)
+        was_fresh, child.is_fresh = child.is_fresh, False
+        out_of_memory = message["outcome"] == Outcome.OUT_OF_MEMORY
+        if child.seconds >= self._group_seconds or out_of_memory or work.alone:
+            self._bury(child)
+        if out_of_memory and not was_fresh and not work.alone:
+            self._again(work)
+            return []
+        record = Record.from_json({**message, **child.circumstances()})
+        self._go_on()
+        return [record]
+
+    def _died(self, child: _Child) -> list[Record]:
+        status = child.process.wait()
+        child.read_the_rest()
+        work, told, was_fresh = child.work, child.told(), child.is_fresh
+        self._bury(child)
+        if not child.is_ready:
+            self._stillborn += 1
+            if self._stillborn >= 3:
+                raise ChildrenError(f"a child process cannot start ({_how(status)}): {told or 'it says nothing'}")
+            if work is not None:
+                work.begun = None
+                self._give(work)
+            return []
+        if work is None:
+            return []
+        no_memory = any(words in told.lower() for words in _NO_MEMORY)
+        if not work.alone and (not was_fresh or -status == SIGKILL or status == 0):
+            self._again(work)
+            return []
+        outcome = Outcome.OUT_OF_MEMORY if no_memory else Outcome.CRASHED
+        message = "out of memory" if no_memory else f"the child {_how(status)}"
+        if -status == SIGKILL:
+            message += ", twice: from outside, or by the system for want of memory"
+        record = self._record(child, work, outcome, message, told)
+        self._go_on()
+        return [record]
+
+    def _late(self) -> list[Record]:
+        """The children whose time is over."""
+        records = []
+        now = time.monotonic()
+        for child in list(self._children):
+            work = child.work
+            if work is not None and (deadline := work.deadline()) is not None and now >= deadline:
+                child.read_the_rest()
+                self._bury(child)
+                message = f"not done within {work.job.limits.time:g} seconds"
+                records.append(self._record(child, work, Outcome.TIMEOUT, message, child.told()))
+                self._go_on()
+        return records
+
+    def _record(self, child: _Child, work: _Work, outcome: Outcome, message: str, stderr: str) -> Record:
+        seconds = 0.0 if work.begun is None else time.monotonic() - work.begun
+        key = work.job.task.key
+        return Record(key, outcome, message=message, stderr=stderr, seconds=seconds, **child.circumstances())
+
+    def _again(self, work: _Work) -> None:
+        self._give(_Work(work.job, alone=True))
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Work that had to wait for a child of its own."""
+        if self._waiting and (len(self._children) < self.jobs or any(c.work is None for c in self._children)):
+            self._give(self._waiting.popleft())
+
+    def _bury(self, child: _Child) -> None:
+        if child in self._children:
+            self._children.remove(child)
+        registered = self._selector.get_map()
+        for stream in (child.answers, child.talk):
+            if stream in registered:
+                self._selector.unregister(stream)
+        child.end()
+
+
+class _Child:
+    """One process, and what it is doing."""
+
+    def __init__(self) -> None:
+        self.work: _Work | None = None
+        self.ready: dict[str, Any] | None = None
+        self.seconds = 0.0
+        self.is_fresh = True  # it has done nothing yet
+        self.documents: set[str] = set()
+        self.stderr: deque[bytes] = deque(maxlen=64)
+        self._unread: list[bytes] = []
+        command = [sys.executable, "-m", "kahanmaps.experiments.child", str(os.getpid())]
+        # Sets of texts have an order that no result may depend on; with a fixed seed none can. A group of its own,
+        # so that Ctrl-C in a terminal reaches us alone.
+        environment = {**os.environ, "PYTHONHASHSEED": "0"}
+        try:
+            self.process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                bufsize=0,
+                env=environment,
+                process_group=0,
+            )
+        except OSError as error:
+            raise ChildrenError(f"a child process cannot be started: {error.strerror or error}") from error
+        self.input = _pipe(self.process.stdin)
+        self.answers = _pipe(self.process.stdout)
+        self.talk = _pipe(self.process.stderr)
+        for stream in (self.answers, self.talk):
+            os.set_blocking(stream.fileno(), False)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it has said that it can take tasks."""
+        return self.ready is not None
+
+    def circumstances(self) -> dict[str, Any]:
+        """Where and when."""
+        return {**(self.ready or {}), "finished": datetime.now(UTC).isoformat(timespec="seconds")}
+
+    def write(self, message: dict[str, Any]) -> None:
+        """Send a message; a pipe takes whole lines or fails."""
+        data = memoryview(json.dumps(message).encode() + b"\n")
+        while data:
+            data = data[self.input.write(data) or 0 :]
+
+    def lines(self, data: bytes) -> Sequence[bytes]:
+        """The lines that are complete now."""
+        *pieces, rest = data.split(b"\n")
+        if not pieces:
+            self._unread.append(rest)
+            return []
+        pieces[0] = b"".join((*self._unread, pieces[0]))
+        self._unread = [rest]
+        return pieces
+
+    def read_the_rest(self) -> None:
+        """What it printed on standard error and nobody has read."""
+        with suppress(OSError):
+            while data := os.read(self.talk.fileno(), _READ):
+                self.stderr.append(data)
+
+    def told(self) -> str:
+        """The end of what it printed on standard error since its task began."""
+        return b"".join(self.stderr).decode("utf-8", "replace")[-_STDERR_KEPT:].strip()
+
+    def end(self) -> None:
+        """Kill it, unless it is dead, and leave no zombie and no open file."""
+        with suppress(ProcessLookupError):
+            self.process.kill()
+        self.process.wait()
+        for stream in (self.input, self.answers, self.talk):
+            with suppress(OSError):
+                stream.close()
+
+
+def _pipe(stream: IO[bytes] | None) -> IO[bytes]:
+    if stream is None:
+        raise AssertionError("a pipe that was asked for is missing")
+    return stream
+
+
+def _documents_of(task: Task) -> list[str]:
+    """The digests of the documents that a task needs."""
+    recipes = (task.system, task.options.get(OTHER))
+    return [recipe["document"] for recipe in recipes if recipe and "document" in recipe]
+
+
+def _how(status: int) -> str:
+    """How a process ended, in words."""
+    if status >= 0:
+        return f"ended with status {status}"
+    with suppress(ValueError):
+        return f"was killed by signal {-status} ({Signals(-status).name})"
+    return f"was killed by signal {-status}"

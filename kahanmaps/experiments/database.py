@@ -1,0 +1,320 @@
+"""One SQLite file: opening and closing it, one transaction or one read at a time, and errors told in sentences.
+
+Opened for writing it holds the lock (locks.py) and has the journal that its file system allows (journals.py). What lies
+in the file is not known here, except whether it is ours (schema.py).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Self
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.journals import journal_for
+from kahanmaps.experiments.locks import Lock, LockedByAnother
+from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT, SCHEMA
+
+_BUSY_SECONDS = 30.0
+_SMALLEST = 512  # bytes, the smallest page that SQLite has
+# In KiB. The index of a million keys, hit at random while they are planned, is to fit into the large one; otherwise
+# every key costs a page written.
+_CACHE, _LARGE_CACHE = 16 << 10, 128 << 10
+_LARGEST_JOURNAL = 64 << 20  # bytes: what is kept of the journal of a large plan
+
+
+class StoreError(InputError):
+    """A database that cannot be used, or not in this way: the message says what to do."""
+
+
+class Database:
+    """An SQLite file of ours. Make one with `Database.open`, and close it.
+
+    `name` is the file as it was given, for messages; `path` is resolved.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], readonly: bool) -> None:
+        self.name = os.fspath(path)
+        # Resolved, or two names of one file would have two locks.
+        self.path = Path(self.name).resolve()
+        self._is_readonly = readonly
+        self._lock = Lock(self.path.with_name(f"{self.path.name}.lock"))
+        self._connection: sqlite3.Connection | None = None
+        self._process = os.getpid()
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False) -> Self:
+        """The database in this file; `create` makes it if it is not there. Open for writing, it has the lock."""
+        if create and readonly:
+            raise ValueError("a database opened for reading only cannot be created")
+        database = cls(path, readonly)
+        try:
+            database._open(create)
+        except BaseException:
+            database.close()
+            raise
+        return database
+
+    def lock(self) -> None:
+        """Become the one that writes, until `close`; opening for writing does it. Another writer: StoreError."""
+        try:
+            self._lock.take()
+        except LockedByAnother as holder:
+            raise StoreError(f"another batch is writing to {self.name} ({holder}): wait for it, or end it") from None
+        except OSError as error:
+            raise StoreError(
+                f"{self.name} cannot be locked for writing ({self._lock.path}: {error.strerror}): change the "
+                "permissions of its folder, or work on a copy elsewhere"
+            ) from error
+
+    def close(self) -> None:
+        """Leave one complete file behind. May be called twice."""
+        if os.getpid() != self._process:
+            return  # a forked child has left a `with` of its parent
+        try:
+            if self._connection is not None and not self._is_readonly and self._lock.is_held:
+                # Out of WAL, so that the file opens where nothing can be written. A reader may hold on to it, or the
+                # disk may be full: then it stays as it is, complete together with its journal.
+                with suppress(sqlite3.Error):
+                    self._connection.execute("PRAGMA busy_timeout = 0")
+                    self._connection.execute("PRAGMA journal_mode = DELETE")
+            with suppress(sqlite3.Error):
+                self._disconnect()
+        finally:
+            self._connection = None
+            self._lock.free()
+
+    # Reading and writing
+
+    def fetch(self, sql: str, values: Sequence[Any] = ()) -> list[Any]:
+        """All rows at once: a statement half read would keep its snapshot, and the writer from tidying its journal."""
+        with self._errors():
+            return self.execute(sql, values).fetchall()
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """What is executed in it is done completely or not at all."""
+        with self._errors():
+            connection = self._opened
+            connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                connection.execute("COMMIT")
+            except BaseException:
+                # After some errors SQLite has rolled back by itself.
+                if connection.in_transaction:
+                    with suppress(sqlite3.Error):
+                        connection.execute("ROLLBACK")
+                raise
+
+    @contextmanager
+    def large_cache(self) -> Iterator[None]:
+        """Memory for a transaction that adds many tasks."""
+        with self._errors():
+            self.execute(f"PRAGMA cache_size = -{_LARGE_CACHE}")
+        try:
+            yield
+        finally:
+            with suppress(sqlite3.Error):
+                self.execute(f"PRAGMA cache_size = -{_CACHE}")
+
+    def execute(self, sql: str, values: Sequence[Any] = ()) -> sqlite3.Cursor:
+        """One statement of a transaction."""
+        return self._opened.execute(sql, values)
+
+    def execute_many(self, sql: str, rows: Iterable[Sequence[Any]]) -> int:
+        """One statement of a transaction for each of these rows; how many rows of the table it changed."""
+        return self._opened.executemany(sql, rows).rowcount
+
+    def must_write(self) -> None:
+        """Refuse if it was opened for reading only."""
+        if self._is_readonly:
+            raise StoreError(f"{self.name} has been opened for reading only: open it for writing")
+
+    def plain(self, text: str) -> Any:
+        """What a text in the file means, which is JSON unless it is damaged."""
+        try:
+            return json.loads(text)
+        except ValueError as error:
+            raise StoreError(self._damaged(f"a text is not JSON: {error}")) from error
+
+    # Opening
+
+    def _open(self, create: bool) -> None:
+        try:
+            self._look_at_the_file(create)
+        except OSError as error:
+            raise StoreError(f"{self.name} cannot be opened ({error.strerror}): check the name") from error
+        with self._errors():
+            if self._is_readonly:
+                self._open_to_read()
+            else:
+                self._open_to_write(create)
+
+    def _look_at_the_file(self, create: bool) -> None:
+        """Refuse what needs no SQLite to see. The file is not opened: closing it would drop SQLite's POSIX locks."""
+        if self.path.is_dir():
+            raise StoreError(f"{self.name} is a folder: name a file in it, such as {self.name}/results.db")
+        if not self.path.exists():
+            if not create:
+                raise StoreError(f"there is no database {self.name}: check the name, or run the batch to make it")
+            if not self.path.parent.is_dir():
+                raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; make it first")
+        elif not os.access(self.path, os.R_OK):
+            raise StoreError(f"{self.name} may not be read: change the permissions of the file")
+        elif 0 < self.path.stat().st_size < _SMALLEST:
+            # SQLite takes a file of one byte for an empty one, and would write over it.
+            raise StoreError(self._foreign())
+        elif not self._is_readonly and not os.access(self.path, os.W_OK):
+            raise StoreError(
+                f"{self.name} may not be written to: change the permissions of the file, or work on a copy"
+            )
+        if not self._is_readonly and not os.access(self.path.parent, os.W_OK | os.X_OK):
+            # SQLite needs more than the file: its journal lies beside it.
+            raise StoreError(
+                f"{self.name} cannot be written to: the folder {self.path.parent} may not be written to; "
+                "change its permissions, or work on a copy elsewhere"
+            )
+
+    def _open_to_read(self) -> None:
+        # Not mode=ro: the journal of a writer that was killed has to be played back, and that writes.
+        self._connect("mode=rw")
+        try:
+            self._check_format()
+        except sqlite3.OperationalError as error:
+            if _primary_code(error) not in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY) or self._has_journal():
+                raise
+            # Marked as WAL, because a reader was there when the writer left, and now where SQLite can make no file
+            # beside it. No journal: the file is complete, and nobody writes where nobody may.
+            self._disconnect()
+            self._connect("mode=ro&immutable=1")
+            self._check_format()
+        self.execute("PRAGMA query_only = ON")
+
+    def _has_journal(self) -> bool:
+        for end in ("-wal", "-journal"):
+            beside = self.path.with_name(self.path.name + end)
+            if beside.exists() and beside.stat().st_size > 0:
+                return True
+        return False
+
+    def _open_to_write(self, create: bool) -> None:
+        self._connect("mode=rwc" if create else "mode=rw")
+        is_empty = self._check_format(may_be_empty=create)  # before the lock: no lock file beside what is not ours
+        self.lock()
+        # Under the lock once more: somebody else may have been making it.
+        is_empty = is_empty and self._check_format(may_be_empty=True)
+        self.execute(f"PRAGMA cache_size = -{_CACHE}")
+        self.execute(f"PRAGMA journal_size_limit = {_LARGEST_JOURNAL}")
+        if not is_empty:
+            self._check_pages()
+        wanted = journal_for(self.path)
+        got = self.execute(f"PRAGMA journal_mode = {wanted}").fetchone()[0]
+        # WAL is whole after a loss of power as it is, only the last commits may be lost; a rollback journal is not.
+        self.execute(f"PRAGMA synchronous = {'NORMAL' if got == 'wal' else 'FULL'}")
+        if is_empty:
+            with self.transaction():
+                for statement in SCHEMA.split(";"):  # executescript would commit
+                    self.execute(statement)
+
+    def _connect(self, how: str) -> None:
+        self._connection = sqlite3.connect(
+            f"{self.path.as_uri()}?{how}", timeout=_BUSY_SECONDS, isolation_level=None, uri=True
+        )
+
+    def _disconnect(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+
+    @property
+    def _opened(self) -> sqlite3.Connection:
+        if self._connection is None:
+            raise StoreError(f"{self.name} has been closed: open it again")
+        return self._connection
+
+    def _check_format(self, may_be_empty: bool = False) -> bool:
+        """Refuse what is not ours; whether it is empty, if it may be."""
+        # First of all the schema: pragmas alone are answered for files that SQLite cannot read.
+        tables = self.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+        application = self.execute("PRAGMA application_id").fetchone()[0]
+        version = self.execute("PRAGMA user_version").fetchone()[0]
+        if not tables and not application and not version:
+            if may_be_empty:
+                return True
+            raise StoreError(f"{self.name} is empty and not a database of results: check the name")
+        if application != APPLICATION_ID:
+            raise StoreError(f"{self.name} is an SQLite database of another program, not one of results: left alone")
+        if version != FORMAT:
+            raise StoreError(
+                f"{self.name} was written by format {version} of kahanmaps databases, this version reads format "
+                f"{FORMAT}: use the kahanmaps that wrote it, or begin another database"
+            )
+        return False
+
+    def _check_pages(self) -> None:
+        found = self.execute("PRAGMA quick_check(1)").fetchone()[0]
+        if found != "ok":
+            raise StoreError(self._damaged(found))
+
+    # Errors
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        """The one place where errors of SQLite become sentences."""
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise StoreError(self._sentence(error)) from error
+
+    def _sentence(self, error: sqlite3.Error) -> str:
+        match _primary_code(error):
+            case sqlite3.SQLITE_NOTADB:
+                return self._foreign()
+            case sqlite3.SQLITE_CORRUPT:
+                return self._damaged(str(error))
+            case sqlite3.SQLITE_FULL:
+                return f"{self.name} cannot grow: {error}; what was stored before is safe, make room and run it again"
+            case sqlite3.SQLITE_IOERR:
+                return (
+                    f"{self.name} cannot be read or written: {error}; what was stored before is safe, look after the "
+                    "disk, its room and its quota, and run it again"
+                )
+            case sqlite3.SQLITE_READONLY | sqlite3.SQLITE_PERM if not self._is_readonly:
+                return (
+                    f"{self.name} may not be written to ({error}): change the permissions of the file and of its "
+                    "folder, or work on a copy"
+                )
+            case sqlite3.SQLITE_CANTOPEN | sqlite3.SQLITE_READONLY | sqlite3.SQLITE_PERM:
+                return (
+                    f"{self.name} cannot be opened ({error}): the file must be readable, and if its writer was killed "
+                    f"(there is a file {self.path.name}-wal or {self.path.name}-journal), file and folder must be "
+                    "writable to finish what it left; copy all of them to a folder that is"
+                )
+            case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_LOCKED:
+                return (
+                    f"{self.name} has been locked by another program for {_BUSY_SECONDS:.0f} seconds: end it, then "
+                    "run it again"
+                )
+            case _:
+                return f"{self.name}: {error}"
+
+    def _foreign(self) -> str:
+        return f"{self.name} is not an SQLite database: check the name"
+
+    def _damaged(self, what: str) -> str:
+        what = " ".join(what.split())
+        return (
+            f"{self.name} is damaged ({what}): take a copy from before, or save what can be read with "
+            f"`sqlite3 {self.name} .recover`"
+        )
+
+
+def _primary_code(error: sqlite3.Error) -> int | None:
+    """13 for "disk is full" and so on; None if it comes from Python's module and not from SQLite."""
+    code: int | None = getattr(error, "sqlite_errorcode", None)
+    return None if code is None else code & 0xFF

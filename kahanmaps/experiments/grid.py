@@ -1,0 +1,240 @@
+"""Values and their combinations: lists, exact ranges "1/10..1/2 step 1/10", products and zips, all lazy.
+
+A grid of ten thousand million points costs nothing until somebody walks it; its size is known beforehand.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import accumulate
+from math import gcd, lcm, prod
+from typing import Any, overload
+
+from flint import fmpq
+
+from kahanmaps.algebra.text import parse_number
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.options import Option, number_of, show
+
+_RANGE_FORM = 'expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'
+_MOST = 2**62  # values of an axis: Python's `len` ends there
+_PAIRS_COMPARED = 100_000
+_TOO_MANY = "more values than anybody can want"
+
+Place = tuple[int, ...]
+Mistake = tuple[Place, str]
+
+
+class RationalRange(Sequence[fmpq]):
+    """first, first + step, ... up to last, which is met only if it is first plus a multiple of step.
+
+    >>> [str(value) for value in RationalRange.from_text("1/10..1/2 step 1/5")]
+    ['1/10', '3/10', '1/2']
+    >>> len(RationalRange.from_text("0..9999"))
+    10000
+    """
+
+    def __init__(self, first: fmpq, last: fmpq, step: fmpq) -> None:
+        if step == 0:
+            raise InputError("found a range of step 0, expected another step")
+        count = (last - first) / step
+        if count < 0:
+            hint = " (for a falling range write a negative step)" if step > 0 else ""
+            raise InputError(
+                f"found a range without values, from {show(first)} to {show(last)} in steps of {show(step)}{hint}"
+            )
+        if count >= _MOST:
+            raise InputError(f"found a range from {show(first)} to {show(last)} in steps of {show(step)}: {_TOO_MANY}")
+        self.first = first
+        self.step = step
+        self._length = int(count.p // count.q) + 1
+
+    @classmethod
+    def from_text(cls, text: str) -> RationalRange:
+        """The range that a text such as "2..5" spells. Raises InputError for any other text."""
+        first, dots, rest = text.partition("..")
+        words = rest.split()
+        if not dots or not first.strip() or not (len(words) == 1 or (len(words) == 3 and words[1] == "step")):
+            raise InputError(f"found {show(text)}, {_RANGE_FORM}")
+        return cls(parse_number(first), parse_number(words[0]), parse_number(words[2]) if len(words) > 1 else fmpq(1))
+
+    def __len__(self) -> int:
+        return self._length
+
+    @overload
+    def __getitem__(self, index: int) -> fmpq: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[fmpq]: ...
+    def __getitem__(self, index: int | slice) -> fmpq | Sequence[fmpq]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(self._length))]
+        if not -self._length <= index < self._length:
+            raise IndexError(index)
+        return self.first + (index % self._length) * self.step
+
+    def __contains__(self, value: object) -> bool:
+        if not isinstance(value, fmpq):
+            return False
+        place = (value - self.first) / self.step
+        return bool(place.q == 1 and 0 <= place < self._length)
+
+    def common(self, other: RationalRange) -> fmpq | None:
+        """The least value that both have, if there is one: a congruence, nothing is enumerated.
+
+        >>> RationalRange.from_text("0..9999 step 3").common(RationalRange.from_text("9998..0 step -7"))
+        9
+        """
+        scale = 1
+        for part in (self, other):
+            scale = lcm(scale, int(part.first.q), int(part.step.q))
+        (low, high, step), (its_low, its_high, its_step) = (
+            (*sorted((int((scale * part[0]).p), int((scale * part[-1]).p))), abs(int((scale * part.step).p)))
+            for part in (self, other)
+        )
+        shared = gcd(step, its_step)
+        if (its_low - low) % shared:
+            return None
+        steps = (its_low - low) // shared * pow(step // shared, -1, its_step // shared) % (its_step // shared)
+        value, period = low + steps * step, step * its_step // shared
+        value += -((value - max(low, its_low)) // period) * period
+        return fmpq(value, scale) if value <= min(high, its_high) else None
+
+
+class Values(Sequence[Any]):
+    """The canonical values of an option, in pieces: single values and ranges."""
+
+    def __init__(self, option: Option, pieces: Sequence[Sequence[Any]]) -> None:
+        self.option = option
+        self.pieces = pieces
+        self._ends = list(accumulate(len(piece) for piece in pieces))
+
+    def __len__(self) -> int:
+        return self._ends[-1]
+
+    @overload
+    def __getitem__(self, index: int) -> Any: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Any]: ...
+    def __getitem__(self, index: int | slice) -> Any:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        if not -len(self) <= index < len(self):
+            raise IndexError(index)
+        index %= len(self)
+        which = bisect_right(self._ends, index)
+        value = self.pieces[which][index - (self._ends[which - 1] if which else 0)]
+        return self.option.read(value) if isinstance(value, fmpq) else value
+
+
+def is_range(raw: Any) -> bool:
+    """Whether a value of a spec is meant as a range."""
+    return isinstance(raw, str) and ".." in raw
+
+
+def read_values(option: Option, raw: Any) -> tuple[Values | None, list[Mistake]]:
+    """The values that a spec gives to an option, and the mistakes with their places (from 1) in a list.
+
+    `raw` is one value, a range or a list of both.
+    """
+    pieces: list[Sequence[Any]] = []
+    mistakes: list[Mistake] = []
+    seen: dict[Any, int] = {}
+    ranges: dict[int, RationalRange] = {}
+    items = raw if isinstance(raw, list) else [raw]
+    if not items:
+        mistakes.append(((), "found an empty list, expected at least one value"))
+    for number, item in enumerate(items, start=1):
+        place = (number,) if isinstance(raw, list) else ()
+        try:
+            if option.numbers and is_range(item):
+                found = RationalRange.from_text(item)
+                # Between the ends nothing can go wrong that does not go wrong there, but for eps = 0 and fractions.
+                values = Values(option, [found])
+                for k in {0, min(1, len(found) - 1), len(found) - 1, _index_of_zero(found)}:
+                    values[k]
+                ranges[number] = found
+                pieces.append(found)
+                continue
+            value = option.read(item)
+            if value in seen:
+                raise InputError(f"found {show(item)}, the same value as in place {seen[value]}: expected it once")
+            seen[value] = number
+            pieces.append((value,))
+        except InputError as error:
+            mistakes.append((place, str(error)))
+    if not mistakes and sum(map(len, pieces)) > _MOST:
+        mistakes.append(((), f"found {_TOO_MANY}"))
+    if not mistakes and 0 < len(ranges) * len(items) <= _PAIRS_COMPARED:
+        mistakes += _twice(items, ranges)
+    return (None if mistakes else Values(option, pieces)), mistakes
+
+
+def _twice(items: Sequence[Any], ranges: Mapping[int, RationalRange]) -> Iterator[Mistake]:
+    """What is in a range and somewhere else as well; `ranges` has the ranges by their numbers in the list."""
+    for number, item in enumerate(items, start=1):
+        mine = ranges.get(number)
+        if mine is None:
+            value = number_of(item)
+            mine = RationalRange(value, value, fmpq(1))
+        for other, values in ranges.items():
+            if other >= number and number in ranges:
+                break
+            common = values.common(mine)
+            if common is not None:
+                told = f"found {show(common)}, which is in place {min(other, number)} as well: expected it once"
+                yield (max(other, number),), told
+                break
+
+
+def _index_of_zero(values: RationalRange) -> int:
+    """Where a range is 0, or 0 if it never is."""
+    place = -values.first / values.step
+    return int(place.p) if place.q == 1 and 0 <= place < len(values) else 0
+
+
+class Grid:
+    """All combinations of named axes, the last one running fastest; zipped axes run together.
+
+    >>> grid = Grid({"m": [2, 3], "seed": range(3), "steps": [10, 20]}, zips=[("m", "steps")])
+    >>> grid.size, grid[3]
+    (6, {'m': 3, 'steps': 20, 'seed': 0})
+    """
+
+    def __init__(self, axes: Mapping[str, Sequence[Any]], zips: Sequence[Sequence[str]] = ()) -> None:
+        groups: list[tuple[str, ...]] = []
+        for name in axes:
+            together = next((tuple(names) for names in zips if name in names), (name,))
+            if together not in groups:
+                groups.append(together)
+        self.axes = axes
+        self.groups = groups
+        self._lengths = [len(axes[group[0]]) for group in groups]
+        for group in groups:
+            for name in group:
+                if len(axes[name]) != len(axes[group[0]]):
+                    raise InputError(
+                        f"found {len(axes[group[0]])} values of {group[0]} and {len(axes[name])} of {name}, expected "
+                        "as many: a zip takes them together"
+                    )
+
+    @property
+    def size(self) -> int:
+        """The number of combinations (not `len`, which Python bounds)."""
+        return prod(self._lengths)
+
+    def __getitem__(self, index: int) -> dict[str, Any]:
+        if not 0 <= index < self.size:
+            raise IndexError(index)
+        places = []
+        for length in reversed(self._lengths):
+            index, place = divmod(index, length)
+            places.append(place)
+        return {
+            name: self.axes[name][place]
+            for group, place in zip(self.groups, reversed(places), strict=True)
+            for name in group
+        }
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        return (self[k] for k in range(self.size))

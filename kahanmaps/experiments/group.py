@@ -1,0 +1,39 @@
+"""A group of jobs done by one command, for engines that run commands: JSON in, records out.
+
+    python -m kahanmaps.experiments.group < group.json
+
+The input is {"documents": {DIGEST: TEXT, ...}, "jobs": [{"task": TEXT, "limits": {"time": S, "memory": BYTES}}, ...]};
+for every job there comes one line, the record, as soon as it is there. The exit status is 0 whatever the tasks did.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from typing import IO
+
+from kahanmaps.experiments.child import end_with_parent
+from kahanmaps.experiments.children import LocalChildren
+from kahanmaps.experiments.records import Job, Limits, Task, canonical
+
+
+def main(source: IO[str], target: IO[str]) -> None:
+    """Do the jobs that `source` describes, one after the other."""
+    group = json.load(source)
+    jobs = [Job(Task.from_text(job["task"]), Limits(**job["limits"])) for job in group["jobs"]]
+    children = LocalChildren(1, group["documents"].__getitem__)
+    try:
+        for job in jobs:
+            children.submit(job)
+            while children.in_flight:
+                for record in children.wait(60.0):
+                    target.write(canonical(record.to_json()) + "\n")
+                    target.flush()
+    finally:
+        children.close()
+
+
+if __name__ == "__main__":
+    end_with_parent(os.getppid())
+    main(sys.stdin, sys.stdout)

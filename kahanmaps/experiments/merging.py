@@ -1,0 +1,108 @@
+"""Two databases into one: shards of a batch that ran apart, or batches that share tasks."""
+
+from __future__ import annotations
+
+import os
+from contextlib import closing
+from dataclasses import dataclass
+
+from kahanmaps.experiments.database import Database, StoreError
+from kahanmaps.experiments.plans import (
+    PLAN_CHUNK,
+    add_document,
+    add_experiment,
+    add_tasks,
+    choose,
+    document_of,
+    fill_plan,
+    stretches,
+)
+from kahanmaps.experiments.records import Outcome, digest
+from kahanmaps.experiments.results import RECORD, RESULT_CHUNK, find_result, put_result
+
+CONFLICTS_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class Merged:
+    """What came from another database: new tasks, new results, failures `replaced` by results.
+
+    `conflicts` counts tasks which are done in both with different results; `conflicting` has the keys of the first few.
+    """
+
+    tasks: int
+    results: int
+    replaced: int
+    conflicts: int
+    conflicting: tuple[str, ...] = ()
+
+
+def merge(database: Database, other: str | os.PathLike[str]) -> Merged:
+    """Take over what another database has, all or nothing; see `Store.merge`."""
+    database.must_write()
+    with closing(Database.open(other, readonly=True)) as source:
+        if source.path.samefile(database.path):
+            raise StoreError(f"{source.name} is this database itself: there is nothing to merge")
+        with database.large_cache(), database.transaction():
+            new = _merge_plans(database, source)
+            _merge_documents(database, source)
+            return _merge_results(database, source, new)
+
+
+def _merge_plans(database: Database, source: Database) -> int:
+    """How many tasks are new."""
+    new = 0
+    for experiment in choose(source, None):
+        rows = source.fetch("SELECT definition, limits FROM experiment WHERE id = ?", (experiment.id,))
+        definition, limits = rows[0]
+        mine = database.execute("SELECT digest FROM experiment WHERE name = ?", (experiment.name,)).fetchone()
+        if mine is not None:
+            if mine[0] != digest(definition):
+                raise StoreError(
+                    f"the experiment {experiment.name} is defined in one way in {database.name} and in another way in "
+                    f"{source.name}: rename it in one of them; nothing was merged"
+                )
+            continue
+        id = add_experiment(database, experiment.name)
+        sql = """
+            SELECT t.key, t.text FROM plan AS p JOIN task AS t ON t.id = p.task
+            WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
+        chunks = stretches(source, sql, experiment, PLAN_CHUNK)
+        _, _, added = fill_plan(database, id, definition, limits, (row for rows in chunks for row in rows))
+        new += added
+    return new
+
+
+def _merge_documents(database: Database, source: Database) -> None:
+    for (name,) in source.fetch("SELECT digest FROM document"):  # one by one: each may be long
+        add_document(database, name, document_of(source, name))
+
+
+def _merge_results(database: Database, source: Database, new: int) -> Merged:
+    """What came along; `new` tasks came with the plans."""
+    results = replaced = conflicts = 0
+    conflicting: list[str] = []
+    last = 0
+    sql = f"""
+        SELECT t.id, t.key, t.text, r.attempts, {RECORD} FROM result AS r JOIN task AS t ON t.id = r.task
+        WHERE r.task > ? ORDER BY r.task LIMIT ?"""
+    while rows := source.fetch(sql, (last, RESULT_CHUNK)):
+        last = rows[-1][0]
+        for _, key, text, attempts, *row in rows:
+            found = find_result(database, key)
+            if found is None:
+                new += add_tasks(database, [(key, text)])
+                found = find_result(database, key)
+                assert found is not None
+            task, outcome, result, verdict = found
+            if outcome is None:
+                results += 1
+                put_result(database, task, attempts, tuple(row))
+            elif row[0] == Outcome.OK != outcome:
+                replaced += 1
+                put_result(database, task, attempts, tuple(row))
+            elif row[0] == Outcome.OK and row[1:3] != [result, verdict]:
+                conflicts += 1
+                if conflicts <= CONFLICTS_SHOWN:
+                    conflicting.append(key)
+    return Merged(new, results, replaced, conflicts, tuple(conflicting))

@@ -1,0 +1,233 @@
+"""What a task can be asked with: the options of all tasks, one meaning for each name, read exactly.
+
+An option reads what a spec says into canonical plain data (exact numbers as text, so that 0.1 and 1/10 are the same
+task), and makes of it, in the child that does the task, what the library wants.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import date, time
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import GF, RR, rational
+from kahanmaps.algebra.text import format_number, format_point, format_univariate, parse_number, parse_point
+from kahanmaps.errors import InputError
+from kahanmaps.family.draw import MAX_M, parse_chi
+
+_LARGEST = 2**63 - 1
+_PRIME_BITS = 192
+_ARITHMETIC = re.compile(r"exact|float|(mod|ball):[1-9][0-9]{0,1999}")
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option of tasks: its name, what it is, `read` for what a spec says, `make` for what the library wants.
+
+    `read` gives plain data, or raises InputError; None always stands for "not given". `numbers` says whether ranges
+    "a..b step c" may be written.
+    """
+
+    name: str
+    help: str
+    read: Callable[[Any], Any]
+    make: Callable[[Any], Any]
+    numbers: bool = False
+
+
+def exact(name: str, help: str, *, zero: bool = True) -> Option:
+    """A rational number: canonical is its text in lowest terms."""
+
+    def read(value: Any) -> str:
+        number = number_of(value)
+        if number == 0 and not zero:
+            raise InputError("found 0, expected another number: at eps = 0 the Kahan map is the identity")
+        return format_number(number)
+
+    return Option(name, help, read, parse_number, numbers=True)
+
+
+def whole(name: str, help: str, least: int = 0, most: int = _LARGEST) -> Option:
+    """A whole number from `least` to `most`."""
+
+    def read(value: Any) -> int:
+        number = number_of(value)
+        if number.q != 1 or not least <= number <= most:
+            raise InputError(f"found {show(number)}, expected a whole number from {least} to {most}")
+        return int(number.p)
+
+    return Option(name, help, read, int, numbers=True)
+
+
+def flag(name: str, help: str) -> Option:
+    """true or false."""
+
+    def read(value: Any) -> bool:
+        if not isinstance(value, bool):
+            raise InputError(f"found {show(value)}, expected true or false")
+        return value
+
+    return Option(name, help, read, bool)
+
+
+def choice(name: str, help: str, words: Sequence[str]) -> Option:
+    """One of some words."""
+
+    def read(value: Any) -> str:
+        if value not in words:
+            raise InputError(f"found {show(value)}, expected one of {', '.join(words)}{suggestion(value, words)}")
+        return str(value)
+
+    return Option(name, help, read, str)
+
+
+def point(name: str, help: str, most: int | None = None) -> Option:
+    """Numbers separated by commas, in one text: a list would be several values."""
+
+    def read(value: Any) -> str:
+        if not isinstance(value, str):
+            raise InputError(f'found {show(value)}, expected numbers separated by commas in one text, e.g. "1/2,-1/3"')
+        numbers = parse_point(value)
+        if most is not None and len(numbers) > most:
+            raise InputError(f"found {len(numbers)} numbers, expected at most {most}")
+        return format_point(numbers)
+
+    return Option(name, help, read, parse_point)
+
+
+def whole_numbers(name: str, help: str, expected: str, allowed: Callable[[fmpq], bool], ordered: bool) -> Option:
+    """Whole numbers separated by commas, in one text; a single one may stand without quotes.
+
+    Without `ordered` they are a set: canonical is then in increasing order, every number once.
+    """
+
+    def read(value: Any) -> str:
+        numbers = parse_point(value) if isinstance(value, str) else (number_of(value),)
+        for number in numbers:
+            if number.q != 1 or not allowed(number):
+                raise InputError(f"found {show(number)}, expected {expected}, separated by commas in one text")
+        return format_point(numbers if ordered else sorted(set(numbers)))
+
+    return Option(name, help, read, lambda value: tuple(int(number) for number in value.split(",")))
+
+
+def _read_arithmetic(value: Any) -> str:
+    if not isinstance(value, str) or not _ARITHMETIC.fullmatch(value):
+        raise InputError(f"found {show(value)}, expected exact, float, mod:P or ball:BITS")
+    kind, _, number = value.partition(":")
+    if kind == "mod":
+        GF(int(number))
+    if kind == "ball":
+        RR(int(number))
+    return value
+
+
+def _read_prime(value: Any) -> str:
+    number = number_of(value)
+    if number.q != 1 or number < 2 or number.p.bit_length() > _PRIME_BITS:
+        raise InputError(f"found {show(number)}, expected a prime of at most {_PRIME_BITS} bits")
+    GF(int(number.p))
+    return format_number(number)  # not an integer: JSON and databases may hold no long ones
+
+
+def _read_chi(value: Any) -> str:
+    if not isinstance(value, str):
+        raise InputError(f'found {show(value)}, expected a polynomial in t, as text, e.g. "t^2 - 2"')
+    polynomial = parse_chi(value)
+    if polynomial.degree() > MAX_M:
+        raise InputError(f"found a polynomial of degree {polynomial.degree()}, expected at most {MAX_M}")
+    return format_univariate(polynomial / polynomial.leading_coefficient())
+
+
+def show(value: Any, width: int = 60) -> str:
+    """A value as it might stand in a spec, shortened, with nothing in it that a terminal would obey.
+
+    >>> show(True), show("two"), show({"a": 1})
+    ('true', "'two'", "{'a': 1}")
+    """
+    if isinstance(value, date | time):  # of which datetime is one
+        return value.isoformat()
+    try:
+        found = str(value).lower() if isinstance(value, bool) else repr(value)
+    except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
+        return "a value too large to show"
+    return found if len(found) <= width else f"{found[: width - 20]}...{found[-15:]}"
+
+
+def suggestion(value: Any, known: Sequence[str]) -> str:
+    """A hint at what was probably meant, or nothing."""
+    from difflib import get_close_matches
+
+    close = get_close_matches(value, known, n=2, cutoff=0.6) if isinstance(value, str) else []
+    return f"; did you mean {' or '.join(close)}?" if close else ""
+
+
+def number_of(value: Any) -> fmpq:
+    """The exact number that a value of a spec spells. Raises InputError for tables, lists, dates and flags."""
+    if isinstance(value, bool) or not isinstance(value, int | str | fmpq):
+        raise InputError(f"found {show(value)}, expected a number")
+    return rational(value)
+
+
+OTHER = "other"  # read by the spec, which knows where files are; canonical is a recipe like that of the system
+
+VOCABULARY = {
+    option.name: option
+    for option in (
+        exact("eps", "the paper's epsilon; the time step is 2 eps", zero=False),
+        exact("eps2", "another eps for the second map", zero=False),
+        Option(OTHER, "a second system: a file or a name of the catalogue", str, str),
+        point("start", "where the orbit starts (default: drawn from the seed)"),
+        whole("steps", "steps of the orbit", most=10**9),
+        whole("every", "take every so many steps only", 1, 10**9),
+        whole_numbers(
+            "at",
+            "iterates to reach directly",
+            "whole numbers from 0 to 10^18",
+            lambda n: 0 <= n <= 10**18,
+            ordered=False,
+        ),
+        whole("seed", "seed of everything drawn at random"),
+        whole("error_bits", "random points until the probability of error is below 2^-BITS", 1, 10_000),
+        whole("max_digits", "digit budget of exact orbits", least=1),
+        choice("method", "how an exact orbit is computed", ("generic", "normal-form", "jump")),
+        Option("arithmetic", "exact, float, mod:P or ball:BITS", _read_arithmetic, str),
+        Option("prime", "the prime of modular arithmetic", _read_prime, int),
+        whole_numbers(
+            "sections",
+            "sections of the paper, 1 to 9, 10: beyond the paper",
+            "whole numbers from 1 to 10",
+            lambda n: 1 <= n <= 10,
+            ordered=False,
+        ),
+        whole("order", "order in eps^2 of the series of the integrals", 1, 20),
+        whole("ball_bits", "also over complex balls of so many bits", 32, 100_000),
+        flag("controls", "run every claim on input that breaks one hypothesis"),
+        flag("report", "keep the whole report, as --json prints it"),
+        whole("m", "half the dimension", 1, 16),
+    )
+}
+
+DRAWS = ("eigenvalues", "generic")
+# What a random member of the family is drawn with; the seed is the one of VOCABULARY.
+FAMILY = {
+    option.name: option
+    for option in (
+        VOCABULARY["m"],
+        choice("draw", "eigenvalues: distinct integers; generic: a random integer chi", DRAWS),
+        point("eigenvalues", "the eigenvalues of A", MAX_M),
+        Option("chi", "chi itself, a polynomial in t", _read_chi, parse_chi),
+        whole("size", "bound for the integer coefficients drawn", 1, 10**6),
+        whole_numbers(
+            "signs",
+            "which associated system: 1 or -1 for each factor of chi",
+            "1 or -1",
+            lambda n: n * n == 1,
+            ordered=True,
+        ),
+    )
+}

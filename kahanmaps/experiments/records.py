@@ -1,0 +1,148 @@
+"""What a batch is made of: tasks with their keys, limits, and the records of what became of them.
+
+All of it is plain data that JSON holds, because it crosses processes and lies in databases: matrices and polynomials of
+FLINT do neither. The key of a task is a hash of its canonical text, so that the same question has the same key in every
+batch, on every machine.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from hashlib import sha256
+from typing import Any
+
+KEY_LENGTH = 32  # hexadecimal digits: 128 bits, no two tasks will ever share them
+
+
+def canonical(data: Any) -> str:
+    """Plain data as JSON that is the same wherever it is written: sorted names, no spaces, ASCII.
+
+    >>> canonical({"m": 2, "eps": "1/10"})
+    '{"eps":"1/10","m":2}'
+    """
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def digest(text: str) -> str:
+    """The hash by which tasks and documents are known."""
+    return sha256(text.encode()).hexdigest()[:KEY_LENGTH]
+
+
+@dataclass(frozen=True)
+class Task:
+    """One question: `kind` names the task, `system` says how to come by the system, `options` has every option.
+
+    `system` is {"family": {"m": 3, "seed": 7, ...}}, or {"document": DIGEST, "name": ..., "parameters": {...}}, or None
+    for tasks without a system. `options` are canonical: all that the kind of task knows, numbers as exact text.
+
+    >>> Task("orbit", {"family": {"m": 2}}, {"eps": "1/10"}).key
+    'aaf89ac6cf9009846f5b9932af33dd31'
+    """
+
+    kind: str
+    system: Mapping[str, Any] | None
+    options: Mapping[str, Any]
+
+    @cached_property
+    def text(self) -> str:
+        """The canonical text, from which `from_text` makes the task again."""
+        return canonical({"task": self.kind, "system": self.system, "options": self.options})
+
+    @cached_property
+    def key(self) -> str:
+        """The hash of the canonical text."""
+        return digest(self.text)
+
+    @classmethod
+    def from_text(cls, text: str) -> Task:
+        """The task with this canonical text."""
+        data = json.loads(text)
+        return cls(data["task"], data["system"], data["options"])
+
+    def value(self, name: str) -> Any:
+        """The option, or the piece of the system's recipe, of this name: m, seed, eps, parameters.a; None if absent."""
+        if name in self.options:
+            return self.options[name]
+        recipe = self.system or {}
+        if name.startswith("parameters."):
+            return recipe.get("parameters", {}).get(name.removeprefix("parameters."))
+        return recipe.get("family", {}).get(name)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one task may take: `time` in seconds, `memory` in bytes beyond what an idle child has; None: no limit.
+
+    Limits do not belong to a task and not to its key: a task that ran out of time may be tried again with more.
+    """
+
+    time: float | None = None
+    memory: int | None = None
+
+
+@dataclass(frozen=True)
+class Job:
+    """A task to be done, within limits."""
+
+    task: Task
+    limits: Limits = Limits()
+
+
+class Outcome(StrEnum):
+    """What became of a task. Everything but `ok` is a failure of the task, not of a claim: that is its verdict."""
+
+    OK = "ok"
+    FAILED = "failed"
+    CRASHED = "crashed"
+    TIMEOUT = "timeout"
+    OUT_OF_MEMORY = "out-of-memory"
+
+
+@dataclass(frozen=True)
+class Record:
+    """What became of one task, and where and how.
+
+    `result` is plain data, None unless the outcome is ok; `verdict` is that of a check. `message` says what happened
+    otherwise, `stderr` is the end of what the child printed. `seconds` and `peak_memory` (bytes, None: not known) are
+    those of the task alone; `host`, `versions` and `finished` (UTC, ISO 8601) say where and when.
+    """
+
+    key: str
+    outcome: Outcome
+    result: Mapping[str, Any] | None = None
+    verdict: str | None = None
+    message: str = ""
+    stderr: str = ""
+    seconds: float = 0.0
+    peak_memory: int | None = None
+    host: str = ""
+    versions: Mapping[str, str] = field(default_factory=dict)
+    finished: str = ""
+
+    @property
+    def is_ok(self) -> bool:
+        """Whether the task was done."""
+        return self.outcome is Outcome.OK
+
+    def to_json(self) -> dict[str, Any]:
+        """The record as plain data."""
+        return {**asdict(self), "outcome": str(self.outcome)}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Record:
+        """The record that `to_json` wrote."""
+        return cls(**{**data, "outcome": Outcome(data["outcome"])})
+
+
+@dataclass(frozen=True)
+class Row:
+    """A task in its place: experiment, number in it (from 0), and its record, None while it is missing."""
+
+    experiment: str
+    number: int
+    task: Task
+    record: Record | None

@@ -1,0 +1,102 @@
+"""The tasks a batch can do: functions that register themselves, and whose signature says what they can be asked.
+
+    @task("family-space", needs=MEMBER)
+    def family_space(system: SystemFile) -> Result:
+        '''The space of cubics that belong to A.'''
+
+The names of the parameters are names of `options.VOCABULARY`; a default makes an option optional, and `system`, if
+it is there, is the system. A result is plain data; "verdict" in it becomes the verdict of the record.
+
+Tasks of one's own live in modules named in the environment variable KAHANMAPS_TASKS (separated by commas), which every
+child imports.
+"""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.options import OTHER, VOCABULARY, Option, suggestion
+
+ENVIRONMENT = "KAHANMAPS_TASKS"
+Result = dict[str, Any]
+
+# What a task needs its system to be.
+SYSTEM, MEMBER, MEMBER_OR_OTHER = "system", "member", "member or other"
+
+
+@dataclass(frozen=True)
+class TaskKind:
+    """A kind of task: its name, what it does in a sentence, its options with their defaults, what it needs."""
+
+    name: str
+    summary: str
+    function: Callable[..., Result]
+    options: Mapping[str, Option]
+    defaults: Mapping[str, Any]
+    needs: str | None
+
+    @property
+    def required(self) -> tuple[str, ...]:
+        """The options without a default."""
+        return tuple(name for name in self.options if name not in self.defaults)
+
+    def perform(self, system: Any, options: Mapping[str, Any]) -> Result:
+        """Do it: `options` are canonical, `other` a system already made."""
+        made = {
+            name: value if value is None or name == OTHER else self.options[name].make(value)
+            for name, value in options.items()
+        }
+        return self.function(**made) if self.needs is None else self.function(system, **made)
+
+
+_KINDS: dict[str, TaskKind] = {}
+
+
+def task(name: str, needs: str = SYSTEM) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
+    """Register a function as a kind of task. Raises TypeError for a parameter that is no known option."""
+
+    def register(function: Callable[..., Result]) -> Callable[..., Result]:
+        parameters = dict(inspect.signature(function).parameters)
+        takes_system = parameters.pop("system", None) is not None
+        unknown = [key for key in parameters if key not in VOCABULARY]
+        if unknown:
+            raise TypeError(f"task {name}: {unknown[0]} is not an option{suggestion(unknown[0], list(VOCABULARY))}")
+        if name in _KINDS and _KINDS[name].function.__code__ != function.__code__:  # equal: imported a second time
+            raise TypeError(f"there are two tasks of the name {name}")
+        summary = (inspect.getdoc(function) or "").partition("\n")[0]
+        defaults = {
+            key: parameter.default for key, parameter in parameters.items() if parameter.default is not parameter.empty
+        }
+        options = {key: VOCABULARY[key] for key in parameters}
+        _KINDS[name] = TaskKind(name, summary, function, options, defaults, needs if takes_system else None)
+        return function
+
+    return register
+
+
+def task_kinds() -> Mapping[str, TaskKind]:
+    """All kinds of tasks by name, those of KAHANMAPS_TASKS among them."""
+    import_module("kahanmaps.experiments.tasks")
+    for module in filter(None, map(str.strip, os.environ.get(ENVIRONMENT, "").split(","))):
+        try:
+            import_module(module)
+        except Exception as error:  # it is somebody's module: whatever it raises
+            told = f"{type(error).__name__}: {error}"
+            raise InputError(f"{ENVIRONMENT} names the module {module}, which cannot be imported: {told}") from error
+    return _KINDS
+
+
+def task_kind(name: str) -> TaskKind:
+    """The kind of task of this name. Raises InputError where there is none."""
+    kinds = task_kinds()
+    if name not in kinds:
+        raise InputError(
+            f"there is no task {name!r}, expected one of {', '.join(kinds)}{suggestion(name, list(kinds))}"
+        )
+    return kinds[name]

@@ -1,0 +1,420 @@
+"""Many results in a few lines: grouped, counted, with the quantiles of their numbers.
+
+Quantiles are order statistics by nearest rank: the p-quantile of n values is the one with rank ceil(p n) from below. So
+each is a value that occurs, found by exact comparison and told as it was written: "7/3" stays "7/3". The median of an
+even number of values is the lower of the two in the middle.
+"""
+
+from __future__ import annotations
+
+import difflib
+from array import array
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from heapq import merge
+from math import inf, isfinite
+from typing import Any
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.export import NUMBER, Entry, entries, plain
+from kahanmaps.experiments.records import Outcome, Row, canonical
+
+QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
+VERDICTS = ("proved", "supported", "refuted", "undecided")
+OF_THE_RUN = ("seconds", "peak_memory")
+
+_SHOWN = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # in tables, and their headings
+_LONGEST_NUMBER = 2_000  # characters of a text: longer ones are no numbers to sort, but texts
+# Names whose values are words, also when they look like numbers: an experiment may be called 007, a digest be 12e34567.
+_WORDS = ("task", "experiment", "system", "document", "outcome", "verdict")
+_RELATED = 3  # names suggested for a mistaken one
+_LISTED = 60
+
+Number = int | float | str
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """The values of one number in a group: how many (`n`), and `quantiles` by the names of `QUANTILES`."""
+
+    n: int
+    quantiles: Mapping[str, Number]
+    is_same: bool  # all n of them are equal
+
+    def to_json(self) -> dict[str, Any]:
+        """The numbers as plain data."""
+        return {"n": self.n, "same": self.is_same, **self.quantiles}
+
+
+@dataclass(frozen=True)
+class Group:
+    """The tasks that have the same values of what was grouped by, `values`, in that order.
+
+    `outcomes` and `verdicts` count records, `flags` how often an entry is (true, false).
+    """
+
+    values: tuple[Any, ...]
+    tasks: int
+    missing: int
+    outcomes: Mapping[str, int]
+    verdicts: Mapping[str, int]
+    numbers: Mapping[str, Numbers]
+    flags: Mapping[str, tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts. The first `words` columns are words, the others numbers, to be aligned on the right."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: int
+
+    def lines(self) -> Iterator[str]:
+        """Lines with tabs between the cells, the names of the columns first."""
+        for row in (self.columns, *self.rows):
+            yield "\t".join(" ".join(cell.split()) for cell in row)
+
+    def markdown(self) -> str:
+        """The table for a Markdown file."""
+        rule = ["---"] * self.words + ["---:"] * (len(self.columns) - self.words)
+        rows = (self.columns, rule, *self.rows)
+        return "".join("| " + " | ".join(map(_markdown_cell, row)) + " |\n" for row in rows)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Groups in the order of their values, numbers as numbers before texts, and None (not known) at the end."""
+
+    by: tuple[str, ...]
+    groups: tuple[Group, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """The summary as plain data: numbers as they were, all quantiles, all outcomes and verdicts."""
+        return {
+            "by": list(self.by),
+            "groups": [
+                {
+                    "group": dict(zip(self.by, group.values, strict=True)),
+                    "tasks": group.tasks,
+                    "missing": group.missing,
+                    "outcomes": dict(group.outcomes),
+                    "verdicts": dict(group.verdicts),
+                    "numbers": {name: numbers.to_json() for name, numbers in group.numbers.items()},
+                    "flags": {name: {"true": true, "false": false} for name, (true, false) in group.flags.items()},
+                }
+                for group in self.groups
+            ],
+        }
+
+    def counts(self, digits: int | None = None) -> Table:
+        """What became of the tasks of each group; what never happened has no column. For `digits`, see `tables`."""
+        kinds: dict[str, list[int]] = {"missing": [group.missing for group in self.groups]}
+        for outcome in Outcome:
+            kinds[outcome] = [group.outcomes[outcome] for group in self.groups]
+        for verdict in sorted({verdict for group in self.groups for verdict in group.verdicts}, key=_place_of_verdict):
+            kinds[verdict] = [group.verdicts.get(verdict, 0) for group in self.groups]
+        seen = {name: counts for name, counts in kinds.items() if any(counts)}
+        rows = (
+            (*_texts(group.values, digits), str(group.tasks), *(str(counts[place]) for counts in seen.values()))
+            for place, group in enumerate(self.groups)
+        )
+        return Table("tasks", (*self.by, "tasks", *seen), tuple(rows), len(self.by))
+
+    def numbers(self, digits: int | None = None) -> Table:
+        """Five quantiles of each number in each group; `same` says that all values are equal."""
+        rows = (
+            (
+                *_texts((*group.values, name), digits),
+                str(numbers.n),
+                "yes" if numbers.is_same else "no",
+                *_texts([numbers.quantiles[key] for key in _SHOWN], digits),
+            )
+            for group in self.groups
+            for name, numbers in group.numbers.items()
+        )
+        return Table("numbers", (*self.by, "name", "n", "same", *_SHOWN.values()), tuple(rows), len(self.by) + 1)
+
+    def flags(self, digits: int | None = None) -> Table:
+        """How often each entry that is true or false was which, in each group."""
+        rows = (
+            (*_texts((*group.values, name), digits), str(true), str(false))
+            for group in self.groups
+            for name, (true, false) in group.flags.items()
+        )
+        return Table("true or false", (*self.by, "name", "true", "false"), tuple(rows), len(self.by) + 1)
+
+    def tables(self, digits: int | None = None) -> list[Table]:
+        """The tables that have rows, the counts always. With `digits`, for the eye: floats have so many significant
+        digits, and texts that are longer than 24 characters are cut, numbers among them to an approximation (~).
+        """
+        return [self.counts(digits), *(table for table in (self.numbers(digits), self.flags(digits)) if table.rows)]
+
+    def lines(self) -> Iterator[str]:
+        """The tables, tabs between the cells and an empty line between the tables; nothing is shortened."""
+        for place, table in enumerate(self.tables()):
+            if place:
+                yield ""
+            yield from table.lines()
+
+    def markdown(self, digits: int | None = 6) -> str:
+        """The tables for a Markdown file."""
+        return "\n".join(table.markdown() for table in self.tables(digits))
+
+
+def summarise(
+    rows: Iterable[Row], by: Sequence[str] = (), values: Sequence[str] | None = None, *, stable: bool = False
+) -> Summary:
+    """Group rows by the values of what `by` names, count, and take the quantiles of the numbers.
+
+    A name in `by` is one of task, experiment, system, document, outcome, verdict; an option; a part of the recipe (m,
+    parameters.a); an entry of the result (dimension, heights.max): the first of these that the row has. option.seed,
+    family.seed and result.seed say which. Rows without it make a group of their own, with the value None.
+
+    Numbers are the integers, floats and texts such as "7/3" or "21.2031" of the results, and seconds and peak_memory of
+    all records unless `stable`; `values` names those to be kept. An entry of a result with a name of these two is
+    result.seconds.
+
+    Rows are read once. Exact quantiles need all values, so these are kept: 8 bytes for a float, some hundred for any
+    other value, equal ones once. A million rows are well within reach.
+
+    >>> from kahanmaps.experiments.records import Record, Task
+    >>> def row(number, m, height):
+    ...     task = Task("orbit", {"family": {"m": m}}, {})
+    ...     return Row("e", number, task, Record(task.key, Outcome.OK, {"height": height}))
+    >>> found = summarise([row(0, 10, "7/3"), row(1, 2, 3), row(2, 10, "2.5")], ["m"], stable=True)
+    >>> print("\\n".join(found.lines()).expandtabs(8))
+    m       tasks   ok
+    2       1       1
+    10      2       2
+    <BLANKLINE>
+    m       name    n       same    min     5 %     median  95 %    max
+    2       height  1       yes     3       3       3       3       3
+    10      height  2       no      7/3     7/3     7/3     2.5     2.5
+    """
+    by = tuple(dict.fromkeys(by))
+    wanted = None if values is None else frozenset(values)
+    gathering: dict[tuple[Any, ...], _Gathering] = {}
+    names, longer, numeric = set(_WORDS), set[str](), set(() if stable else OF_THE_RUN)
+    full_names: dict[Entry, tuple[str, str]] = {}  # thousands of rows have the same few entries
+    has_results = False
+    for row in rows:
+        found = list(entries(row))
+        for entry, _ in found:
+            if entry not in full_names:
+                full_names[entry] = (entry.name, entry.full_name)
+                names.add(entry.name)
+                longer.add(entry.full_name)
+        place = _place(row, by, found, full_names)
+        identity = tuple(key for key, _ in place)
+        group = gathering.get(identity)
+        if group is None:
+            group = gathering[identity] = _Gathering(tuple(value for _, value in place))
+        group.add(row)
+        if row.record is None:
+            continue
+        has_results = has_results or row.record.result is not None
+        measured = [] if stable else [(name, getattr(row.record, name)) for name in OF_THE_RUN]
+        for entry, value in found:
+            if entry.section == "result":
+                short, full = full_names[entry]
+                measured.append((full if short in OF_THE_RUN else short, value))
+        for name, value in measured:
+            if _is_number(value):
+                numeric.add(name)
+                if wanted is None or name in wanted:
+                    group.measure(name, value)
+    if gathering:  # nobody can tell a mistaken name in nothing
+        for name in by:
+            if name not in longer:
+                _must_exist(name, names, "to group by" if has_results else "to group by (there is no result yet)")
+        for name in values or ():
+            _must_exist(name, numeric, "of numbers")
+    ordered = sorted(gathering.items(), key=lambda item: item[0])
+    return Summary(by, tuple(group.finish() for _, group in ordered))
+
+
+class _Values:
+    """All values of one number in a group."""
+
+    def __init__(self) -> None:
+        self._floats = array("d")
+        self._others: Counter[int | str] = Counter()
+
+    def add(self, value: Number) -> None:
+        if isinstance(value, float):
+            self._floats.append(value)
+        else:
+            self._others[value] += 1
+
+    def finish(self) -> Numbers:
+        """The quantiles, by one sort.
+
+        Values are sorted by their floats, for speed: rounding never turns an order round, and the exact numbers decide
+        between equal floats. Of several texts for one number the shortest comes first.
+        """
+        others = []
+        for other, count in self._others.items():
+            exact, text = Fraction(other), str(other)
+            others.append((_approximate(exact), exact, len(text), text, other, count))
+        others.sort(key=lambda other: other[:4])
+        floats = ((value, value, 0, "", value, 1) for value in sorted(self._floats))
+        n = len(self._floats) + self._others.total()
+        ahead = [(name, -(-percent * n // 100)) for name, percent in reversed(QUANTILES.items())]
+        quantiles: dict[str, Number] = {}
+        passed = 0
+        for *_, value, count in merge(others, floats):
+            passed += count
+            while ahead and ahead[-1][1] <= passed:
+                quantiles[ahead.pop()[0]] = value
+        return Numbers(n, quantiles, Fraction(quantiles["min"]) == Fraction(quantiles["max"]))
+
+
+@dataclass
+class _Gathering:
+    """A group while rows come in."""
+
+    values: tuple[Any, ...]
+    tasks: int = 0
+    missing: int = 0
+    outcomes: Counter[str] = field(default_factory=Counter)
+    verdicts: Counter[str] = field(default_factory=Counter)
+    numbers: dict[str, _Values] = field(default_factory=dict)
+    flags: dict[str, list[int]] = field(default_factory=dict)
+
+    def add(self, row: Row) -> None:
+        self.tasks += 1
+        if row.record is None:
+            self.missing += 1
+            return
+        self.outcomes[row.record.outcome] += 1
+        if row.record.verdict is not None:
+            self.verdicts[row.record.verdict] += 1
+
+    def measure(self, name: str, value: Any) -> None:
+        if isinstance(value, bool):
+            self.flags.setdefault(name, [0, 0])[not value] += 1
+        else:
+            if name not in self.numbers:
+                self.numbers[name] = _Values()
+            self.numbers[name].add(value)
+
+    def finish(self) -> Group:
+        verdicts = sorted({*VERDICTS, *self.verdicts}, key=_place_of_verdict)
+        return Group(
+            self.values,
+            self.tasks,
+            self.missing,
+            {str(outcome): self.outcomes[outcome] for outcome in Outcome},
+            {verdict: self.verdicts[verdict] for verdict in verdicts},
+            {name: self.numbers[name].finish() for name in sorted(self.numbers, key=lambda n: (n in OF_THE_RUN, n))},
+            {name: (true, false) for name, (true, false) in sorted(self.flags.items())},
+        )
+
+
+def _place(
+    row: Row, by: Sequence[str], found: Sequence[tuple[Entry, Any]], full_names: Mapping[Entry, tuple[str, str]]
+) -> list[tuple[Any, Any]]:
+    """For each name in `by`: what the row is sorted and recognised by, and its value."""
+    if not by:
+        return []
+    values: dict[str, Any] = {}
+    # Backwards, so that the first to have a name keeps it: options, the recipe, the result.
+    for section in ("result", "system", "option"):
+        for entry, value in found:
+            if entry.section == section:
+                values.update((name, value) for name in full_names[entry] if name in by)
+    place = []
+    for name in by:
+        if name in _WORDS:
+            word = _word(row, name)
+            place.append(((2, word) if word is not None else (3,), word))
+        else:
+            place.append((_order(values.get(name)), values.get(name)))
+    return place
+
+
+def _word(row: Row, name: str) -> str | None:
+    match name:
+        case "task":
+            return row.task.kind
+        case "experiment":
+            return row.experiment
+        case "system":
+            return None if row.task.system is None else canonical(row.task.system)
+        case "document":
+            return (row.task.system or {}).get("document")
+        case "outcome":
+            return None if row.record is None else str(row.record.outcome)
+    return None if row.record is None else row.record.verdict
+
+
+def _order(value: Any) -> tuple[Any, ...]:
+    """A key by which values are sorted, the same for equal values only: numbers, false and true, texts, None.
+
+    >>> sorted([None, "x", 10, "1/7", True, "0.5", 2, "1/10"], key=_order)
+    ['1/10', '1/7', '0.5', 2, 10, True, 'x', None]
+    """
+    if value is None:
+        return (3,)
+    if isinstance(value, bool):
+        return 1, value
+    if _is_number(value):
+        return 0, Fraction(value)
+    return 2, plain(value)
+
+
+def _is_number(value: Any) -> bool:
+    if isinstance(value, str):
+        return len(value) <= _LONGEST_NUMBER and NUMBER.fullmatch(value) is not None
+    if isinstance(value, float):
+        return isfinite(value)
+    return isinstance(value, int)  # true and false among them: who cares asks for them first
+
+
+def _approximate(exact: Fraction) -> float:
+    try:
+        return float(exact)
+    except OverflowError:
+        return inf if exact > 0 else -inf
+
+
+def _must_exist(name: str, known: set[str], what: str) -> None:
+    if name in known:
+        return
+    close = difflib.get_close_matches(name, sorted(known), _RELATED)
+    meant = f", did you mean {' or '.join(close)}?" if close else ";"
+    listed = sorted(known)
+    more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
+    raise InputError(f"found the unknown name {name!r}{meant} names {what}: {', '.join(listed[:_LISTED])}{more}")
+
+
+def _place_of_verdict(verdict: str) -> tuple[int, str]:
+    return (VERDICTS.index(verdict) if verdict in VERDICTS else len(VERDICTS)), verdict
+
+
+def _texts(values: Iterable[Any], digits: int | None) -> list[str]:
+    return [plain(value) if digits is None else _shortened(value, digits) for value in values]
+
+
+def _shortened(value: Any, digits: int, longest: int = 24) -> str:
+    """A value as text for the eye.
+
+    >>> _shortened(0.123456789, 4), _shortened("7/3", 4), _shortened("1" * 30 + "/7", 4)
+    ('0.1235', '7/3', '~1.587e+28')
+    """
+    if isinstance(value, float):
+        return f"{value:.{digits}g}"
+    text = plain(value)
+    if len(text) <= longest:
+        return text
+    if _is_number(value) and 0 < abs(approximation := _approximate(Fraction(value))) < inf:
+        return f"~{approximation:.{digits}g}"
+    return text[: longest - 3] + "..."
+
+
+def _markdown_cell(text: str) -> str:
+    return " ".join(text.replace("\\", "\\\\").replace("|", "\\|").split())

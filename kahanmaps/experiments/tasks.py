@@ -1,0 +1,315 @@
+"""The tasks that the library has. One function is one task; `registry.task` says what its signature means.
+
+Results are small: counts, verdicts, numbers, and what a refutation needs to be believed. `report = true` keeps all that
+`--json` would print.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from hashlib import sha256
+from typing import Any
+
+from kahanmaps.algebra.fields import GF, QQ, RR, Field
+from kahanmaps.algebra.text import format_number
+from kahanmaps.checks.claims import Report, Verdict
+from kahanmaps.checks.commute import check_commute
+from kahanmaps.checks.conserve import check_integrals
+from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
+from kahanmaps.checks.preserve import check_measure, check_poisson
+from kahanmaps.checks.settings import Settings, random_starts
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, task
+from kahanmaps.family.cubics import cubic_space
+from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.invariants.heights import height_growth
+from kahanmaps.maps.integer_steps import IntegerPoint
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.methods import choose_method
+from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitPoint
+from kahanmaps.maps.periods import period_of
+from kahanmaps.systems.files import SystemFile
+
+_LONGEST_POINT = 400  # characters of a last point that are kept; longer ones are known by their hash
+
+
+@task("check-commute", needs=MEMBER_OR_OTHER)
+def commute(
+    system: SystemFile,
+    other: SystemFile | None = None,
+    eps: Any = None,
+    eps2: Any = None,
+    start: Any = None,
+    steps: int = 10,
+    seed: int = 0,
+    error_bits: int = DEFAULT_ERROR_BITS,
+    max_digits: int | None = None,
+    report: bool = False,
+) -> Result:
+    """Do two Kahan maps commute, or all rational associated maps of a member of the family?"""
+    settings = _settings(eps, start, steps, seed, error_bits, max_digits)
+    return _of_report(check_commute(system, other, settings, eps2), report)
+
+
+@task("check-integrals")
+def integrals(
+    system: SystemFile,
+    eps: Any = None,
+    start: Any = None,
+    steps: int = 10,
+    seed: int = 0,
+    error_bits: int = DEFAULT_ERROR_BITS,
+    max_digits: int | None = None,
+    report: bool = False,
+) -> Result:
+    """Are the known or claimed integrals conserved?"""
+    return _of_report(check_integrals(system, _settings(eps, start, steps, seed, error_bits, max_digits)), report)
+
+
+@task("check-measure")
+def measure(
+    system: SystemFile,
+    eps: Any = None,
+    start: Any = None,
+    steps: int = 10,
+    seed: int = 0,
+    error_bits: int = DEFAULT_ERROR_BITS,
+    max_digits: int | None = None,
+    report: bool = False,
+) -> Result:
+    """Is the measure dx/phi invariant?"""
+    return _of_report(check_measure(system, _settings(eps, start, steps, seed, error_bits, max_digits)), report)
+
+
+@task("check-poisson")
+def poisson(
+    system: SystemFile,
+    eps: Any = None,
+    start: Any = None,
+    steps: int = 10,
+    seed: int = 0,
+    error_bits: int = DEFAULT_ERROR_BITS,
+    max_digits: int | None = None,
+    report: bool = False,
+) -> Result:
+    """Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?"""
+    return _of_report(check_poisson(system, _settings(eps, start, steps, seed, error_bits, max_digits)), report)
+
+
+@task("verify", needs=MEMBER)
+def verify_member(
+    system: SystemFile,
+    eps: Any = None,
+    sections: tuple[int, ...] | None = None,
+    order: int = 3,
+    ball_bits: int | None = None,
+    controls: bool = False,
+    seed: int = 0,
+    error_bits: int = DEFAULT_ERROR_BITS,
+    report: bool = False,
+) -> Result:
+    """Every statement of the paper, for one member of the family."""
+    from kahanmaps.paper.examiner import VerifyOptions
+    from kahanmaps.paper.verify import verify
+
+    settings = Settings(eps=eps, seed=seed, error_bits=error_bits)
+    return _of_report(verify(system, settings, VerifyOptions(sections, order, ball_bits, controls)), report)
+
+
+@task("verify-universal")
+def verify_in_general(
+    m: int,
+    sections: tuple[int, ...] | None = None,
+    order: int = 3,
+    controls: bool = False,
+    seed: int = 0,
+    error_bits: int = DEFAULT_ERROR_BITS,
+    report: bool = False,
+) -> Result:
+    """Every statement of the paper, for the member in general."""
+    from kahanmaps.paper.examiner import VerifyOptions
+    from kahanmaps.paper.verify import verify_universal
+
+    settings = Settings(seed=seed, error_bits=error_bits)
+    return _of_report(verify_universal(m, settings, VerifyOptions(sections, order, None, controls)), report)
+
+
+@task("family-space", needs=MEMBER)
+def family_space(system: SystemFile) -> Result:
+    """The space of cubics that belong to A, and how many associated systems there are."""
+    member = _member(system)
+    space = cubic_space(member.A, member.variables)
+    return {
+        "m": member.m,
+        "dimension": space.dimension,
+        "expected": space.expected,
+        "rank": space.rank,
+        "unknowns": space.unknowns,
+        "factors": [str(factor) for factor in member.factors],
+        "generic": member.is_generic,
+        "associated": 2 ** (len(member.factors) - 1),
+    }
+
+
+@task("orbit")
+def orbit(
+    system: SystemFile,
+    eps: Any,
+    steps: int = 100,
+    start: Any = None,
+    at: tuple[int, ...] | None = None,
+    arithmetic: str = "exact",
+    method: str | None = None,
+    max_digits: int = DEFAULT_MAX_DIGITS,
+    seed: int = 0,
+) -> Result:
+    """A summary of an orbit: how it ended, its period, how long its numbers are, its last point."""
+    point = start if start is not None else next(random_starts(system.system.dim, seed))
+    kind, _, number = arithmetic.partition(":")
+    if kind == "float":
+        if at is not None:
+            raise InputError("iterates reached directly (at) need exact, mod:P or ball:BITS arithmetic")
+        return {"start": _text(point), **_float_orbit(system, eps, point, steps, method)}
+    field: Field = QQ if kind == "exact" else GF(int(number)) if kind == "mod" else RR(int(number))
+    kahan = KahanMap(system.system, eps, field)
+    structure = NoStructure("as asked for") if method == "generic" else _structure(system)
+    chosen = choose_method(method, kind, structure, at)
+    walk: Orbit | Iterates
+    if chosen.name == "jump" and isinstance(structure, Structure):
+        walk = Iterates(kahan, point, at or (), structure=structure, max_digits=max_digits)
+    else:
+        used = structure if chosen.name == "normal-form" and isinstance(structure, Structure) else None
+        walk = Orbit(kahan, point, max(at) if at else steps, max_digits=max_digits, structure=used)
+    first = kahan.point(point)
+    last = OrbitPoint(0, field, IntegerPoint.from_rationals(first) if field is QQ else first)
+    for reached in walk:
+        last = reached
+    end = walk.end
+    if end is None:
+        raise AssertionError("an orbit ended without saying how")
+    result: Result = {
+        "start": _text(point),
+        "method": chosen.name,
+        "status": end.status,
+        "reached": end.steps,
+        "ending": end.message,
+        "period": end.period,
+        **_last(",".join(last.text)),
+    }
+    if field is QQ:
+        result["digits"] = last.digits
+    return result
+
+
+def _float_orbit(system: SystemFile, eps: Any, start: Any, steps: int, method: str | None) -> Result:
+    from kahanmaps.maps.fast import FloatOrbit
+
+    structure = NoStructure("as asked for") if method == "generic" else _structure(system)
+    if isinstance(structure, Structure) and structure.T is not None:
+        structure = NoStructure("in machine numbers only J = [[0, I], [-I, 0]] has one")
+    chosen = choose_method(method, "float", structure, None)
+    form = structure.form if chosen.name == "normal-form" and isinstance(structure, Structure) else None
+    walk = FloatOrbit(system.system, eps, start, steps, form=form)
+    last = ""
+    for _, x in walk:
+        last = ",".join(map(repr, x.tolist()))
+    end = walk.end
+    if end is None:
+        raise AssertionError("an orbit ended without saying how")
+    return {
+        "method": chosen.name,
+        "status": end.status,
+        "reached": end.steps,
+        "ending": end.message,
+        **_last(last),
+    }
+
+
+@task("heights")
+def heights(
+    system: SystemFile,
+    eps: Any,
+    steps: int = 60,
+    every: int = 1,
+    start: Any = None,
+    max_digits: int = DEFAULT_MAX_DIGITS,
+    seed: int = 0,
+) -> Result:
+    """How fast the numbers of an orbit grow: the kind of growth, and its constant."""
+    point = start if start is not None else next(random_starts(system.system.dim, seed))
+    structure = _structure(system)
+    growth = height_growth(
+        KahanMap(system.system, eps), point, steps, structure=structure, every=every, max_digits=max_digits
+    )
+    found = growth.to_json()
+    return {
+        "start": _text(point),
+        "growth": found.pop("kind"),
+        "reached": found.pop("steps"),
+        "ending": found.pop("message"),
+        **{name: value for name, value in found.items() if name != "every"},
+    }
+
+
+@task("period")
+def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = None, seed: int = 0) -> Result:
+    """The exact period of an orbit of a member of the family, modulo a prime or over the rationals."""
+    structure = _structure(system)
+    if isinstance(structure, NoStructure):
+        raise InputError(f"no period of {system.name} can be computed: {structure.reason}")
+    point = start if start is not None else next(random_starts(system.system.dim, seed))
+    found = period_of(structure, eps, point, prime)
+    return {
+        "start": _text(point),
+        "status": found.status,
+        "period": None if found.period is None else str(found.period),
+        "meets_pole": found.meets_pole,
+        "planes": [plane.text for plane in found.planes],
+    }
+
+
+def _settings(eps: Any, start: Any, steps: int, seed: int, error_bits: int, max_digits: int | None) -> Settings:
+    return Settings(eps=eps, start=start, steps=steps, seed=seed, error_bits=error_bits, max_digits=max_digits)
+
+
+def _of_report(report: Report, whole: bool) -> Result:
+    """The verdict, how many claims have which, and every claim that does not hold, with its witness."""
+    counted = [finding for finding in report.findings if finding.applies and not finding.control]
+    counts = Counter(finding.verdict for finding in counted)
+    controls = [finding for finding in report.findings if finding.control]
+    result: Result = {
+        "verdict": str(report.verdict),
+        "claims": len(counted),
+        **{str(verdict): counts[verdict] for verdict in Verdict},
+        "controls": len(controls),
+        "controls_refuted": sum(finding.verdict is Verdict.REFUTED for finding in controls),
+        "ended_early": report.ended_early,
+    }
+    if "m" in report.context:
+        result["m"] = report.context["m"]
+    doubtful = [f for f in counted if f.verdict in (Verdict.REFUTED, Verdict.UNDECIDED)]
+    if doubtful:
+        result["doubtful"] = [finding.to_json() for finding in doubtful]
+    if whole:
+        result["report"] = report.to_json()
+    return result
+
+
+def _member(system: SystemFile) -> Any:
+    if system.member is None:
+        raise InputError(f"{system.name} is of kind [{system.kind}], expected one of kind [family]")
+    return system.member
+
+
+def _structure(system: SystemFile) -> Structure | NoStructure:
+    return structure_of(system.system, system.hamiltonian, system.member)
+
+
+def _text(point: Any) -> str:
+    return ",".join(format_number(entry) for entry in point)
+
+
+def _last(text: str) -> Result:
+    """A point as it is if it is short, and its hash, which tells whether two computations agree."""
+    shown = {"last": text} if len(text) <= _LONGEST_POINT else {}
+    return {**shown, "last_sha256": sha256(text.encode()).hexdigest()}

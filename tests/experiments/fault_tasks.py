@@ -1,0 +1,112 @@
+"""Tasks that go wrong, for tests of the machinery: KAHANMAPS_TASKS=fault_tasks brings them in.
+
+`prime` says what happens, `seed` when: the odd ones go wrong, the even ones are done.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+import time
+from typing import Any
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.registry import task
+
+
+@task("fault")
+def fault(arithmetic: str = "exact", seed: int = 0, order: int = 1, report: bool = False) -> dict[str, Any]:
+    """Go wrong in the way that `order` names, where the seed is odd."""
+    if seed % 2 == 0:
+        return {"seed_squared": seed**2, "verdict": "proved"}
+    return FAULTS[order]()
+
+
+@task("pause")
+def pause(steps: int = 0, seed: int = 0) -> dict[str, Any]:
+    """Sleep for so many milliseconds."""
+    time.sleep(steps / 1000)
+    return {"seed_squared": seed**2, "verdict": "proved" if seed % 3 else "refuted"}
+
+
+def _kill(number: int) -> dict[str, Any]:
+    print(f"about to die of {number}", file=sys.stderr, flush=True)
+    os.kill(os.getpid(), number)
+    time.sleep(60)
+    return {}
+
+
+def _segfault() -> dict[str, Any]:
+    ctypes.string_at(0)
+    return {}
+
+
+def _hang() -> dict[str, Any]:
+    signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())  # like a long call of FLINT
+    while True:
+        time.sleep(60)
+
+
+def _python_bomb() -> dict[str, Any]:
+    hoard = []
+    while True:
+        hoard.append(bytearray(1 << 20))
+
+
+def _flint_bomb() -> dict[str, Any]:
+    from flint import fmpz_mat
+
+    hoard = []
+    while True:
+        hoard.append(fmpz_mat(3000, 3000))
+
+
+def _gmp_bomb() -> dict[str, Any]:
+    from flint import fmpz
+
+    return {"bits": (fmpz(1) << 400_000_000_000).bit_length()}
+
+
+def _input_error() -> dict[str, Any]:
+    raise InputError("found nothing, expected something")
+
+
+def _bug() -> dict[str, Any]:
+    return {"quotient": 1 // 0}
+
+
+def _not_a_number() -> dict[str, Any]:
+    return {"value": float("nan")}
+
+
+def _chatter() -> dict[str, Any]:
+    print("noise on standard output")
+    sys.stderr.write("x" * 300_000 + "the end of the noise\n")
+    return {"said": "much"}
+
+
+def _exit() -> dict[str, Any]:
+    os._exit(7)
+
+
+def _large() -> dict[str, Any]:
+    return {"digits": "7" * 3_000_000}
+
+
+FAULTS = {
+    1: lambda: _kill(signal.SIGKILL),
+    2: lambda: _kill(signal.SIGABRT),
+    3: _segfault,
+    4: _hang,
+    5: _python_bomb,
+    6: _flint_bomb,
+    7: _gmp_bomb,
+    8: _input_error,
+    9: _bug,
+    10: _not_a_number,
+    11: _chatter,
+    12: _exit,
+    13: _large,
+}

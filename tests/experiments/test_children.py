@@ -1,0 +1,271 @@
+"""Child processes: whatever a task does to its child, the others are done and it gets the right record.
+
+The tasks that go wrong are in fault_tasks.py. Negative controls: even seeds, which are done.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from kahanmaps.experiments.children import ChildrenError, LocalChildren
+from kahanmaps.experiments.records import Job, Limits, Outcome, Record, Task
+from kahanmaps.experiments.run import Batch
+from kahanmaps.systems.catalog import load
+
+HERE = Path(__file__).parent
+KILL, ABORT, SEGFAULT, HANG, PYTHON_BOMB, FLINT_BOMB, GMP_BOMB = range(1, 8)
+INPUT_ERROR, BUG, NOT_A_NUMBER, CHATTER, EXIT, LARGE = range(8, 14)
+
+
+@pytest.fixture(autouse=True)
+def _fault_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
+    monkeypatch.setenv("PYTHONPATH", str(HERE))
+
+
+def fault(order: int, seed: int = 1, limits: Limits | None = None) -> Job:
+    return Job(Task("fault", None, {"order": order, "seed": seed}), limits or Limits(20.0, 400_000_000))
+
+
+def pause(milliseconds: int, seed: int = 0, limits: Limits | None = None) -> Job:
+    return Job(Task("pause", None, {"steps": milliseconds, "seed": seed}), limits or Limits(20.0))
+
+
+def done(jobs: list[Job], children: int = 2, **settings: float) -> dict[str, Record]:
+    """The records by key; every job has one and only one."""
+    found: list[Record] = []
+    for records in Batch(jobs, LocalChildren(children, {}.__getitem__, **settings)):
+        found += records
+    assert sorted(record.key for record in found) == sorted(job.task.key for job in jobs)
+    return {record.key: record for record in found}
+
+
+def outcome_of(job: Job, **settings: float) -> Record:
+    """The record of a job among others that are done."""
+    others = [fault(1, seed) for seed in range(0, 8, 2)]
+    records = done([*others[:2], job, *others[2:]], **settings)
+    assert all(records[other.task.key].is_ok for other in others)
+    return records[job.task.key]
+
+
+@pytest.mark.parametrize(
+    ("order", "outcome", "message"),
+    [
+        (KILL, Outcome.CRASHED, "signal 9 (SIGKILL)"),
+        (ABORT, Outcome.CRASHED, "signal 6 (SIGABRT)"),
+        (SEGFAULT, Outcome.CRASHED, "signal 11 (SIGSEGV)"),
+        (EXIT, Outcome.CRASHED, "ended with status 7"),
+        (PYTHON_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
+        (FLINT_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
+        (GMP_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
+        (INPUT_ERROR, Outcome.FAILED, "found nothing, expected something"),
+        (BUG, Outcome.FAILED, "ZeroDivisionError"),
+        (NOT_A_NUMBER, Outcome.FAILED, "the result cannot be kept"),
+        (CHATTER, Outcome.OK, ""),
+        (LARGE, Outcome.OK, ""),
+    ],
+)
+def test_what_a_task_does_to_its_child_is_told_of_this_task_alone(order: int, outcome: Outcome, message: str):
+    record = outcome_of(fault(order))
+    assert record.outcome is outcome
+    assert message in record.message
+    assert (record.result is None) == (outcome is not Outcome.OK)
+
+
+def test_a_child_that_hangs_is_killed_when_its_time_is_over():
+    begin = time.monotonic()
+    record = outcome_of(fault(HANG, limits=Limits(time=0.5)))
+    assert record.outcome is Outcome.TIMEOUT
+    assert record.message == "not done within 0.5 seconds"
+    assert time.monotonic() - begin < 10
+
+
+def test_the_time_of_one_task_is_not_that_of_its_group():
+    records = done([pause(300, seed, Limits(time=1.0)) for seed in range(6)], children=1)
+    assert all(record.is_ok for record in records.values())  # 1.8 seconds in one child
+
+
+def test_without_limits_a_task_may_take_its_time():
+    assert outcome_of(pause(700, limits=Limits())).is_ok
+
+
+def test_the_end_of_what_a_dying_child_printed_is_kept():
+    assert outcome_of(fault(KILL)).stderr == "about to die of 9"
+    assert "Unable to allocate memory" in outcome_of(fault(FLINT_BOMB)).stderr
+
+
+def test_what_a_bug_leaves_is_the_end_of_its_traceback():
+    assert outcome_of(fault(BUG)).stderr.rstrip().endswith("ZeroDivisionError: integer division or modulo by zero")
+
+
+def test_what_is_printed_does_not_get_into_the_answers():
+    assert outcome_of(fault(CHATTER)).result == {"said": "much"}
+
+
+def test_answers_of_megabytes_come_whole():
+    result = outcome_of(fault(LARGE)).result
+    assert result is not None
+    assert result["digits"] == "7" * 3_000_000
+
+
+def test_a_child_serves_many_short_tasks_and_is_replaced_after_some_seconds_of_work():
+    jobs = [pause(20, seed) for seed in range(30)]
+    begin = time.monotonic()
+    done(jobs, children=1)
+    grouped = time.monotonic() - begin
+    begin = time.monotonic()
+    done(jobs[:10], children=1, group_seconds=0.0)  # a child for each
+    assert (time.monotonic() - begin) / 10 > grouped / 30
+
+
+def test_a_crash_does_not_depend_on_what_the_child_did_before():
+    alone = done([fault(ABORT)], children=1)
+    among = done([fault(ABORT, 2), fault(ABORT, 4), fault(ABORT)], children=1)
+    key = fault(ABORT).task.key
+    assert (alone[key].outcome, alone[key].message) == (among[key].outcome, among[key].message)
+
+
+def test_a_child_that_somebody_kills_once_costs_no_task():
+    """A task that kills its child the first time only: it is tried again alone, and done."""
+    jobs = [pause(1500, seed) for seed in range(2)]
+    children = LocalChildren(2, {}.__getitem__)
+    for job in jobs:
+        children.submit(job)
+    children.wait(1.0)
+    victims = [child.process.pid for child in children._children]
+    os.kill(victims[0], 9)
+    records = []
+    while children.in_flight:
+        records += children.wait(5.0)
+    children.close()
+    assert sorted(record.key for record in records) == sorted(job.task.key for job in jobs)
+    assert all(record.is_ok for record in records)
+
+
+def test_at_most_so_many_children_work_at_a_time():
+    children = LocalChildren(2, {}.__getitem__)
+    try:
+        assert children.is_free
+        children.submit(pause(200, 1))
+        children.submit(pause(200, 2))
+        assert not children.is_free
+        assert children.in_flight == 2
+        assert len(children._children) == 2
+    finally:
+        children.close()
+
+
+def test_waiting_ends_after_its_timeout():
+    children = LocalChildren(1, {}.__getitem__)
+    children.submit(pause(5_000))
+    begin = time.monotonic()
+    assert children.wait(0.3) == []
+    assert 0.2 < time.monotonic() - begin < 2
+    children.close()
+
+
+def test_closing_kills_what_is_in_flight_and_may_be_done_twice():
+    children = LocalChildren(2, {}.__getitem__)
+    children.submit(fault(HANG))
+    children.submit(pause(60_000))
+    children.wait(0.8)
+    pids = [child.process.pid for child in children._children]
+    children.close()
+    children.close()
+    assert all(not is_running(pid) for pid in pids)
+
+
+def test_systems_reach_the_child_by_their_documents():
+    from kahanmaps.experiments.recipes import recipe_of
+
+    documents: dict[str, str] = {}
+    recipe = recipe_of(load("euler_top"), documents)
+    task = Task("orbit", recipe, {"eps": "1/10", "steps": 3, "start": "1,2,3"})
+    (records,) = filter(None, Batch([Job(task)], LocalChildren(1, documents.__getitem__)))
+    assert records[0].result is not None
+    assert records[0].result["reached"] == 3
+
+
+def test_a_record_says_where_and_with_what():
+    (record,) = done([pause(50)]).values()
+    assert record.host
+    assert set(record.versions) == {"kahanmaps", "python", "python-flint", "flint"}
+    assert record.finished.endswith("+00:00")
+    assert 0.05 <= record.seconds < 5
+    assert record.peak_memory is None or record.peak_memory > 10_000_000
+
+
+def test_children_that_cannot_start_are_told_once(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("KAHANMAPS_TASKS", "no_such_module_anywhere")
+    with pytest.raises(ChildrenError, match="no_such_module_anywhere"):
+        done([pause(1, seed) for seed in range(5)])
+
+
+def test_an_interpreter_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(sys, "executable", "/no/such/python")
+    with pytest.raises(ChildrenError, match="cannot be started: No such file"):
+        done([pause(1)])
+
+
+def test_no_result_depends_on_the_order_of_sets(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("PYTHONHASHSEED", "123")
+    child = LocalChildren(1, {}.__getitem__)
+    child.submit(pause(2000))
+    (pid,) = [one.process.pid for one in child._children]
+    environ = Path(f"/proc/{pid}/environ")
+    if not environ.exists():
+        child.close()
+        pytest.skip("needs /proc")
+    child.wait(0.5)
+    assert b"PYTHONHASHSEED=0" in environ.read_bytes().split(b"\0")
+    child.close()
+
+
+@pytest.fixture
+def parent() -> Iterator[subprocess.Popen[str]]:
+    """A process with two children, one hanging as in a long call of FLINT, whose numbers it prints."""
+    code = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from kahanmaps.experiments.children import LocalChildren
+from test_children import fault, pause, HANG
+children = LocalChildren(2, {}.__getitem__)
+children.submit(fault(HANG)); children.submit(pause(60_000))
+children.wait(1.5)
+print(*(child.process.pid for child in children._children), flush=True)
+children.wait(60)
+"""
+    process = subprocess.Popen([sys.executable, "-c", code, str(HERE)], stdout=subprocess.PIPE, text=True)
+    yield process
+    process.kill()
+    process.communicate()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a child ends when its task does")
+def test_no_child_outlives_a_parent_that_is_killed(parent: subprocess.Popen[str]):
+    assert parent.stdout is not None
+    pids = [int(word) for word in parent.stdout.readline().split()]
+    assert len(pids) == 2
+    assert all(map(is_running, pids))
+    parent.kill()
+    parent.wait()
+    deadline = time.monotonic() + 5
+    while any(map(is_running, pids)) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not any(map(is_running, pids))
+
+
+def is_running(pid: int) -> bool:
+    """Whether there is such a process, not counting the dead that nobody has looked at yet."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"

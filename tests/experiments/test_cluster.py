@@ -1,0 +1,605 @@
+"""Tasks on a dask cluster: every record comes back exactly once, whatever dies on the way, and nothing hangs.
+
+Schedulers and workers are real ones, on 127.0.0.1. What the workers run is a script that reads and prints what the
+group command does, and misbehaves where a task asks it to.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import Counter
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments import cluster
+from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
+from kahanmaps.experiments.records import Job, Limits, Outcome, Task
+
+pytest.importorskip("distributed")
+
+# What a task asks for is in its options: `sleep` seconds, `claim` other seconds than it took, `die` with a signal,
+# `leave` with a status, `once` only where this file is not there yet, `size` of the result, `twice` printed.
+GROUP = """
+import hashlib, json, os, sys, time
+read = json.load(sys.stdin)
+for job in read["jobs"]:
+    options = json.loads(job["task"])["options"]
+    once = options.get("once")
+    if once is None or not os.path.exists(once):
+        if once is not None:
+            open(once, "x").close()
+        if "die" in options:
+            sys.stderr.write("x" * 5000 + "the last words")
+            sys.stderr.flush()
+            os.kill(os.getpid(), options["die"])
+        if "leave" in options:
+            sys.exit(options["leave"])
+        time.sleep(options.get("sleep", 0))
+    result = {
+        "documents": read["documents"], "jobs": len(read["jobs"]), "limits": job["limits"], "pid": os.getpid(),
+        "seed": os.environ.get("PYTHONHASHSEED"), "tasks": os.environ.get("KAHANMAPS_TASKS"),
+        "home": os.environ.get("OF_THE_WORKER"), "padding": "x" * options.get("size", 0),
+    }
+    record = {
+        "key": hashlib.sha256(job["task"].encode()).hexdigest()[:32], "outcome": "ok", "result": result,
+        "seconds": options.get("claim", options.get("sleep", 0)),
+    }
+    print("a stray line\\n{}\\n" + json.dumps({**record, "key": "unknown"}))
+    for _ in range(2 if options.get("twice") else 1):
+        print(json.dumps(record), flush=True)
+"""
+
+
+UNLIMITED = Limits()
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Machines:
+    """A scheduler and workers, each in a process group of its own, that end with the test."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.file = folder / "scheduler.json"
+        self.running: list[subprocess.Popen[bytes]] = []
+        self.scheduler = self.start("distributed.cli.dask_scheduler", "--port", "0", "--scheduler-file", str(self.file))
+        self.script = folder / "group.py"
+        self.script.write_text(GROUP, encoding="utf-8")
+        self.command = [sys.executable, "-S", str(self.script)]
+        until(self.is_known)
+
+    def is_known(self) -> bool:
+        """Whether the scheduler has written its file, to the end."""
+        try:
+            return "address" in json.loads(self.file.read_text())
+        except (OSError, ValueError):
+            return False
+
+    def start(self, module: str, *options: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", module, "--no-dashboard", "--host", "127.0.0.1", *options]
+        with (self.folder / "log").open("ab") as log:
+            process = subprocess.Popen(
+                command,
+                stdout=log,
+                stderr=log,
+                cwd=self.folder,
+                start_new_session=True,
+                env={**os.environ, "OF_THE_WORKER": "kept", "PYTHONWARNINGS": "ignore"},
+            )
+        self.running.append(process)
+        return process
+
+    def worker(self, threads: int = 2, nanny: bool = True) -> subprocess.Popen[bytes]:
+        place = ["--scheduler-file", str(self.file), "--local-directory", str(self.folder)]
+        kind = "--nanny" if nanny else "--no-nanny"
+        return self.start("distributed.cli.dask_worker", *place, "--nthreads", str(threads), kind)
+
+    def kill(self, process: subprocess.Popen[bytes]) -> None:
+        """End a process, its nanny's child and the group commands, all at once and for good."""
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        self.running.remove(process)
+
+    def end(self) -> None:
+        for process in self.running.copy():
+            self.kill(process)
+
+    def workers(self, documents=lambda digest: digest, address=None, **options) -> ClusterWorkers:
+        """An executor on this scheduler, with our script."""
+        options = {"command": self.command, **options}
+        return ClusterWorkers(str(self.file) if address is None else address, documents, **options)
+
+
+def until(holds, seconds=20.0):
+    """Wait until something holds."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
+@contextmanager
+def machines_in(folder):
+    """A scheduler without workers."""
+    with ExitStack() as stack:
+        machines = Machines(folder)
+        stack.callback(machines.end)
+        yield machines
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory):
+    """A scheduler with two threads, for tests that leave it as it was."""
+    with machines_in(tmp_path_factory.mktemp("cluster")) as machines:
+        machines.worker()
+        yield machines
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A scheduler, still without workers, that the test may destroy."""
+    with machines_in(tmp_path) as machines:
+        yield machines
+
+
+def jobs_of(number, limits=UNLIMITED, kind="test", **options):
+    """Jobs that differ in their number only."""
+    return [Job(Task(kind, None, {"number": n, **options}), limits) for n in range(number)]
+
+
+def done(workers, jobs, seconds=60.0, meanwhile=lambda records: None):
+    """Run jobs as a batch does, and return all that comes back."""
+    left, records = list(reversed(jobs)), []
+    end = time.monotonic() + seconds
+    while left or workers.in_flight:
+        assert time.monotonic() < end, f"{workers.in_flight} jobs never came back"
+        while left and workers.is_free:
+            workers.submit(left.pop())
+        records += workers.wait(0.5)
+        meanwhile(records)
+    return records
+
+
+def assert_exactly_once(records, jobs):
+    assert Counter(record.key for record in records) == Counter(job.task.key for job in jobs)
+
+
+@pytest.fixture
+def workers(shared):
+    """An executor on the shared scheduler, closed afterwards."""
+    opened = shared.workers()
+    yield opened
+    opened.close()
+
+
+# What goes out and what comes back
+
+
+def test_every_job_comes_back_exactly_once(workers):
+    jobs = jobs_of(500)
+    records = done(workers, jobs)
+    assert_exactly_once(records, jobs)
+    assert {record.outcome for record in records} == {Outcome.OK}
+    assert (workers.in_flight, workers.groups_in_flight) == (0, 0)
+
+
+def test_a_record_that_is_printed_twice_is_handed_back_once(workers):
+    jobs = jobs_of(10, twice=True)
+    assert_exactly_once(done(workers, jobs), jobs)
+
+
+def test_a_record_of_a_megabyte_comes_back_whole(workers):
+    (record,) = done(workers, jobs_of(1, size=1 << 20))
+    assert len(record.result["padding"]) == 1 << 20
+
+
+def test_limits_travel_with_the_job(workers):
+    (record,) = done(workers, jobs_of(1, limits=Limits(time=7.5, memory=10**9)))
+    assert record.result["limits"] == {"time": 7.5, "memory": 10**9}
+
+
+def test_a_group_carries_the_documents_it_needs_and_no_others(shared):
+    texts = {"first": "one = 1", "second": "two = 2", "third": "three = 3"}
+    tasks = [Task("test", {"document": name, "parameters": {}}, {}) for name in ("first", "second")]
+    tasks.append(Task("test", {"family": {"m": 2}}, {}))
+    workers = shared.workers(texts.__getitem__)
+    try:
+        found = {record.key: record.result["documents"] for record in done(workers, [Job(task) for task in tasks])}
+    finally:
+        workers.close()
+    assert [found[task.key] for task in tasks] == [{"first": "one = 1"}, {"second": "two = 2"}, {}]
+
+
+def test_the_workers_own_environment_stays_and_our_variables_are_added(shared, monkeypatch):
+    monkeypatch.setenv("KAHANMAPS_TASKS", "some.module")
+    workers = shared.workers()
+    try:
+        (record,) = done(workers, jobs_of(1))
+    finally:
+        workers.close()
+    assert [record.result[name] for name in ("seed", "tasks", "home")] == ["0", "some.module", "kept"]
+
+
+def test_a_job_cannot_be_in_flight_twice(workers):
+    (job,) = jobs_of(1)
+    workers.submit(job)
+    with pytest.raises(InputError, match="in flight already"):
+        workers.submit(job)
+
+
+# Groups
+
+
+# The mean of what the tasks say they took decides; here they say it without taking it.
+@pytest.mark.parametrize(
+    ("claim", "largest"),
+    [(60.0, 1), (1.0, 5), (0.1, 50), (0.0, 200)],
+)
+def test_groups_grow_to_the_seconds_that_were_asked_for(workers, claim, largest):
+    records = done(workers, jobs_of(450 if claim < 1 else 40, claim=claim))
+    assert max(record.result["jobs"] for record in records) in range(largest - 1, largest + 1)
+    assert sum(record.result["jobs"] == 1 for record in records) >= 2  # nothing is known of the first ones
+
+
+def test_groups_stay_full_as_records_come_in(workers):
+    sizes = sorted(record.result["jobs"] for record in done(workers, jobs_of(150, claim=0.9)))
+    assert sizes[len(sizes) // 2] == 6  # the nearest to 5 s; without filling up it would be 6 and 1 in turn
+    assert sizes.count(6) > 100
+
+
+def test_groups_of_large_records_stay_small(workers):
+    records = done(workers, jobs_of(100, size=100_000))
+    assert max(record.result["jobs"] for record in records) <= 12  # of a megabyte
+
+
+def test_what_is_in_flight_is_bounded_by_the_threads(workers):
+    until(lambda: workers.threads == 2)
+    largest = 0
+
+    def watch(records):
+        nonlocal largest
+        largest = max(largest, workers.groups_in_flight)
+
+    done(workers, jobs_of(300, claim=1.0), meanwhile=watch)
+    assert largest <= 4
+    for job in jobs_of(10, kind="unknown"):
+        if workers.is_free:
+            workers.submit(job)
+    assert workers.in_flight == 4
+
+
+# Failures of a task
+
+
+def test_a_group_that_is_killed_leaves_only_the_guilty_job_crashed(workers):
+    good = jobs_of(60)
+    bad = jobs_of(1, die=9)
+    records = done(workers, [*good[:40], *bad, *good[40:]])
+    assert_exactly_once(records, good + bad)
+    (crashed,) = [record for record in records if not record.is_ok]
+    assert (crashed.key, crashed.outcome) == (bad[0].task.key, Outcome.CRASHED)
+    assert crashed.message == "the worker's command ended with status -9"
+    assert crashed.stderr.endswith("the last words")
+    assert len(crashed.stderr) == 2000
+
+
+def test_a_job_that_kills_its_group_is_crashed_even_when_it_is_the_only_one(workers):
+    (record,) = done(workers, jobs_of(1, die=11))
+    assert (record.outcome, record.message) == (Outcome.CRASHED, "the worker's command ended with status -11")
+
+
+def test_a_job_whose_group_ends_early_once_is_done_at_the_second_try(workers, tmp_path):
+    once = jobs_of(1, leave=3, once=str(tmp_path / "been-here"))
+    jobs = [*jobs_of(20), *once, *jobs_of(20, kind="other")]
+    records = done(workers, jobs)
+    assert_exactly_once(records, jobs)
+    assert all(record.is_ok for record in records)
+
+
+def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_times_out(shared, monkeypatch):
+    monkeypatch.setattr(cluster, "START_UP", 0.5)
+    monkeypatch.setattr(cluster, "START_UP_OF_A_JOB", 0.05)
+    limits = Limits(time=0.05)
+    good = jobs_of(12, limits=limits)
+    bad = jobs_of(1, limits=limits, sleep=600, claim=0)
+    workers = shared.workers()
+    try:
+        records = done(workers, [*good[:8], *bad, *good[8:]])
+    finally:
+        workers.close()
+    assert_exactly_once(records, good + bad)
+    (hung,) = [record for record in records if not record.is_ok]
+    assert (hung.key, hung.outcome) == (bad[0].task.key, Outcome.TIMEOUT)
+    assert hung.message == "the worker's command did not end within 0.6 s"
+
+
+def test_a_group_with_an_unlimited_job_has_no_limit():
+    limited, unlimited = cluster._Kept("test", "", Limits(time=1.0)), cluster._Kept("test", "", Limits())
+    assert cluster._Group({"limited": limited}).timeout == cluster.START_UP + cluster.START_UP_OF_A_JOB + 1.0
+    group = cluster._Group({"limited": limited, "unlimited": unlimited})
+    assert group.timeout is None
+
+
+# Workers that cannot run anything
+
+
+@pytest.mark.parametrize("number", [1, 5000])
+def test_a_module_that_the_workers_lack_is_one_error_and_not_a_record_for_each_task(shared, number):
+    workers = shared.workers(command=[sys.executable, "-S", "-m", "no_such_module"])
+    try:
+        with pytest.raises(WorkersUnfit, match="No module named no_such_module"):
+            done(workers, jobs_of(number))
+    finally:
+        workers.close()
+
+
+def test_an_interpreter_that_the_workers_lack_is_one_error(shared):
+    workers = shared.workers(command=None, python="no-such-python")
+    try:
+        with pytest.raises(WorkersUnfit, match=r"the workers cannot run .*no-such-python -m kahanmaps\.experi"):
+            done(workers, jobs_of(5000))
+    finally:
+        workers.close()
+
+
+def test_groups_that_all_die_before_any_record_are_one_error(workers):
+    with pytest.raises(WorkersUnfit, match="status -9"):
+        done(workers, jobs_of(5000, die=9))
+
+
+# Workers and schedulers that come and go
+
+
+def test_everything_comes_back_once_though_a_worker_and_its_nanny_are_killed(own):
+    first = own.worker()
+    own.worker()
+    workers = own.workers(group_seconds=0.5)
+    jobs = jobs_of(60, sleep=0.05)
+
+    def kill(records):
+        if len(records) > 10 and first in own.running:
+            own.kill(first)
+
+    try:
+        records = done(workers, jobs, meanwhile=kill)
+    finally:
+        workers.close()
+    assert_exactly_once(records, jobs)
+    assert all(record.is_ok for record in records)
+
+
+@pytest.mark.slow
+def test_a_job_that_takes_its_workers_with_it_is_crashed_and_the_others_are_done(own):
+    # The command kills its parent, the worker; nannies start it anew, until dask gives the task up.
+    own.script.write_text(GROUP.replace("os.kill(os.getpid()", "os.kill(os.getppid()"), encoding="utf-8")
+    own.worker(threads=1)
+    own.worker(threads=1)
+    good, bad = jobs_of(20, sleep=0.1), jobs_of(1, die=9)
+    workers = own.workers()
+    try:
+        records = done(workers, [*good[:10], *bad, *good[10:]], seconds=100)
+    finally:
+        workers.close()
+    assert_exactly_once(records, good + bad)
+    (crashed,) = [record for record in records if not record.is_ok]
+    assert (crashed.key, crashed.outcome) == (bad[0].task.key, Outcome.CRASHED)
+    assert "workers died one after the other" in crashed.message
+
+
+def test_workers_may_come_later_and_are_waited_for_aloud(own, monkeypatch):
+    monkeypatch.setattr(cluster, "SILENCE", 0.2)
+    said = []
+    workers = own.workers(talk=said.append)
+    try:
+        (job,) = jobs_of(1)
+        workers.submit(job)
+        assert workers.wait(1.5) == []
+        assert said == [f"waiting for workers: the scheduler at {own.file} has none"]
+        own.worker(threads=3, nanny=False)
+        assert len(done(workers, [])) == 1
+        until(lambda: workers.threads == 3)
+    finally:
+        workers.close()
+
+
+@pytest.mark.parametrize("is_busy", [True, False])
+def test_a_scheduler_that_is_killed_is_told_at_once_and_holds_nobody_up(own, is_busy):
+    own.worker(nanny=False)
+    workers = own.workers()
+    try:
+        if is_busy:
+            workers.submit(jobs_of(1, sleep=600)[0])
+            assert workers.wait(0.5) == []
+        own.kill(own.scheduler)
+        start = time.monotonic()
+        with pytest.raises(ClusterLost, match=r"what was recorded is safe; run the same command again"):
+            workers.wait(20)
+        assert time.monotonic() - start < 4
+    finally:
+        start = time.monotonic()
+        workers.close()
+    assert time.monotonic() - start < 4
+
+
+def test_records_that_came_before_the_scheduler_died_are_handed_back(own):
+    own.worker(nanny=False)
+    workers = own.workers()
+    try:
+        until(lambda: workers.threads == 2)
+        jobs = jobs_of(1)
+        for job in jobs + jobs_of(1, kind="long", sleep=600):
+            workers.submit(job)
+        workers._send_open()
+        until(lambda: not workers._results.empty())
+        own.kill(own.scheduler)
+        assert_exactly_once(workers.wait(20), jobs)
+        with pytest.raises(ClusterLost):
+            workers.wait(20)
+    finally:
+        workers.close()
+
+
+def test_closing_twice_is_allowed_and_leaves_the_scheduler_and_its_workers(shared):
+    workers = shared.workers()
+    for job in jobs_of(3, sleep=0.5):
+        workers.submit(job)
+    workers.close()
+    workers.close()
+    assert workers.in_flight == 0
+    again = shared.workers()
+    try:
+        assert len(done(again, jobs_of(5))) == 5
+    finally:
+        again.close()
+
+
+def test_what_was_in_flight_is_forgotten_when_the_executor_is_closed(shared, tmp_path):
+    workers = shared.workers()
+    until(lambda: workers.threads == 2)
+    marks = [tmp_path / str(n) for n in range(4)]
+    for n, mark in enumerate(marks):  # two of them run, two wait
+        workers.submit(Job(Task("test", None, {"number": n, "once": str(mark), "sleep": 1.0})))
+    until(lambda: sum(mark.exists() for mark in marks) == 2)
+    workers.close()
+    time.sleep(1.5)
+    assert sum(mark.exists() for mark in marks) == 2
+
+
+@pytest.mark.slow
+def test_nothing_remains_of_a_coordinator_that_is_killed(shared, tmp_path):
+    marks = [tmp_path / str(n) for n in range(4)]
+    script = f"""
+from kahanmaps.experiments.cluster import ClusterWorkers
+from kahanmaps.experiments.records import Job, Task
+workers = ClusterWorkers({str(shared.file)!r}, str, command={shared.command!r})
+for mark in {[str(mark) for mark in marks]!r}:
+    workers.submit(Job(Task("test", None, {{"once": mark, "sleep": 1.0}})))
+workers.wait(60)
+"""
+    coordinator = subprocess.Popen([sys.executable, "-c", script])
+    try:
+        until(lambda: sum(mark.exists() for mark in marks) == 2)
+    finally:
+        coordinator.kill()
+        coordinator.wait()
+    time.sleep(2.0)
+    assert sum(mark.exists() for mark in marks) == 2
+
+
+# The group command itself
+
+
+def test_real_tasks_are_done_by_the_workers(shared, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    families = [{"draw": "eigenvalues", "m": m, "seed": seed} for m in (2, 3) for seed in range(3)]
+    jobs = [Job(Task("family-space", {"family": family}, {}), Limits(time=60)) for family in families]
+    workers = shared.workers(command=None)
+    try:
+        records = done(workers, jobs)
+    finally:
+        workers.close()
+    assert_exactly_once(records, jobs)
+    assert {record.outcome for record in records} == {Outcome.OK}
+
+
+# Before there is a cluster
+
+
+def test_an_address_where_nobody_listens_is_told_in_a_sentence_and_in_time():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
+        start = time.monotonic()
+        with pytest.raises(InputError, match=f"no dask scheduler answers at {address} within 1 s"):
+            ClusterWorkers(address, str, connect_seconds=1.0)
+        assert time.monotonic() - start < 4
+
+
+def test_a_listener_that_is_no_scheduler_is_told_in_a_sentence():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(InputError, match="no dask scheduler answers"):
+            ClusterWorkers(address, str, connect_seconds=1.0)
+
+
+@pytest.mark.parametrize(
+    ("address", "sentence"),
+    [
+        ("nonsense", "'nonsense' is not the address of a scheduler: write tcp://host:port"),
+        ("tcp://host", "is not the address of a scheduler"),
+        ("", "is not the address of a scheduler"),
+        ("no-such-file.json", "cannot read the scheduler file no-such-file.json: No such file or directory"),
+        ("udp://127.0.0.1:8786", "no dask scheduler answers"),
+    ],
+)
+def test_an_address_that_cannot_be_one_is_told_in_a_sentence(address, sentence):
+    with pytest.raises(InputError, match=sentence):
+        ClusterWorkers(address, str, connect_seconds=1.0)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"address": '])
+def test_a_file_that_no_scheduler_has_written_is_told_in_a_sentence(tmp_path, text):
+    path = tmp_path / "scheduler.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="is not the file that `dask scheduler --scheduler-file` writes"):
+        ClusterWorkers(str(path), str)
+
+
+def test_a_missing_installation_is_told_with_the_command_that_repairs_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"pip install 'kahanmaps\[cluster\]'"):
+        ClusterWorkers("tcp://127.0.0.1:8786", str)
+
+
+# The terminal
+
+
+def test_nothing_is_printed_but_our_own_sentence_when_the_scheduler_dies(own):
+    own.worker(nanny=False)
+    script = f"""
+import os, signal
+from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers
+from kahanmaps.experiments.records import Job, Task
+workers = ClusterWorkers({str(own.file)!r}, str, command={own.command!r})
+workers.submit(Job(Task("test", None, {{"sleep": 600}})))
+workers.wait(1)
+os.kill({own.scheduler.pid}, signal.SIGKILL)
+try:
+    workers.wait(20)
+except ClusterLost as error:
+    print(error)
+finally:
+    workers.close()
+"""
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    assert ended.stderr == ""
+    assert ended.stdout.startswith("the scheduler at")
+    assert len(ended.stdout.splitlines()) == 1
+
+
+def test_the_log_of_distributed_is_as_before_once_the_last_executor_is_closed(shared):
+    import logging
+
+    logger = logging.getLogger("distributed")
+    before = logger.handlers, logger.propagate
+    first, second = shared.workers(), shared.workers()
+    first.close()
+    assert [type(handler) for handler in logger.handlers] == [logging.NullHandler]
+    second.close()
+    assert (logger.handlers, logger.propagate) == before
+
+
+def test_json_that_is_no_record_is_no_record():
+    assert [cluster._record(line) for line in (b"", b"{", b"{}", b"[1]", b'{"key": 1, "outcome": "fine"}')] == [
+        None
+    ] * 5
+    line = json.dumps({"key": "k", "outcome": "ok"}).encode()
+    assert cluster._record(line).is_ok

@@ -1,0 +1,448 @@
+"""Exports: nothing is lost in JSON lines, tables have the columns and types that are promised, memory stays small.
+
+A stable export has no trace of where, when and how long the work was done.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import subprocess
+import sys
+import tracemalloc
+from dataclasses import replace
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.export import NUMBER, cell, flatten, write_csv, write_jsonl, write_parquet
+from kahanmaps.experiments.records import Outcome, Record, Row, Task
+from kahanmaps.version import __version__
+
+FAMILY = Task("check-commute", {"family": {"m": 3, "seed": 7}}, {"eps": "1/10", "steps": 5})
+FILE = Task("check-commute", {"document": "d1", "parameters": {"a": "1/2"}}, {"eps": None, "steps": 5})
+FIRST_COLUMNS = ["experiment", "number", "key", "task"]
+LAST_COLUMNS = ["message", "seconds", "peak_memory", "host", "finished"]
+OF_THE_RUN = {"seconds", "peak_memory", "host", "versions", "finished", "stderr"}
+
+
+def row(number=0, task=FAMILY, result=None, outcome=Outcome.OK, **more):
+    more = {"seconds": 1.5, "peak_memory": 4096, "host": "hilbert", "finished": "2025-01-01T00:00:00Z", **more}
+    more = {"versions": {"python": "3.11.7"}, "stderr": "a warning", **more}
+    return Row("e", number, task, Record(task.key, outcome, result, **more))
+
+
+def jsonl(rows, **options):
+    stream = io.StringIO()
+    write_jsonl(rows, stream, **options)
+    return stream.getvalue()
+
+
+def csv_text(rows, **options):
+    stream = io.StringIO(newline="")
+    write_csv(lambda: iter(rows), stream, **options)
+    return stream.getvalue()
+
+
+def table(rows, **options):
+    """The rows of a CSV export as dicts."""
+    return list(csv.DictReader(io.StringIO(csv_text(rows, **options), newline=""), strict=True))
+
+
+def columns(rows, **options):
+    return next(csv.reader(io.StringIO(csv_text(rows, **options), newline="")))
+
+
+TEXTS = st.text(max_size=8) | st.sampled_from(
+    ["=A1", "-1/2", "+x", "'=1", "a\rb", "a\nb", 'a"b', "\udc80", "\0", "-1e5"]
+)
+SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | TEXTS
+DATA = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXTS, inner, max_size=3))
+RESULTS = st.none() | st.dictionaries(TEXTS, DATA, max_size=4)
+TASKS = st.builds(
+    Task,
+    TEXTS,
+    st.none() | st.builds(lambda parts: {"family": parts}, st.dictionaries(TEXTS, DATA, max_size=3)),
+    st.dictionaries(TEXTS, SCALARS, max_size=3),
+)
+RECORDS = st.builds(
+    Record,
+    st.just(""),
+    st.sampled_from(Outcome),
+    RESULTS,
+    st.none() | st.sampled_from(["proved", "refuted"]),
+    TEXTS,
+    TEXTS,
+    st.floats(0, 1e6),
+    st.none() | st.integers(0, 2**40),
+    TEXTS,
+    st.dictionaries(TEXTS, TEXTS, max_size=2),
+    TEXTS,
+)
+
+
+@st.composite
+def many_rows(draw):
+    tasks = draw(st.lists(TASKS, max_size=4))
+    records = [draw(st.none() | RECORDS) for _ in tasks]
+    return [
+        Row("e", number, task, record and replace(record, key=task.key))
+        for number, (task, record) in enumerate(zip(tasks, records, strict=True))
+    ]
+
+
+# JSON lines
+
+
+def test_a_line_has_the_documented_shape():
+    lines = jsonl([row(result={"claims": 3}, verdict="proved")]).splitlines()
+    assert [json.loads(line) for line in lines] == [
+        {
+            "record": "header",
+            "version": __version__,
+            "convention": "eps is the paper's epsilon, the time step is 2 eps",
+        },
+        {
+            "record": "result",
+            "experiment": "e",
+            "number": 0,
+            "key": FAMILY.key,
+            "task": "check-commute",
+            "system": {"family": {"m": 3, "seed": 7}},
+            "options": {"eps": "1/10", "steps": 5},
+            "outcome": "ok",
+            "verdict": "proved",
+            "result": {"claims": 3},
+            "message": "",
+            "stderr": "a warning",
+            "seconds": 1.5,
+            "peak_memory": 4096,
+            "host": "hilbert",
+            "versions": {"python": "3.11.7"},
+            "finished": "2025-01-01T00:00:00Z",
+        },
+        {"record": "end", "results": 1},
+    ]
+
+
+@given(many_rows())
+def test_lines_parse_back_to_what_was_put_in(rows):
+    header, *results, end = [json.loads(line) for line in jsonl(rows).split("\n")[:-1]]
+    assert (header["record"], end) == ("header", {"record": "end", "results": len(rows)})
+    for data, source in zip(results, rows, strict=True):
+        assert (data["experiment"], data["number"], data["key"]) == (source.experiment, source.number, source.task.key)
+        assert Task(data["task"], data["system"], data["options"]) == source.task
+        of_record = {name: data[name] for name in Record("", Outcome.OK).to_json()}
+        if source.record is None:
+            assert {value for name, value in of_record.items() if name != "key"} == {None}
+        else:
+            assert Record.from_json(of_record) == source.record
+
+
+def test_a_line_does_not_depend_on_the_order_in_which_a_task_was_written():
+    turned = Task(FAMILY.kind, {"family": {"seed": 7, "m": 3}}, {"steps": 5, "eps": "1/10"})
+    assert jsonl([row(task=turned, result={"b": 1, "a": 2})]) == jsonl([row(result={"a": 2, "b": 1})])
+
+
+def test_loading_the_module_does_not_load_flint():
+    code = "import sys, kahanmaps.experiments.export; sys.exit('flint' in sys.modules or 'pyarrow' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+
+
+# Columns of a table
+
+
+def test_columns_come_in_the_documented_order():
+    rows = [
+        row(0, FAMILY, {"heights": {"max": 8}, "claims": 3}),
+        row(1, FILE),
+    ]
+    expected = ["document", "m", "seed", "parameters.a", "eps", "steps"]
+    expected += ["outcome", "verdict", "claims", "heights.max"]
+    assert columns(rows) == [*FIRST_COLUMNS, *expected, *LAST_COLUMNS]
+
+
+def test_a_stable_table_leaves_out_the_columns_of_the_run():
+    assert columns([row()], stable=True) == [
+        *FIRST_COLUMNS,
+        "m",
+        "seed",
+        "eps",
+        "steps",
+        "outcome",
+        "verdict",
+        "message",
+    ]
+
+
+def test_no_rows_give_a_header_only():
+    assert csv_text([]) == ",".join([*FIRST_COLUMNS, "outcome", "verdict", *LAST_COLUMNS]) + "\n"
+    assert [json.loads(line)["record"] for line in jsonl([]).splitlines()] == ["header", "end"]
+
+
+def test_a_clash_of_names_is_settled_for_options_then_the_recipe_then_the_result():
+    task = Task("orbit", {"family": {"seed": 1, "m": 2}}, {"seed": 2, "verdict": "v", "host": "h"})
+    (found,) = table([row(task=task, result={"seed": 3, "m": 4, "system": 5, "verdict": 6}, verdict="proved")])
+    names = ["seed", "family.seed", "result.seed", "m", "result.m", "result.system"]
+    assert [found[name] for name in names] == ["2", "1", "3", "2", "4", "5"]
+    names = ["verdict", "option.verdict", "result.verdict", "host", "option.host"]
+    assert [found[name] for name in names] == ["proved", "v", "6", "hilbert", "h"]
+
+
+def test_names_are_the_same_whether_or_not_the_export_is_stable():
+    rows = [row(result={"seconds": 1, "claims": 2})]
+    assert set(columns(rows)) - set(columns(rows, stable=True)) == {"seconds", "peak_memory", "host", "finished"}
+    assert "result.seconds" in columns(rows, stable=True)
+
+
+def test_no_two_columns_share_a_name():
+    result = {"a": {"b": 1}, "a.b": 2, "result.a.b": 3, "seed": 4, "result.seed": 5, "result": {"seed": 6}}
+    (found,) = table([row(result=result)])
+    assert sorted(value for name, value in found.items() if "a.b" in name or "result" in name) == list("123456")[:6]
+
+
+# Cells
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, ""),
+        (True, "true"),
+        (False, "false"),
+        (-3, "-3"),
+        (10**40 + 1, "1" + "0" * 39 + "1"),
+        (-0.1, "-0.1"),
+        ("-7/3", "-7/3"),
+        ("+.5", "+.5"),
+        ("-1.5e-3", "-1.5e-3"),
+        ([1, "a", None], '[1, "a", null]'),
+        ("=1+1", "'=1+1"),
+        ("@x", "'@x"),
+        ("+x", "'+x"),
+        ("-x^2", "'-x^2"),
+        ("-1/0", "'-1/0"),  # no number
+        ("-1+cmd", "'-1+cmd"),
+        ("\t=1", "'\t=1"),
+        ("'=1", "''=1"),
+        ("'quoted'", "'quoted'"),
+        ("a-b", "a-b"),
+        ("\udc80", "\\udc80"),
+    ],
+)
+def test_a_cell_says_the_value(value, text):
+    assert cell(value) == text
+
+
+@given(st.text(alphabet="'=+-@\t1/x.e", max_size=6))
+@example("''=x")
+def test_the_apostrophe_in_front_of_formulas_can_be_taken_away(text):
+    written = cell(text)
+    harmful = written[:1] in {"=", "+", "-", "@", "\t"} and not NUMBER.fullmatch(written)
+    assert not harmful
+    is_guarded = written.startswith("'") and written.lstrip("'")[:1] in {"=", "+", "-", "@", "\t"}
+    assert (written[1:] if is_guarded else written) == text
+
+
+@given(many_rows())
+def test_a_table_reads_back_cell_by_cell(rows):
+    found = table(rows)
+    assert len(found) == len(rows)
+    for cells, source in zip(found, rows, strict=True):
+        record = source.record
+        result = dict(flatten(record.result or {})) if record else {}
+        parts = [*dict(flatten(source.task.system or {})).values(), *source.task.options.values(), *result.values()]
+        always = [source.experiment, source.number, source.task.key, source.task.kind]
+        if record:
+            always += [record.outcome, record.verdict, record.message]
+            always += [record.seconds, record.peak_memory, record.host, record.finished]
+        expected = sorted(filter(None, map(cell, [*parts, *always])))
+        assert sorted(filter(None, cells.values())) == expected
+
+
+def test_lines_end_in_a_newline_alone_and_cells_keep_their_line_ends():
+    rows = [row(message="a\r\nb"), row(message="c\rd"), row(message="e\nf")]
+    text = csv_text(rows)
+    assert text.count("\r\n") == 1
+    assert [cells["message"] for cells in table(rows)] == ["a\r\nb", "c\rd", "e\nf"]
+
+
+def test_a_missing_task_leaves_its_cells_empty():
+    (cells,) = table([Row("e", 4, FAMILY, None)])
+    assert {name for name, text in cells.items() if text} == {*FIRST_COLUMNS, "m", "seed", "eps", "steps"}
+
+
+def test_a_new_column_in_the_second_reading_is_refused():
+    readings = iter([[row()], [row(result={"late": 1})]])
+    with pytest.raises(InputError, match="'late' of task 0 changed"):
+        write_csv(lambda: next(readings), io.StringIO())
+
+
+# Stable exports
+
+
+@given(many_rows(), st.data())
+def test_stable_exports_are_the_same_bytes_whatever_the_timings(rows, data):
+    def elsewhere(source):
+        if source.record is None:
+            return source
+        other = {"seconds": data.draw(st.floats(0, 9)), "peak_memory": None, "host": "noether", "stderr": "x"}
+        return replace(source, record=replace(source.record, versions={"python": "4"}, finished="later", **other))
+
+    others = [elsewhere(source) for source in rows]
+    assert jsonl(rows, stable=True) == jsonl(others, stable=True)
+    assert csv_text(rows, stable=True) == csv_text(others, stable=True)
+
+
+@pytest.mark.parametrize("export", [jsonl, csv_text])
+def test_a_stable_export_does_not_tell_where_and_when(export):
+    rows = [row(result={"claims": 3})]
+    tells = ["hilbert", "1.5", "4096", "2025-01-01", "3.11.7", "a warning", *OF_THE_RUN]
+    assert not [word for word in [*tells, __version__] if word in export(rows, stable=True)]
+    assert {"hilbert", "1.5", "4096", "2025-01-01"} <= {word for word in tells if word in export(rows)}
+
+
+# Memory, and streams that fail
+
+
+class Sink:
+    """A stream that keeps nothing but the count."""
+
+    def __init__(self):
+        self.lines = 0
+
+    def write(self, text):
+        self.lines += text.count("\n")
+        return len(text)
+
+
+def stream_of_rows(count):
+    """Rows that differ, made one at a time."""
+    for number in range(count):
+        yield row(number, result={"claims": number, "constant": f"{number}/7"})
+
+
+def to_jsonl(count, sink):
+    write_jsonl(stream_of_rows(count), sink)
+
+
+def to_csv(count, sink):
+    write_csv(lambda: stream_of_rows(count), sink)
+
+
+@pytest.mark.parametrize("count", [10_000, pytest.param(100_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("write", "extra_lines"), [(to_jsonl, 2), (to_csv, 1)])
+def test_many_rows_are_never_held_together(write, extra_lines, count):
+    write(1, Sink())  # what is loaded late does not count
+    sink = Sink()
+    tracemalloc.start()
+    try:
+        write(count, sink)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert sink.lines == count + extra_lines
+    assert peak < 300_000  # measured: 4 kB and 140 kB, for any count; 10,000 rows in a list take 7 MB
+
+
+class Full:
+    """A disk without space."""
+
+    def write(self, text):
+        raise OSError(28, "No space left on device")
+
+
+def test_a_full_disk_is_told_as_such():
+    with pytest.raises(OSError, match="No space"):
+        write_jsonl([row()], Full())
+    with pytest.raises(OSError, match="No space"):
+        write_csv(lambda: [row()], Full())
+
+
+# Parquet
+
+
+@pytest.fixture
+def parquet(tmp_path):
+    """Writes rows, and reads the file back."""
+    reader = pytest.importorskip("pyarrow.parquet")
+
+    def written(rows, **options):
+        path = tmp_path / "results.parquet"
+        write_parquet(lambda: iter(rows), path, **options)
+        assert [entry.name for entry in tmp_path.iterdir()] == ["results.parquet"]
+        return reader.ParquetFile(path)
+
+    return written
+
+
+@pytest.mark.parametrize(
+    ("values", "kind", "expected"),
+    [
+        ([1, None, -(2**63)], "int64", [1, None, -(2**63)]),
+        ([1, 2**63], "string", ["1", str(2**63)]),
+        ([True, False], "bool", [True, False]),
+        ([True, 1], "string", ["true", "1"]),
+        ([1, 0.5], "double", [1.0, 0.5]),
+        ([2**53 + 1, 0.5], "string", [str(2**53 + 1), "0.5"]),  # a float would lose the last digit
+        ([1, "7/3"], "string", ["1", "7/3"]),
+        (["=1", "\udc80"], "string", ["=1", "\\udc80"]),  # no spreadsheet here
+        ([[1], None], "string", ["[1]", None]),
+        ([None, None], "string", [None, None]),
+    ],
+)
+def test_a_column_of_parquet_has_the_type_that_fits_all_its_values(parquet, values, kind, expected):
+    found = parquet([row(number, result={"x": value}) for number, value in enumerate(values)]).read()
+    assert str(found.schema.field("x").type) == kind
+    assert found["x"].to_pylist() == expected
+
+
+def test_parquet_has_the_columns_of_the_csv_file(parquet):
+    rows = [row(0, result={"seed": 1, "a": {"b": 2}}), row(1, FILE), Row("e", 2, FAMILY, None)]
+    for stable in (False, True):
+        found = parquet(rows, stable=stable).read()
+        assert found.column_names == columns(rows, stable=stable)
+        assert [{name: cell(value) for name, value in line.items()} for line in found.to_pylist()] == table(
+            rows, stable=stable
+        )
+
+
+def test_parquet_without_rows_has_the_types_of_its_columns(parquet):
+    found = parquet([]).read()
+    assert found.num_rows == 0
+    assert [str(found.schema.field(name).type) for name in ("number", "seconds", "host")] == [
+        "int64",
+        "double",
+        "string",
+    ]
+
+
+def test_parquet_is_written_in_row_groups(parquet):
+    metadata = parquet(list(stream_of_rows(10_002))).metadata
+    assert [metadata.row_group(place).num_rows for place in range(metadata.num_row_groups)] == [10_000, 2]
+
+
+def test_a_parquet_file_that_fails_leaves_the_old_one(tmp_path):
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "results.parquet"
+    path.write_text("old")
+    readings = iter([[row(result={"x": 1})], [row(result={"x": "one"})]])
+    with pytest.raises(InputError, match="'x' of task 0 changed"):
+        write_parquet(lambda: next(readings), path)
+    assert [(entry.name, entry.read_text()) for entry in tmp_path.iterdir()] == [("results.parquet", "old")]
+
+
+def test_a_stable_parquet_file_is_the_same_bytes(tmp_path):
+    pytest.importorskip("pyarrow")
+    for name, seconds in (("a", 1.0), ("b", 2.0)):
+        write_parquet(lambda seconds=seconds: [row(seconds=seconds)], tmp_path / name, stable=True)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_without_pyarrow_the_error_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(InputError, match="pip install pyarrow"):
+        write_parquet(list, tmp_path / "x.parquet")

@@ -1,0 +1,322 @@
+"""Grids: all combinations of axes, counted without being walked, in an order that is fixed; ranges are exact."""
+
+from __future__ import annotations
+
+import time
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+import pytest
+from flint import fmpq
+from helpers import fraction, rationals
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.grid import Grid, RationalRange, Values, is_range, read_values
+from kahanmaps.experiments.options import VOCABULARY, exact
+
+EPS, STEPS, SEED, METHOD = (VOCABULARY[name] for name in ("eps", "steps", "seed", "method"))
+HUGE = 10**18
+
+
+# Ranges of a few values, their ends not always met.
+ranges = st.builds(
+    lambda first, step, count: RationalRange(first, first + count * step, step),
+    rationals(6),
+    rationals(3).filter(lambda step: step != 0),
+    rationals(6).map(lambda count: count * count),
+)
+
+
+def texts(text: str) -> list[str]:
+    return [str(value) for value in RationalRange.from_text(text)]
+
+
+def naive(first: Fraction, last: Fraction, step: Fraction) -> list[Fraction]:
+    """What a range is, value by value."""
+    values = []
+    while first <= last if step > 0 else first >= last:
+        values.append(first)
+        first += step
+    return values
+
+
+def read(option: Any, raw: Any) -> list[Any]:
+    values, mistakes = read_values(option, raw)
+    assert not mistakes
+    assert values is not None
+    return list(values)
+
+
+def mistakes(option: Any, raw: Any) -> list[tuple[tuple[int, ...], str]]:
+    values, found = read_values(option, raw)
+    assert values is None
+    return found
+
+
+# Ranges
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("1..3", ["1", "2", "3"]),
+        ("3..3", ["3"]),
+        ("1/10..1/2 step 1/10", ["1/10", "1/5", "3/10", "2/5", "1/2"]),
+        ("0.1..0.3 step 0.1", ["1/10", "1/5", "3/10"]),  # machine numbers would end at 0.2
+        ("0..1 step 0.3", ["0", "3/10", "3/5", "9/10"]),  # the end is not met
+        ("0..1 step 2", ["0"]),
+        ("3..1 step -1", ["3", "2", "1"]),
+        ("1/2..-1/2 step -1/3", ["1/2", "1/6", "-1/6", "-1/2"]),
+        ("-2..2 step 2", ["-2", "0", "2"]),
+        ("-5..-4", ["-5", "-4"]),
+        (" 1 .. 2  step  1/2 ", ["1", "3/2", "2"]),
+        (".5..1.5", ["1/2", "3/2"]),
+        ("1e1..2e1 step 5", ["10", "15", "20"]),
+        ("1/3...5 step .1", ["1/3", "13/30"]),  # up to .5
+    ],
+)
+def test_a_range_is_exact(text, values):
+    assert texts(text) == values
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1..5 step 0", "found a range of step 0, expected another step"),
+        ("5..1", "found a range without values, from 5 to 1 in steps of 1 (for a falling range write a negative step)"),
+        ("1..5 step -1", "found a range without values, from 1 to 5 in steps of -1"),
+        ("..", 'found \'..\', expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'),
+        ("1..", "expected \"FIRST..LAST\""),
+        ("..5", "expected \"FIRST..LAST\""),
+        ("5", "expected \"FIRST..LAST\""),
+        ("1..5 step", "expected \"FIRST..LAST\""),
+        ("1..5 by 2", "expected \"FIRST..LAST\""),
+        ("1..5 step 1 2", "expected \"FIRST..LAST\""),
+        ("1..5 Step 2", "expected \"FIRST..LAST\""),
+        ("1..3..5", "found '3..5', expected an integer, p/q or a decimal"),
+        ("a..b", "found 'a', expected an integer, p/q or a decimal"),
+        ("0..10^18", "found '10^18', expected an integer, p/q or a decimal"),
+        ("0..1e30", "more values than anybody can want"),
+        ("0..1 step 1e-5000", "more values than anybody can want"),
+    ],
+)  # fmt: skip
+def test_a_wrong_range_is_told_in_a_sentence(text, words):
+    with pytest.raises(InputError) as caught:
+        RationalRange.from_text(text)
+    assert words in str(caught.value)
+
+
+def test_long_nonsense_is_refused_at_once():
+    begin = time.perf_counter()
+    for text in ("." * 200_000, "1.." + " " * 200_000 + "x y", "1" * 200_000 + "..x " + "y " * 100_000):
+        with pytest.raises(InputError):
+            RationalRange.from_text(text)
+    assert time.perf_counter() - begin < 2
+
+
+@given(rationals(12), rationals(12), rationals(6))
+def test_a_range_is_what_a_loop_gives(first, last, step):
+    assume(step != 0)
+    expected = naive(fraction(first), fraction(last), fraction(step))
+    if not expected:
+        with pytest.raises(InputError, match="without values"):
+            RationalRange(first, last, step)
+        return
+    found = RationalRange(first, last, step)
+    assert len(found) == len(expected)
+    assert [fraction(value) for value in found] == expected
+
+
+@given(ranges, rationals(8))
+def test_a_range_knows_what_is_in_it(found, value):
+    assert (value in found) == any(value == entry for entry in found)
+
+
+@given(ranges, ranges)
+def test_the_least_common_value_of_two_ranges_is_that_of_their_values(left, right):
+    both = {fraction(value) for value in left} & {fraction(value) for value in right}
+    common = left.common(right)
+    assert (None if common is None else fraction(common)) == min(both, default=None)
+
+
+def test_a_range_has_places_from_both_ends_and_slices():
+    values = RationalRange.from_text("0..10 step 2")
+    assert (values[-1], values[1:3]) == (10, [2, 4])
+    with pytest.raises(IndexError):
+        values[6]
+    with pytest.raises(IndexError):
+        values[-7]
+
+
+def test_a_huge_range_is_not_enumerated():
+    values = RationalRange.from_text(f"0..{HUGE} step 1/2")
+    assert (len(values), values[-1], fmpq(1, 3) in values) == (2 * HUGE + 1, HUGE, False)
+    assert values.common(RationalRange.from_text(f"1/6..{HUGE} step 1/3")) == fmpq(1, 2)
+
+
+@pytest.mark.parametrize(("raw", "expected"), [("1..2", True), ("1.2", False), (5, False), (["1..2"], False)])
+def test_two_dots_in_a_text_make_a_range(raw, expected):
+    assert is_range(raw) is expected
+
+
+# Values of an option
+
+
+@pytest.mark.parametrize(
+    ("option", "raw", "values"),
+    [
+        (EPS, "0.1", ["1/10"]),
+        (EPS, ["1/10", "0.05"], ["1/10", "1/20"]),
+        (EPS, ["1/10", "1/3..2/3 step 1/6", 7], ["1/10", "1/3", "1/2", "2/3", "7"]),
+        (STEPS, "0..2", [0, 1, 2]),
+        (STEPS, ["4..2 step -1", "10..11"], [4, 3, 2, 10, 11]),
+        (STEPS, "1/2..1 step 1/2", None),
+        (METHOD, ["jump", "generic"], ["jump", "generic"]),
+    ],
+)
+def test_values_come_canonical_and_in_the_order_written(option, raw, values):
+    if values is None:
+        assert mistakes(option, raw) == [((), "found 1/2, expected a whole number from 0 to 1000000000")]
+    else:
+        assert read(option, raw) == values
+
+
+def test_values_have_places_from_both_ends_and_slices():
+    values, _ = read_values(STEPS, ["1..3", 7])
+    assert isinstance(values, Values)
+    assert (values[-1], values[3], values[1:]) == (7, 7, [2, 3, 7])
+    for index in (4, -5):
+        with pytest.raises(IndexError):
+            values[index]
+
+
+@pytest.mark.parametrize(
+    ("option", "raw", "expected"),
+    [
+        (EPS, [], [((), "found an empty list, expected at least one value")]),
+        (EPS, [1, 0, "x"], [(2, "found 0"), (3, "found 'x'")]),
+        (EPS, "-1..1", [((), "found 0, expected another number")]),
+        (EPS, ["-1/2..1/2 step 1/4"], [(1, "found 0, expected another number")]),
+        (EPS, ["0.1", "1/10"], [(2, "found '1/10', the same value as in place 1: expected it once")]),
+        (EPS, ["1..3", 2], [(2, "found 2, which is in place 1 as well: expected it once")]),
+        (EPS, [2, "1..3"], [(2, "found 2, which is in place 1 as well: expected it once")]),
+        (EPS, ["1..9 step 2", "2..9 step 3"], [(2, "found 5, which is in place 1 as well: expected it once")]),
+        (EPS, ["1/2..3/2 step 1/3", "0.5"], [(2, "found 1/2, which is in place 1 as well: expected it once")]),
+        (STEPS, "0..4 step 3/2", [((), "found 3/2, expected a whole number")]),
+        (STEPS, "1..2 step 1/2", [((), "found 3/2, expected a whole number")]),
+        (STEPS, "-5..5", [((), "found -5, expected a whole number")]),
+        (STEPS, "0..1e10 step 1e9", [((), "found 10000000000, expected a whole number")]),
+        (SEED, ["0..1e18"] * 3, [(2, "found 0, which is in place 1"), (3, "found 0, which is in place 1")]),
+        (SEED, ["0..4e18 step 2", "1..4e18 step 2"], None),
+        (EPS, ["1..4e18", "5e18..9e18"], [((), "found more values than anybody can want")]),
+        (METHOD, "1..2", [((), "found '1..2', expected one of")]),
+    ],
+)
+def test_wrong_values_are_told_with_their_places(option, raw, expected):
+    if expected is None:
+        assert read_values(option, raw)[1] == []
+        return
+    found = mistakes(option, raw)
+    assert [place for place, _ in found] == [place if place == () else (place,) for place, _ in expected]
+    for (_, sentence), (_, words) in zip(found, expected, strict=True):
+        assert sentence.startswith(words)
+
+
+@given(st.lists(rationals(4) | ranges, min_size=1, max_size=4))
+def test_a_value_is_found_twice_exactly_where_it_is_there_twice(pieces):
+    raw, values = [], []
+    for piece in pieces:
+        is_one = isinstance(piece, fmpq)
+        raw.append(str(piece) if is_one else f"{piece[0]}..{piece[-1]} step {piece.step}")
+        values += [fraction(value) for value in ([piece] if is_one else piece)]
+    assert bool(read_values(exact("c", "a parameter, which may be 0"), raw)[1]) == (len(set(values)) < len(values))
+
+
+def test_a_long_list_is_read_in_no_time():
+    begin = time.perf_counter()
+    values, found = read_values(SEED, [*range(20_000), *(f"{k}..{k + 3}" for k in range(100_000, 200_000, 10))])
+    assert not found
+    assert values is not None
+    assert len(values) == 60_000
+    assert time.perf_counter() - begin < 5  # 1/4 s where nothing else runs
+
+
+# Grids
+
+
+def combinations(axes: dict[str, list[int]], zips: list[list[str]]) -> list[dict[str, int]]:
+    """What a grid is: itertools.product of the axes, zipped ones in one."""
+    groups: list[list[str]] = []
+    for name in axes:
+        group = next((names for names in zips if name in names), [name])
+        if group not in groups:
+            groups.append(group)
+    columns = [list(zip(*(axes[name] for name in group), strict=True)) for group in groups]
+    return [
+        {
+            name: value
+            for group, values in zip(groups, row, strict=True)
+            for name, value in zip(group, values, strict=True)
+        }
+        for row in product(*columns)
+    ]
+
+
+@st.composite
+def grids(draw: Any) -> tuple[dict[str, list[int]], list[list[str]]]:
+    names = draw(st.permutations("abcde"))[: draw(st.integers(0, 5))]
+    axes = {name: draw(st.lists(st.integers(0, 9), min_size=1, max_size=3)) for name in names}
+    zips: list[list[str]] = []
+    free = list(names)
+    while len(free) > 1 and draw(st.booleans()):
+        chosen = draw(st.lists(st.sampled_from(free), min_size=2, max_size=3, unique=True))
+        length = min(len(axes[name]) for name in chosen)
+        axes |= {name: axes[name][:length] for name in chosen}
+        zips.append(chosen)
+        free = [name for name in free if name not in chosen]
+    return axes, zips
+
+
+@given(grids())
+def test_a_grid_is_the_product_of_its_axes_in_order(case):
+    axes, zips = case
+    grid, expected = Grid(axes, zips), combinations(axes, zips)
+    assert grid.size == len(expected)
+    assert list(grid) == expected
+    assert [grid[k] for k in range(grid.size)] == expected
+
+
+def test_the_last_axis_runs_fastest():
+    assert [row["b"] for row in Grid({"a": [1, 2], "b": [3, 4]})] == [3, 4, 3, 4]
+
+
+def test_zipped_axes_run_together_in_the_place_of_the_first():
+    grid = Grid({"a": [1, 2], "b": [3, 4], "c": [5, 6]}, [["c", "a"]])
+    assert [(row["a"], row["b"], row["c"]) for row in grid] == [(1, 3, 5), (1, 4, 5), (2, 3, 6), (2, 4, 6)]
+
+
+def test_a_grid_without_axes_is_one_point():
+    assert list(Grid({})) == [{}]
+
+
+def test_axes_of_different_lengths_cannot_be_zipped():
+    with pytest.raises(InputError, match="found 2 values of a and 3 of b, expected as many: a zip takes them together"):
+        Grid({"a": [1, 2], "b": [1, 2, 3]}, [["a", "b"]])
+
+
+@pytest.mark.parametrize("index", [-1, 4])
+def test_there_is_nothing_outside_a_grid(index):
+    with pytest.raises(IndexError):
+        Grid({"a": [1, 2], "b": [3, 4]})[index]
+
+
+def test_a_huge_grid_is_not_enumerated():
+    axis = RationalRange.from_text(f"0..{HUGE - 1}")
+    grid = Grid({"a": axis, "b": axis, "c": axis})
+    assert grid.size == HUGE**3  # more than `len` may be
+    assert grid[grid.size - 1] == {"a": HUGE - 1, "b": HUGE - 1, "c": HUGE - 1}
+    assert grid[HUGE + 7] == {"a": 0, "b": 1, "c": 7}
+    assert next(iter(grid)) == {"a": 0, "b": 0, "c": 0}

@@ -1,0 +1,231 @@
+"""Options: what is written becomes canonical plain data, one text for one value, and gives back what it stands for.
+
+Whatever is no value of an option is told in a sentence (InputError), with what was found and what was expected.
+"""
+
+from __future__ import annotations
+
+import json
+from datetime import date, datetime, time
+from typing import Any
+
+import pytest
+from flint import fmpq, fmpq_poly
+from helpers import rationals
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.options import FAMILY, VOCABULARY, Option, show, suggestion
+from kahanmaps.experiments.registry import task_kinds
+
+ALL = {**VOCABULARY, **FAMILY}
+PRIME = 2**61 - 1
+
+# Option, ways to write one value, the canonical text.
+SAME = [
+    ("eps", [0.1, "0.1", "1/10", "2/20", " 1/10 ", ".1", "1e-1", fmpq(1, 10)], "1/10"),
+    ("eps", [5, "5", "5.0", "10/2", "+5"], "5"),
+    ("eps", ["-1/3", "-2/6"], "-1/3"),
+    ("steps", [5, "5", "5.0", "10/2"], 5),
+    ("seed", [0, "0", "-0", "0.0"], 0),
+    ("seed", [2**63 - 1, "9223372036854775807"], 2**63 - 1),
+    ("start", ["1/2,-1/3", "1/2, -1/3", " 0.5 ,-2/6"], "1/2,-1/3"),
+    ("at", [5, "5", "5.0", "5,5"], "5"),
+    ("at", ["3,10", "10, 3", "3,10,3"], "3,10"),
+    ("sections", ["1,2", "2,1", "2,1,2"], "1,2"),
+    ("prime", [7, "7", "7.0", " 7"], "7"),
+    ("prime", [PRIME, str(PRIME)], str(PRIME)),
+    ("report", [True], True),
+    ("method", ["jump"], "jump"),
+    ("arithmetic", ["mod:7"], "mod:7"),
+    ("chi", ["t^2 - 2", "t^2-2", "2*t^2 - 4", "(t^2 - 2)", "t*t - 2"], "t^2 - 2"),
+    ("chi", ["(t - 1)*(t + 1/2)", "t^2 - t/2 - 1/2"], "t^2 - 1/2*t - 1/2"),
+    ("eigenvalues", ["1,0.5", "1, 1/2"], "1,1/2"),
+    ("signs", ["1,-1", "+1, -1"], "1,-1"),
+    ("signs", ["-1,1"], "-1,1"),
+]
+
+
+def read(name: str, value: Any) -> Any:
+    # A decimal of a spec arrives as the text that was written.
+    return ALL[name].read(str(value) if isinstance(value, float) else value)
+
+
+def refused(name: str, value: Any) -> str:
+    with pytest.raises(InputError) as caught:
+        read(name, value)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(("name", "written", "canonical"), SAME)
+def test_one_value_has_one_canonical_form_however_it_is_written(name, written, canonical):
+    assert [read(name, value) for value in written] == [canonical] * len(written)
+
+
+@pytest.mark.parametrize(("name", "written", "canonical"), SAME)
+def test_a_canonical_value_reads_back_as_itself(name, written, canonical):
+    assert ALL[name].read(canonical) == canonical
+
+
+@pytest.mark.parametrize(("name", "written", "canonical"), SAME)
+def test_a_canonical_value_is_what_json_gives_back(name, written, canonical):
+    assert json.loads(json.dumps(canonical)) == canonical
+
+
+@pytest.mark.parametrize(
+    ("name", "canonical", "made"),
+    [
+        ("eps", "1/10", fmpq(1, 10)),
+        ("steps", 5, 5),
+        ("start", "1/2,-1/3", (fmpq(1, 2), fmpq(-1, 3))),
+        ("at", "3,10", (3, 10)),
+        ("sections", "2", (2,)),
+        ("signs", "1,-1", (1, -1)),
+        ("prime", "7", 7),
+        ("report", True, True),
+        ("method", "jump", "jump"),
+        ("chi", "t^2 - 2", fmpq_poly([-2, 0, 1])),
+        ("eigenvalues", "1,1/2", (fmpq(1), fmpq(1, 2))),
+    ],
+)
+def test_an_option_makes_what_the_library_wants(name, canonical, made):
+    assert ALL[name].make(canonical) == made
+
+
+@given(rationals(10**9))
+def test_a_rational_option_gives_the_number_back(value):
+    a, b = int(value.p), int(value.q)
+    if value != 0:
+        assert read("eps", f"{7 * a}/{7 * b}") == read("eps", f"{a}/{b}") == str(value)
+        assert ALL["eps"].make(read("eps", f"{a}/{b}")) == value
+
+
+@given(st.lists(rationals(), min_size=1, max_size=5))
+def test_a_point_gives_its_numbers_back(point):
+    text = read("start", " , ".join(f"{2 * int(x.p)}/{2 * int(x.q)}" for x in point))
+    assert ALL["start"].make(text) == tuple(point)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("eps", 0, "found 0, expected another number: at eps = 0 the Kahan map is the identity"),
+        ("eps", "0/5", "found 0, expected another number"),
+        ("eps", True, "found true, expected a number"),
+        ("eps", [1], "found [1], expected a number"),
+        ("eps", {"a": 1}, "found {'a': 1}, expected a number"),
+        ("eps", date(1979, 5, 27), "found 1979-05-27, expected a number"),
+        ("eps", "nan", "found 'nan', expected an integer, p/q or a decimal such as 0.1"),
+        ("eps", "1_000", "found '1_000', expected an integer, p/q or a decimal such as 0.1"),
+        ("eps", "", "found nothing, expected an integer, p/q or a decimal such as 0.1"),
+        ("eps", "1/0", "found the denominator 0, expected a nonzero integer"),
+        ("eps", "1e10001", "found the power of ten '10001', expected at most 10000 in size"),
+        ("steps", "1/2", "found 1/2, expected a whole number from 0 to 1000000000"),
+        ("steps", -1, "found -1, expected a whole number from 0 to 1000000000"),
+        ("steps", 10**9 + 1, "found 1000000001, expected a whole number from 0 to 1000000000"),
+        ("every", 0, "found 0, expected a whole number from 1 to 1000000000"),
+        ("seed", 2**63, "found 9223372036854775808, expected a whole number from 0 to 9223372036854775807"),
+        ("m", 17, "found 17, expected a whole number from 1 to 16"),
+        ("report", 1, "found 1, expected true or false"),
+        ("report", "true", "found 'true', expected true or false"),
+        ("method", "jmp", "found 'jmp', expected one of generic, normal-form, jump; did you mean jump?"),
+        ("method", 5, "found 5, expected one of generic, normal-form, jump"),
+        ("start", 1, 'found 1, expected numbers separated by commas in one text, e.g. "1/2,-1/3"'),
+        ("start", "1,,2", "entry 2: found nothing, expected an integer, p/q or a decimal such as 0.1"),
+        ("start", "", "found nothing, expected a point"),
+        ("at", "1.5", "found 3/2, expected whole numbers from 0 to 10^18, separated by commas in one text"),
+        ("at", -1, "found -1, expected whole numbers from 0 to 10^18"),
+        ("at", 10**18 + 1, "found 1000000000000000001, expected whole numbers from 0 to 10^18"),
+        ("at", True, "found true, expected a number"),
+        ("at", "3,,4", "entry 2: found nothing"),
+        ("sections", "1,11", "found 11, expected whole numbers from 1 to 10"),
+        ("signs", "1,0", "found 0, expected 1 or -1"),
+        ("prime", 4, "4"),
+        ("prime", 1, "found 1, expected a prime of at most 192 bits"),
+        ("prime", "-7", "found -7, expected a prime of at most 192 bits"),
+        ("prime", 2**200, "expected a prime of at most 192 bits"),
+        ("arithmetic", "mod:4", "4"),
+        ("arithmetic", "mod:07", "found 'mod:07', expected exact, float, mod:P or ball:BITS"),
+        ("arithmetic", "mod:" + "7" * 3000, "expected exact, float, mod:P or ball:BITS"),
+        ("arithmetic", "ball:1000000000", "1000000000"),
+        ("arithmetic", 7, "found 7, expected exact, float, mod:P or ball:BITS"),
+        ("chi", "t^2 +", "found the end of the text"),
+        ("chi", "5", "found chi = 5, expected a polynomial in t of degree m >= 1"),
+        ("chi", "x^2", "x"),
+        ("chi", "t^17", "found a polynomial of degree 17, expected at most 16"),
+        ("chi", 2, "found 2, expected a polynomial in t, as text"),
+        ("eigenvalues", ",".join(["1"] * 17), "found 17 numbers, expected at most 16"),
+        ("draw", "genric", "did you mean generic?"),
+    ],
+)
+def test_what_is_no_value_is_told_in_a_sentence(name, value, words):
+    assert words in refused(name, value)
+
+
+@pytest.mark.parametrize("name", [name for name in ALL if name != "other"])
+@pytest.mark.parametrize(
+    "value",
+    [
+        None, True, -7, 10**4000, "", " ", "\x1b[31m", "1..2", "a" * 10_000, [], [1], {}, {"a": {}},
+        date(1979, 5, 27), time(7, 32), datetime(1979, 5, 27, 7, 32),
+    ],
+    ids=lambda value: show(value)[:12],
+)  # fmt: skip
+def test_whatever_is_written_is_read_or_refused_in_a_short_sentence(name, value):
+    try:
+        json.dumps(ALL[name].read(value))
+    except InputError as error:
+        assert len(str(error)) < 400  # noqa: PT017
+        assert "\x1b" not in str(error)  # noqa: PT017
+
+
+# Showing and suggesting
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (True, "true"),
+        ("two", "'two'"),
+        ("\x1b[31m", r"'\x1b[31m'"),
+        (date(1979, 5, 27), "1979-05-27"),
+        ("x" * 100, "'" + "x" * 39 + "..." + "x" * 14 + "'"),
+    ],
+)
+def test_a_value_is_shown_as_a_spec_has_it_and_short(value, shown):
+    assert show(value) == shown
+
+
+def test_an_integer_too_long_for_python_to_print_is_not_shown():
+    assert show(16**6000) == "a value too large to show"
+
+
+def test_a_table_nested_too_deeply_is_not_shown():
+    value: Any = 1
+    for _ in range(100_000):
+        value = {"a": value}
+    assert show(value) == "a value too large to show"
+
+
+@pytest.mark.parametrize(
+    ("value", "hint"), [("stpes", "; did you mean steps?"), ("xyz", ""), (5, ""), (None, ""), ([], "")]
+)
+def test_a_suggestion_is_made_where_something_is_close(value, hint):
+    assert suggestion(value, ["steps", "seed"]) == hint
+
+
+# The vocabulary
+
+
+@pytest.mark.parametrize("option", ALL.values(), ids=ALL.keys())
+def test_every_option_has_a_name_and_a_help(option: Option):
+    assert ALL[option.name] is option
+    assert option.help.strip()
+    assert len(option.help) <= 80
+
+
+@pytest.mark.parametrize("name", VOCABULARY)
+def test_every_option_of_the_vocabulary_is_used_by_a_task_of_the_library(name):
+    ours = [kind for kind in task_kinds().values() if kind.function.__module__ == "kahanmaps.experiments.tasks"]
+    assert any(name in kind.options for kind in ours)

@@ -1,0 +1,164 @@
+"""Recipes: plain data that say how to come by a system, the same for the same system, and what is made of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from flint import fmpq, fmpq_poly
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.options import FAMILY
+from kahanmaps.experiments.recipes import document_text, family_recipe, find_file, recipe_of, system_from
+from kahanmaps.experiments.records import canonical
+from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues, random_eigenvalues
+from kahanmaps.systems.catalog import load, names
+from kahanmaps.systems.files import SystemFile, parse_system
+
+ROTOR = 'name = "rotor"\nvariables = ["x", "y"]\n[parameters]\na = "2"\n[system]\nrhs = ["a*y", "-x*y"]\n'
+CATALOG = '[catalog]\ntitle = "Rotor"\nfacts = ["Measured: it turns."]\n'
+
+
+def drawn(**values: object) -> SystemFile:
+    """The random member of a recipe, with values as a spec has them."""
+    return system_from(
+        family_recipe({k: FAMILY[k].read(v) if k in FAMILY else v for k, v in values.items()}), {}.__getitem__
+    )
+
+
+def again(file: SystemFile, **parameters: str) -> SystemFile:
+    """The system that comes back from the recipe of a file."""
+    documents: dict[str, str] = {}
+    recipe = recipe_of(file, documents)
+    recipe = json.loads(canonical({**recipe, "parameters": {**recipe["parameters"], **parameters}}))
+    return system_from(recipe, documents.__getitem__)
+
+
+# Random members
+
+
+@pytest.mark.parametrize(
+    ("values", "member"),
+    [
+        ({"m": 2}, lambda: draw_with_eigenvalues(random_eigenvalues(2, 0), 0)),
+        ({"m": 3, "seed": 7}, lambda: draw_with_eigenvalues(random_eigenvalues(3, 7), 7)),
+        ({"m": 3, "seed": 7, "size": 5}, lambda: draw_with_eigenvalues(random_eigenvalues(3, 7), 7, 5)),
+        ({"m": 3, "seed": 7, "draw": "generic"}, lambda: draw_generic(3, 7)),
+        ({"m": 3, "seed": 7, "draw": "generic", "size": 4}, lambda: draw_generic(3, 7, 4)),
+        ({"eigenvalues": "1/2,-3", "seed": 7}, lambda: draw_with_eigenvalues([fmpq(1, 2), -3], 7)),
+        ({"chi": "t^2 - 2", "seed": 7}, lambda: draw_with_chi(fmpq_poly([-2, 0, 1]), 7)),
+        ({"chi": "2*t^2 - 4", "seed": 7, "size": 3}, lambda: draw_with_chi(fmpq_poly([-2, 0, 1]), 7, 3)),
+    ],
+)
+def test_a_random_member_is_the_one_that_the_library_draws(values, member):
+    assert drawn(**values).member == member()
+
+
+def test_signs_pick_an_associated_system():
+    plain, other = drawn(m=2, seed=1).member, drawn(m=2, seed=1, signs="1,-1").member
+    assert plain is not None
+    assert other is not None
+    assert (other.A, other.H, other.signs) == (plain.A, plain.H, (1, -1))
+
+
+def test_as_many_signs_as_factors_are_needed():
+    with pytest.raises(InputError, match="signs"):
+        drawn(m=2, seed=1, signs="1,-1,1")
+
+
+def test_a_recipe_without_a_size_of_the_member_is_told():
+    with pytest.raises(InputError, match="a random member of the family needs m, eigenvalues or chi"):
+        system_from({"family": {"draw": "eigenvalues", "seed": 0}}, {}.__getitem__)
+
+
+def test_a_recipe_of_a_member_is_complete():
+    assert family_recipe({"m": 3, "eps": "1/10", "size": None}) == {
+        "family": {"draw": "eigenvalues", "size": 2, "m": 3, "seed": 0}
+    }
+    assert family_recipe({"m": 3, "draw": "generic"})["family"]["size"] == 1
+    assert family_recipe({"chi": "t^2 - 2"})["family"]["size"] == 1
+
+
+def test_a_recipe_says_what_it_would_say_in_full():
+    assert drawn(m=2, seed=3) == system_from({"family": {"draw": "eigenvalues", "m": 2, "seed": 3}}, {}.__getitem__)
+
+
+def test_the_name_of_a_random_member_says_how_it_was_drawn():
+    assert drawn(m=2, seed=3).name == "random member, m = 2, seed 3"
+    assert drawn(m=2, seed=3, draw="generic").name == "random member, generic, m = 2, seed 3"
+
+
+# Files
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_system_of_the_catalogue_comes_back_equal(name):
+    assert again(load(name)) == load(name)
+
+
+def test_parameters_replace_those_of_the_file():
+    assert again(load("lorenz"), s="1/2") == load("lorenz", {"s": "1/2"})
+
+
+def test_a_recipe_has_all_parameters():
+    assert recipe_of(load("lorenz"), {})["parameters"] == {"s": "10", "r": "28", "b": "8/3"}
+
+
+def test_documents_are_known_by_what_the_file_says():
+    documents: dict[str, str] = {}
+    recipe = recipe_of(parse_system(ROTOR), documents)
+    assert documents == {recipe["document"]: document_text(parse_system(ROTOR))}
+    assert recipe["name"] == "rotor"
+
+
+@pytest.mark.parametrize(
+    ("text", "is_same"),
+    [
+        (ROTOR + CATALOG, True),  # what is told about a system is not the system
+        (ROTOR + CATALOG.replace("it turns", "it rests"), True),
+        (ROTOR.replace('"2"', "2.0"), True),
+        ("# a remark\n" + ROTOR, True),
+        (ROTOR.replace('"2"', '"3"'), False),
+        (ROTOR.replace("-x*y", "x*y"), False),
+        (ROTOR.replace("rotor", "motor"), False),  # reports print the name
+        (ROTOR + '[integrals]\nI = "x^2"\n', False),
+        (ROTOR + '[density]\nphi = "x"\n', False),
+    ],
+)
+def test_a_recipe_is_another_one_when_the_file_says_something_else(text, is_same):
+    assert (recipe_of(parse_system(text), {}) == recipe_of(parse_system(ROTOR), {})) is is_same
+
+
+def test_facts_of_the_catalogue_are_not_in_documents():
+    assert "facts" not in document_text(load("lorenz"))
+
+
+def test_a_parameter_that_the_system_has_not_is_told():
+    with pytest.raises(InputError, match="unknown parameter 'q'"):
+        again(load("lorenz"), q="1")
+
+
+@pytest.mark.parametrize("reference", ["./lorenz.toml", "lorenz.toml", "sub/../lorenz.toml"])
+def test_a_path_is_relative_to_the_folder(tmp_path, reference):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "lorenz.toml").write_text(ROTOR)
+    assert find_file(reference, tmp_path).name == "rotor"
+
+
+def test_a_name_is_that_of_the_catalogue(tmp_path):
+    (tmp_path / "lorenz").write_text(ROTOR)
+    assert find_file("lorenz", tmp_path).name == "lorenz"
+
+
+@pytest.mark.parametrize("reference", ["sub/rotor", "./rotor", "/rotor", "rotor"])
+def test_a_file_ends_in_toml(tmp_path, monkeypatch, reference):
+    (tmp_path / "rotor").write_text(ROTOR)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"expected a name of the catalogue or a path that ends in \.toml"):
+        find_file(reference, tmp_path)
+
+
+def test_an_unknown_name_is_told_with_a_suggestion():
+    with pytest.raises(InputError, match="did you mean lorenz"):
+        find_file("lorens", Path())

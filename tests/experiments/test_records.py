@@ -1,0 +1,136 @@
+"""Records and tasks are plain data that JSON gives back; the key of a task is a hash of what is asked, no more."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kahanmaps.experiments.records import KEY_LENGTH, Limits, Outcome, Record, Task, canonical, digest
+
+plain = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
+    max_leaves=8,
+)
+tables = st.dictionaries(st.text(max_size=5), plain, max_size=4)
+tasks = st.builds(Task, st.text(max_size=8), st.none() | tables, tables)
+
+TASK = Task("orbit", {"family": {"m": 2, "seed": 7}}, {"eps": "1/10", "steps": 5, "start": None})
+FILE = Task("orbit", {"document": "d", "name": "top", "parameters": {"a": "2"}}, {"eps": "1/10"})
+
+
+@given(plain)
+def test_canonical_text_says_what_the_data_say(data):
+    assert json.loads(canonical(data)) == data
+
+
+@given(tables)
+def test_canonical_text_does_not_depend_on_the_order_of_names(table):
+    assert canonical(dict(reversed(table.items()))) == canonical(table)
+
+
+def test_canonical_text_is_ascii_on_one_line_without_spaces():
+    assert canonical({"ä b": [1, "\n"], "a": None}) == '{"a":null,"\\u00e4 b":[1,"\\n"]}'
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), object(), b"x", {1, 2}])
+def test_what_is_not_plain_has_no_canonical_text(value):
+    with pytest.raises((TypeError, ValueError)):
+        canonical({"a": value})
+
+
+def test_digests_are_those_of_sha256():
+    # printf abc | sha256sum, GNU coreutils 9.1
+    assert digest("abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"[:KEY_LENGTH]
+
+
+@given(tasks)
+def test_a_task_is_made_again_from_its_text(task):
+    again = Task.from_text(task.text)
+    assert (again, again.key) == (task, task.key)
+
+
+def test_keys_stay_the_same_from_version_to_version():
+    # printf of the canonical text | sha256sum, GNU coreutils 9.1. Databases hold keys: when this fails, every old
+    # result is lost to its task.
+    assert (TASK.key, FILE.key) == ("9bb970790bd9ee91d5fab53e891129a2", "c6de480710a5912168ac18d97b312d9f")
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        Task("heights", TASK.system, TASK.options),
+        Task("orbit", None, TASK.options),
+        Task("orbit", {"family": {"m": 2, "seed": 8}}, TASK.options),
+        Task("orbit", TASK.system, {**TASK.options, "eps": "1/11"}),
+        Task("orbit", TASK.system, {**TASK.options, "start": "1,2,3,4"}),
+        Task("orbit", TASK.system, {**TASK.options, "at": None}),
+        Task("orbit", TASK.system, {**TASK.options, "steps": "5"}),
+    ],
+)
+def test_different_questions_have_different_keys(other):
+    assert other.key != TASK.key
+
+
+def test_the_order_of_options_is_no_part_of_the_question():
+    assert Task("orbit", TASK.system, dict(reversed(TASK.options.items()))).key == TASK.key
+
+
+@pytest.mark.parametrize(
+    ("task", "name", "value"),
+    [
+        (TASK, "eps", "1/10"),
+        (TASK, "start", None),
+        (TASK, "m", 2),
+        (TASK, "seed", 7),
+        (TASK, "parameters.a", None),
+        (TASK, "nothing", None),
+        (FILE, "parameters.a", "2"),
+        (FILE, "parameters.b", None),
+        (FILE, "m", None),
+        (Task("verify-universal", None, {"m": 3}), "m", 3),
+        (Task("verify-universal", None, {"m": 3}), "parameters.a", None),
+        (Task("a", {"family": {"seed": 1}}, {"seed": 2}), "seed", 2),  # the option comes first
+    ],
+)
+def test_a_task_tells_its_options_and_the_pieces_of_its_system(task, name, value):
+    assert task.value(name) == value
+
+
+@given(
+    st.builds(
+        Record,
+        key=st.text(max_size=5),
+        outcome=st.sampled_from(Outcome),
+        result=st.none() | tables,
+        verdict=st.none() | st.text(max_size=5),
+        message=st.text(max_size=5),
+        seconds=st.floats(0, 1e6),
+        peak_memory=st.none() | st.integers(0, 10**12),
+        versions=st.dictionaries(st.text(max_size=3), st.text(max_size=3), max_size=2),
+    )
+)
+def test_a_record_is_made_again_from_its_json(record):
+    assert Record.from_json(json.loads(json.dumps(record.to_json()))) == record
+
+
+@pytest.mark.parametrize("outcome", list(Outcome))
+def test_only_a_task_that_was_done_is_ok(outcome):
+    assert Record("k", outcome).is_ok == (outcome == "ok")
+
+
+def test_outcomes_are_spelled_as_documented():
+    assert [str(outcome) for outcome in Outcome] == ["ok", "failed", "crashed", "timeout", "out-of-memory"]
+
+
+def test_nothing_is_limited_unless_said():
+    assert Limits() == Limits(None, None)
+
+
+def test_the_parts_of_a_task_are_plain():
+    assert isinstance(TASK.options, Mapping)
+    assert json.loads(TASK.text) == {"task": "orbit", "system": TASK.system, "options": TASK.options}

@@ -1,0 +1,185 @@
+"""Kinds of tasks: a function registers itself, its signature says what it can be asked; others' modules are brought in.
+
+Tests register names of their own and take them away again: the registry is one for the whole process.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments import registry
+from kahanmaps.experiments.options import VOCABULARY
+from kahanmaps.experiments.registry import ENVIRONMENT, MEMBER, SYSTEM, task, task_kind, task_kinds
+
+LIBRARY = (
+    "check-commute", "check-integrals", "check-measure", "check-poisson", "verify", "verify-universal", "family-space",
+    "orbit", "heights", "period",
+)  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def own_registry(monkeypatch):
+    """What a test registers is gone after it."""
+    task_kinds()
+    monkeypatch.setattr(registry, "_KINDS", dict(registry._KINDS))
+
+
+@pytest.fixture
+def modules(tmp_path, monkeypatch):
+    """A folder of modules that can be imported, and are forgotten after the test."""
+    monkeypatch.syspath_prepend(tmp_path)
+    before = set(sys.modules)
+    yield tmp_path
+    for name in set(sys.modules) - before:
+        del sys.modules[name]
+
+
+def named(folder: Path, monkeypatch: pytest.MonkeyPatch, **texts: str) -> None:
+    for name, text in texts.items():
+        (folder / f"{name}.py").write_text(text)
+    monkeypatch.setenv(ENVIRONMENT, ",".join(texts))
+
+
+TASK = """
+from kahanmaps.experiments.registry import task
+@task("NAME")
+def f(seed: int = 0):
+    '''Do it.'''
+    return {"seed": seed}
+"""
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_the_library_has_the_tasks_that_are_documented(name):
+    assert task_kind(name).name == name
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_every_task_has_a_summary_on_one_line(name):
+    summary = task_kind(name).summary
+    assert summary[-1] in ".?"
+    assert 10 < len(summary) <= 110
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_defaults_are_canonical_and_none_stands_for_not_given(name):
+    kind = task_kind(name)
+    for key, default in kind.defaults.items():
+        assert default is None or kind.options[key].read(default) == default
+
+
+def test_a_signature_says_what_a_task_can_be_asked():
+    @task("a-task", needs=MEMBER)
+    def f(system: Any, eps: Any, steps: int = 5, start: Any = None) -> dict[str, Any]:
+        """Do it.
+
+        And more.
+        """
+        return {}
+
+    kind = task_kind("a-task")
+    assert (kind.summary, kind.needs, kind.required) == ("Do it.", MEMBER, ("eps",))
+    assert list(kind.options) == ["eps", "steps", "start"]
+    assert all(kind.options[name] is VOCABULARY[name] for name in kind.options)
+    assert dict(kind.defaults) == {"steps": 5, "start": None}
+
+
+def test_a_task_needs_a_system_if_it_has_a_parameter_of_that_name():
+    task("with-system")(lambda system: {})
+    task("without-system")(lambda seed=0: {})
+    assert (task_kind("with-system").needs, task_kind("without-system").needs) == (SYSTEM, None)
+
+
+def test_a_task_is_done_with_what_its_options_stand_for():
+    asked = {}
+
+    @task("a-task")
+    def f(system: Any, eps: Any, start: Any, at: Any, other: Any = None) -> dict[str, Any]:
+        asked.update(locals())
+        return {"verdict": "proved"}
+
+    options = {"eps": "1/10", "start": "1/2,0", "at": None, "other": "a system"}
+    assert task_kind("a-task").perform("S", options) == {"verdict": "proved"}
+    expected = {"system": "S", "eps": fmpq(1, 10), "start": (fmpq(1, 2), fmpq(0)), "at": None, "other": "a system"}
+    assert {name: asked[name] for name in expected} == expected
+
+
+def test_a_registered_function_is_still_a_function():
+    @task("a-task")
+    def f(seed: int = 3) -> dict[str, Any]:
+        return {"seed": seed}
+
+    assert f() == {"seed": 3}
+
+
+def test_an_option_that_is_none_is_told_with_a_suggestion():
+    with pytest.raises(TypeError, match="task a-task: stpes is not an option; did you mean steps"):
+        task("a-task")(lambda stpes: {})
+
+
+def test_two_tasks_cannot_have_one_name():
+    with pytest.raises(TypeError, match="there are two tasks of the name orbit"):
+        task("orbit")(lambda seed=0: {"mine": seed})
+
+
+def test_an_unknown_task_is_told_with_the_known_ones_and_a_suggestion():
+    with pytest.raises(InputError) as caught:
+        task_kind("orbot")
+    assert str(caught.value).startswith("there is no task 'orbot', expected one of ")
+    assert str(caught.value).endswith("; did you mean orbit?")
+    assert all(name in str(caught.value) for name in LIBRARY)
+
+
+# Modules of others
+
+
+def test_tasks_of_ones_own_are_brought_in_by_the_environment(modules, monkeypatch):
+    named(modules, monkeypatch, own_one=TASK.replace("NAME", "one"), own_two=TASK.replace("NAME", "two"))
+    assert task_kind("two").perform(None, {"seed": 4}) == {"seed": 4}
+    assert "one" in task_kinds()
+
+
+@pytest.mark.parametrize("value", ["", ",", " , ", "own_one,", " own_one ,own_one"])
+def test_blanks_and_empty_names_in_the_environment_do_no_harm(modules, monkeypatch, value):
+    named(modules, monkeypatch, own_one=TASK.replace("NAME", "one"))
+    monkeypatch.setenv(ENVIRONMENT, value)
+    assert set(LIBRARY) <= set(task_kinds())
+
+
+def test_a_module_imported_under_two_names_is_the_same_tasks(modules, monkeypatch):
+    # As happens where a folder of tasks lies on the path and is part of a package as well.
+    named(modules, monkeypatch, own_one=TASK.replace("NAME", "one"), own_two=TASK.replace("NAME", "one"))
+    assert "one" in task_kinds()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "ModuleNotFoundError: No module named 'own_one'"),
+        ("import nothing_of_the_sort", "ModuleNotFoundError: No module named 'nothing_of_the_sort'"),
+        ("def f(:", "SyntaxError: invalid syntax"),
+        ("1/0", "ZeroDivisionError: division by zero"),
+        (TASK.replace("NAME", "orbit"), "TypeError: there are two tasks of the name orbit"),
+        (TASK.replace("seed", "sed"), "TypeError: task NAME: sed is not an option; did you mean seed"),
+    ],
+)
+def test_a_module_that_cannot_be_imported_is_told_in_a_sentence(modules, monkeypatch, text, words):
+    if text is not None:
+        named(modules, monkeypatch, own_one=text)
+    monkeypatch.setenv(ENVIRONMENT, "own_one")
+    with pytest.raises(InputError) as caught:
+        task_kinds()
+    assert str(caught.value).startswith(f"{ENVIRONMENT} names the module own_one, which cannot be imported: {words}")
+
+
+def test_the_tasks_of_the_tests_can_be_brought_in(monkeypatch):
+    monkeypatch.syspath_prepend(Path(__file__).parent)
+    monkeypatch.setenv(ENVIRONMENT, "fault_tasks")
+    sys.modules.pop("fault_tasks", None)  # as in a process of its own
+    assert task_kind("fault").perform(None, {"seed": 4}) == {"seed_squared": 16, "verdict": "proved"}

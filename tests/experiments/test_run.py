@@ -1,0 +1,277 @@
+"""Running batches: what comes out does not depend on how it was run, and nothing that is killed loses a record."""
+
+from __future__ import annotations
+
+import io
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.export import write_jsonl
+from kahanmaps.experiments.records import Job, Outcome, Record, Task
+from kahanmaps.experiments.run import Batch, run
+from kahanmaps.experiments.spec import SpecError, parse_spec
+from kahanmaps.experiments.store import Store
+
+HERE = Path(__file__).parent
+MIXED = """
+name = "mixed"
+limits = { time = "30 s", memory = "150 MB" }
+[experiments.faults]
+task = "fault"
+axes = { order = [2, 5, 6, 8, 11, 12], seed = "0..2" }
+[experiments.space]
+task = "family-space"
+system = "family"
+axes = { m = "2..3", seed = "0..9", draw = ["generic", "eigenvalues"] }
+[experiments.top]
+task = "check-integrals"
+system = ["euler_top", "lorenz", "henon_heiles"]
+axes = { time_step = ["1/5", "0.3"] }
+"""
+PAUSES = """
+[experiments.pause]
+task = "pause"
+options = {{ steps = {milliseconds} }}
+axes = {{ seed = "0..{last}" }}
+"""
+
+
+@pytest.fixture(autouse=True)
+def _fault_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(HERE))
+    monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
+    monkeypatch.setenv("PYTHONPATH", str(HERE))
+
+
+def exported(db: Path) -> str:
+    """The results of a database without times and places, in the order of the plan."""
+    stream = io.StringIO()
+    with Store.open(db, readonly=True) as store:
+        write_jsonl(store.rows(), stream, stable=True)
+    return stream.getvalue()
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What MIXED gives, one child at a time."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.syspath_prepend(str(HERE))
+        monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
+        monkeypatch.setenv("PYTHONPATH", str(HERE))
+        db = tmp_path_factory.mktemp("undisturbed") / "results.db"
+        records = list(run(MIXED, db))
+    assert len(records) == 18 + 40 + 6
+    assert {record.outcome for record in records} == {
+        Outcome.OK,
+        Outcome.CRASHED,
+        Outcome.FAILED,
+        Outcome.OUT_OF_MEMORY,
+    }
+    return exported(db)
+
+
+def test_results_do_not_depend_on_the_number_of_children(undisturbed: str, tmp_path: Path):
+    list(run(MIXED, tmp_path / "b.db", jobs=3))
+    assert exported(tmp_path / "b.db") == undisturbed
+
+
+def test_results_do_not_depend_on_the_order_of_tasks(undisturbed: str, tmp_path: Path):
+    for name in ("top", "faults", "space"):
+        list(run(MIXED, tmp_path / "b.db", jobs=2, only=[name]))
+    assert exported(tmp_path / "b.db") == undisturbed
+
+
+def test_results_do_not_depend_on_interruptions(undisturbed: str, tmp_path: Path):
+    for _ in range(4):
+        found = run(MIXED, tmp_path / "b.db", jobs=2)
+        assert len(list(islice(found, 15))) == 15
+        found.close()  # type: ignore[attr-defined]
+    list(run(MIXED, tmp_path / "b.db", jobs=2))
+    assert exported(tmp_path / "b.db") == undisturbed
+
+
+def test_shards_merged_are_the_whole(undisturbed: str, tmp_path: Path):
+    counts = [len(list(run(MIXED, tmp_path / f"{i}.db", jobs=2, shard=(i, 3)))) for i in (1, 2, 3)]
+    assert counts == [22, 21, 21]
+    with Store.open(tmp_path / "all.db", create=True) as store:
+        for i in (2, 3, 1):
+            store.merge(tmp_path / f"{i}.db")
+    assert exported(tmp_path / "all.db") == undisturbed
+
+
+def test_a_record_is_in_the_database_before_it_is_yielded(tmp_path: Path):
+    found = run(PAUSES.format(milliseconds=1, last=20), tmp_path / "a.db")
+    for record in islice(found, 5):
+        with Store.open(tmp_path / "a.db", readonly=True) as store:
+            ((_, stored, _, _),) = store.find(record.key)
+        assert stored == record
+    found.close()  # type: ignore[attr-defined]
+
+
+def test_a_second_run_does_nothing(tmp_path: Path):
+    text = PAUSES.format(milliseconds=1, last=5)
+    assert len(list(run(text, tmp_path / "a.db"))) == 6
+    assert list(run(text, tmp_path / "a.db")) == []
+
+
+def test_a_changed_axis_runs_the_new_tasks_only(tmp_path: Path):
+    assert len(list(run(PAUSES.format(milliseconds=1, last=5), tmp_path / "a.db"))) == 6
+    new = list(run(PAUSES.format(milliseconds=1, last=8), tmp_path / "a.db"))
+    assert len(new) == 3
+    assert len(list(run(PAUSES.format(milliseconds=2, last=5), tmp_path / "a.db"))) == 6
+
+
+def test_failed_tasks_are_done_again_when_that_is_asked_for(tmp_path: Path):
+    text = '[experiments.a]\ntask = "fault"\naxes = { order = [8], seed = "0..3" }'
+    assert sum(not record.is_ok for record in run(text, tmp_path / "a.db")) == 2
+    assert list(run(text, tmp_path / "a.db")) == []
+    again = list(run(text, tmp_path / "a.db", retry_failed=True))
+    assert [record.outcome for record in again] == [Outcome.FAILED] * 2
+
+
+def test_without_a_database_records_come_all_the_same():
+    records = list(run(PAUSES.format(milliseconds=1, last=5), jobs=2))
+    assert sorted(record.result["seed_squared"] for record in records if record.result) == [0, 1, 4, 9, 16, 25]
+
+
+def test_a_spec_may_be_a_path_a_text_or_an_object(tmp_path: Path):
+    text = PAUSES.format(milliseconds=1, last=1)
+    path = tmp_path / "spec.toml"
+    path.write_text(text)
+    keys = [sorted(record.key for record in run(spec)) for spec in (text, path, str(path), parse_spec(text))]
+    assert keys[0] == keys[1] == keys[2] == keys[3]
+
+
+def test_wrong_specs_and_missing_files_are_told(tmp_path: Path):
+    with pytest.raises(SpecError, match=r"experiments\.a\.task"):
+        list(run('[experiments.a]\ntask = "no"'))
+    with pytest.raises(InputError, match="cannot read the spec"):
+        list(run(tmp_path / "no.toml"))
+
+
+class Scripted:
+    """An executor that hands back what was submitted, one at a time, and writes down what it was asked."""
+
+    def __init__(self) -> None:
+        self.jobs: list[Job] = []
+        self.most = 0
+        self.closed = 0
+
+    @property
+    def is_free(self) -> bool:
+        return len(self.jobs) < 3
+
+    @property
+    def in_flight(self) -> int:
+        return len(self.jobs)
+
+    def submit(self, job: Job) -> None:
+        self.jobs.append(job)
+        self.most = max(self.most, len(self.jobs))
+
+    def wait(self, timeout: float) -> list[Record]:
+        return [Record(self.jobs.pop(0).task.key, Outcome.OK)]
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+def jobs(count: int) -> Iterator[Job]:
+    return (Job(Task("pause", None, {"seed": seed})) for seed in range(count))
+
+
+def test_no_more_is_handed_out_than_the_executor_takes():
+    executor = Scripted()
+    assert sum(len(records) for records in Batch(jobs(50), executor)) == 50
+    assert executor.most == 3
+    assert executor.closed == 1
+
+
+def test_nothing_is_handed_out_after_an_interrupt():
+    executor = Scripted()
+    batch = Batch(jobs(50), executor)
+    seen = 0
+    for records in batch:
+        seen += len(records)
+        if seen == 10:
+            batch.interrupt()
+    assert seen == 12  # the two in flight are done
+    assert batch.was_interrupted
+    assert batch.abandoned == 0
+
+
+def test_what_is_not_done_within_the_grace_is_given_up():
+    class Slow(Scripted):
+        def wait(self, timeout: float) -> list[Record]:
+            time.sleep(0.05)
+            return []
+
+    executor = Slow()
+    batch = Batch(jobs(5), executor, grace=0.2)
+    batch.interrupt()
+    assert not any(batch)
+    batch = Batch(jobs(5), executor, grace=0.2)
+    executor.jobs = list(jobs(2))
+    batch.interrupt()
+    assert not any(batch)
+    assert batch.abandoned == 2
+
+
+def test_jobs_are_taken_one_by_one_as_they_are_needed():
+    taken = 0
+
+    def endless() -> Iterator[Job]:
+        nonlocal taken
+        for job in jobs(10**9):
+            taken += 1
+            yield job
+
+    assert len(list(islice(Batch(endless(), Scripted()), 100))) == 100
+    assert taken < 110
+
+
+def killed_and_completed(folder: Path, kills: int, last: int, seed: int) -> None:
+    """Run a batch, kill -9 its parent at random instants, complete it, compare with an undisturbed run."""
+    text = PAUSES.format(milliseconds=4, last=last)
+    spec = folder / "spec.toml"
+    spec.write_text(text)
+    list(run(text, folder / "calm.db", jobs=2))
+    command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "spec.toml", "--db", "wild.db", "-j", "2"]
+    rng = random.Random(seed)
+    killed = 0
+    while killed < kills:
+        process = subprocess.Popen([*command, "-q"], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        try:
+            process.wait(rng.uniform(0.05, 1.2))
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGKILL)
+            killed += 1
+        else:
+            assert process.stderr is not None
+            assert process.returncode == 0, process.stderr.read().decode()
+            (folder / "wild.db").unlink()  # done before it could be killed: once more from the start
+        process.communicate()
+    done = sum(1 for _ in run(text, folder / "wild.db", jobs=2))
+    assert exported(folder / "wild.db") == exported(folder / "calm.db")
+    assert sqlite3.connect(folder / "wild.db").execute("PRAGMA integrity_check").fetchone() == ("ok",)
+    assert not list(folder.glob("*.db-*"))
+    assert done <= last + 1
+
+
+def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path: Path):
+    killed_and_completed(tmp_path, kills=6, last=400, seed=1)
+
+
+@pytest.mark.slow
+def test_a_batch_that_is_killed_fifty_times_comes_to_the_same_end(tmp_path: Path):
+    killed_and_completed(tmp_path, kills=50, last=12_000, seed=2)

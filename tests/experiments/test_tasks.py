@@ -1,0 +1,357 @@
+"""The tasks of the library: each gives what a direct call gives, small and as plain data, and says what it cannot do.
+
+Verdicts, periods, ranks and last points are compared with the functions of the library themselves.
+"""
+
+from __future__ import annotations
+
+import json
+from hashlib import sha256
+from typing import Any
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.fields import GF, QQ, RR, Field
+from kahanmaps.checks.claims import Report, Verdict
+from kahanmaps.checks.commute import check_commute
+from kahanmaps.checks.conserve import check_integrals
+from kahanmaps.checks.preserve import check_measure, check_poisson
+from kahanmaps.checks.settings import Settings, random_starts
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.recipes import recipe_of, system_from
+from kahanmaps.experiments.records import canonical
+from kahanmaps.experiments.registry import task_kind
+from kahanmaps.family.cubics import cubic_space
+from kahanmaps.family.structure import structure_of
+from kahanmaps.invariants.heights import height_growth
+from kahanmaps.maps.fast import FloatOrbit
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.periods import period_of
+from kahanmaps.paper.examiner import VerifyOptions
+from kahanmaps.paper.verify import verify, verify_universal
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.files import SystemFile, parse_system
+
+FALSE = """
+name = "false claims"
+variables = ["x", "y"]
+[system]
+rhs = ["x*(1 - y)", "y*(x - 1)"]
+[integrals]
+I = "x + y"
+[density]
+phi = "x + y"
+"""
+
+
+def made(file: SystemFile) -> SystemFile:
+    """The system as a child has it: from the recipe of the file."""
+    documents: dict[str, str] = {}
+    return system_from(recipe_of(file, documents), documents.__getitem__)
+
+
+def member(m: int = 2, seed: int = 1, **recipe: Any) -> SystemFile:
+    return system_from({"family": {"draw": "eigenvalues", "m": m, "seed": seed, **recipe}}, {}.__getitem__)
+
+
+MEMBER, LORENZ, TOP, RIVALS, WRONG = member(), *map(made, map(load, ["lorenz", "euler_top", "lotka_volterra"])), made(
+    parse_system(FALSE)
+)  # fmt: skip
+
+
+def perform(name: str, system: SystemFile | None, **asked: Any) -> dict[str, Any]:
+    """What a task gives, with the defaults of its kind for what is not asked; it has to be plain data."""
+    kind = task_kind(name)
+    given = {key: value if key == "other" else kind.options[key].read(value) for key, value in asked.items()}
+    result = kind.perform(system, {**kind.defaults, **given})
+    assert json.loads(canonical(result)) == result
+    return result
+
+
+def start_of(system: SystemFile, seed: int = 0) -> Any:
+    return next(random_starts(system.system.dim, seed))
+
+
+def structure(system: SystemFile) -> Any:
+    return structure_of(system.system, system.hamiltonian, system.member)
+
+
+# Checks
+
+
+CHECKS = [
+    ("check-commute", MEMBER, {}, lambda: check_commute(MEMBER)),
+    ("check-commute", MEMBER, {"eps": "1/3"}, lambda: check_commute(MEMBER, None, Settings(eps="1/3"))),
+    ("check-commute", LORENZ, {"other": TOP}, lambda: check_commute(LORENZ, TOP)),
+    (
+        "check-commute",
+        TOP,
+        {"other": TOP, "eps": 1, "eps2": "1/7", "seed": 5},
+        lambda: check_commute(TOP, TOP, Settings(eps=1, seed=5), fmpq(1, 7)),
+    ),
+    ("check-integrals", MEMBER, {}, lambda: check_integrals(MEMBER)),
+    ("check-integrals", TOP, {"steps": 3}, lambda: check_integrals(TOP, Settings(steps=3))),
+    ("check-integrals", WRONG, {}, lambda: check_integrals(WRONG)),
+    ("check-measure", RIVALS, {"error_bits": 60}, lambda: check_measure(RIVALS, Settings(error_bits=60))),
+    ("check-measure", WRONG, {}, lambda: check_measure(WRONG)),
+    ("check-poisson", MEMBER, {"start": "1,2,3,4"}, lambda: check_poisson(MEMBER, Settings(start=(1, 2, 3, 4)))),
+    ("verify", MEMBER, {"sections": "2,6"}, lambda: verify(MEMBER, Settings(), VerifyOptions((2, 6)))),
+    (
+        "verify",
+        MEMBER,
+        {"sections": 2, "controls": True, "eps": "1/3"},
+        lambda: verify(MEMBER, Settings(eps="1/3"), VerifyOptions((2,), controls=True)),
+    ),
+    ("verify", MEMBER, {"sections": 4, "ball_bits": 64}, lambda: verify(MEMBER, None, VerifyOptions((4,), 3, 64))),
+    ("verify-universal", None, {"m": 1, "sections": 6}, lambda: verify_universal(1, None, VerifyOptions((6,)))),
+    (
+        "verify-universal",
+        None,
+        {"m": 2, "sections": 2, "controls": True, "order": 1},
+        lambda: verify_universal(2, None, VerifyOptions((2,), 1, None, True)),
+    ),
+]  # fmt: skip
+over_checks = pytest.mark.parametrize(("name", "system", "asked", "call"), CHECKS)
+
+
+@over_checks
+def test_a_check_comes_to_the_verdict_of_the_library(name, system, asked, call):
+    assert perform(name, system, **asked)["verdict"] == str(call().verdict)
+
+
+@over_checks
+def test_a_check_counts_the_claims_of_the_report(name, system, asked, call):
+    result, report = perform(name, system, **asked), call()
+    counted = [f for f in report.findings if f.applies and not f.control]
+    controls = [f for f in report.findings if f.control]
+    assert result["claims"] == len(counted) == sum(result[str(verdict)] for verdict in Verdict)
+    assert all(result[str(verdict)] == sum(f.verdict is verdict for f in counted) for verdict in Verdict)
+    assert (result["controls"], result["controls_refuted"]) == (
+        len(controls),
+        sum(f.verdict is Verdict.REFUTED for f in controls),
+    )
+
+
+@over_checks
+def test_a_check_keeps_the_whole_report_if_asked_to(name, system, asked, call):
+    plain: Report = call()
+    assert perform(name, system, report=True, **asked)["report"] == json.loads(json.dumps(plain.to_json()))
+
+
+@over_checks
+def test_a_check_keeps_no_report_unless_asked_to(name, system, asked, call):
+    assert "report" not in perform(name, system, **asked)
+
+
+@over_checks
+def test_what_does_not_hold_is_kept_with_its_witness(name, system, asked, call):
+    doubtful = [f for f in call().findings if f.applies and not f.control and f.verdict.holds is not True]
+    kept = perform(name, system, **asked).get("doubtful", [])
+    assert kept == [json.loads(json.dumps(f.to_json())) for f in doubtful]
+    assert all(claim["witness"] for claim in kept if claim["verdict"] == "refuted")
+
+
+def test_the_checks_above_come_out_both_ways():
+    found = {perform(name, system, **asked)["verdict"] for name, system, asked, _ in CHECKS[:10]}
+    assert {"proved", "refuted"} <= found
+
+
+def test_a_check_of_a_member_says_its_size():
+    assert perform("verify", MEMBER, sections=2)["m"] == 2
+
+
+# The family
+
+
+@pytest.mark.parametrize(
+    ("system", "generic", "associated"),
+    [
+        (MEMBER, True, 2),
+        (member(3, draw="generic", seed=7), True, None),
+        (member(2, eigenvalues="1,1"), False, 1),
+        (made(load("paper_m3_irreducible")), True, 1),
+    ],
+)
+def test_the_space_of_a_member_is_that_of_the_library(system, generic, associated):
+    space = cubic_space(system.member.A, system.member.variables)
+    result = perform("family-space", system)
+    assert (result["dimension"], result["expected"], result["rank"], result["unknowns"]) == (
+        space.dimension,
+        space.expected,
+        space.rank,
+        space.unknowns,
+    )
+    assert result["factors"] == [str(factor) for factor in system.member.factors]
+    assert result["generic"] is generic
+    assert result["associated"] == (associated or 2 ** (len(result["factors"]) - 1))
+
+
+# Orbits
+
+
+def last_of(system: SystemFile, field: Field, steps: int, start: Any = None) -> str:
+    """The last point of an orbit, solved for step by step."""
+    walk = Orbit(KahanMap(system.system, "1/10", field), start or start_of(system), steps, max_digits=None)
+    return ",".join(list(walk)[-1].text)
+
+
+@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007", f"mod:{2**89 - 1}", "ball:200"])
+@pytest.mark.parametrize("system", [LORENZ, TOP], ids=["lorenz", "top"])
+def test_an_orbit_ends_where_the_library_does(system, arithmetic):
+    kind, _, number = arithmetic.partition(":")
+    field = {"exact": lambda: QQ, "mod": lambda: GF(int(number)), "ball": lambda: RR(int(number))}[kind]()
+    result = perform("orbit", system, eps="0.1", steps=5, arithmetic=arithmetic)
+    expected = last_of(system, field, 5)
+    assert result["last_sha256"] == sha256(expected.encode()).hexdigest()
+    assert result.get("last", expected) == expected
+    assert (result["status"], result["reached"], result["method"]) == ("completed", 5, "generic")
+
+
+@pytest.mark.parametrize("asked", [{"steps": 6}, {"at": "6"}, {"at": "2,6"}, {"at": 6, "method": "jump"}])
+@pytest.mark.parametrize("method", [None, "generic", "normal-form"])
+def test_every_method_comes_to_the_same_point(method, asked):
+    asked = {"method": method, **asked} if method else asked
+    result = perform("orbit", MEMBER, eps="1/10", **asked)
+    assert result["last_sha256"] == sha256(last_of(MEMBER, QQ, 6).encode()).hexdigest()
+    assert result["reached"] == 6
+
+
+def test_an_orbit_of_machine_numbers_is_that_of_the_library():
+    walk = FloatOrbit(LORENZ.system, "1/100", start_of(LORENZ), 5)
+    expected = [x.tolist() for _, x in walk][-1]
+    result = perform("orbit", LORENZ, eps="1/100", steps=5, arithmetic="float")
+    assert [float(entry) for entry in result["last"].split(",")] == expected
+    assert (result["status"], result["reached"], result["method"]) == ("completed", 5, "generic")
+
+
+def test_a_member_is_walked_in_normal_form_also_by_machine_numbers():
+    results = [
+        perform("orbit", MEMBER, eps="1/100", steps=3, start="0.1,0.2,-0.1,0.3", arithmetic="float", **asked)
+        for asked in ({}, {"method": "generic"})
+    ]
+    assert [result["method"] for result in results] == ["normal-form", "generic"]
+    ends = [[float(entry) for entry in result["last"].split(",")] for result in results]
+    assert ends[0] == pytest.approx(ends[1], rel=1e-10)  # three steps of small numbers lose a few bits of 53
+
+
+def test_a_long_orbit_modulo_a_prime_is_reached_directly():
+    result = perform("orbit", MEMBER, eps="1/10", at=10**18, arithmetic="mod:10007")
+    assert (result["method"], result["reached"]) == ("jump", 10**18)
+
+
+@pytest.mark.parametrize(("steps", "digits"), [(0, 1), (2, None)])
+def test_an_exact_orbit_counts_digits(steps, digits):
+    result = perform("orbit", LORENZ, eps="1/10", steps=steps, start="1,2,3")
+    walk = Orbit(KahanMap(LORENZ.system, "1/10"), (1, 2, 3), steps)
+    assert result["digits"] == list(walk)[-1].digits
+    assert digits is None or result["digits"] == digits
+
+
+def test_an_iterate_beyond_the_budget_leaves_the_start_as_the_last_point():
+    result = perform("orbit", MEMBER, eps="1/10", at=10**6, max_digits=100, start="1,2,3,44")
+    assert (result["status"], result["reached"], result["last"], result["digits"]) == ("budget", 0, "1,2,3,44", 2)
+
+
+def test_an_orbit_over_budget_says_so():
+    result = perform("orbit", LORENZ, eps="1/10", steps=50, max_digits=100)
+    assert result["status"] == "budget"
+    assert result["reached"] < 50
+    assert result["digits"] <= 100
+
+
+def test_a_singular_start_ends_an_orbit_without_failing_it():
+    # x' = x^2 has the map x/(1 - 2 eps x): no value at x = 5 for eps = 1/10.
+    file = made(parse_system('variables = ["x"]\n[system]\nrhs = ["x^2"]'))
+    result = perform("orbit", file, eps="1/10", start="5")
+    assert (result["status"], result["reached"], result["last"]) == ("singular", 0, "5")
+
+
+def test_an_orbit_that_comes_back_says_its_period():
+    result = perform("orbit", MEMBER, eps="1/10", start="0,0,0,0", steps=10)
+    assert result["period"] == 1
+
+
+def test_a_short_last_point_is_kept_and_a_long_one_known_by_its_hash():
+    short, long = (perform("orbit", LORENZ, eps="1/10", steps=steps) for steps in (1, 8))
+    assert short["last_sha256"] == sha256(short["last"].encode()).hexdigest()
+    assert "last" not in long
+    assert len(canonical(long)) < 1000
+
+
+@pytest.mark.parametrize("name", ["orbit", "heights", "period"])
+def test_a_start_is_drawn_from_the_seed_unless_given(name):
+    drawn = perform(name, MEMBER, eps="1/10", seed=5)
+    point = ",".join(map(str, start_of(MEMBER, 5)))
+    assert drawn["start"] == point
+    assert perform(name, MEMBER, eps="1/10", start=point) == drawn
+
+
+# Heights and periods
+
+
+@pytest.mark.parametrize(("system", "steps", "growth"), [(MEMBER, 40, "quadratic"), (LORENZ, 9, "exponential")])
+def test_heights_are_those_of_the_library(system, steps, growth):
+    found = height_growth(
+        KahanMap(system.system, "1/10"), start_of(system), steps, structure=structure(system)
+    ).to_json()
+    result = perform("heights", system, eps="1/10", steps=steps)
+    assert result["growth"] == found["kind"] == growth
+    assert (result["heights"], result["constant"], result["reached"]) == (found["heights"], found["constant"], steps)
+
+
+def test_heights_may_be_taken_every_so_many_steps():
+    result = perform("heights", MEMBER, eps="1/10", steps=40, every=4)
+    assert all(entry["step"] % 4 == 0 for entry in result["heights"])
+
+
+@pytest.mark.parametrize("prime", [None, "10007", 10007, 2**61 - 1])
+def test_a_period_is_that_of_the_library(prime):
+    found = period_of(structure(MEMBER), "1/10", start_of(MEMBER), None if prime is None else int(prime))
+    result = perform("period", MEMBER, eps="1/10", **({} if prime is None else {"prime": prime}))
+    assert result["period"] == (None if found.period is None else str(found.period))
+    assert (result["status"], result["meets_pole"]) == (found.status, found.meets_pole)
+    assert result["planes"] == [plane.text for plane in found.planes]
+
+
+def test_a_period_is_that_of_the_orbit_itself():
+    # Of a start whose orbit meets no pole: walked step by step modulo a small prime.
+    for seed in range(50):
+        found = perform("period", MEMBER, eps="1/10", prime=101, seed=seed)
+        if found["meets_pole"] is False and found["period"] is not None:
+            walked = perform("orbit", MEMBER, eps="1/10", arithmetic="mod:101", steps=20_000, seed=seed)
+            assert str(walked["period"]) == found["period"]
+            return
+    raise AssertionError("every orbit meets a pole")
+
+
+# What cannot be done
+
+
+@pytest.mark.parametrize(
+    ("name", "system", "asked", "words"),
+    [
+        ("check-commute", LORENZ, {}, "kind \\[family\\]"),
+        ("check-commute", LORENZ, {"other": RIVALS}, "lorenz has dimension 3 and lotka_volterra 2"),
+        ("check-commute", TOP, {"other": TOP, "eps2": 1}, "a second step needs the first one as well"),
+        ("check-integrals", LORENZ, {}, "no integral of lorenz is known or claimed"),
+        ("check-measure", LORENZ, {}, "lorenz"),
+        ("check-poisson", LORENZ, {}, "needs a Hamiltonian system"),
+        ("verify", LORENZ, {}, "lorenz"),
+        ("verify-universal", None, {"m": 9}, "9"),
+        ("family-space", LORENZ, {}, "lorenz is of kind \\[system\\], expected one of kind \\[family\\]"),
+        ("orbit", LORENZ, {"eps": 1, "start": "1,2"}, "found a point with 2 coordinates, expected 3"),
+        ("orbit", LORENZ, {"eps": 1, "start": "1,2", "arithmetic": "float"}, "found a point with 2 coordinates"),
+        ("orbit", LORENZ, {"eps": 1, "at": 5, "method": "jump"}, "needs a normal form, and there is none"),
+        ("orbit", LORENZ, {"eps": 1, "at": 5, "arithmetic": "float"}, "need exact, mod:P or ball:BITS arithmetic"),
+        ("orbit", MEMBER, {"eps": "1/7", "arithmetic": "mod:7"}, "the prime 7 divides the denominator of 1/7"),
+        ("heights", LORENZ, {"eps": 1, "start": "1,2"}, "found a point with 2 coordinates, expected 3"),
+        ("period", LORENZ, {"eps": 1}, "no period of lorenz can be computed"),
+        ("period", MEMBER, {"eps": 1, "start": "1,2"}, "found a point with 2 coordinates, expected 4"),
+        ("period", MEMBER, {"eps": "1/7", "prime": 7}, "the prime 7 divides the denominator of 1/7"),
+    ],
+)
+def test_what_cannot_be_done_is_told_in_a_sentence(name, system, asked, words):
+    with pytest.raises(InputError, match=words):
+        perform(name, system, **asked)

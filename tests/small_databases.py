@@ -1,0 +1,107 @@
+"""What the tests of databases share: small databases, and processes that are killed while they write to one."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from kahanmaps.experiments import merging, plans
+from kahanmaps.experiments import store as store_module
+from kahanmaps.experiments.records import Limits, Outcome, Record, Task
+from kahanmaps.experiments.store import Store
+
+# For hundreds of small databases: a disk that others use makes each wait to be synchronised.
+MEMORY = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+
+LIMITS = Limits(time=1.5, memory=1 << 30)
+
+
+def task(number: int) -> Task:
+    return Task("orbit", {"family": {"m": 2, "seed": number}}, {"eps": "1/10"})
+
+
+def tasks(*numbers: int) -> list[Task]:
+    return [task(number) for number in numbers]
+
+
+def ok(number: int, result: object = "1/2", verdict: str | None = None) -> Record:
+    return Record(task(number).key, Outcome.OK, {"value": result}, verdict, seconds=0.25)
+
+
+def failed(number: int, message: str = "no") -> Record:
+    return Record(task(number).key, Outcome.FAILED, message=message, seconds=0.5)
+
+
+def seed(what: Task) -> int:
+    assert what.system is not None
+    return what.system["family"]["seed"]
+
+
+def seeds(jobs) -> list[int]:
+    return [seed(job.task) for job in jobs]
+
+
+def planned(path: Path, *numbers: int, records=(), experiment: str = "a", definition: str = "") -> Path:
+    """A database with one experiment, closed."""
+    with Store.open(path, create=True) as store:
+        store.plan(experiment, definition or repr(numbers), LIMITS, tasks(*numbers), {})
+        store.add(records)
+    return path
+
+
+@contextmanager
+def small_chunks():
+    """So that a dozen rows are many chunks. A context and not a fixture, because Hypothesis needs it anew each time."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (store_module, plans, merging):
+            for name in {"PLAN_CHUNK", "RESULT_CHUNK", "COUNT_CHUNK"} & set(vars(module)):
+                patch.setattr(module, name, 3)
+        yield
+
+
+PRELUDE = """
+import json, os, resource, sys, time
+from kahanmaps.experiments import database
+from kahanmaps.experiments.records import Limits, Outcome, Record, Task
+from kahanmaps.experiments.store import Store, StoreError
+
+def task(number):
+    return Task("orbit", {"family": {"m": 2, "seed": number}}, {"eps": "1/10"})
+
+def ok(number, result="1/2"):
+    return Record(task(number).key, Outcome.OK, {"value": result})
+
+path, arguments = sys.argv[1], sys.argv[2:]
+"""
+
+
+def start(script: str, path: Path, *arguments: object) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", PRELUDE + script, str(path), *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+
+def output(script: str, path: Path, *arguments: object) -> str:
+    with start(script, path, *arguments) as process:
+        text, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    return text
+
+
+def killed(path: Path) -> None:
+    """A database whose writer was killed: the results are in its journal."""
+    script = """
+database.journal_for = lambda path: "wal"
+store = Store.open(path)
+store.add([ok(1)])
+os.kill(os.getpid(), 9)
+"""
+    planned(path, 1, 2)
+    with start(script, path) as process:
+        assert process.wait(60) == -signal.SIGKILL
+    assert path.with_name("results.db-wal").stat().st_size > 0
