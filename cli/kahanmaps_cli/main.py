@@ -30,6 +30,7 @@ COMMANDS = {
     "check-poisson": ("check_poisson", "Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?"),
     "verify": ("verify", "Every statement of the paper, for a random or given member, any m."),
     "family": ("family", "Make and look at members of the commuting family."),
+    "batch": ("batch", "Thousands of experiments from one file: run, resume, summarise."),
     "systems": ("systems", "The catalogue of named systems."),
     "version": ("version", "The versions of kahanmaps and of what it computes with."),
 }

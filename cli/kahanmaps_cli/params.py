@@ -9,12 +9,12 @@ import click
 from kahanmaps.errors import InputError
 
 if TYPE_CHECKING:
-    _ParamType = click.ParamType[Any]  # generic for the type checker, but not in every version of click we run with
+    OptionType = click.ParamType[Any]  # generic for the type checker, but not in every version of click we run with
 else:
-    _ParamType = click.ParamType
+    OptionType = click.ParamType
 
 
-class ExactNumber(_ParamType):
+class ExactNumber(OptionType):
     """An integer, p/q or a decimal, read exactly."""
 
     name = "number"
@@ -30,7 +30,7 @@ class ExactNumber(_ParamType):
             self.fail(str(error), param, ctx)
 
 
-class PointText(_ParamType):
+class PointText(OptionType):
     """Numbers separated by commas, read exactly."""
 
     name = "point"
@@ -46,7 +46,7 @@ class PointText(_ParamType):
             self.fail(str(error), param, ctx)
 
 
-class NameValue(_ParamType):
+class NameValue(OptionType):
     """NAME=VALUE; without a name the whole text is the value where `name_is_optional`."""
 
     name = "name=value"
@@ -65,7 +65,7 @@ class NameValue(_ParamType):
         self.fail(f"found {_shorten(value)}, expected NAME=VALUE", param, ctx)
 
 
-class Arithmetic(_ParamType):
+class Arithmetic(OptionType):
     """exact, float, mod:P (P a prime), ball:BITS or ball:auto; gives the pair (kind, number), 0 for auto."""
 
     name = "kind"
@@ -91,7 +91,7 @@ class Arithmetic(_ParamType):
         )
 
 
-class Steps(_ParamType):
+class Steps(OptionType):
     """Step numbers separated by commas."""
 
     name = "n1,n2,..."

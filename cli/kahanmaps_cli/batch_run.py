@@ -1,0 +1,230 @@
+"""`batch run`: from a spec and a database to results, with a word on how it went."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.batch_progress import BatchProgress, duration
+from kahanmaps_cli.batch_show import print_status, status_data
+from kahanmaps_cli.progress import say
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.signals import interruptible
+
+if TYPE_CHECKING:
+    from kahanmaps.experiments.executor import Executor
+    from kahanmaps.experiments.spec import Spec
+    from kahanmaps.experiments.store import Planned, Store
+
+_SHOWN = 3  # tasks of each experiment in a dry run
+
+
+def dry_run(path: str, db: str | None, options: Mapping[str, Any]) -> int:
+    """Read the spec, and say what it would do."""
+    from kahanmaps.experiments.spec import MAX_TASKS, read_spec
+    from kahanmaps.version import __version__
+
+    spec = read_spec(path, max_tasks=options["max_tasks"] or MAX_TASKS)
+    missing = _missing(db, spec, options)
+    chosen = [e for e in spec.experiments if not options["only"] or e.name in options["only"]]
+    _require_names(options["only"], spec)
+    if options["as_json"]:
+        data = [
+            {
+                "name": experiment.name,
+                "task": experiment.kind.name,
+                "tasks": experiment.size,
+                "axes": {name: len(values) for name, values in experiment.grid.axes.items()},
+                "limits": {"time": experiment.limits.time, "memory": experiment.limits.memory},
+                "first": [_task_data(experiment[k]) for k in range(min(_SHOWN, experiment.size))],
+            }
+            for experiment in chosen
+        ]
+        print_json(
+            {
+                "command": "batch run --dry-run",
+                "version": __version__,
+                "spec": path,
+                "tasks": sum(experiment.size for experiment in chosen),
+                "missing": missing,
+                "experiments": data,
+            }
+        )
+        return 0
+    for experiment in chosen:
+        axes = " x ".join(
+            f"{len(experiment.grid.axes[group[0]])} {'+'.join(group)}" for group in experiment.grid.groups
+        )
+        click.echo(f"{experiment.name}\t{experiment.kind.name}\t{experiment.size} tasks\t{axes}")
+        for k in range(min(_SHOWN, experiment.size)):
+            task = experiment[k]
+            given = {name: value for name, value in task.options.items() if value is not None}
+            click.echo(f"\t{task.key[:8]}\t{_recipe(task.system)}\t{_pairs(given)}")
+        if experiment.size > _SHOWN:
+            click.echo(f"\t... and {experiment.size - _SHOWN} more")
+    click.echo(
+        f"{sum(e.size for e in chosen)} tasks" + ("" if missing is None else f", {missing} of them without result")
+    )
+    return 0
+
+
+def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
+    """Do what is missing; the exit status."""
+    from kahanmaps.experiments.run import Batch, plan
+    from kahanmaps.experiments.spec import MAX_TASKS, read_spec
+    from kahanmaps.experiments.store import Store
+
+    spec = None if path is None else read_spec(path, max_tasks=options["max_tasks"] or MAX_TASKS)
+    if spec is not None:
+        _require_names(options["only"], spec)
+    quiet, shard = options["quiet"], options["shard"] or (1, 1)
+    with Store.open(db, create=spec is not None) as store:
+        planned = {} if spec is None else plan(spec, store)
+        names = list(options["only"]) or ([e.name for e in spec.experiments] if spec is not None else None)
+        todo = store.count_pending(names, retry_failed=options["retry_failed"], shard=shard)
+        if not quiet:
+            _tell_plan(planned, todo, db)
+        batch = None
+        with BatchProgress(todo, quiet) as progress:
+            if todo:
+                batch = Batch(
+                    store.pending(names, retry_failed=options["retry_failed"], shard=shard), _executor(store, options)
+                )
+
+                def interrupt() -> None:
+                    assert batch is not None
+                    batch.interrupt()
+                    if not quiet and batch.in_flight:
+                        say(f"finishing {batch.in_flight} tasks in flight (Ctrl-C again gives them up)")
+
+                with interruptible(interrupt):
+                    for records in batch:
+                        if records:
+                            store.add(records)
+                        progress.tell(records, batch.in_flight)
+                        if options["as_jsonl"]:
+                            for record in records:
+                                click.echo(json.dumps({"record": "result", **record.to_json()}))
+        missing = store.count_pending(names, shard=shard)
+        data = status_data(store, names or ())
+    interrupted = batch is not None and batch.was_interrupted and missing > 0
+    failed = sum(count for e in data["experiments"] for name, count in e["outcomes"].items() if name != "ok")
+    if options["as_json"]:
+        print_json(
+            {
+                **data,
+                "command": "batch run",
+                "spec": path,
+                "done": dict(progress.outcomes),
+                "missing": missing,
+                "interrupted": interrupted,
+                "seconds": round(progress.seconds, 3),
+            }
+        )
+    elif not options["as_jsonl"]:
+        print_status(data)
+    if not quiet:
+        _tell_end(path, db, progress, missing, failed, interrupted, options)
+    if interrupted:
+        return 130
+    return 3 if failed or missing else 0
+
+
+def _executor(store: Store, options: Mapping[str, Any]) -> Executor:
+    from kahanmaps.experiments.run import executor_for
+
+    try:
+        processors = len(os.sched_getaffinity(0))
+    except AttributeError:  # not on every system
+        processors = os.cpu_count() or 1
+    talk = (lambda text: None) if options["quiet"] else say
+    return executor_for(
+        store.document,
+        options["jobs"] or processors,
+        options["scheduler"],
+        options["worker_python"],
+        options["group_seconds"],
+        talk,
+    )
+
+
+def _tell_plan(planned: Mapping[str, Planned], todo: int, db: str) -> None:
+    for name, found in planned.items():
+        if found.is_resumed:
+            continue
+        words = [f"{found.total} tasks", f"{found.new_tasks} of them new" if found.new_tasks < found.total else ""]
+        words.append(f"{found.dropped} of the earlier plan are not in it" if found.dropped else "")
+        say(f"{name}: {', '.join(filter(None, words))}")
+    say(f"{todo} tasks to do, results go to {db}" if todo else f"nothing to do: every task has a result in {db}")
+
+
+def _tell_end(
+    path: str | None,
+    db: str,
+    progress: BatchProgress,
+    missing: int,
+    failed: int,
+    interrupted: bool,
+    options: Mapping[str, Any],
+) -> None:
+    if progress.done:
+        say(f"{progress.done} tasks in {duration(progress.seconds)}")
+    again = f"kahanmaps batch run {path + ' ' if path else ''}--db {db}"
+    if options["shard"]:
+        again += f" --shard {options['shard'][0]}/{options['shard'][1]}"
+    if missing:
+        say(f"{'interrupted: ' if interrupted else ''}{missing} tasks have no result yet; to continue: {again}")
+    if failed:
+        say(
+            f"{failed} tasks failed ('kahanmaps batch summary --db {db} --by outcome'); "
+            f"to try them again: {again} --retry-failed"
+        )
+
+
+def _require_names(only: tuple[str, ...], spec: Spec) -> None:
+    from kahanmaps.errors import InputError
+    from kahanmaps.experiments.options import suggestion
+
+    known = [experiment.name for experiment in spec.experiments]
+    for name in only:
+        if name not in known:
+            raise InputError(
+                f"there is no experiment {name!r}, expected one of {', '.join(known)}{suggestion(name, known)}"
+            )
+
+
+def _missing(db: str | None, spec: Spec, options: Mapping[str, Any]) -> int | None:
+    """How many tasks have no result, if there is a database to ask; it is not changed."""
+    if db is None or not os.path.exists(db):
+        return None
+    from kahanmaps.experiments.store import Store
+
+    with Store.open(db, readonly=True) as store:
+        done = {row.task.key for row in store.rows() if row.record is not None}
+    names = options["only"] or [experiment.name for experiment in spec.experiments]
+    keys = {task.key for experiment in spec.experiments if experiment.name in names for task in experiment.tasks()}
+    return len(keys - done)
+
+
+def _task_data(task: Any) -> dict[str, Any]:
+    return {"key": task.key, "task": task.kind, "system": task.system, "options": dict(task.options)}
+
+
+def _recipe(recipe: Mapping[str, Any] | None) -> str:
+    if recipe is None:
+        return "-"
+    if "family" in recipe:
+        return "family " + _pairs(recipe["family"])
+    return f"{recipe['name']} {_pairs(recipe['parameters'])}".rstrip()
+
+
+def _pairs(values: Mapping[str, Any]) -> str:
+    return " ".join(f"{name}={_word(value)}" for name, value in values.items())
+
+
+def _word(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else json.dumps(value)

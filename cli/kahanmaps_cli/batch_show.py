@@ -1,0 +1,240 @@
+"""What a database of results looks like: status, single tasks, summaries, exports, the list of tasks."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.batch_progress import duration
+from kahanmaps_cli.render import COLOURS, on_terminal, print_json, shorten
+
+if TYPE_CHECKING:
+    from kahanmaps.experiments.store import Found, Store
+
+_VALUE_WIDTH = 300
+
+
+def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
+    """How far the experiments are, as plain data."""
+    from kahanmaps.errors import InputError
+    from kahanmaps.version import __version__
+
+    found = store.status()
+    for name in only:
+        if name not in [one.name for one in found]:
+            known = ", ".join(one.name for one in found) or "none"
+            raise InputError(f"there is no experiment {name!r} in it, expected one of: {known}")
+    return {
+        "command": "batch status",
+        "version": __version__,
+        "experiments": [
+            {
+                "name": one.name,
+                "tasks": one.tasks,
+                "missing": one.missing,
+                "outcomes": {str(outcome): count for outcome, count in one.outcomes.items() if count},
+                "verdicts": dict(one.verdicts),
+                "seconds": round(one.seconds, 3),
+            }
+            for one in found
+            if not only or one.name in only
+        ],
+        "unplanned": store.unplanned(),
+    }
+
+
+def print_status(data: Mapping[str, Any]) -> None:
+    """A line for each experiment."""
+    kinds = ("ok", "failed", "crashed", "timeout", "out-of-memory")
+    verdicts = ("proved", "supported", "refuted", "undecided")
+    rows = data["experiments"]
+    shown = [kind for kind in kinds if kind == "ok" or any(row["outcomes"].get(kind) for row in rows)]
+    given = [verdict for verdict in verdicts if any(row["verdicts"].get(verdict) for row in rows)]
+    table = [["experiment", "tasks", "missing", *shown, *given, "time"]]
+    for row in rows:
+        numbers = [row["tasks"], row["missing"], *(row["outcomes"].get(kind, 0) for kind in shown)]
+        numbers += [row["verdicts"].get(verdict, 0) for verdict in given]
+        table.append([row["name"], *map(str, numbers), duration(row["seconds"])])
+    print_table(table)
+    if data["unplanned"]:
+        click.echo(f"{data['unplanned']} more results belong to tasks that no experiment has now")
+
+
+def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
+    """Columns on a terminal, tabs elsewhere; the first `words` columns are texts, the others numbers."""
+    if not on_terminal():
+        for row in rows:
+            click.echo("\t".join(row))
+        return
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(header_style="bold")
+    for k, heading in enumerate(rows[0]):
+        table.add_column(
+            Text(heading, style=COLOURS.get(heading, "")), justify="left" if k < words else "right", overflow="fold"
+        )
+    for row in rows[1:]:
+        table.add_row(*map(Text, row))
+    Console(markup=False, emoji=False, highlight=False).print(table)
+
+
+def found_data(store: Store, found: Found) -> dict[str, Any]:
+    """A task and its record as plain data."""
+    task, record, places, attempts = found
+    recipes = (task.system, task.options.get("other"))
+    digests = [recipe["document"] for recipe in recipes if recipe and "document" in recipe]
+    return {
+        "key": task.key,
+        "task": task.kind,
+        "system": task.system,
+        "options": dict(task.options),
+        "places": [{"experiment": name, "number": number} for name, number in places],
+        "attempts": attempts,
+        **({} if record is None else {k: v for k, v in record.to_json().items() if k != "key"}),
+        "documents": {key: json.loads(store.document(key)) for key in digests},
+    }
+
+
+def print_found(data: Sequence[Mapping[str, Any]]) -> None:
+    """A block of lines for each task."""
+    for k, one in enumerate(data):
+        if k:
+            click.echo()
+        lines = [
+            ("key", one["key"]),
+            ("task", one["task"]),
+            ("in", ", ".join(f"{place['experiment']} {place['number']}" for place in one["places"]) or "no plan"),
+            ("system", _compact(one["system"])),
+            ("options", _compact({name: v for name, v in one["options"].items() if v is not None})),
+        ]
+        if "outcome" not in one:
+            lines.append(("outcome", "none yet"))
+        else:
+            lines.append(("outcome", one["outcome"] + (f": {one['message']}" if one["message"] else "")))
+            lines += [("result." + name, _compact(value)) for name, value in (one["result"] or {}).items()]
+            if one["stderr"]:
+                lines.append(("stderr", one["stderr"]))
+            memory = "" if one["peak_memory"] is None else f", {one['peak_memory'] / 1e6:.0f} MB at most"
+            lines.append(("took", f"{one['seconds']:.3g} s{memory}, attempts: {one['attempts']}"))
+            versions = ", ".join(f"{name} {number}" for name, number in one["versions"].items())
+            lines.append(("where", f"{one['host']}, {one['finished']}, {versions}"))
+        for name, text in lines:
+            text = "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
+            click.echo(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
+
+
+def print_summary(
+    store: Store,
+    by: Sequence[str],
+    *,
+    as_json: bool,
+    as_markdown: bool,
+    values: Sequence[str],
+    stable: bool,
+    only: Sequence[str],
+) -> None:
+    """The tables of a summary."""
+    from kahanmaps.experiments.summary import summarise
+    from kahanmaps.version import __version__
+
+    found = summarise(store.rows(list(only) or None, missing=True), by, list(values) or None, stable=stable)
+    if as_json:
+        print_json({"command": "batch summary", "version": __version__, **found.to_json()})
+    elif as_markdown:
+        click.echo(found.markdown(), nl=False)
+    elif on_terminal():
+        for table in found.tables(digits=6):
+            print_table([table.columns, *table.rows], words=table.words)
+    else:
+        for line in found.lines():
+            click.echo(line)
+
+
+def export_rows(store: Store, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:
+    """Write the results; a file is complete or is not there."""
+    from kahanmaps.experiments.export import write_parquet
+
+    if form == "parquet":
+        assert output is not None
+        write_parquet(lambda: store.rows(only), output, stable=stable)
+        return
+    if output is None:
+        _write(store, form, sys.stdout, stable, only)
+        return
+    part = f"{output}.part"
+    try:
+        with open(part, "w", encoding="utf-8", newline="") as stream:
+            _write(store, form, stream, stable, only)
+        os.replace(part, output)
+    finally:
+        if os.path.exists(part):
+            os.remove(part)
+
+
+def _write(store: Store, form: str, stream: Any, stable: bool, only: list[str] | None) -> None:
+    from kahanmaps.experiments.export import write_csv, write_jsonl
+
+    if form == "csv":
+        write_csv(lambda: store.rows(only), stream, stable=stable)
+    else:
+        write_jsonl(store.rows(only), stream, stable=stable)
+
+
+def print_tasks(name: str | None, as_json: bool) -> None:
+    """The kinds of tasks, or one with its options."""
+    from kahanmaps.experiments.options import FAMILY
+    from kahanmaps.experiments.registry import task_kind, task_kinds
+    from kahanmaps.version import __version__
+
+    kinds = list(task_kinds().values()) if name is None else [task_kind(name)]
+    if as_json:
+        data = [
+            {
+                "name": kind.name,
+                "summary": kind.summary,
+                "needs": kind.needs,
+                "options": {
+                    key: {"help": option.help, "required": key in kind.required, "default": kind.defaults.get(key)}
+                    for key, option in kind.options.items()
+                },
+            }
+            for kind in kinds
+        ]
+        print_json({"version": __version__, "tasks": data})
+        return
+    width = max(len(kind.name) for kind in kinds)
+    for kind in kinds:
+        click.echo(f"{kind.name:<{width}}  {kind.summary}")
+    if name is None:
+        click.echo("'kahanmaps batch tasks NAME' has the options of one of them")
+        return
+    kind = kinds[0]
+    click.echo(f"system: {_NEEDS[kind.needs]}")
+    for key, option in kind.options.items():
+        default = "required" if key in kind.required else f"default {json.dumps(kind.defaults[key])}"
+        click.echo(f"  {key:<12}  {option.help}" + (f" ({default})" if default != "default null" else ""))
+    if kind.needs is not None:
+        click.echo('with system = "family" also:')
+        for key, option in FAMILY.items():
+            click.echo(f"  {key:<12}  {option.help}")
+        if "seed" not in kind.options:
+            click.echo(f"  {'seed':<12}  seed of everything drawn at random (default 0)")
+
+
+_NEEDS = {
+    None: "none",
+    "system": '"family", a name of the catalogue, a file, or a list of these',
+    "member": '"family", or files of kind [family]',
+    "member or other": '"family", files of kind [family], or any other system together with a second one (other)',
+}
+
+
+def _compact(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)

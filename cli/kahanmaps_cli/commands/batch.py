@@ -1,0 +1,291 @@
+"""kahanmaps batch run | status | show | export | summary | merge | tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from kahanmaps_cli.params import OptionType
+from kahanmaps_cli.progress import say
+from kahanmaps_cli.render import print_json
+
+if TYPE_CHECKING:
+    from kahanmaps.experiments.store import Store
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+_QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress and no talk on standard error.")
+_ONLY = click.option(
+    "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment (may be repeated)."
+)
+
+
+def _database(required: bool = True) -> Callable[[F], F]:
+    return click.option(
+        "--db",
+        type=click.Path(dir_okay=False),
+        envvar="KAHANMAPS_DB",
+        required=required,
+        metavar="FILE",
+        help="The database of results (or set KAHANMAPS_DB).",
+    )
+
+
+class Shard(OptionType):
+    """I/N: the I-th of N parts."""
+
+    name = "i/n"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value
+        part, slash, parts = value.partition("/")
+        numbers = [int(text) if text.isascii() and text.isdigit() and len(text) < 10 else 0 for text in (part, parts)]
+        if not slash or not 1 <= numbers[0] <= numbers[1]:
+            self.fail(f"found {value[:40]!r}, expected I/N with 1 <= I <= N, e.g. 3/16", param, ctx)
+        return tuple(numbers)
+
+
+@click.group("batch")
+def command() -> None:
+    """Thousands of experiments from one file: planned, run in child processes, stored, resumed.
+
+    \b
+      kahanmaps batch run study.toml -j 2              results go to study.db; the same command continues
+      kahanmaps batch run study.toml --dry-run
+      kahanmaps batch status --db study.db
+      kahanmaps batch summary --db study.db --by m,eps
+      kahanmaps batch export --db study.db --csv -o study.csv
+      kahanmaps batch tasks                            what an experiment can do, with all options
+
+    docs/batch.md describes the file, and how to use many machines.
+    """
+
+
+@command.command("run")
+@click.argument("spec", required=False, type=click.Path(dir_okay=False))
+@_database(required=False)
+@click.option("-j", "--jobs", type=click.IntRange(1, 1024), help="Child processes at a time (default: the processors).")
+@_ONLY
+@click.option("--shard", type=Shard(), metavar="I/N", help="Only the I-th of N parts: for job arrays.")
+@click.option("--retry-failed", is_flag=True, help="Do failed tasks again as well.")
+@click.option("--dry-run", is_flag=True, help="Check the spec, show how many tasks there are and the first few.")
+@click.option("--max-tasks", type=click.IntRange(1), help="Refuse specs with more tasks (default 1000000).")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Use the workers of a dask scheduler: tcp://host:port or its file."
+)
+@click.option("--worker-python", metavar="PATH", help="The Python of those workers (default: the path of this one).")
+@click.option(
+    "--group-seconds",
+    type=click.FloatRange(0, 86400),
+    default=5.0,
+    show_default=True,
+    help="Short tasks share a child, or a command on the cluster, for so long.",
+)
+@click.option("--jsonl", "as_jsonl", is_flag=True, help="Every record on standard output, as it comes in.")
+@_JSON
+@_QUIET
+def run(spec: str | None, db: str | None, **options: Any) -> int:
+    """Do the tasks of SPEC that have no result yet, and put the results into a database.
+
+    \b
+      kahanmaps batch run study.toml --dry-run
+      kahanmaps batch run study.toml -j 2                   results in study.db
+      kahanmaps batch run study.toml --db all.db            the same again: does what is missing
+      kahanmaps batch run --db all.db --retry-failed        continue without the spec
+      kahanmaps batch run study.toml --shard 3/16 --db part3.db
+      kahanmaps batch run study.toml --scheduler tcp://head:8786
+
+    Every result is in the database the moment it is there: whatever is killed, only tasks in flight are lost, and the
+    same command continues. Ctrl-C lets the tasks in flight end, for ten seconds at most; a second one ends at once.
+
+    Exit status: 0 all done, 2 wrong use, 3 some tasks failed or were given up, 130 interrupted.
+    """
+    from kahanmaps_cli.batch_run import dry_run, run_batch
+
+    if options["as_json"] and options["as_jsonl"]:
+        raise click.UsageError("give --json or --jsonl, not both")
+    if spec is None and (db is None or options["dry_run"]):
+        raise click.UsageError("missing SPEC, a TOML file with experiments (or --db FILE, to continue what is in it)")
+    if options["scheduler"] is not None and options["jobs"] is not None:
+        raise click.UsageError("give --jobs or --scheduler, not both: on a cluster its workers say how many")
+    if options["dry_run"]:
+        return dry_run(str(spec), db, options)
+    return run_batch(spec, db or str(Path(str(spec)).with_suffix(".db").name), options)
+
+
+@command.command("status")
+@_database()
+@_ONLY
+@_JSON
+def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
+    """How far the experiments in a database have come. May be asked while a batch is running.
+
+    \b
+      kahanmaps batch status --db study.db
+      kahanmaps batch status --db study.db --json | jq '.experiments[].missing'
+    """
+    from kahanmaps_cli.batch_show import print_status, status_data
+
+    with _open(db) as store:
+        data = status_data(store, only)
+    if as_json:
+        print_json(data)
+    else:
+        print_status(data)
+
+
+@command.command("show")
+@click.argument("key")
+@_database()
+@_JSON
+def show(key: str, db: str, as_json: bool) -> None:
+    """One task with all that is known of it. KEY: the first digits of its key, four or more.
+
+    \b
+      kahanmaps batch show 3fa8 --db study.db
+      kahanmaps batch show 3fa8 --db study.db --json | jq .result
+    """
+    from kahanmaps.errors import InputError
+    from kahanmaps_cli.batch_show import found_data, print_found
+
+    with _open(db) as store:
+        found = store.find(key)
+        if not found:
+            raise InputError(f"{db} has no task whose key begins with {key[:40]!r}: batch export lists the keys")
+        data = [found_data(store, one) for one in found]
+    if as_json:
+        for one in data:
+            print_json(one)
+    else:
+        print_found(data)
+
+
+@command.command("export")
+@_database()
+@click.option("--csv", "form", flag_value="csv", help="A table, a column for each option and each entry of results.")
+@click.option("--jsonl", "form", flag_value="jsonl", help="One JSON object a line, everything in it.")
+@click.option("--parquet", "form", flag_value="parquet", help="The table of --csv with types; needs pyarrow and -o.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
+@click.option("--stable", is_flag=True, help="Leave out times, memory, hosts and versions: the same work, same bytes.")
+@_ONLY
+def export(db: str, form: str | None, output: str | None, stable: bool, only: tuple[str, ...]) -> None:
+    """Write the results of a database to standard output or a file, in the order of the plan.
+
+    \b
+      kahanmaps batch export --db study.db --csv -o study.csv
+      kahanmaps batch export --db study.db --jsonl | jq 'select(.verdict == "refuted") | .key'
+      kahanmaps batch export --db study.db --parquet -o study.parquet
+    """
+    from kahanmaps_cli.batch_show import export_rows
+
+    if form is None:
+        endings = {".csv": "csv", ".jsonl": "jsonl", ".parquet": "parquet"}
+        form = endings.get(Path(output).suffix) if output else None
+    if form is None:
+        raise click.UsageError("missing --csv, --jsonl or --parquet")
+    if form == "parquet" and output is None:
+        raise click.UsageError("--parquet needs -o FILE: it is no text")
+    with _open(db) as store:
+        export_rows(store, form, output, stable, list(only) or None)
+
+
+@command.command("summary")
+@_database()
+@click.option("--by", default="experiment", show_default=True, metavar="NAME,...", help="Group by these, e.g. m,eps.")
+@click.option("--value", "values", multiple=True, metavar="NAME", help="Only these numbers (may be repeated).")
+@click.option("--stable", is_flag=True, help="Leave out times and memory.")
+@click.option("--markdown", "as_markdown", is_flag=True, help="Tables in Markdown.")
+@_ONLY
+@_JSON
+def summary(db: str, by: str, as_markdown: bool, as_json: bool, **options: Any) -> None:
+    """Counts of outcomes and verdicts, and quantiles of the numbers, for groups of tasks.
+
+    \b
+      kahanmaps batch summary --db study.db --by m,eps
+      kahanmaps batch summary --db study.db --by experiment,m --value constant --markdown
+
+    --by takes options (eps), parts of the system (m, seed, parameters.a), entries of results (dimension), and
+    experiment, task, outcome, verdict.
+    """
+    from kahanmaps_cli.batch_show import print_summary
+
+    if as_json and as_markdown:
+        raise click.UsageError("give --json or --markdown, not both")
+    names = [name.strip() for name in by.split(",") if name.strip()]
+    with _open(db) as store:
+        print_summary(store, names, as_json=as_json, as_markdown=as_markdown, **options)
+
+
+@command.command("merge")
+@click.argument("target", type=click.Path(dir_okay=False))
+@click.argument("sources", nargs=-1, required=True, type=click.Path(dir_okay=False))
+@_JSON
+@_QUIET
+def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> int:
+    """Bring the results of SOURCES into TARGET, which is made if it is not there.
+
+    \b
+      kahanmaps batch merge all.db part1.db part2.db
+      kahanmaps batch merge A.db B.db
+
+    Exit status: 0 done, 2 wrong use, 3 some task has different results in two of them (those of TARGET are kept).
+    """
+    from kahanmaps.experiments.store import Store
+    from kahanmaps.version import __version__
+
+    merged = []
+    with Store.open(target, create=True) as store:
+        for source in sources:
+            found = store.merge(source)
+            merged.append(
+                {
+                    "source": source,
+                    "tasks": found.tasks,
+                    "results": found.results,
+                    "replaced": found.replaced,
+                    "conflicts": found.conflicts,
+                    "conflicting": list(found.conflicting),
+                }
+            )
+    conflicts = sum(one["conflicts"] for one in merged)  # type: ignore[misc]
+    if as_json:
+        print_json({"command": "batch merge", "version": __version__, "target": target, "merged": merged})
+    else:
+        for one in merged:
+            click.echo(
+                f"{one['source']}\t{one['results']} new results\t{one['replaced']} failures replaced\t"
+                f"{one['conflicts']} conflicts"
+            )
+    if conflicts and not quiet:
+        keys = [key for one in merged for key in one["conflicting"]]  # type: ignore[attr-defined]
+        say(
+            f"{conflicts} tasks have different results in two databases, those of {target} were kept: "
+            f"{', '.join(keys[:3])}{', ...' if len(keys) > 3 else ''} (batch show KEY --db FILE)"
+        )
+    return 3 if conflicts else 0
+
+
+@command.command("tasks")
+@click.argument("name", required=False)
+@_JSON
+def tasks(name: str | None, as_json: bool) -> None:
+    """What an experiment can do: the kinds of tasks, and their options with defaults.
+
+    \b
+      kahanmaps batch tasks
+      kahanmaps batch tasks check-commute
+    """
+    from kahanmaps_cli.batch_show import print_tasks
+
+    print_tasks(name, as_json)
+
+
+def _open(db: str) -> Store:
+    from kahanmaps.experiments.store import Store
+
+    return Store.open(db, readonly=True)

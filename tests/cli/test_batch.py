@@ -1,0 +1,416 @@
+"""`kahanmaps batch`: what it prints, what it says on standard error, its exit statuses, and that it can be interrupted.
+
+The tasks that go wrong are those of tests/experiments/fault_tasks.py.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from cli_helpers import COMMAND, Outcome, environment, shell, terminal
+
+FAULTS = Path(__file__).parent.parent / "experiments"
+SPACE = """
+[experiments.space]
+task = "family-space"
+system = "family"
+axes = { m = "2..3", seed = "0..2" }
+"""
+PAUSE = """
+[experiments.pause]
+task = "pause"
+options = { steps = 30 }
+axes = { seed = "0..199" }
+"""
+FAULT = """
+[experiments.fault]
+task = "fault"
+axes = { order = [8], seed = "0..3" }
+"""
+
+
+@pytest.fixture(autouse=True)
+def _fault_tasks(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.syspath_prepend(str(FAULTS))
+    monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
+    monkeypatch.setenv("PYTHONPATH", str(FAULTS))
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def batch(kahanmaps: Callable[..., Outcome]) -> Callable[..., Outcome]:
+    """`kahanmaps batch`; a text with a line break in it becomes the file study.toml."""
+
+    def run(*pieces: str) -> Outcome:
+        words = []
+        for piece in pieces:
+            if "\n" in piece:
+                Path("study.toml").write_text(piece)
+                piece = "study.toml"
+            words.append(piece)
+        return kahanmaps("batch", *words)
+
+    return run
+
+
+def test_a_batch_runs_and_says_where_the_results_are(batch):
+    done = batch("run", SPACE, "-j 2")
+    assert done.status == 0
+    assert done.rows == [["experiment", "tasks", "missing", "ok", "time"], ["space", "6", "0", "6", done.rows[1][4]]]
+    assert "6 tasks to do, results go to study.db" in done.err
+    assert Path("study.db").exists()
+
+
+def test_the_second_run_has_nothing_to_do(batch):
+    batch("run", SPACE)
+    done = batch("run", SPACE)
+    assert done.status == 0
+    assert done.err == "nothing to do: every task has a result in study.db\n"
+
+
+def test_quiet_is_quiet(batch):
+    assert batch("run", SPACE, "-q").err == ""
+
+
+def test_json_is_one_object_with_everything_counted(batch):
+    done = batch("run", SPACE, "--json -q")
+    (one,) = done.json["experiments"]
+    assert (one["name"], one["tasks"], one["missing"], one["outcomes"]) == ("space", 6, 0, {"ok": 6})
+    assert done.json["done"] == {"ok": 6}
+    assert not done.json["interrupted"]
+
+
+def test_jsonl_has_every_record_as_it_comes(batch):
+    records = batch("run", SPACE, "--jsonl -q").records
+    assert sorted(record["result"]["dimension"] for record in records) == [8, 8, 8, 12, 12, 12]
+
+
+def test_failed_tasks_give_status_3_and_say_how_to_try_again(batch):
+    done = batch("run", FAULT)
+    assert done.status == 3
+    assert "2 tasks failed" in done.err
+    assert "kahanmaps batch run study.toml --db study.db --retry-failed" in done.err
+    assert batch("run", FAULT, "-q").status == 3  # they have not been mended
+    again = batch("run --db study.db --retry-failed --json -q")
+    assert again.json["done"] == {"failed": 2}
+
+
+def test_refuted_claims_are_results_like_others(batch):
+    done = batch("run", PAUSE.replace("199", "5").replace("30", "1"), "-q")
+    assert done.status == 0
+    assert done.rows[0][4:6] == ["proved", "refuted"]
+    assert done.rows[1][4:6] == ["4", "2"]
+
+
+def test_a_dry_run_shows_the_tasks_and_does_nothing(batch):
+    done = batch("run", SPACE, "--dry-run")
+    assert done.status == 0
+    assert done.rows[0] == ["space", "family-space", "6 tasks", "2 m x 3 seed"]
+    assert done.rows[1][2].endswith("m=2 seed=0")
+    assert done.out.endswith("6 tasks\n")
+    assert not Path("study.db").exists()
+
+
+def test_a_dry_run_with_a_database_says_what_is_missing(batch):
+    batch("run", SPACE, "-q")
+    wider = SPACE.replace("0..2", "0..4")
+    assert batch("run", wider, "--dry-run --db study.db").out.endswith("10 tasks, 4 of them without result\n")
+    assert batch("run", wider, "--dry-run --db study.db --json").json["missing"] == 4
+
+
+def test_all_mistakes_of_a_spec_are_told_and_nothing_is_begun(batch):
+    done = batch("run", SPACE.replace("family-space", "familyspace").replace('system = "family"', "sistem = 1"))
+    assert done.status == 2
+    assert "study.toml: " in done.err
+    assert "experiments.space.task: there is no task 'familyspace'" in done.err
+    assert "did you mean family-space?" in done.err
+    assert "experiments.space.sistem: unknown key" in done.err
+    assert not Path("study.db").exists()
+
+
+def test_absurd_products_are_refused_and_may_be_allowed(batch):
+    absurd = SPACE.replace("0..2", "0..9999999999")
+    done = batch("run", absurd, "--dry-run")
+    assert done.status == 2
+    assert "found 20,000,000,000 tasks, expected at most 1,000,000" in done.err
+    assert batch("run", absurd, "--dry-run --max-tasks 20000000000").status == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("run", "missing SPEC"),
+        ("run no.toml", "cannot read the spec no.toml"),
+        ("run --db no.db", "there is no database no.db"),
+        ("run study.toml --shard 4/3", "expected I/N"),
+        ("run study.toml --shard 0/3", "expected I/N"),
+        ("run study.toml -e spice", "did you mean space?"),
+        ("run study.toml -j 0", "-j"),
+        ("run study.toml --json --jsonl", "not both"),
+        ("run study.toml -j 2 --scheduler x", "not both"),
+        ("status", "--db"),
+        ("status --db no.db", "there is no database no.db"),
+        ("status --db study.toml", "study.toml"),
+        ("show 12 --db study.db", "4"),
+        ("show ffff0000 --db study.db", "no task"),
+        ("export --db study.db", "missing --csv, --jsonl or --parquet"),
+        ("export --db study.db --parquet", "needs -o"),
+        ("summary --db study.db --by sead", "seed"),
+        ("merge all.db no.db", "there is no database no.db"),
+        ("tasks orbot", "did you mean orbit?"),
+    ],
+)
+def test_wrong_use_is_status_2_and_a_sentence(batch, words: str, message: str):
+    batch("run", SPACE, "-q")
+    done = batch(words)
+    assert done.status == 2
+    assert message in done.err
+    assert "Traceback" not in done.err
+
+
+def test_status_may_be_asked_in_json(batch):
+    batch("run", SPACE, "-q")
+    data = batch("status --db study.db --json").json
+    assert data["experiments"][0]["outcomes"] == {"ok": 6}
+    assert data["unplanned"] == 0
+
+
+def test_results_that_no_experiment_asks_for_are_told(batch):
+    batch("run", SPACE, "-q")
+    batch("run", SPACE.replace("2..3", "3..3"), "-q")
+    assert "3 more results belong to tasks that no experiment has now" in batch("status --db study.db").out
+
+
+def test_the_database_may_be_named_in_the_environment(batch, monkeypatch: pytest.MonkeyPatch):
+    batch("run", SPACE, "-q")
+    monkeypatch.setenv("KAHANMAPS_DB", "study.db")
+    assert batch("status").status == 0
+
+
+def test_show_has_all_that_is_known_of_a_task(batch):
+    batch("run", SPACE, "-q")
+    key = batch("export --db study.db --jsonl").records[1]["key"]
+    shown = dict(line.split("\t", 1) for line in batch(f"show {key[:8]} --db study.db").out.splitlines())
+    assert shown["task"] == "family-space"
+    assert shown["in"] == "space 0"
+    assert shown["result.dimension"] == "8"
+    data = batch(f"show {key} --db study.db --json").json
+    assert data["result"]["dimension"] == 8
+    assert data["places"] == [{"experiment": "space", "number": 0}]
+    assert data["attempts"] == 1
+
+
+def test_a_task_can_be_redone_from_what_show_prints(batch):
+    from kahanmaps.experiments.recipes import system_from
+    from kahanmaps.experiments.registry import task_kind
+
+    batch("run", '[experiments.top]\ntask = "check-integrals"\nsystem = "euler_top"\noptions.eps = "1/7"\n', "-q")
+    key = batch("export --db study.db --jsonl").records[1]["key"]
+    data = batch(f"show {key} --db study.db --json").json
+    documents = {digest: json.dumps(document) for digest, document in data["documents"].items()}
+    again = task_kind(data["task"]).perform(system_from(data["system"], documents.__getitem__), data["options"])
+    assert again.pop("verdict") == data["verdict"]
+    assert again == data["result"]
+
+
+def test_export_writes_a_table_or_lines_to_a_file_or_out(batch):
+    batch("run", SPACE, "-q")
+    rows = list(csv.DictReader(io.StringIO(batch("export --db study.db --csv").out)))
+    assert [(row["m"], row["dimension"]) for row in rows] == [("2", "8")] * 3 + [("3", "12")] * 3
+    batch("export --db study.db -o study.csv")  # the ending says which
+    assert list(csv.DictReader(io.StringIO(Path("study.csv").read_text()))) == rows
+    records = batch("export --db study.db --jsonl --stable").records
+    assert [record["record"] for record in records] == ["header", *["result"] * 6, "end"]
+    assert "seconds" not in records[1]
+
+
+def test_export_to_parquet(batch):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    batch("run", SPACE, "-q")
+    assert batch("export --db study.db --parquet -o study.parquet").status == 0
+    assert parquet.read_table("study.parquet")["dimension"].to_pylist() == [8] * 3 + [12] * 3
+
+
+def test_an_export_that_fails_leaves_the_old_file(batch):
+    batch("run", SPACE, "-q")
+    Path("out.csv").mkdir()
+    assert batch("export --db study.db --csv -o out.csv").status == 2
+    assert sorted(path.name for path in Path().iterdir() if "part" in path.name) == []
+
+
+def test_a_summary_groups_and_counts(batch):
+    batch("run", SPACE, "-q")
+    rows = batch("summary --db study.db --by m --value dimension --stable").rows
+    assert rows[:3] == [["m", "tasks", "ok"], ["2", "3", "3"], ["3", "3", "3"]]
+    assert ["3", "dimension", "3", "yes", *["12"] * 5] in rows
+    data = batch("summary --db study.db --by m --json --stable").json
+    assert data["groups"][1]["numbers"]["dimension"] == {
+        "n": 3,
+        "same": True,
+        **dict.fromkeys(("min", "p5", "p25", "median", "p75", "p95", "max"), 12),
+    }
+    assert batch("summary --db study.db --by m --markdown").out.startswith("| m | tasks | ok |\n| --- | ---: | ---: |")
+
+
+def test_shards_are_merged_into_one_database(batch):
+    for part in (1, 2, 3):
+        done = batch("run", SPACE, f"--shard {part}/3 --db part{part}.db --json -q")
+        assert done.json["done"] == {"ok": 2}
+        assert done.status == 0  # this part of it is complete
+    done = batch("merge all.db part1.db part2.db part3.db --json")
+    assert [one["results"] for one in done.json["merged"]] == [2, 2, 2]
+    batch("run", SPACE, "--db whole.db -q")
+    assert batch("export --db all.db --csv --stable").out == batch("export --db whole.db --csv --stable").out
+    assert batch("run", SPACE, "--db all.db -q --json").json["done"] == {}
+
+
+def test_tasks_lists_what_can_be_done(batch):
+    assert "family-space" in batch("tasks").out
+    assert "(required)" in batch("tasks orbit").out
+    described = {task["name"]: task for task in batch("tasks --json").json["tasks"]}
+    assert described["orbit"]["options"]["eps"]["required"]
+    assert described["orbit"]["options"]["steps"]["default"] == 100
+
+
+@pytest.mark.parametrize("name", ["run", "status", "show", "export", "summary", "merge", "tasks"])
+def test_every_help_has_an_example(batch, name: str):
+    assert f"kahanmaps batch {name}" in batch(f"{name} --help").out
+
+
+def test_on_a_terminal_there_are_tables(batch):
+    batch("run", SPACE, "-q")
+    for words in (["status"], ["summary", "--by", "m"]):
+        shown = terminal("batch", *words, "--db", "study.db", NO_COLOR="1")
+        assert "━" in shown.out
+        assert max(len(re.sub(r"\x1b\[[0-9;]*m", "", line)) for line in shown.out.splitlines()) <= 80
+
+
+def start(*words: str) -> subprocess.Popen[str]:
+    """A batch in a process of its own, once it is at work."""
+    process = subprocess.Popen(
+        [*COMMAND, "batch", "run", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+    )
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline and _stored() < 4:
+        time.sleep(0.05)
+    return process
+
+
+def _stored() -> int:
+    from kahanmaps.experiments.store import Store, StoreError
+
+    try:
+        with Store.open("study.db", readonly=True) as store:
+            return sum(one.tasks - one.missing for one in store.status())
+    except StoreError:
+        return 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_the_tasks_in_flight_and_says_how_to_continue(batch, number: signal.Signals):
+    Path("study.toml").write_text(PAUSE)
+    process = start("study.toml", "-j", "2")
+    process.send_signal(number)
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "interrupted: " in err
+    assert "to continue: kahanmaps batch run study.toml --db study.db" in err
+    row = out.splitlines()[1].split("\t")
+    assert int(row[1]) == 200
+    assert 0 < int(row[2]) < 200
+    assert batch("run", PAUSE, "-q").status == 0
+
+
+def test_a_second_ctrl_c_is_immediate(batch):
+    Path("study.toml").write_text(PAUSE.replace("steps = 30", "steps = 60000").replace('"0..199"', '"0..3"'))
+    process = subprocess.Popen(
+        [*COMMAND, "batch", "run", "study.toml", "-j", "2"], stderr=subprocess.PIPE, text=True, env=environment()
+    )
+    time.sleep(2)
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.5)
+    assert process.poll() is None  # waits for the tasks in flight
+    begin = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert time.monotonic() - begin < 3
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert "finishing 2 tasks in flight" in err
+
+
+def test_two_batches_do_not_write_to_one_database(batch):
+    Path("study.toml").write_text(PAUSE)
+    process = start("study.toml", "-j", "1")
+    done = batch("run study.toml")
+    assert done.status == 2
+    assert str(process.pid) in done.err
+    assert batch("status --db study.db").status == 0  # looking is allowed
+    process.kill()
+    process.communicate()
+
+
+def test_progress_is_a_line_now_and_then_where_there_is_no_terminal(monkeypatch: pytest.MonkeyPatch):
+    from kahanmaps_cli import batch_progress
+
+    monkeypatch.setattr(batch_progress, "_LINE_EVERY", 0.0)
+    said: list[str] = []
+    monkeypatch.setattr(batch_progress, "say", said.append)
+    from kahanmaps.experiments.records import Outcome as Word
+    from kahanmaps.experiments.records import Record
+
+    progress = batch_progress.BatchProgress(4, quiet=False)
+    progress.tell([Record("a", Word.OK), Record("b", Word.FAILED)], 2)
+    assert len(said) == 1
+    assert said[0].startswith("2 of 4 tasks, ")
+    assert said[0].endswith(", 2 running, 1 failed")
+    assert "left" in said[0]
+
+
+def test_an_empty_batch_database_has_an_empty_status(batch, kahanmaps: Callable[..., Outcome]):
+    batch("run", SPACE, "-q")
+    done = batch("merge empty.db study.db")
+    assert done.status == 0
+    assert batch("status --db empty.db").rows[1][:4] == ["space", "6", "0", "6"]
+
+
+def test_the_documented_shell_examples_run(tmp_path: Path):
+    (tmp_path / "study.toml").write_text(SPACE)
+    script = """
+    set -e
+    kahanmaps batch run study.toml -q --shard 1/2 --db part1.db
+    kahanmaps batch run study.toml -q --shard 2/2 --db part2.db
+    kahanmaps batch merge study.db part1.db part2.db
+    kahanmaps batch export --db study.db --jsonl | grep -c '"record": "result"'
+    """
+    done = shell(script, tmp_path)
+    assert done.status == 0, done.err
+    assert done.out.splitlines()[-1] == "6"
+
+
+def test_what_a_reader_does_not_want_is_no_error(batch, tmp_path: Path):
+    batch("run", SPACE, "-q")
+    done = shell("kahanmaps batch export --db study.db --jsonl | head -n 1; echo ${PIPESTATUS[0]}", tmp_path)
+    assert done.out.splitlines()[-1] == "0"
+    assert done.err == ""
+
+
+def test_nothing_of_a_record_reaches_a_terminal_as_an_escape_sequence(batch):
+    name = "evil\\u001b[31m"
+    spec = f'[experiments.a]\ntask = "orbit"\nsystem = "x.toml"\noptions.eps = "1/2"\noptions.steps = 2\n# {name}'
+    Path("x.toml").write_text('variables = ["x"]\n[system]\nrhs = ["x"]\n')
+    batch("run", spec, "-q")
+    assert "\x1b" not in batch("status --db study.db").out
