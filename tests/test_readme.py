@@ -29,6 +29,7 @@ def sessions(page: Path) -> list[tuple[str, str]]:
 @pytest.mark.parametrize("page", [page for page in PAGES if sessions(page)], ids=lambda page: page.name)
 def test_console_sessions_print_what_the_page_shows(page, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
     checker = doctest.OutputChecker()
     for command, expected in sessions(page):
         words = shlex.split(command)
