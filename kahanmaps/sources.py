@@ -53,6 +53,11 @@ SOURCES: dict[str, str] = {
         "J. T. Schwartz. Fast probabilistic algorithms for verification of polynomial identities. "
         "J. ACM 27 (1980), 701-717"
     ),
+    "shioda-1990": "T. Shioda. On the Mordell-Weil lattices. Comment. Math. Univ. St. Pauli 39 (1990), 211-240",
+    "tate-1983": (
+        "J. Tate. Variation of the canonical height of a point depending on a parameter. "
+        "Amer. J. Math. 105 (1983), 287-294"
+    ),
 }
 
 

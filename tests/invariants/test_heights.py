@@ -15,8 +15,8 @@ from math import gcd, lcm, log2
 from types import SimpleNamespace
 
 import pytest
-from flint import fmpq
-from hypothesis import given
+from flint import fmpq, fmpq_poly
+from hypothesis import example, given
 from hypothesis import strategies as st
 from planar_helpers import SPLIT, over_members, side_by_side, structure_and_system
 
@@ -299,9 +299,13 @@ def test_the_constant_of_a_moebius_map_is_the_height_of_its_multiplier(rhs, eps,
     assert abs(float(found.constant) - expected) < 0.005
 
 
-def translation_constant(block: IntegerBlock, doublings: int = 8) -> Fraction:
-    """3 hhat(T)/log 2 for the plane, from x(2^k T) on its Jacobian; the error is O(4^-k)."""
-    gamma = 1 - block.delta
+def translation_constant(block: IntegerBlock) -> Fraction:
+    """3 hhat(T)/log 2 for the plane."""
+    return constant_at(1 - block.delta)
+
+
+def constant_at(gamma: fmpq, doublings: int = 8) -> Fraction:
+    """3 hhat(T)/log 2 on the curve with this gamma, from x(2^k T); the error is O(4^-k)."""
     a1, a2, a3 = 6, 3 * gamma, 16 * gamma
     x, y = fmpq(0), fmpq(0)
     for _ in range(doublings):
@@ -322,6 +326,41 @@ def test_the_constant_of_a_member_is_the_sum_of_the_canonical_heights_of_its_pla
     assert abs(found.constant / expected - 1) < Fraction(1, 2000)  # measured: at most 2 parts in 10^4
     # Control: the constants of the planes are not so small that one of them might be missing.
     assert all(translation_constant(block) > expected / 5 for block in blocks)
+
+
+@given(st.fractions(max_denominator=2**40).filter(lambda gamma: gamma not in (0, 1)))
+@example(Fraction(2**60 + 1, 3**30))
+@example(Fraction(2**60 + 1, 2**60))
+@example(Fraction(1, 10**18))
+def test_the_constant_of_a_plane_is_an_eighth_of_the_height_of_gamma_up_to_a_bounded_error(gamma):
+    try:
+        constant = constant_at(fmpq(gamma.numerator, gamma.denominator), doublings=6)
+    except ZeroDivisionError:  # T has finite order there
+        return
+    size = log2(max(abs(gamma.numerator), gamma.denominator))
+    assert -0.7 < float(constant) - size / 8 < 0.8  # measured: -0.6 to 0.71; six doublings are good to 0.01
+
+
+def test_an_eighth_is_the_right_fraction():
+    """Control: neither a ninth nor a seventh would do."""
+    sizes, constants = [], []
+    for power in (100, 1000):
+        sizes.append(log2(3) * power)
+        constants.append(float(constant_at(fmpq(3**power + 2, 2**power), doublings=6)))
+    slope = (constants[1] - constants[0]) / (sizes[1] - sizes[0])
+    assert abs(slope - 1 / 8) < 0.001
+
+
+def test_the_curve_has_the_fibres_and_the_points_of_the_argument():
+    gamma = fmpq_poly([0, 1])
+    a1, a2, a3 = 6, 3 * gamma, 16 * gamma
+    b2, b4, b6 = a1 * a1 + 4 * a2, a1 * a3, a3 * a3
+    b8 = (b2 * b6 - b4 * b4) / 4
+    assert -b2 * b2 * b8 - 8 * b4 * b4 * b4 - 27 * b6 * b6 + 9 * b2 * b4 * b6 == -110592 * gamma**3 * (gamma - 1) ** 2
+    assert b2 * b2 - 24 * b4 == 144 * (gamma - 1) * (gamma - 9)
+    x, y = -3 * gamma, 2 * gamma  # 2T, where the tangent y = 0 at T = (0, 0) meets E once more, reflected
+    assert y * y + a1 * x * y + a3 * y == x**3 + a2 * x * x
+    assert -a1 * x - a3 - y == 0 * gamma
 
 
 def test_the_constant_of_two_equal_planes_is_that_of_one():
