@@ -28,10 +28,12 @@ from typing import Any
 from kahanmaps.experiments import cluster
 from kahanmaps.experiments.cluster import ClusterWorkers
 from kahanmaps.experiments.records import Limits, Outcome, Record, Task
-from kahanmaps.experiments.run import Batch
+from kahanmaps.experiments.run import Batch, executor_for, plan
+from kahanmaps.experiments.spec import parse_spec
 from kahanmaps.experiments.store import Store
 
 WORKERS = 1000
+CHILDREN = 2
 SIZES = (500, 5_000, 50_000)  # bytes of a record
 DURATIONS = (0.1, 1.0, 10.0)  # seconds of a task
 GROUP_SECONDS = (1, 2, 5, 10, 20, 60)
@@ -107,6 +109,27 @@ def costs_of_a_record(folder: Path, number: int) -> list[list[object]]:
 
 
 # A group -------------------------------------------------------------------------------------------------------------
+
+
+def overhead_here(folder: Path, number: int, group_seconds: float) -> list[object]:
+    """A batch of short real tasks on two children: what a task costs beyond its own time, and how often a second."""
+    name = "own child" if group_seconds == 0 else f"{group_seconds:g} s"
+    text = (
+        f'[experiments.space]\ntask = "family-space"\nsystem = "family"\naxes = {{m = [2], seed = "0..{number - 1}"}}'
+    )
+    spec = parse_spec(text)
+    begin = time.perf_counter()
+    with Store.open(folder / f"{number} {name}.db", create=True) as store:
+        plan(spec, store)
+        planned_in = time.perf_counter() - begin
+        begin, own = time.perf_counter(), 0.0
+        for records in Batch(store.pending(), executor_for(store.document, CHILDREN, group_seconds=group_seconds)):
+            store.add(records)
+            own += sum(record.seconds for record in records)
+        elapsed = time.perf_counter() - begin
+    overhead = (CHILDREN * elapsed - own) / number
+    rate = f"{number / elapsed:,.0f}"
+    return [name, number, f"{1e3 * own / number:.2f}", f"{1e3 * overhead:.2f}", rate, f"{1e3 * planned_in:.0f}"]
 
 
 def processor_time(pid: int) -> float:
@@ -338,6 +361,10 @@ def main() -> None:
         say("a record")
         header = ["a record of", "read, µs", "stored alone, µs", "stored among 100, µs", "records each second"]
         print(table(header, costs_of_a_record(folder, 5000 // fewer)))
+        say("one machine")
+        header = ["a child serves for", "tasks", "own, ms", "on top, ms", "tasks each second", "planned in, ms"]
+        rows_here = [overhead_here(folder, 2000 // fewer, 5.0), overhead_here(folder, 20_000 // fewer, 5.0)]
+        print(table(header, [*rows_here, overhead_here(folder, 200 // fewer, 0.0)]))
         say("a group")
         costs = costs_of_a_group(folder, 3000 // fewer)
         costs["start"] = start_of_a_group()

@@ -30,6 +30,7 @@ def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> NDArr
     import numpy as np
 
     from kahanmaps.algebra.fields import rational
+    from kahanmaps.maps.float_ensemble import starts_in_box
     from kahanmaps.maps.float_numbers import to_float
 
     if count < 1:
@@ -38,17 +39,15 @@ def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> NDArr
         raise InputError(f"found --random {count}, expected at most {MAX_NUMBERS // dim} starts in dimension {dim}")
     if seed < 0:
         raise InputError(f"found --seed {seed}, expected 0 or more")
-    generator = np.random.default_rng(seed)
     if prime is not None:
-        return generator.integers(0, prime, (count, dim), dtype=np.int64)
+        return np.random.default_rng(seed).integers(0, prime, (count, dim), dtype=np.int64)
     box = rational(box)
     if box <= 0:
         raise InputError(f"found --box {box}, expected a number above 0: coordinates are drawn from -R to R")
     size = to_float(box)
     if size == 0.0:
         raise InputError("found a --box that is 0 in machine numbers, expected a larger one")
-    starts: NDArray[Any] = (2 * generator.random((count, dim)) - 1) * size
-    return starts
+    return starts_in_box(count, dim, size, seed)
 
 
 def read_starts(path: str, variables: Sequence[str], prime: int | None) -> NDArray[Any]:

@@ -183,6 +183,8 @@ VOCABULARY = {
         Option(OTHER, "a second system: a file or a name of the catalogue", str, str),
         point("start", "where the orbit starts (default: drawn from the seed)"),
         whole("steps", "steps of the orbit", most=10**9),
+        whole("orbits", "how many orbits", 1, 10**6),
+        exact("box", "coordinates of random starts are drawn from -R to R"),
         whole("every", "take every so many steps only", 1, 10**9),
         whole_numbers(
             "at",
@@ -218,10 +220,10 @@ FAMILY = {
     option.name: option
     for option in (
         VOCABULARY["m"],
-        choice("draw", "eigenvalues: distinct integers; generic: a random integer chi", DRAWS),
+        choice("draw", "eigenvalues (the default): distinct integers; generic: a random integer chi", DRAWS),
         point("eigenvalues", "the eigenvalues of A", MAX_M),
         Option("chi", "chi itself, a polynomial in t", _read_chi, parse_chi),
-        whole("size", "bound for the integer coefficients drawn", 1, 10**6),
+        whole("size", "bound for the integer coefficients drawn (default 2, or 1 for generic and chi)", 1, 10**6),
         whole_numbers(
             "signs",
             "which associated system: 1 or -1 for each factor of chi",

@@ -30,6 +30,7 @@ from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitPoin
 from kahanmaps.maps.periods import period_of
 from kahanmaps.systems.files import SystemFile
 
+_WORTH_COMPILING = 5_000_000  # orbits times steps
 _LONGEST_POINT = 400  # characters of a last point that are kept; longer ones are known by their hash
 
 
@@ -204,9 +205,7 @@ def orbit(
 def _float_orbit(system: SystemFile, eps: Any, start: Any, steps: int, method: str | None) -> Result:
     from kahanmaps.maps.fast import FloatOrbit
 
-    structure = NoStructure("as asked for") if method == "generic" else _structure(system)
-    if isinstance(structure, Structure) and structure.T is not None:
-        structure = NoStructure("in machine numbers only J = [[0, I], [-I, 0]] has one")
+    structure = _float_structure(system, method)
     chosen = choose_method(method, "float", structure, None)
     form = structure.form if chosen.name == "normal-form" and isinstance(structure, Structure) else None
     walk = FloatOrbit(system.system, eps, start, steps, form=form)
@@ -222,6 +221,38 @@ def _float_orbit(system: SystemFile, eps: Any, start: Any, steps: int, method: s
         "reached": end.steps,
         "ending": end.message,
         **_last(last),
+    }
+
+
+@task("ensemble")
+def ensemble(
+    system: SystemFile,
+    eps: Any,
+    orbits: int = 1000,
+    box: Any = "1",
+    steps: int = 1000,
+    method: str | None = None,
+    seed: int = 0,
+) -> Result:
+    """Float orbits from random starts: how many are completed, how far the integrals of the planes drift."""
+    from kahanmaps.maps.fast import to_floats
+    from kahanmaps.maps.float_ensemble import FloatEnsemble, starts_in_box
+
+    starts = starts_in_box(orbits, system.system.dim, float(to_floats([box])[0]), seed)
+    structure = _float_structure(system, method)
+    chosen = choose_method(method, "float", structure, None)
+    form = structure.form if chosen.name == "normal-form" and isinstance(structure, Structure) else None
+    # The kernel makes no difference to the numbers, and compiling one takes longer than a short task.
+    kernel = "numpy" if orbits * steps < _WORTH_COMPILING else None
+    run = FloatEnsemble(system.system, eps, starts, form=form, kernel=kernel, threads=1)
+    run.advance(steps)
+    words, counts = run.status.tolist(), Counter(run.status.tolist())
+    alive = [k for k, word in enumerate(words) if word == "completed"]
+    return {
+        "method": chosen.name,
+        **{word: counts[word] for word in ("completed", "overflow", "singular")},
+        "near_singular": int((run.near_singular > 0).sum()),
+        "largest_drift": max((float(drift.largest[alive].max()) for drift in run.drift if alive), default=None),
     }
 
 
@@ -299,6 +330,13 @@ def _member(system: SystemFile) -> Any:
     if system.member is None:
         raise InputError(f"{system.name} is of kind [{system.kind}], expected one of kind [family]")
     return system.member
+
+
+def _float_structure(system: SystemFile, method: str | None) -> Structure | NoStructure:
+    structure = NoStructure("as asked for") if method == "generic" else _structure(system)
+    if isinstance(structure, Structure) and structure.T is not None:
+        return NoStructure("in machine numbers only J = [[0, I], [-I, 0]] has one")
+    return structure
 
 
 def _structure(system: SystemFile) -> Structure | NoStructure:

@@ -157,6 +157,16 @@ class Stepping:
         return max(1, int(0.1 * speed * self.threads / work))
 
 
+def starts_in_box(count: int, dim: int, size: float, seed: int) -> FloatArray:
+    """Starts (count, dim) drawn uniformly from -size to size, the same ones for the same seed.
+
+    >>> starts_in_box(2, 1, 1.0, seed=0).tolist()
+    [[0.2739233746429086], [-0.4604265724722594]]
+    """
+    starts: FloatArray = (2 * np.random.default_rng(seed).random((count, dim)) - 1) * size
+    return starts
+
+
 class FloatEnsemble:
     """Orbits of many starts in double precision, advanced together.
 

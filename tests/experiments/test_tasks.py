@@ -301,6 +301,25 @@ def test_heights_are_those_of_the_library(system, steps, growth):
     assert (result["heights"], result["constant"], result["reached"]) == (found["heights"], found["constant"], steps)
 
 
+def test_an_ensemble_is_that_of_the_library():
+    from kahanmaps.maps.float_ensemble import FloatEnsemble, starts_in_box
+
+    found = perform("ensemble", load("lorenz"), eps="1/10", orbits=50, box="1/2", steps=300, seed=4)
+    run = FloatEnsemble(load("lorenz").system, "1/10", starts_in_box(50, 3, 0.5, 4), kernel="numpy")
+    run.advance(300)
+    assert [found[word] for word in ("completed", "overflow", "singular")] == [
+        (run.status == word).sum() for word in ("completed", "overflow", "singular")
+    ]
+    assert 0 < found["completed"] < 50
+    assert found["largest_drift"] is None  # nothing is known to be conserved
+
+
+def test_the_drift_of_an_ensemble_is_small_in_normal_form():
+    found = perform("ensemble", member(), eps="1/10", orbits=20, steps=200)
+    assert (found["method"], found["completed"]) == ("normal-form", 20)
+    assert 0 < found["largest_drift"] < 1e-6  # rounding errors of 200 steps; they are 10^-9 here
+
+
 def test_heights_may_be_taken_every_so_many_steps():
     result = perform("heights", MEMBER, eps="1/10", steps=40, every=4)
     assert all(entry["step"] % 4 == 0 for entry in result["heights"])
