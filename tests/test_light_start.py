@@ -41,3 +41,20 @@ def test_an_exact_orbit_does_not_load_numpy():
     loaded = modules_loaded_by(COMMAND.format(arguments=arguments))
     assert loaded & {"numpy", "numba", "matplotlib", "pydantic", "distributed"} == set()
     assert "flint" in loaded
+
+
+def test_looking_at_a_database_of_results_loads_no_mathematics(tmp_path):
+    database = str(tmp_path / "results.db")
+    made = f"from kahanmaps.experiments.store import Store; Store.open({database!r}, create=True).close()"
+    assert modules_loaded_by(made) & HEAVY == set()
+    arguments = ["batch", "status", "--db", database]
+    assert modules_loaded_by(COMMAND.format(arguments=arguments)) & HEAVY == set()
+
+
+def test_a_dry_run_of_a_batch_loads_no_numpy(tmp_path):
+    spec = tmp_path / "spec.toml"
+    spec.write_text('[experiments.a]\ntask = "family-space"\nsystem = "family"\naxes = { m = [2] }\n')
+    arguments = ["batch", "run", str(spec), "--dry-run"]
+    loaded = modules_loaded_by(COMMAND.format(arguments=arguments))
+    assert loaded & {"numpy", "numba", "distributed", "pyarrow", "matplotlib"} == set()
+    assert {"flint", "pydantic"} <= loaded
