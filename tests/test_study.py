@@ -1,0 +1,69 @@
+"""The study of examples/members: its spec is sound, its committed results are those of all its tasks, its script runs."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import kahanmaps as km
+
+STUDY = Path(__file__).parent.parent / "examples" / "members"
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of the first few members."""
+    text = (STUDY / "study.toml").read_text()
+    text, count = re.subn(r'"0\.\.\d+"', '"0..2"', text)
+    assert count == 5
+    db = tmp_path_factory.mktemp("study") / "study.db"
+    records = list(km.run(text, db, jobs=2))
+    assert {record.outcome for record in records} == {"ok"}
+    return db
+
+
+def sizes() -> dict[str, int]:
+    return {experiment.name: experiment.size for experiment in km.read_spec(STUDY / "study.toml").experiments}
+
+
+def test_there_are_five_hundred_members_for_each_m():
+    assert sizes()["heights"] == 3 * 500
+    assert sizes()["space"] == sizes()["commute"] == 2 * 3 * 500
+
+
+def test_the_committed_results_are_those_of_all_tasks():
+    results = (STUDY / "results.md").read_text()
+    for heading, name in (
+        ("The space of cubics", "space"),
+        ("Commutativity", "commute"),
+        ("Heights", "heights"),
+        ("Heights and eps, m = 3", "heights-eps"),
+        ("Heights of associated maps, m = 3", "heights-associated"),
+    ):
+        table = results.partition(f"## {heading}\n")[2].strip().partition("\n\n")[0].splitlines()
+        column = [cell.strip() for cell in table[0].split("|")].index("tasks")
+        assert sum(int(line.split("|")[column]) for line in table[2:]) == sizes()[name]
+
+
+def test_what_was_learned_comes_out_of_the_first_members_too(small: Path):
+    done = subprocess.run([sys.executable, STUDY / "learned.py", small], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[:3] == [
+        f"m = {m}: dimension {4 * m} of the space of cubics, for 6 of 6 members" for m in (2, 3, 4)
+    ]
+    committed = (STUDY / "learned.out").read_text().splitlines()
+    kinds = [re.sub(r"[-\d.e]+", "#", line) for line in lines if not line.startswith(" ")]
+    assert kinds[3:5] == [re.sub(r"[-\d.e]+", "#", line) for line in committed if not line.startswith(" ")][3:5]
+
+
+def test_the_dimension_is_4m_for_every_member(small: Path):
+    with km.Store.open(small, readonly=True) as store:
+        for row in store.rows(["space"]):
+            assert row.record is not None
+            assert row.record.result is not None
+            assert row.record.result["dimension"] == 4 * row.task.value("m")
