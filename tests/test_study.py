@@ -1,4 +1,4 @@
-"""The study of examples/members: its spec is sound, its committed results are those of all its tasks, its script runs."""
+"""The study of examples/members: its spec is sound, its committed results are those of all tasks, its script runs."""
 
 from __future__ import annotations
 
@@ -53,9 +53,7 @@ def test_what_was_learned_comes_out_of_the_first_members_too(small: Path):
     done = subprocess.run([sys.executable, STUDY / "learned.py", small], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
-    assert lines[:3] == [
-        f"m = {m}: dimension {4 * m} of the space of cubics, for 6 of 6 members" for m in (2, 3, 4)
-    ]
+    assert lines[:3] == [f"m = {m}: dimension {4 * m} of the space of cubics, for 6 of 6 members" for m in (2, 3, 4)]
     committed = (STUDY / "learned.out").read_text().splitlines()
     kinds = [re.sub(r"[-\d.e]+", "#", line) for line in lines if not line.startswith(" ")]
     assert kinds[3:5] == [re.sub(r"[-\d.e]+", "#", line) for line in committed if not line.startswith(" ")][3:5]

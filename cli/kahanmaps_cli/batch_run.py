@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _SHOWN = 3  # tasks of each experiment in a dry run
 
 
-def dry_run(path: str, db: str | None, options: Mapping[str, Any]) -> int:
+def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
     """Read the spec, and say what it would do."""
     from kahanmaps.experiments.spec import MAX_TASKS, read_spec
     from kahanmaps.version import __version__
@@ -56,19 +56,16 @@ def dry_run(path: str, db: str | None, options: Mapping[str, Any]) -> int:
         )
         return 0
     for experiment in chosen:
-        axes = " x ".join(
-            f"{len(experiment.grid.axes[group[0]])} {'+'.join(group)}" for group in experiment.grid.groups
-        )
-        click.echo(f"{experiment.name}\t{experiment.kind.name}\t{experiment.size} tasks\t{axes}")
+        click.echo(f"{experiment.name}\t{experiment.kind.name}\t{_tasks(experiment.size)}\t{experiment.product}")
         for k in range(min(_SHOWN, experiment.size)):
             task = experiment[k]
             given = {name: value for name, value in task.options.items() if value is not None}
+            if "other" in given:
+                given["other"] = _recipe(given["other"])
             click.echo(f"\t{task.key[:8]}\t{_recipe(task.system)}\t{_pairs(given)}")
         if experiment.size > _SHOWN:
             click.echo(f"\t... and {experiment.size - _SHOWN} more")
-    click.echo(
-        f"{sum(e.size for e in chosen)} tasks" + ("" if missing is None else f", {missing} of them without result")
-    )
+    click.echo(_tasks(sum(e.size for e in chosen)) + ("" if missing is None else f", {missing} of them without result"))
     return 0
 
 
@@ -99,7 +96,7 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                     assert batch is not None
                     batch.interrupt()
                     if not quiet and batch.in_flight:
-                        say(f"finishing {batch.in_flight} tasks in flight (Ctrl-C again gives them up)")
+                        say(f"finishing {_tasks(batch.in_flight)} in flight (Ctrl-C again ends at once)")
 
                 with interruptible(interrupt):
                     for records in batch:
@@ -156,10 +153,10 @@ def _tell_plan(planned: Mapping[str, Planned], todo: int, db: str) -> None:
     for name, found in planned.items():
         if found.is_resumed:
             continue
-        words = [f"{found.total} tasks", f"{found.new_tasks} of them new" if found.new_tasks < found.total else ""]
+        words = [_tasks(found.total), f"{found.new_tasks} of them new" if found.new_tasks < found.total else ""]
         words.append(f"{found.dropped} of the earlier plan are not in it" if found.dropped else "")
         say(f"{name}: {', '.join(filter(None, words))}")
-    say(f"{todo} tasks to do, results go to {db}" if todo else f"nothing to do: every task has a result in {db}")
+    say(f"{_tasks(todo)} to do, results go to {db}" if todo else f"nothing to do: every task has a result in {db}")
 
 
 def _tell_end(
@@ -172,16 +169,20 @@ def _tell_end(
     options: Mapping[str, Any],
 ) -> None:
     if progress.done:
-        say(f"{progress.done} tasks in {duration(progress.seconds)}")
+        say(f"{_tasks(progress.done)} in {duration(progress.seconds)}")
     again = f"kahanmaps batch run {path + ' ' if path else ''}--db {db}"
+    again += "".join(f" -e {name}" for name in options["only"])
+    for name in ("scheduler", "worker_python"):
+        if options[name] is not None:
+            again += f" --{name.replace('_', '-')} {options[name]}"
     if options["shard"]:
         again += f" --shard {options['shard'][0]}/{options['shard'][1]}"
     if missing:
-        say(f"{'interrupted: ' if interrupted else ''}{missing} tasks have no result yet; to continue: {again}")
+        say(f"{'interrupted: ' if interrupted else ''}{_tasks(missing)} without a result yet; to continue: {again}")
     if failed:
         say(
-            f"{failed} tasks failed ('kahanmaps batch summary --db {db} --by outcome'); "
-            f"to try them again: {again} --retry-failed"
+            f"{_tasks(failed)} failed, why: kahanmaps batch summary --db {db} --by outcome,message; "
+            f"to try again: {again} --retry-failed"
         )
 
 
@@ -197,9 +198,9 @@ def _require_names(only: tuple[str, ...], spec: Spec) -> None:
             )
 
 
-def _missing(db: str | None, spec: Spec, options: Mapping[str, Any]) -> int | None:
+def _missing(db: str, spec: Spec, options: Mapping[str, Any]) -> int | None:
     """How many tasks have no result, if there is a database to ask; it is not changed."""
-    if db is None or not os.path.exists(db):
+    if not os.path.exists(db):
         return None
     from kahanmaps.experiments.store import Store
 
@@ -208,6 +209,12 @@ def _missing(db: str | None, spec: Spec, options: Mapping[str, Any]) -> int | No
     names = options["only"] or [experiment.name for experiment in spec.experiments]
     keys = {task.key for experiment in spec.experiments if experiment.name in names for task in experiment.tasks()}
     return len(keys - done)
+
+
+def _tasks(number: int) -> str:
+    from kahanmaps.maps.orbits import counted
+
+    return counted(number, "task")
 
 
 def _task_data(task: Any) -> dict[str, Any]:

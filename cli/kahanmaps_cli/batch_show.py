@@ -6,17 +6,20 @@ import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from kahanmaps_cli.batch_progress import duration
+from kahanmaps_cli.progress import printable
 from kahanmaps_cli.render import COLOURS, on_terminal, print_json, shorten
 
 if TYPE_CHECKING:
     from kahanmaps.experiments.store import Found, Store
 
 _VALUE_WIDTH = 300
+_WORD_WIDTH = 10  # what words keep in a table that is too wide
 
 
 def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
@@ -75,14 +78,23 @@ def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(header_style="bold")
+    console = Console(markup=False, emoji=False, highlight=False)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    padding = 1 if sum(widths) + 3 * len(widths) < console.width else 0
+    # Where a table is too wide words are broken, and numbers only where that is not enough.
+    least = sum(min(width, _WORD_WIDTH) for width in widths[:words])
+    least += sum(widths[words:]) + (1 + 2 * padding) * len(widths) + 1
+    table = Table(header_style="bold", padding=(0, padding))
     for k, heading in enumerate(rows[0]):
         table.add_column(
-            Text(heading, style=COLOURS.get(heading, "")), justify="left" if k < words else "right", overflow="fold"
+            Text(heading, style=COLOURS.get(heading, "")),
+            justify="left" if k < words else "right",
+            overflow="fold",
+            no_wrap=k >= words and least <= console.width,
         )
     for row in rows[1:]:
-        table.add_row(*map(Text, row))
-    Console(markup=False, emoji=False, highlight=False).print(table)
+        table.add_row(*(Text(printable(cell)) for cell in row))
+    console.print(table)
 
 
 def found_data(store: Store, found: Found) -> dict[str, Any]:
@@ -118,6 +130,8 @@ def print_found(data: Sequence[Mapping[str, Any]]) -> None:
             lines.append(("outcome", "none yet"))
         else:
             lines.append(("outcome", one["outcome"] + (f": {one['message']}" if one["message"] else "")))
+            if one["verdict"] is not None:
+                lines.append(("verdict", one["verdict"]))
             lines += [("result." + name, _compact(value)) for name, value in (one["result"] or {}).items()]
             if one["stderr"]:
                 lines.append(("stderr", one["stderr"]))
@@ -126,7 +140,7 @@ def print_found(data: Sequence[Mapping[str, Any]]) -> None:
             versions = ", ".join(f"{name} {number}" for name, number in one["versions"].items())
             lines.append(("where", f"{one['host']}, {one['finished']}, {versions}"))
         for name, text in lines:
-            text = "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
+            text = printable(text)
             click.echo(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
 
 
@@ -150,32 +164,43 @@ def print_summary(
     elif as_markdown:
         click.echo(found.markdown(), nl=False)
     elif on_terminal():
-        for table in found.tables(digits=6):
+        for table in found.tables(digits=4):
             print_table([table.columns, *table.rows], words=table.words)
     else:
         for line in found.lines():
             click.echo(line)
 
 
-def export_rows(store: Store, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:
-    """Write the results; a file is complete or is not there."""
+def export_rows(store: Store, db: str, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:
+    """Write the results; a file is complete or is not there. `output` is another file than `db`."""
+    from kahanmaps.errors import InputError
     from kahanmaps.experiments.export import write_parquet
 
-    if form == "parquet":
-        assert output is not None
-        write_parquet(lambda: store.rows(only), output, stable=stable)
-        return
-    if output is None:
+    if output is None or output == "-":
         _write(store, form, sys.stdout, stable, only)
         return
-    part = f"{output}.part"
+    target = Path(output).resolve()
+    if target == Path(db).resolve() or (target.exists() and target.samefile(db)):
+        raise InputError(f"{output} is the database itself: name another file for the export")
+    if not target.parent.is_dir():
+        raise InputError(f"{output} cannot be made: there is no folder {target.parent}; make it first")
+    is_special = os.path.exists(output) and not os.path.isfile(output)  # a pipe, a device
+    if form == "parquet":
+        if is_special:
+            raise InputError(f"{output} is not a file: Parquet needs one")
+        write_parquet(lambda: store.rows(only), target, stable=stable)
+        return
+    if is_special:
+        with open(output, "w", encoding="utf-8", newline="") as stream:
+            _write(store, form, stream, stable, only)
+        return
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
         with open(part, "w", encoding="utf-8", newline="") as stream:
             _write(store, form, stream, stable, only)
-        os.replace(part, output)
+        os.replace(part, target)
     finally:
-        if os.path.exists(part):
-            os.remove(part)
+        part.unlink(missing_ok=True)
 
 
 def _write(store: Store, form: str, stream: Any, stable: bool, only: list[str] | None) -> None:

@@ -17,7 +17,12 @@ import click
 def say(message: str) -> None:
     """Print a message, with nothing in it that a terminal would obey."""
     with suppress(OSError):
-        click.echo("".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in message), err=True)
+        click.echo(printable(message), err=True)
+
+
+def printable(text: str) -> str:
+    """The text with nothing in it that a terminal would obey, but for ends of lines and tabs."""
+    return "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
 
 
 class Progress:

@@ -11,6 +11,7 @@ own. It ends when its standard input ends, and on Linux at the moment its parent
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -30,51 +31,77 @@ from kahanmaps.experiments.versions import host_name, versions
 
 _TAIL = 2000  # characters of a message or a traceback that are kept
 _PR_SET_PDEATHSIG = 1
+_NOT_LOADED = ("failed to map segment", "cannot allocate memory", "Cannot allocate memory")  # what ld.so says
 
 
 def main(parent: int) -> None:
     """Do tasks until standard input ends. `parent` is the process that must be alive."""
     end_with_parent(parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which decides
-    answers = _private_stdout()
+    questions, answers = _private_stdin(), _private_stdout()
+    me = os.getpid()
     documents: dict[str, str] = {}
     task_kinds()  # importing them is no part of any task
-    _answer(answers, {"ready": {"host": host_name(), "versions": versions()}})
-    for line in sys.stdin:
+    ready = canonical({"ready": {"host": host_name(), "versions": versions()}})
+    idle = _address_space()
+    answers.write(ready + "\n")
+    answers.flush()
+    for line in questions:
         message = json.loads(line)
         if "document" in message:
             documents[message["document"]] = message["text"]
             continue
-        record = perform(Task.from_text(message["task"]), message["memory"], documents)
-        try:
-            _answer(answers, record)
-        except ValueError as error:  # a number that JSON does not have
-            text = f"the result cannot be kept: {error}"
-            _answer(answers, {"key": record["key"], "outcome": "failed", "message": text})
+        record = perform(Task.from_text(message["task"]), message["memory"], documents, idle)
+        if os.getpid() != me:
+            os._exit(0)  # the task has forked, and this is the copy
+        answers.write(_answer(record) + "\n")
+        answers.flush()
         if record["outcome"] == Outcome.OUT_OF_MEMORY:
             return  # what is left of the memory nobody knows
 
 
-def perform(task: Task, memory: int | None, documents: Mapping[str, str]) -> dict[str, Any]:
-    """Do a task; what became of it, as plain data for a `Record`."""
+def perform(task: Task, memory: int | None, documents: Mapping[str, str], idle: int | None = None) -> dict[str, Any]:
+    """Do a task; what became of it, as plain data for a `Record`.
+
+    `idle` is the address space of a child that has done nothing yet: what earlier tasks left counts as memory of this
+    one, which would otherwise have more of it here than in a new child.
+    """
     with suppress(OSError), open("/proc/self/clear_refs", "w") as file:
         file.write("5")  # from here on the peak is that of the task
-    _limit_memory(memory)
+    _limit_memory(memory, idle)
     begin = time.perf_counter()
     found: dict[str, Any] = {"key": task.key, "outcome": Outcome.OK}
     try:
         result = _result(task, documents)
-        found |= {"verdict": result.pop("verdict", None), "result": result}
-    except MemoryError:
-        found |= {"outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"}
-    except InputError as error:
-        found |= {"outcome": Outcome.FAILED, "message": str(error)[-_TAIL:]}
+        verdict = result.pop("verdict", None)
+        if not isinstance(verdict, str | None):
+            raise InputError(f"found the verdict {str(verdict)[:100]}, expected a text")
+        found |= {"verdict": verdict, "result": result}
     except Exception as error:  # whatever a task does wrong is its own affair
-        found |= {"outcome": Outcome.FAILED, "message": f"{type(error).__name__}: {error}"[:_TAIL]}
-        if not isinstance(error, KahanmapsError):
-            found["stderr"] = traceback.format_exc()[-_TAIL:]
-    _limit_memory(None)
+        found |= _failure(error)
+    _limit_memory(None, idle)
     return {**found, "seconds": time.perf_counter() - begin, "peak_memory": _peak_memory()}
+
+
+def _failure(error: Exception) -> dict[str, Any]:
+    """What an error means for the record; one that nobody raised on purpose has its traceback in it."""
+    if _is_for_want_of_memory(error):
+        return {"outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"}
+    if isinstance(error, InputError):
+        return {"outcome": Outcome.FAILED, "message": str(error)[:_TAIL]}
+    found = {"outcome": Outcome.FAILED, "message": f"{type(error).__name__}: {error}"[:_TAIL]}
+    return found if isinstance(error, KahanmapsError) else {**found, "stderr": traceback.format_exc()[-_TAIL:]}
+
+
+def _is_for_want_of_memory(error: BaseException | None) -> bool:
+    """Whether an error, or what it was raised from, is MemoryError or says the same: of a module not loaded, say."""
+    while error is not None:
+        if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
+            return True
+        if isinstance(error, ImportError) and any(words in str(error) for words in _NOT_LOADED):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _result(task: Task, documents: Mapping[str, str]) -> dict[str, Any]:
@@ -83,7 +110,10 @@ def _result(task: Task, documents: Mapping[str, str]) -> dict[str, Any]:
     if options.get(OTHER) is not None:
         options[OTHER] = system_from(options[OTHER], documents.__getitem__)
     system = None if task.system is None else system_from(task.system, documents.__getitem__)
-    return kind.perform(system, options)
+    result = kind.perform(system, options)
+    if not isinstance(result, dict):
+        raise InputError(f"found a result of type {type(result).__name__}, expected a dict")
+    return result
 
 
 def end_with_parent(parent: int) -> None:
@@ -96,18 +126,24 @@ def end_with_parent(parent: int) -> None:
         os._exit(1)
 
 
-def _limit_memory(memory: int | None) -> None:
-    """Bound the address space to what it is now and `memory` more; None: to what the user has."""
+def _limit_memory(memory: int | None, idle: int | None) -> None:
+    """Bound the address space to `idle`, by default what it is now, and `memory` more; None: to what the user has."""
     with suppress(ImportError, OSError, ValueError):  # not on Windows; not below what is used already
         import resource
 
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         soft = hard
-        if memory is not None:
-            with open("/proc/self/statm") as file:
-                soft = int(file.read().split()[0]) * resource.getpagesize() + memory
+        if memory is not None and (used := idle or _address_space()) is not None:
+            soft = used + memory
             soft = soft if hard == resource.RLIM_INFINITY else min(soft, hard)
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def _address_space() -> int | None:
+    """How much of it this process has, in bytes, where that is known."""
+    with suppress(OSError), open("/proc/self/statm") as file:
+        return int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    return None
 
 
 def _peak_memory() -> int | None:
@@ -124,18 +160,29 @@ def _peak_memory() -> int | None:
     return None
 
 
+def _private_stdin() -> IO[str]:
+    """Standard input for questions alone: whatever else reads it finds nothing."""
+    private = os.dup(0)
+    with open(os.devnull) as nothing:
+        os.dup2(nothing.fileno(), 0)
+    return os.fdopen(private, encoding="ascii")
+
+
 def _private_stdout() -> IO[str]:
     """Standard output for answers alone: what anything else prints goes to standard error."""
     sys.stdout.flush()
     private = os.dup(1)
-    os.set_inheritable(private, False)
     os.dup2(2, 1)
     return os.fdopen(private, "w", encoding="ascii", errors="strict")
 
 
-def _answer(stream: IO[str], data: Mapping[str, Any]) -> None:
-    stream.write(canonical(data) + "\n")
-    stream.flush()
+def _answer(record: Mapping[str, Any]) -> str:
+    """The record as text. What JSON does not have (nan, a Fraction, an array) makes it a failure."""
+    try:
+        return canonical(record)
+    except (ValueError, TypeError, RecursionError) as error:
+        message = f"the result cannot be kept: {error}"[:_TAIL]
+        return canonical({"key": record["key"], "outcome": Outcome.FAILED, "message": message})
 
 
 if __name__ == "__main__":

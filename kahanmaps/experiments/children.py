@@ -29,6 +29,10 @@ from kahanmaps.experiments.records import Job, Outcome, Record, Task
 GROUP_SECONDS = 5.0  # of work for one child: starting it costs about a fifth of a second
 _STDERR_KEPT = 2000
 _READ = 1 << 16
+_READS = 64  # of what a child prints, at most, before somebody else is heard
+_LOOK_EVERY = 1.0  # seconds between two looks at who is alive; to be away for longer is to have been stopped
+_STARTS = 3  # children that end before they are ready, one after the other: then there is no use in more
+_KILLED_STARTS = 20  # the same for children that somebody kills, for each that may work at a time
 # Words with which Python, FLINT and GMP end where there is no memory.
 _NO_MEMORY = ("allocate memory", "out of memory", "memoryerror", "cannot reallocate", "bad_alloc")
 
@@ -45,10 +49,6 @@ class _Work:
     alone: bool = False
     begun: float | None = None
 
-    def deadline(self) -> float | None:
-        limit = self.job.limits.time
-        return None if limit is None or self.begun is None else self.begun + limit
-
 
 class LocalChildren:
     """An executor that runs at most `jobs` child processes on this machine.
@@ -64,6 +64,7 @@ class LocalChildren:
         self._children: list[_Child] = []
         self._waiting: deque[_Work] = deque()
         self._stillborn = 0
+        self._looked = self._checked = time.monotonic()
 
     @property
     def is_free(self) -> bool:
@@ -83,18 +84,32 @@ class LocalChildren:
         """The records that came in, after at most `timeout` seconds."""
         end = time.monotonic() + timeout
         records: list[Record] = []
+        self._make_up_for(self._looked)
         while self.in_flight and not records:
-            now = time.monotonic()
-            deadlines = [d for child in self._children if child.work and (d := child.work.deadline()) is not None]
-            pause = max(0.0, min([end, *deadlines]) - now)
-            for key, _ in self._selector.select(pause):
+            deadlines = [d for child in self._children if (d := child.deadline()) is not None]
+            until = max(self._looked, min([end, *deadlines, self._looked + _LOOK_EVERY]))
+            ready = self._selector.select(until - self._looked)
+            self._make_up_for(until)
+            for key, _ in ready:
                 child, stream = key.data
                 if child in self._children:
                     records += self._hear(child, stream)
+            if self._looked - self._checked >= _LOOK_EVERY:
+                self._checked = self._looked
+                records += self._dead()
             records += self._late()
             if time.monotonic() >= end:
                 break
         return records
+
+    def _make_up_for(self, until: float) -> None:
+        """Time beyond `until` in which this process was stopped, or busy elsewhere, is nobody's."""
+        self._looked = time.monotonic()
+        lost = self._looked - until
+        if lost > _LOOK_EVERY:
+            for child in self._children:
+                if child.work is not None and child.work.begun is not None:
+                    child.work.begun = min(child.work.begun + lost, self._looked)
 
     def close(self) -> None:
         """Kill every child at once."""
@@ -132,7 +147,7 @@ class LocalChildren:
         child.read_the_rest()  # before the task is sent: what comes from now on is its own
         child.stderr.clear()
         try:
-            for key in _documents_of(work.job.task):
+            for key in documents_of(work.job.task):
                 if key not in child.documents:
                     child.write({"document": key, "text": self._documents(key)})
                     child.documents.add(key)
@@ -153,30 +168,47 @@ class LocalChildren:
             else:
                 self._selector.unregister(stream)
             return []
-        if not data:
-            return self._died(child)
+        return self._heard(child, data) if data else self._died(child)
+
+    def _heard(self, child: _Child, data: bytes) -> list[Record]:
         records = []
         for line in child.lines(data):
-            message = json.loads(line)
+            try:
+                message = json.loads(line)
+            except (ValueError, RecursionError) as error:  # an integer of more digits than are read here
+                key = child.work.job.task.key if child.work is not None else ""
+                message = {"key": key, "outcome": Outcome.FAILED, "message": f"the result cannot be kept: {error}"}
             if "ready" in message:
                 child.ready = message["ready"]
                 self._stillborn = 0
                 if child.work is not None:
                     self._send(child)
-            else:
-                records += self._finished(child, message)
+            elif child.work is not None and message["key"] == child.work.job.task.key:
+                records += self._finished(child, child.work, message)
         return records
 
-    def _finished(self, child: _Child, message: dict[str, Any]) -> list[Record]:
-        work = child.work
-        assert work is not None
+    def _dead(self) -> list[Record]:
+        """The children that are dead, where something they have started keeps their end of the pipe open."""
+        records = []
+        for child in list(self._children):
+            while child in self._children and child.process.poll() is not None:
+                try:
+                    data = os.read(child.answers.fileno(), _READ)
+                except BlockingIOError:
+                    data = b""
+                records += self._heard(child, data) if data else self._died(child)
+        return records
+
+    def _finished(self, child: _Child, work: _Work, message: dict[str, Any]) -> list[Record]:
         child.work = None
         child.seconds += message.get("seconds", 0.0)
         was_fresh, child.is_fresh = child.is_fresh, False
         out_of_memory = message["outcome"] == Outcome.OUT_OF_MEMORY
         if child.seconds >= self._group_seconds or out_of_memory or work.alone:
             self._bury(child)
-        if out_of_memory and not was_fresh and not work.alone:
+        # A traceback: nobody expected this, so it may be the fault of what was done before.
+        is_doubtful = out_of_memory or (message["outcome"] == Outcome.FAILED and "stderr" in message)
+        if is_doubtful and not was_fresh and not work.alone:
             self._again(work)
             return []
         record = Record.from_json({**message, **child.circumstances()})
@@ -184,13 +216,13 @@ class LocalChildren:
         return [record]
 
     def _died(self, child: _Child) -> list[Record]:
-        status = child.process.wait()
+        status = child.status()
         child.read_the_rest()
         work, told, was_fresh = child.work, child.told(), child.is_fresh
         self._bury(child)
         if not child.is_ready:
             self._stillborn += 1
-            if self._stillborn >= 3:
+            if self._stillborn >= (_KILLED_STARTS * self.jobs if status == -SIGKILL else _STARTS):
                 raise ChildrenError(f"a child process cannot start ({_how(status)}): {told or 'it says nothing'}")
             if work is not None:
                 work.begun = None
@@ -199,12 +231,12 @@ class LocalChildren:
         if work is None:
             return []
         no_memory = any(words in told.lower() for words in _NO_MEMORY)
-        if not work.alone and (not was_fresh or -status == SIGKILL or status == 0):
+        if not work.alone and (not was_fresh or status in (-SIGKILL, 0)):
             self._again(work)
             return []
         outcome = Outcome.OUT_OF_MEMORY if no_memory else Outcome.CRASHED
         message = "out of memory" if no_memory else f"the child {_how(status)}"
-        if -status == SIGKILL:
+        if status == -SIGKILL:
             message += ", twice: from outside, or by the system for want of memory"
         record = self._record(child, work, outcome, message, told)
         self._go_on()
@@ -216,7 +248,7 @@ class LocalChildren:
         now = time.monotonic()
         for child in list(self._children):
             work = child.work
-            if work is not None and (deadline := work.deadline()) is not None and now >= deadline:
+            if work is not None and (deadline := child.deadline()) is not None and now >= deadline:
                 child.read_the_rest()
                 self._bury(child)
                 message = f"not done within {work.job.limits.time:g} seconds"
@@ -257,7 +289,7 @@ class _Child:
         self.seconds = 0.0
         self.is_fresh = True  # it has done nothing yet
         self.documents: set[str] = set()
-        self.stderr: deque[bytes] = deque(maxlen=64)
+        self.stderr: deque[bytes] = deque(maxlen=_READS)
         self._unread: list[bytes] = []
         command = [sys.executable, "-m", "kahanmaps.experiments.child", str(os.getpid())]
         # Sets of texts have an order that no result may depend on; with a fixed seed none can. A group of its own,
@@ -286,6 +318,19 @@ class _Child:
         """Whether it has said that it can take tasks."""
         return self.ready is not None
 
+    def deadline(self) -> float | None:
+        """When its task has to be done; None if it may take its time, or is done and being told."""
+        if self.work is None or self.work.begun is None or self.work.job.limits.time is None or any(self._unread):
+            return None
+        return self.work.begun + self.work.job.limits.time
+
+    def status(self) -> int | None:
+        """How it ended, after the end of its answers; None if it lives on without them."""
+        try:
+            return self.process.wait(1.0)
+        except subprocess.TimeoutExpired:
+            return None
+
     def circumstances(self) -> dict[str, Any]:
         """Where and when."""
         return {**(self.ready or {}), "finished": datetime.now(UTC).isoformat(timespec="seconds")}
@@ -309,7 +354,9 @@ class _Child:
     def read_the_rest(self) -> None:
         """What it printed on standard error and nobody has read."""
         with suppress(OSError):
-            while data := os.read(self.talk.fileno(), _READ):
+            for _ in range(_READS):
+                if not (data := os.read(self.talk.fileno(), _READ)):
+                    break
                 self.stderr.append(data)
 
     def told(self) -> str:
@@ -317,7 +364,9 @@ class _Child:
         return b"".join(self.stderr).decode("utf-8", "replace")[-_STDERR_KEPT:].strip()
 
     def end(self) -> None:
-        """Kill it, unless it is dead, and leave no zombie and no open file."""
+        """Kill it with all that its tasks have started, and leave no zombie and no open file."""
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.process.pid, SIGKILL)
         with suppress(ProcessLookupError):
             self.process.kill()
         self.process.wait()
@@ -332,14 +381,16 @@ def _pipe(stream: IO[bytes] | None) -> IO[bytes]:
     return stream
 
 
-def _documents_of(task: Task) -> list[str]:
+def documents_of(task: Task) -> list[str]:
     """The digests of the documents that a task needs."""
     recipes = (task.system, task.options.get(OTHER))
     return [recipe["document"] for recipe in recipes if recipe and "document" in recipe]
 
 
-def _how(status: int) -> str:
+def _how(status: int | None) -> str:
     """How a process ended, in words."""
+    if status is None:
+        return "closed the pipe for its answers"
     if status >= 0:
         return f"ended with status {status}"
     with suppress(ValueError):

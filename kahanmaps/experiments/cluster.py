@@ -34,6 +34,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from kahanmaps.errors import InputError, KahanmapsError
+from kahanmaps.experiments.children import documents_of
 from kahanmaps.experiments.executor import Documents, Executor
 from kahanmaps.experiments.records import Job, Limits, Outcome, Record, Task
 
@@ -315,10 +316,10 @@ class ClusterWorkers(Executor):
         )
 
     def _add(self, group: _Group, task: Task, limits: Limits) -> None:
-        wanted = (task.system or {}).get("document")
-        if wanted is not None and wanted not in group.documents:
-            group.documents[wanted] = self._documents(wanted)
-            group.sent += len(group.documents[wanted])
+        for wanted in documents_of(task):
+            if wanted not in group.documents:
+                group.documents[wanted] = self._documents(wanted)
+                group.sent += len(group.documents[wanted])
         group.jobs[task.key] = _Kept(task.kind, task.text, limits)
         group.seconds += self._seconds(task.kind)
         group.expected += self._mean(task.kind).size

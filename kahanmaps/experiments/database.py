@@ -45,6 +45,7 @@ class Database:
         self._lock = Lock(self.path.with_name(f"{self.path.name}.lock"))
         self._connection: sqlite3.Connection | None = None
         self._process = os.getpid()
+        self._identity: tuple[int, int] | None = None
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False) -> Self:
@@ -104,6 +105,7 @@ class Database:
             try:
                 yield
                 connection.execute("COMMIT")
+                self._require_name()
             except BaseException:
                 # After some errors SQLite has rolled back by itself.
                 if connection.in_transaction:
@@ -129,6 +131,22 @@ class Database:
     def execute_many(self, sql: str, rows: Iterable[Sequence[Any]]) -> int:
         """One statement of a transaction for each of these rows; how many rows of the table it changed."""
         return self._opened.executemany(sql, rows).rowcount
+
+    def _require_name(self) -> None:
+        """Refuse to go on with a file that nobody will find. SQLite itself does not mind."""
+        if self._identity is not None and self._identity != self._named():
+            raise StoreError(
+                f"{self.name} has been removed or replaced while it was being written to: what was written last is "
+                "not in the file of this name; leave it there, and run the batch again"
+            )
+
+    def _named(self) -> tuple[int, int] | None:
+        """Which file has the name now; None if there is none."""
+        try:
+            found = os.stat(self.path)
+        except OSError:
+            return None
+        return found.st_dev, found.st_ino
 
     def must_write(self) -> None:
         """Refuse if it was opened for reading only."""
@@ -206,6 +224,7 @@ class Database:
         self._connect("mode=rwc" if create else "mode=rw")
         is_empty = self._check_format(may_be_empty=create)  # before the lock: no lock file beside what is not ours
         self.lock()
+        self._identity = self._named()
         # Under the lock once more: somebody else may have been making it.
         is_empty = is_empty and self._check_format(may_be_empty=True)
         self.execute(f"PRAGMA cache_size = -{_CACHE}")

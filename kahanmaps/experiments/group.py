@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import sys
 from typing import IO
 
@@ -34,6 +35,16 @@ def main(source: IO[str], target: IO[str]) -> None:
         children.close()
 
 
+def _require_reader(stream: IO[str]) -> None:
+    """End if nobody reads: the parent died before it could be known who that is."""
+    if hasattr(select, "poll"):
+        poll = select.poll()
+        poll.register(stream.fileno(), 0)
+        if any(events & select.POLLERR for _, events in poll.poll(0)):
+            os._exit(1)
+
+
 if __name__ == "__main__":
     end_with_parent(os.getppid())
+    _require_reader(sys.stdout)
     main(sys.stdin, sys.stdout)

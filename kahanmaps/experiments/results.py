@@ -9,7 +9,7 @@ from typing import Any
 from kahanmaps.experiments.database import Database
 from kahanmaps.experiments.records import Outcome, Record, canonical
 
-RESULT_CHUNK = 250  # rows with their results, which may be long
+RESULT_CHUNK = 50  # rows with their results, which may be megabytes
 
 _COLUMNS = (
     "outcome",
@@ -52,7 +52,7 @@ def row_of(record: Record) -> tuple[Any, ...]:
     return (
         str(record.outcome),
         None if record.result is None else canonical(dict(record.result)),
-        record.verdict,
+        None if record.verdict is None else _encodable(record.verdict),
         _encodable(record.message),
         _encodable(record.stderr),
         record.seconds,

@@ -46,8 +46,10 @@ DEFAULT_LIMITS = Limits(time=3600.0, memory=4 * 10**9)
 FAMILY_WORD = "family"
 _PARAMETERS = "parameters."
 _TIME_STEP = "time_step"
+_EPS2 = "eps2"
 _FILES_AT_MOST = 10_000
 _POINTS_COMPARED = 1_000
+_LARGEST_TOLD = 3
 # m from what a random member is drawn with.
 _SIZES: Mapping[str, Callable[[Any], int]] = {
     "m": int,
@@ -75,6 +77,11 @@ class Experiment:
     def size(self) -> int:
         """The number of its tasks."""
         return self.grid.size
+
+    @property
+    def product(self) -> str:
+        """That number as a product: 4 m x 10,000 seed x 3 eps."""
+        return " x ".join(f"{len(self.grid.axes[group[0]]):,} {'+'.join(group)}" for group in self.grid.groups)
 
     @cached_property
     def definition(self) -> str:
@@ -186,7 +193,7 @@ class _SpecReader:
             self.mistake(
                 "experiments",
                 f"found {spec.size:,} tasks, expected at most {self.max_tasks:,} (--max-tasks allows more): "
-                + ", ".join(f"{experiment.name} has {_product(experiment)}" for experiment in experiments),
+                + _largest(experiments),
             )
         if self.mistakes:
             raise SpecError(self.where, self.mistakes)
@@ -224,6 +231,7 @@ class _ExperimentReader:
         self.at = f"experiments.{name}"
         self.kind: TaskKind | None = None
         self.files: list[SystemFile] = []
+        self.others: list[tuple[str, SystemFile]] = []
         self.is_family = False
 
     def read(self) -> Experiment | None:
@@ -238,7 +246,7 @@ class _ExperimentReader:
         zips = self._read_zips(axes)
         limits = self._read_limits(fixed)
         self._require()
-        self._compare_dimensions(fixed, axes, zips)
+        self._compare_dimensions({**fixed, **axes}, zips)
         if len(self.reader.mistakes) > before:
             return None
         constant = {key: values[0] for key, values in fixed.items()}
@@ -303,6 +311,8 @@ class _ExperimentReader:
                     if key == "system":
                         self.files.append(file)
                         self._require_kind(place, file)
+                    else:
+                        self.others.append((place, file))
             except InputError as error:
                 self._mistake(place, str(error))
         return list(recipes.values())
@@ -452,11 +462,12 @@ class _ExperimentReader:
                     self._mistake(place, f"{name} is not an axis{suggestion(name, list(axes))}")
             if len(names) < 2:
                 self._mistake(place, f"found {show(names)}, expected at least two axes that run together")
+                continue
             twice = [name for k, name in enumerate(names) if name in names[:k] or name in before]
             before |= set(names)
             for name in twice:
                 self._mistake(place, f"found {name} twice, expected every axis in one zip at most")
-            if unknown or twice or len(names) < 2:
+            if unknown or twice:
                 continue
             lengths = {name: len(axes[name]) for name in names}
             if len(set(lengths.values())) > 1:
@@ -480,7 +491,9 @@ class _ExperimentReader:
                 limits[name] = default  # told already, with the shape
         assert self.kind is not None
         place = self._given().get("max_digits")
-        if "max_digits" not in self.kind.options:
+        if "digits" in own and self._sound("limits", "digits") is None:
+            pass  # told already, with the shape
+        elif "max_digits" not in self.kind.options:
             if "digits" in own:
                 self._mistake("limits.digits", f"{self.kind.name} has no digit budget, expected time and memory only")
         elif place is not None:
@@ -498,6 +511,10 @@ class _ExperimentReader:
         for name in self.kind.required:
             if name not in given:
                 self._mistake(f"axes.{name}", f"missing, expected {self.kind.options[name].help} (in axes or options)")
+        if _EPS2 in given and self.kind.needs == MEMBER_OR_OTHER:
+            for name, reason in ((OTHER, "it is the eps of a second system"), ("eps", "without it every eps is meant")):
+                if name not in given:
+                    self._mistake(given[_EPS2], f"found no {name}, expected one with eps2: {reason}")
         if not self.is_family:
             return
         if not {"m", "eigenvalues", "chi"} & given.keys():
@@ -512,31 +529,28 @@ class _ExperimentReader:
             if first in given and second in given:
                 self._mistake(given[second], f"found {given[first]} as well, expected one of {first} and {second}")
 
-    def _compare_dimensions(
-        self, fixed: Mapping[str, Values], axes: Mapping[str, Values], zips: Sequence[Sequence[str]]
-    ) -> None:
-        """Every start must fit every system; zipped ones are compared in pairs."""
-        values = {**fixed, **axes}
-        starts = values.get("start")
-        if starts is None or len(starts) > _POINTS_COMPARED:
-            return
-        partners: list[list[int]]
-        if self.is_family:
-            name = next((name for name in _SIZES if name in values), None)
-            if name is None or len(values[name]) > _POINTS_COMPARED:
-                return
-            dims = [2 * _SIZES[name](value) for value in values[name]]
-            zipped = any(name in names and "start" in names for names in zips)
-            partners = [[dim] for dim in dims] if zipped else [dims] * len(starts)
+    def _compare_dimensions(self, values: Mapping[str, Values], zips: Sequence[Sequence[str]]) -> None:
+        """Every start and every second system must fit every system; zipped ones are compared in pairs."""
+        drawn = next((name for name in _SIZES if name in values), None) if self.is_family else None
+        if drawn is not None and len(values[drawn]) <= _POINTS_COMPARED:
+            dims = [2 * _SIZES[drawn](value) for value in values[drawn]]
         else:
-            partners = [[file.system.dim for file in self.files]] * len(starts)
-        part = "axes" if "start" in axes else "options"
-        for number, start in enumerate(starts):
-            count = start.count(",") + 1
-            wrong = sorted({dim for dim in partners[number] if dim != count})
+            dims = [file.system.dim for file in self.files]
+        starts = values.get("start", ())
+        if len(starts) <= _POINTS_COMPARED:
+            place = self._given().get("start", "")
+            places = [f"{place}[{k}]" if len(starts) > 1 else place for k in range(1, len(starts) + 1)]
+            found = [(place, start.count(",") + 1) for place, start in zip(places, starts, strict=True)]
+            self._compare(found, dims, "coordinates", any({drawn, "start"} <= set(names) for names in zips))
+        if OTHER in values:
+            found = [(place, file.system.dim) for place, file in self.others]
+            self._compare(found, dims, "variables", any({drawn, OTHER} <= set(names) for names in zips))
+
+    def _compare(self, found: Sequence[tuple[str, int]], dims: Sequence[int], what: str, zipped: bool) -> None:
+        for (place, count), partners in zip(found, [[d] for d in dims] if zipped else [dims] * len(found), strict=True):
+            wrong = sorted({dim for dim in partners if dim != count})
             if wrong:
-                place = f"{part}.start[{number + 1}]" if len(starts) > 1 else f"{part}.start"
-                self._mistake(place, f"found {count} coordinates, expected {wrong[0]}, the dimension of the system")
+                self._mistake(place, f"found {count} {what}, expected {wrong[0]}, the dimension of the system")
 
 
 def _time_step(eps: Option) -> Option:
@@ -570,6 +584,9 @@ def _axis_data(values: Sequence[Any]) -> Any:
     return pieces
 
 
-def _product(experiment: Experiment) -> str:
-    """The number of tasks of an experiment as a product: 4 m x 10000 seed x 3 eps."""
-    return " x ".join(f"{len(experiment.grid.axes[group[0]]):,} {'+'.join(group)}" for group in experiment.grid.groups)
+def _largest(experiments: Sequence[Experiment]) -> str:
+    """What the largest experiments have, and how many more there are."""
+    by_size = sorted(experiments, key=lambda experiment: -experiment.size)
+    told = [f"{experiment.name} has {experiment.product}" for experiment in by_size[:_LARGEST_TOLD]]
+    more = len(experiments) - len(told)
+    return ", ".join(told) + (f" and {more} more" if more else "")

@@ -28,9 +28,11 @@ OF_THE_RUN = ("seconds", "peak_memory")
 _SHOWN = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "max"}  # in tables, and their headings
 _LONGEST_NUMBER = 2_000  # characters of a text: longer ones are no numbers to sort, but texts
 # Names whose values are words, also when they look like numbers: an experiment may be called 007, a digest be 12e34567.
-_WORDS = ("task", "experiment", "system", "document", "outcome", "verdict")
+_WORDS = ("task", "experiment", "system", "document", "outcome", "verdict", "message")
 _RELATED = 3  # names suggested for a mistaken one
 _LISTED = 60
+# Characters in tables for the eye; texts are what failures say, and what systems are.
+_LONGEST_SHOWN_NUMBER, _LONGEST_SHOWN_TEXT = 24, 160
 
 Number = int | float | str
 
@@ -149,7 +151,7 @@ class Summary:
 
     def tables(self, digits: int | None = None) -> list[Table]:
         """The tables that have rows, the counts always. With `digits`, for the eye: floats have so many significant
-        digits, and texts that are longer than 24 characters are cut, numbers among them to an approximation (~).
+        digits, numbers of more than 24 characters are approximated (~), texts of more than 160 are cut.
         """
         return [self.counts(digits), *(table for table in (self.numbers(digits), self.flags(digits)) if table.rows)]
 
@@ -170,13 +172,13 @@ def summarise(
 ) -> Summary:
     """Group rows by the values of what `by` names, count, and take the quantiles of the numbers.
 
-    A name in `by` is one of task, experiment, system, document, outcome, verdict; an option; a part of the recipe (m,
-    parameters.a); an entry of the result (dimension, heights.max): the first of these that the row has. option.seed,
-    family.seed and result.seed say which. Rows without it make a group of their own, with the value None.
+    A name in `by` is one of task, experiment, system, document, outcome, verdict, message; an option; a part of the
+    recipe (m, parameters.a); an entry of the result (dimension, heights.max): the first of these that the row has.
+    option.seed, family.seed and result.seed say which. Rows without it make a group of their own, with the value None.
 
     Numbers are the integers, floats and texts such as "7/3" or "21.2031" of the results, and seconds and peak_memory of
-    all records unless `stable`; `values` names those to be kept. An entry of a result with a name of these two is
-    result.seconds.
+    all records unless `stable`; not those that `by` names, which are the same throughout a group. `values` names those
+    to be kept. An entry of a result with a name of these two is result.seconds.
 
     Rows are read once. Exact quantiles need all values, so these are kept: 8 bytes for a float, some hundred for any
     other value, equal ones once. A million rows are well within reach.
@@ -225,7 +227,7 @@ def summarise(
         for name, value in measured:
             if _is_number(value):
                 numeric.add(name)
-                if wanted is None or name in wanted:
+                if name not in by if wanted is None else name in wanted:
                     group.measure(name, value)
     if gathering:  # nobody can tell a mistaken name in nothing
         for name in by:
@@ -349,6 +351,8 @@ def _word(row: Row, name: str) -> str | None:
             return (row.task.system or {}).get("document")
         case "outcome":
             return None if row.record is None else str(row.record.outcome)
+        case "message":
+            return None if row.record is None else row.record.message or None
     return None if row.record is None else row.record.verdict
 
 
@@ -400,7 +404,7 @@ def _texts(values: Iterable[Any], digits: int | None) -> list[str]:
     return [plain(value) if digits is None else _shortened(value, digits) for value in values]
 
 
-def _shortened(value: Any, digits: int, longest: int = 24) -> str:
+def _shortened(value: Any, digits: int) -> str:
     """A value as text for the eye.
 
     >>> _shortened(0.123456789, 4), _shortened("7/3", 4), _shortened("1" * 30 + "/7", 4)
@@ -409,9 +413,11 @@ def _shortened(value: Any, digits: int, longest: int = 24) -> str:
     if isinstance(value, float):
         return f"{value:.{digits}g}"
     text = plain(value)
+    is_number = _is_number(value)
+    longest = _LONGEST_SHOWN_NUMBER if is_number else _LONGEST_SHOWN_TEXT
     if len(text) <= longest:
         return text
-    if _is_number(value) and 0 < abs(approximation := _approximate(Fraction(value))) < inf:
+    if is_number and 0 < abs(approximation := _approximate(Fraction(value))) < inf:
         return f"~{approximation:.{digits}g}"
     return text[: longest - 3] + "..."
 

@@ -300,7 +300,15 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
 
 
 def _settings(eps: Any, start: Any, steps: int, seed: int, error_bits: int, max_digits: int | None) -> Settings:
-    return Settings(eps=eps, start=start, steps=steps, seed=seed, error_bits=error_bits, max_digits=max_digits)
+    return Settings(
+        eps=eps,
+        start=start,
+        steps=steps,
+        seed=seed,
+        error_bits=error_bits,
+        max_digits=max_digits,
+        orbit_is_asked=start is not None or steps != Settings.steps,
+    )
 
 
 def _of_report(report: Report, whole: bool) -> Result:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import re
 import signal
 import subprocess
@@ -97,11 +98,16 @@ def test_jsonl_has_every_record_as_it_comes(batch):
 def test_failed_tasks_give_status_3_and_say_how_to_try_again(batch):
     done = batch("run", FAULT)
     assert done.status == 3
-    assert "2 tasks failed" in done.err
+    assert "2 tasks failed, why: kahanmaps batch summary --db study.db --by outcome,message; " in done.err
     assert "kahanmaps batch run study.toml --db study.db --retry-failed" in done.err
     assert batch("run", FAULT, "-q").status == 3  # they have not been mended
     again = batch("run --db study.db --retry-failed --json -q")
     assert again.json["done"] == {"failed": 2}
+
+
+def test_the_command_that_continues_is_about_the_same_experiments(batch):
+    done = batch("run", FAULT, "-e fault --shard 1/1")
+    assert "kahanmaps batch run study.toml --db study.db -e fault --shard 1/1 --retry-failed" in done.err
 
 
 def test_refuted_claims_are_results_like_others(batch):
@@ -120,10 +126,18 @@ def test_a_dry_run_shows_the_tasks_and_does_nothing(batch):
     assert not Path("study.db").exists()
 
 
+def test_a_dry_run_shows_a_second_system_by_its_name_and_one_task_as_one(batch):
+    done = batch(
+        "run", '[experiments.a]\ntask = "check-commute"\nsystem = "lorenz"\noptions.other = "lorenz"\n', "--dry-run"
+    )
+    assert done.rows[0][2] == "1 task"
+    assert done.rows[1][3].startswith("other=lorenz s=10 r=28 b=8/3 steps=10 ")
+
+
 def test_a_dry_run_with_a_database_says_what_is_missing(batch):
     batch("run", SPACE, "-q")
     wider = SPACE.replace("0..2", "0..4")
-    assert batch("run", wider, "--dry-run --db study.db").out.endswith("10 tasks, 4 of them without result\n")
+    assert batch("run", wider, "--dry-run").out.endswith("10 tasks, 4 of them without result\n")
     assert batch("run", wider, "--dry-run --db study.db --json").json["missing"] == 4
 
 
@@ -209,6 +223,12 @@ def test_show_has_all_that_is_known_of_a_task(batch):
     assert data["attempts"] == 1
 
 
+def test_show_tells_the_verdict_of_a_check(batch):
+    batch("run", '[experiments.one]\ntask = "check-measure"\nsystem = "euler_top"\n', "-q")
+    key = batch("export --db study.db --jsonl").records[1]["key"]
+    assert "\noutcome\tok\nverdict\tproved\n" in batch(f"show {key} --db study.db").out
+
+
 def test_a_task_can_be_redone_from_what_show_prints(batch):
     from kahanmaps.experiments.recipes import system_from
     from kahanmaps.experiments.registry import task_kind
@@ -238,6 +258,34 @@ def test_export_to_parquet(batch):
     batch("run", SPACE, "-q")
     assert batch("export --db study.db --parquet -o study.parquet").status == 0
     assert parquet.read_table("study.parquet")["dimension"].to_pylist() == [8] * 3 + [12] * 3
+
+
+@pytest.mark.parametrize("name", ["study.db", "./study.db", "link", "hard"])
+def test_an_export_does_not_go_where_the_database_is(batch, name: str):
+    batch("run", SPACE, "-q")
+    os.symlink("study.db", "link")
+    os.link("study.db", "hard")
+    before = Path("study.db").read_bytes()
+    done = batch(f"export --db study.db --csv -o {name}")
+    assert done.status == 2
+    assert "is the database itself" in done.err
+    assert Path("study.db").read_bytes() == before
+
+
+def test_an_export_follows_links_and_goes_through_pipes(batch):
+    batch("run", SPACE, "-q")
+    expected = batch("export --db study.db --csv --stable").out
+    os.symlink("real.csv", "link.csv")
+    assert batch("export --db study.db --csv --stable -o link.csv").status == 0
+    assert Path("link.csv").is_symlink()
+    assert Path("real.csv").read_text() == expected
+    os.mkfifo("pipe")
+    with subprocess.Popen(["cat", "pipe"], stdout=subprocess.PIPE, text=True) as reader:
+        assert batch("export --db study.db --csv --stable -o pipe").status == 0
+        assert reader.communicate(timeout=10)[0] == expected
+    assert Path("pipe").is_fifo()
+    assert batch("export --db study.db --csv --stable -o -").out == expected
+    assert sorted(os.listdir()) == ["link.csv", "pipe", "real.csv", "study.db", "study.toml"]
 
 
 def test_an_export_that_fails_leaves_the_old_file(batch):
@@ -409,8 +457,34 @@ def test_what_a_reader_does_not_want_is_no_error(batch, tmp_path: Path):
 
 
 def test_nothing_of_a_record_reaches_a_terminal_as_an_escape_sequence(batch):
-    name = "evil\\u001b[31m"
-    spec = f'[experiments.a]\ntask = "orbit"\nsystem = "x.toml"\noptions.eps = "1/2"\noptions.steps = 2\n# {name}'
-    Path("x.toml").write_text('variables = ["x"]\n[system]\nrhs = ["x"]\n')
-    batch("run", spec, "-q")
-    assert "\x1b" not in batch("status --db study.db").out
+    key = failed_with("evil \x1b[41m")
+    for words in ([f"show {key}"], ["summary", "--by", "outcome,message"]):
+        shown = terminal("batch", *" ".join(words).split(), "--db", "study.db", NO_COLOR="1").out
+        assert r"evil \x1b[41m" in shown
+        assert "\x1b[41m" not in shown
+
+
+def test_on_a_terminal_a_message_is_broken_but_complete_and_numbers_are_not_broken(batch):
+    words = ["no", "period", "of", "this", "orbit"] * 5
+    failed_with(" ".join(words))
+    batch("run --db study.db --shard 2/6 -q")
+    shown = terminal("batch", "summary", "--db", "study.db", "--by", "outcome,message", NO_COLOR="1").out
+    cells = [line.split("│")[2].split() for line in shown.partition("└")[0].splitlines() if "│" in line]
+    assert [word for cell in cells for word in cell] == words
+    shown = terminal("batch", "summary", "--db", "study.db", "--by", "experiment,m", NO_COLOR="1").out
+    assert re.search(r"│ *[0-9]{8,9}│", shown)  # the memory, in bytes
+
+
+def failed_with(message: str) -> str:
+    """Make study.db, in which the first task of SPACE failed with this message; its key."""
+    from kahanmaps.experiments.records import Outcome as Word
+    from kahanmaps.experiments.records import Record
+    from kahanmaps.experiments.run import plan
+    from kahanmaps.experiments.spec import parse_spec
+    from kahanmaps.experiments.store import Store
+
+    spec = parse_spec(SPACE)
+    with Store.open("study.db", create=True) as store:
+        plan(spec, store)
+        store.add([Record(spec.experiments[0][0].key, Word.FAILED, message=message)])
+    return spec.experiments[0][0].key

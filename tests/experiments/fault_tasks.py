@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+import subprocess
 import sys
 import time
 from typing import Any
@@ -29,6 +30,24 @@ def pause(steps: int = 0, seed: int = 0) -> dict[str, Any]:
     """Sleep for so many milliseconds."""
     time.sleep(steps / 1000)
     return {"seed_squared": seed**2, "verdict": "proved" if seed % 3 else "refuted"}
+
+
+@task("use")
+def use(steps: int = 0, seed: int = 0) -> dict[str, Any]:
+    """Use so many megabytes, in small pieces, which Python keeps for later."""
+    return {"pieces": len([bytes(968) for _ in range(1000 * steps)])}
+
+
+@task("first")
+def first(steps: int = 0, seed: int = 0) -> dict[str, Any]:
+    """Fail unless it is the first one in its child."""
+    _seen.append(seed)
+    if len(_seen) > 1:
+        raise RuntimeError(f"after {_seen[0]}")
+    return {"seed": seed}
+
+
+_seen: list[int] = []
 
 
 def _kill(number: int) -> dict[str, Any]:
@@ -95,6 +114,44 @@ def _large() -> dict[str, Any]:
     return {"digits": "7" * 3_000_000}
 
 
+def _deaf() -> dict[str, Any]:
+    os.closerange(3, 256)  # the pipes to the parent among them
+    time.sleep(60)
+    return {}
+
+
+def _twins() -> dict[str, Any]:
+    os.fork()
+    return {"forked": True}
+
+
+def _heir() -> dict[str, Any]:
+    if os.fork() == 0:  # keeps the pipes of its parent open
+        time.sleep(60)
+        os._exit(0)
+    return _kill(signal.SIGABRT)
+
+
+def _reader() -> dict[str, Any]:
+    return {"read": sys.stdin.read()}
+
+
+def _not_plain() -> dict[str, Any]:
+    return {"value": {1, 2}}
+
+
+def _verdict_of_no_text() -> dict[str, Any]:
+    return {"verdict": ["proved"]}
+
+
+def _not_loaded() -> dict[str, Any]:
+    raise ImportError("numbers.so: failed to map segment from shared object")
+
+
+def _starter() -> dict[str, Any]:
+    return {"pid": subprocess.Popen(["sleep", "60"]).pid}
+
+
 FAULTS = {
     1: lambda: _kill(signal.SIGKILL),
     2: lambda: _kill(signal.SIGABRT),
@@ -109,4 +166,12 @@ FAULTS = {
     11: _chatter,
     12: _exit,
     13: _large,
+    14: _deaf,
+    15: _twins,
+    16: _heir,
+    17: _reader,
+    18: _not_plain,
+    19: _verdict_of_no_text,
+    20: _starter,
+    21: _not_loaded,
 }

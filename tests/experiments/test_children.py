@@ -6,6 +6,7 @@ The tasks that go wrong are in fault_tasks.py. Negative controls: even seeds, wh
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -22,6 +23,8 @@ from kahanmaps.systems.catalog import load
 HERE = Path(__file__).parent
 KILL, ABORT, SEGFAULT, HANG, PYTHON_BOMB, FLINT_BOMB, GMP_BOMB = range(1, 8)
 INPUT_ERROR, BUG, NOT_A_NUMBER, CHATTER, EXIT, LARGE = range(8, 14)
+NOT_LOADED = 21
+DEAF, TWINS, HEIR, READER, NOT_PLAIN, VERDICT_OF_NO_TEXT, STARTER = range(14, 21)
 
 
 @pytest.fixture(autouse=True)
@@ -65,11 +68,18 @@ def outcome_of(job: Job, **settings: float) -> Record:
         (PYTHON_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
         (FLINT_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
         (GMP_BOMB, Outcome.OUT_OF_MEMORY, "out of memory"),
+        (NOT_LOADED, Outcome.OUT_OF_MEMORY, "out of memory"),
         (INPUT_ERROR, Outcome.FAILED, "found nothing, expected something"),
         (BUG, Outcome.FAILED, "ZeroDivisionError"),
         (NOT_A_NUMBER, Outcome.FAILED, "the result cannot be kept"),
         (CHATTER, Outcome.OK, ""),
         (LARGE, Outcome.OK, ""),
+        (DEAF, Outcome.CRASHED, "closed the pipe for its answers"),
+        (TWINS, Outcome.OK, ""),
+        (HEIR, Outcome.CRASHED, "signal 6 (SIGABRT)"),
+        (READER, Outcome.OK, ""),
+        (NOT_PLAIN, Outcome.FAILED, "the result cannot be kept: Object of type set"),
+        (VERDICT_OF_NO_TEXT, Outcome.FAILED, "found the verdict ['proved'], expected a text"),
     ],
 )
 def test_what_a_task_does_to_its_child_is_told_of_this_task_alone(order: int, outcome: Outcome, message: str):
@@ -107,6 +117,60 @@ def test_what_a_bug_leaves_is_the_end_of_its_traceback():
 
 def test_what_is_printed_does_not_get_into_the_answers():
     assert outcome_of(fault(CHATTER)).result == {"said": "much"}
+
+
+def test_what_a_task_has_started_ends_with_its_child():
+    result = outcome_of(fault(STARTER)).result
+    assert result is not None
+    deadline = time.monotonic() + 5
+    while is_running(result["pid"]) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not is_running(result["pid"])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is no limit of memory")
+def test_what_earlier_tasks_left_does_not_add_to_the_memory_of_a_task():
+    jobs = [
+        Job(Task("use", None, {"steps": steps, "seed": seed}), Limits(20.0, 60_000_000))
+        for seed, steps in enumerate((40, 48, 54, 65, 68, 72))
+    ]
+    among, alone = done(jobs, children=1), done(jobs, children=1, group_seconds=0.0)
+    assert {key: record.outcome for key, record in among.items()} == {key: r.outcome for key, r in alone.items()}
+    assert {record.outcome for record in alone.values()} == {Outcome.OK, Outcome.OUT_OF_MEMORY}
+
+
+def test_an_error_nobody_expected_is_tried_again_in_a_new_child():
+    jobs = [Job(Task("first", None, {"steps": 0, "seed": seed}), Limits(20.0)) for seed in range(3)]
+    assert all(record.is_ok for record in done(jobs, children=1).values())
+
+
+def test_time_in_which_everything_was_stopped_is_not_the_tasks():
+    children = LocalChildren(1, {}.__getitem__)
+    children.submit(pause(700, limits=Limits(time=1.5)))
+    (child,) = children._children
+    while child.work is not None and child.work.begun is None:
+        children.wait(0.05)
+    os.kill(child.process.pid, signal.SIGSTOP)
+    time.sleep(3)  # nor did this process look, as if it had been stopped as well
+    os.kill(child.process.pid, signal.SIGCONT)
+    records = []
+    while children.in_flight:
+        records += children.wait(5.0)
+    children.close()
+    assert [record.outcome for record in records] == [Outcome.OK]
+
+
+def test_children_that_are_killed_while_they_start_are_started_again():
+    children = LocalChildren(1, {}.__getitem__)
+    children.submit(pause(10))
+    for _ in range(5):
+        os.kill(children._children[0].process.pid, signal.SIGKILL)
+        pid = children._children[0].process.pid
+        while children._children[0].process.pid == pid:
+            children.wait(0.01)
+    records = children.wait(20)
+    children.close()
+    assert [record.outcome for record in records] == [Outcome.OK]
 
 
 def test_answers_of_megabytes_come_whole():

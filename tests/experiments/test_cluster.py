@@ -210,12 +210,18 @@ def test_a_group_carries_the_documents_it_needs_and_no_others(shared):
     texts = {"first": "one = 1", "second": "two = 2", "third": "three = 3"}
     tasks = [Task("test", {"document": name, "parameters": {}}, {}) for name in ("first", "second")]
     tasks.append(Task("test", {"family": {"m": 2}}, {}))
+    tasks.append(Task("test", {"document": "first", "parameters": {}}, {"other": {"document": "third"}}))
     workers = shared.workers(texts.__getitem__)
     try:
         found = {record.key: record.result["documents"] for record in done(workers, [Job(task) for task in tasks])}
     finally:
         workers.close()
-    assert [found[task.key] for task in tasks] == [{"first": "one = 1"}, {"second": "two = 2"}, {}]
+    assert [found[task.key] for task in tasks] == [
+        {"first": "one = 1"},
+        {"second": "two = 2"},
+        {},
+        {"first": "one = 1", "third": "three = 3"},
+    ]
 
 
 def test_the_workers_own_environment_stays_and_our_variables_are_added(shared, monkeypatch):

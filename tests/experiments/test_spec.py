@@ -206,10 +206,10 @@ def test_a_catalogue_name_is_not_a_file_of_the_folder(folder, monkeypatch):
 
 
 def test_a_second_system_is_a_recipe_like_the_first(folder):
-    text = COMMUTE + 'system = "lorenz"\naxes = {other = ["euler_top", "rotor.toml"]}'
+    text = COMMUTE + 'system = "lotka_volterra"\naxes = {other = ["harmonic", "rotor.toml"]}'
     found = tasks(text, folder=folder)
     spec = parse_spec(text, folder=folder)
-    assert [task.options["other"]["name"] for task in found] == ["euler_top", "rotor"]
+    assert [task.options["other"]["name"] for task in found] == ["harmonic", "rotor"]
     assert all(task.options["other"]["document"] in spec.documents for task in found)
 
 
@@ -339,7 +339,8 @@ def test_keys_do_not_depend_on_where_the_folder_lies(folder, tmp_path_factory):
 EXPERIMENTS = [
     LORENZ + 'axes = {eps = ["1/3..2/3 step 1/6", 5], seed = "3..1 step -1"}',
     FAMILY + 'zip = [["m", "steps"]]\naxes = {m = [2, 3], steps = "10..11", eps = [1, 2], seed = [4, "7..8"]}',
-    COMMUTE + 'system = ["lorenz", "euler_top"]\naxes = {other = ["riccati", "henon_heiles"], parameters = {}}',
+    COMMUTE
+    + 'system = ["lorenz", "euler_top"]\naxes = {other = ["volterra_periodic_3", "dressing_chain_3"], parameters = {}}',
     UNIVERSAL + 'options = {m = 2}\naxes = {sections = ["1", "2,3"]}',
     LORENZ + "options = {eps = 1}",
 ]
@@ -809,10 +810,10 @@ def test_starts_zipped_with_sizes_are_compared_in_pairs():
             [("system", "lorenz is of kind [system], expected one of kind [family], or a se")],
         ),
         (COMMUTE + 'system = "lorenz"\naxes = {other = "eulertop"}', [("axes.other", "found the unknown system")]),
-        (COMMUTE + 'system = "lorenz"\naxes = {other = ["riccati", "nix.toml"]}', [("axes.other[2]", "cannot read")]),
+        (COMMUTE + 'system = "lorenz"\naxes = {other = ["euler_top", "nix.toml"]}', [("axes.other[2]", "cannot read")]),
         (
-            COMMUTE + 'system = "lorenz"\naxes = {other = ["riccati", "riccati"]}',
-            [("axes.other[2]", "found riccati twi")],
+            COMMUTE + 'system = "lorenz"\naxes = {other = ["euler_top", "euler_top"]}',
+            [("axes.other[2]", "found euler_top twi")],
         ),
         (COMMUTE + 'system = "lorenz"\naxes = {other = []}', [("axes.other", "found [], expected a file")]),
         (COMMUTE + 'system = "lorenz"\naxes = {other = 5}', [("axes.other", "found 5, expected a file")]),
@@ -823,6 +824,23 @@ def test_starts_zipped_with_sizes_are_compared_in_pairs():
         (
             COMMUTE + 'system = "lorenz"\noptions = {other = "family"}',
             [("options.other", "found the unknown system 'family'")],
+        ),
+        (
+            COMMUTE + 'system = "lorenz"\naxes = {other = ["euler_top", "harmonic"]}',
+            [("axes.other[2]", "found 2 variables, expected 3, the dimension of the system")],
+        ),
+        (
+            COMMUTE + 'system = "family"\naxes = {m = [1, 2]}\noptions = {other = "harmonic"}',
+            [("options.other", "found 2 variables, expected 4, the dimension of the system")],
+        ),
+        (
+            COMMUTE + 'system = "family"\naxes = {m = 1, eps2 = 1}',
+            [("axes.eps2", "found no other, expected one"), ("axes.eps2", "found no eps, expected one")],
+        ),
+        (SPACE + 'system = "paper_m2"\nlimits = {digits = 0}', [("limits.digits", "found 0, expected a whole number")]),
+        (
+            LORENZ + "axes = {eps = 1, seed = 1}\nzip = [['eps', 'seed'], ['eps']]",
+            [("zip[2]", "found ['eps'], expected at least two axes")],
         ),
         (
             UNIVERSAL + 'system = "lorenz"\naxes = {m = 2}',
@@ -858,6 +876,21 @@ def test_what_does_not_fit_the_task_is_told_with_its_key(text, expected):
     found = mistakes(text)
     assert [key for key, _ in found] == [f"experiments.a.{key}" for key, _ in expected]
     assert all(told.startswith(words) for (_, told), (_, words) in zip(found, expected, strict=True))
+
+
+def test_a_second_system_zipped_with_m_is_compared_in_pairs():
+    text = COMMUTE + 'system = "family"\naxes = {m = [1, 2], other = ["harmonic", "paper_m2"]}\n'
+    assert [task.value("m") for task in tasks(text + 'zip = [["m", "other"]]')] == [1, 2]
+    assert [key for key, _ in mistakes(text)] == ["experiments.a.axes.other[1]", "experiments.a.axes.other[2]"]
+
+
+def test_of_many_experiments_that_are_too_many_tasks_the_largest_are_told():
+    text = "".join(
+        f'[experiments.e{k}]\ntask = "orbit"\nsystem = "lorenz"\naxes = {{eps = 1, seed = "1..{k}"}}\n'
+        for k in range(1, 9)
+    )
+    ((_, told),) = mistakes(text, max_tasks=10)
+    assert told.endswith("e8 has 1 eps x 8 seed, e7 has 1 eps x 7 seed, e6 has 1 eps x 6 seed and 5 more")
 
 
 @pytest.mark.parametrize(

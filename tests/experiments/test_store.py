@@ -67,6 +67,13 @@ def test_numbers_that_are_not_finite_stay_outside_with_all_that_came_along(store
     assert list(store.rows()) == []
 
 
+def test_a_verdict_that_is_no_text_of_utf8_does_no_harm(store):
+    store.plan("a", "1", LIMITS, tasks(1), {})
+    store.add([replace(ok(1), verdict="\ud800")])
+    (row,) = store.rows()
+    assert row.record.verdict == "\\ud800"
+
+
 def test_a_child_that_printed_no_text_does_no_harm(store):
     store.plan("a", "1", LIMITS, tasks(1), {})
     store.add([replace(failed(1), stderr=b"caf\xe9".decode(errors="surrogateescape"))])
@@ -361,3 +368,14 @@ def test_at_most_twenty_are_found_and_all_of_them_begin_as_asked(store):
 def test_what_is_no_beginning_of_a_key_is_refused(store, prefix):
     with pytest.raises(StoreError, match="at least 4 of its 32 hexadecimal digits"):
         store.find(prefix)
+
+
+@pytest.mark.parametrize("is_replaced", [False, True])
+def test_a_database_that_is_taken_away_while_it_is_written_to_is_told(store, path, is_replaced):
+    store.plan("a", "1", LIMITS, tasks(1, 2), {})
+    store.add([ok(1)])
+    path.rename(path.with_name("elsewhere.db"))
+    if is_replaced:
+        path.write_bytes(b"")
+    with pytest.raises(StoreError, match="has been removed or replaced while it was being written to"):
+        store.add([ok(2)])

@@ -179,6 +179,12 @@ def test_only_the_values_asked_for_are_kept():
     assert (list(group.numbers), list(group.flags)) == (["b"], ["c"])
 
 
+def test_what_is_grouped_by_is_no_number_unless_asked_for():
+    rows = [row({"m": 2, "x": 1}), row({"m": 2, "x": 3})]
+    assert list(summarise(rows, ["m"], stable=True).groups[0].numbers) == ["x"]
+    assert list(summarise(rows, ["m"], ["m"]).groups[0].numbers) == ["m"]
+
+
 # Groups
 
 
@@ -250,6 +256,12 @@ def test_groups_share_out_the_rows(pairs):
         assert (group.tasks, group.numbers["x"]) == (len(members), numbers_of(members))
 
 
+def test_failures_are_grouped_by_what_they_say():
+    rows = [row({}), row(outcome=Outcome.FAILED, message="no start"), row(outcome=Outcome.FAILED, message="no start")]
+    found = summarise(rows, ["outcome", "message"]).groups
+    assert [(group.values, group.tasks) for group in found] == [(("failed", "no start"), 2), (("ok", None), 1)]
+
+
 def test_nothing_gives_no_groups():
     found = summarise([], ["m"], ["anything"])
     assert found.to_json() == {"by": ["m"], "groups": []}
@@ -262,7 +274,7 @@ def test_nothing_gives_no_groups():
         ({"by": ["dimensions"]}, r"unknown name 'dimensions', did you mean dimension\? names to group by: dim"),
         (
             {"by": ["zzz"]},
-            r"unknown name 'zzz'; names to group by: dimension, document, eps, experiment, height, m, outcome, ",
+            r"unknown name 'zzz'; names to group by: dimension, document, eps, experiment, height, m, message, out",
         ),
         ({"values": ["heigth"]}, r"unknown name 'heigth', did you mean height\? names of numbers: height, peak"),
         ({"values": ["status"]}, "unknown name 'status'"),  # a text in all of the rows

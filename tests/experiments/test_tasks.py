@@ -158,6 +158,12 @@ def test_the_checks_above_come_out_both_ways():
     assert {"proved", "refuted"} <= found
 
 
+def test_an_orbit_that_was_asked_for_and_ended_early_is_told():
+    assert perform("check-integrals", TOP, eps="1/10", steps=30, max_digits=3)["ended_early"]
+    assert perform("check-integrals", TOP, eps="1/10", start="1,2,3", max_digits=3)["ended_early"]
+    assert not perform("check-integrals", TOP, eps="1/10", max_digits=3)["ended_early"]
+
+
 def test_a_check_of_a_member_says_its_size():
     assert perform("verify", MEMBER, sections=2)["m"] == 2
 

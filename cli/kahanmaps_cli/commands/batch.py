@@ -66,7 +66,7 @@ def command() -> None:
     """
 
 
-@command.command("run")
+@command.command("run", short_help="Do the tasks of a spec, with the results in a database.")
 @click.argument("spec", required=False, type=click.Path(dir_okay=False))
 @_database(required=False)
 @click.option("-j", "--jobs", type=click.IntRange(1, 1024), help="Child processes at a time (default: the processors).")
@@ -103,7 +103,8 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
     Every result is in the database the moment it is there: whatever is killed, only tasks in flight are lost, and the
     same command continues. Ctrl-C lets the tasks in flight end, for ten seconds at most; a second one ends at once.
 
-    Exit status: 0 all done, 2 wrong use, 3 some tasks failed or were given up, 130 interrupted.
+    Exit status: 0 every task is done, whatever the verdicts, 2 wrong use, 3 some task failed or has no result, 130
+    interrupted.
     """
     from kahanmaps_cli.batch_run import dry_run, run_batch
 
@@ -113,9 +114,10 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
         raise click.UsageError("missing SPEC, a TOML file with experiments (or --db FILE, to continue what is in it)")
     if options["scheduler"] is not None and options["jobs"] is not None:
         raise click.UsageError("give --jobs or --scheduler, not both: on a cluster its workers say how many")
+    db = db or Path(str(spec)).with_suffix(".db").name
     if options["dry_run"]:
         return dry_run(str(spec), db, options)
-    return run_batch(spec, db or str(Path(str(spec)).with_suffix(".db").name), options)
+    return run_batch(spec, db, options)
 
 
 @command.command("status")
@@ -165,12 +167,14 @@ def show(key: str, db: str, as_json: bool) -> None:
         print_found(data)
 
 
-@command.command("export")
+@command.command("export", short_help="The results as CSV, JSON lines or Parquet.")
 @_database()
 @click.option("--csv", "form", flag_value="csv", help="A table, a column for each option and each entry of results.")
 @click.option("--jsonl", "form", flag_value="jsonl", help="One JSON object a line, everything in it.")
 @click.option("--parquet", "form", flag_value="parquet", help="The table of --csv with types; needs pyarrow and -o.")
-@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
+@click.option(
+    "-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE (-: standard output)."
+)
 @click.option("--stable", is_flag=True, help="Leave out times, memory, hosts and versions: the same work, same bytes.")
 @_ONLY
 def export(db: str, form: str | None, output: str | None, stable: bool, only: tuple[str, ...]) -> None:
@@ -188,13 +192,13 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
         form = endings.get(Path(output).suffix) if output else None
     if form is None:
         raise click.UsageError("missing --csv, --jsonl or --parquet")
-    if form == "parquet" and output is None:
+    if form == "parquet" and output in (None, "-"):
         raise click.UsageError("--parquet needs -o FILE: it is no text")
     with _open(db) as store:
-        export_rows(store, form, output, stable, list(only) or None)
+        export_rows(store, db, form, output, stable, list(only) or None)
 
 
-@command.command("summary")
+@command.command("summary", short_help="Counts and quantiles for groups of tasks.")
 @_database()
 @click.option("--by", default="experiment", show_default=True, metavar="NAME,...", help="Group by these, e.g. m,eps.")
 @click.option("--value", "values", multiple=True, metavar="NAME", help="Only these numbers (may be repeated).")
@@ -208,9 +212,10 @@ def summary(db: str, by: str, as_markdown: bool, as_json: bool, **options: Any) 
     \b
       kahanmaps batch summary --db study.db --by m,eps
       kahanmaps batch summary --db study.db --by experiment,m --value constant --markdown
+      kahanmaps batch summary --db study.db --by outcome,message       why tasks failed
 
-    --by takes options (eps), parts of the system (m, seed, parameters.a), entries of results (dimension), and
-    experiment, task, outcome, verdict.
+    --by takes options (eps), parts of the system (name, m, seed, parameters.a), entries of results (dimension,
+    growth), and experiment, task, outcome, verdict, message.
     """
     from kahanmaps_cli.batch_show import print_summary
 
@@ -221,7 +226,7 @@ def summary(db: str, by: str, as_markdown: bool, as_json: bool, **options: Any) 
         print_summary(store, names, as_json=as_json, as_markdown=as_markdown, **options)
 
 
-@command.command("merge")
+@command.command("merge", short_help="Bring the results of several databases together.")
 @click.argument("target", type=click.Path(dir_okay=False))
 @click.argument("sources", nargs=-1, required=True, type=click.Path(dir_okay=False))
 @_JSON
@@ -270,7 +275,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
     return 3 if conflicts else 0
 
 
-@command.command("tasks")
+@command.command("tasks", short_help="What an experiment can do, with all options.")
 @click.argument("name", required=False)
 @_JSON
 def tasks(name: str | None, as_json: bool) -> None:
