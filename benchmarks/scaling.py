@@ -23,10 +23,12 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
-from kahanmaps.experiments import cluster
-from kahanmaps.experiments.cluster import ClusterWorkers
+from kahanmaps.experiments.cluster import GROUP_MODULE, ClusterWorkers
+from kahanmaps.experiments.dask_client import RESULTS_AT_ONCE, Result
+from kahanmaps.experiments.group_results import record_on
 from kahanmaps.experiments.records import Limits, Outcome, Record, Task
 from kahanmaps.experiments.run import Batch, executor_for, plan
 from kahanmaps.experiments.spec import parse_spec
@@ -92,7 +94,7 @@ def costs_of_a_record(folder: Path, number: int) -> list[list[object]]:
         keys = [task(n).key for n in range(number)]
         lines = [json.dumps(record(key, size).to_json()).encode() for key in keys]
         start = time.perf_counter()
-        records = [found for found in map(cluster._record, lines) if found is not None]
+        records = [found for found in map(record_on, lines) if found is not None]
         reading = (time.perf_counter() - start) / number
         storing = []
         for chunk in (1, 100):
@@ -208,7 +210,7 @@ def start_of_a_group(repeats: int = 5) -> float:
     taken = []
     for _ in range(repeats):
         start = time.perf_counter()
-        done = subprocess.run([sys.executable, "-m", cluster.GROUP_MODULE], input=text, capture_output=True, check=True)
+        done = subprocess.run([sys.executable, "-m", GROUP_MODULE], input=text, capture_output=True, check=True)
         taken.append(time.perf_counter() - start - float(json.loads(done.stdout)["seconds"]))
     return min(taken)
 
@@ -237,8 +239,8 @@ class Simulated(ClusterWorkers):
         """Seconds on the clock of the cluster."""
         return time.perf_counter() + self.leaps
 
-    def _connect(self, seconds: float) -> None:
-        self._threads = WORKERS
+    def _connect(self, seconds: float) -> Any:
+        return SimpleNamespace(threads=WORKERS, lost=None, drained=self._drained)
 
     def _send(self, group: Any) -> None:
         number = next(self._numbers)
@@ -258,9 +260,9 @@ class Simulated(ClusterWorkers):
         found: list[Any] = []
         begun = time.perf_counter()
         until = self.now
-        while self.ending and self.ending[0][0] <= until and len(found) < cluster.RESULTS_AT_ONCE:
+        while self.ending and self.ending[0][0] <= until and len(found) < RESULTS_AT_ONCE:
             number = heapq.heappop(self.ending)[1]
-            found.append(cluster._Result(number, subprocess.CompletedProcess([], 0, self._output(number), b"")))
+            found.append(Result(number, subprocess.CompletedProcess([], 0, self._output(number), b"")))
         self.leaps -= time.perf_counter() - begun
         return found
 
@@ -315,7 +317,7 @@ def memory_of(number: int) -> dict[str, float]:
         planning = time.perf_counter() - start
         size = (Path(folder) / "plan.db").stat().st_size
         executor = Simulated(0.025, 500, 0.3, 0.0)
-        executor._mean("check-commute").learn(0.025, 500)  # groups of 200
+        executor._grouping.learn("check-commute", 0.025, 500)  # groups of 200
         pending = store.pending()
         after = resident()
         held = _filled(executor, pending)

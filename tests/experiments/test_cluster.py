@@ -20,8 +20,10 @@ from pathlib import Path
 import pytest
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments import cluster
+from kahanmaps.experiments import cluster, job_groups
 from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
+from kahanmaps.experiments.group_results import record_on
+from kahanmaps.experiments.job_groups import JobGroup, KeptJob
 from kahanmaps.experiments.records import Job, Limits, Outcome, Task
 
 pytest.importorskip("distributed")
@@ -311,8 +313,8 @@ def test_a_job_whose_group_ends_early_once_is_done_at_the_second_try(workers, tm
 
 
 def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_times_out(shared, monkeypatch):
-    monkeypatch.setattr(cluster, "START_UP", 0.5)
-    monkeypatch.setattr(cluster, "START_UP_OF_A_JOB", 0.05)
+    monkeypatch.setattr(job_groups, "START_UP", 0.5)
+    monkeypatch.setattr(job_groups, "START_UP_OF_A_JOB", 0.05)
     limits = Limits(time=0.05)
     good = jobs_of(12, limits=limits)
     bad = jobs_of(1, limits=limits, sleep=600, claim=0)
@@ -328,9 +330,9 @@ def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_times_out(shared, m
 
 
 def test_a_group_with_an_unlimited_job_has_no_limit():
-    limited, unlimited = cluster._Kept("test", "", Limits(time=1.0)), cluster._Kept("test", "", Limits())
-    assert cluster._Group({"limited": limited}).timeout == cluster.START_UP + cluster.START_UP_OF_A_JOB + 1.0
-    group = cluster._Group({"limited": limited, "unlimited": unlimited})
+    limited, unlimited = KeptJob("test", "", Limits(time=1.0)), KeptJob("test", "", Limits())
+    assert JobGroup({"limited": limited}).timeout == job_groups.START_UP + job_groups.START_UP_OF_A_JOB + 1.0
+    group = JobGroup({"limited": limited, "unlimited": unlimited})
     assert group.timeout is None
 
 
@@ -444,7 +446,7 @@ def test_records_that_came_before_the_scheduler_died_are_handed_back(own):
         for job in jobs + jobs_of(1, kind="long", sleep=600):
             workers.submit(job)
         workers._send_open()
-        until(lambda: not workers._results.empty())
+        until(lambda: not workers._dask._results.empty())
         own.kill(own.scheduler)
         assert_exactly_once(workers.wait(20), jobs)
         with pytest.raises(ClusterLost):
@@ -604,8 +606,6 @@ def test_the_log_of_distributed_is_as_before_once_the_last_executor_is_closed(sh
 
 
 def test_json_that_is_no_record_is_no_record():
-    assert [cluster._record(line) for line in (b"", b"{", b"{}", b"[1]", b'{"key": 1, "outcome": "fine"}')] == [
-        None
-    ] * 5
+    assert [record_on(line) for line in (b"", b"{", b"{}", b"[1]", b'{"key": 1, "outcome": "fine"}')] == [None] * 5
     line = json.dumps({"key": "k", "outcome": "ok"}).encode()
-    assert cluster._record(line).is_ok
+    assert record_on(line).is_ok

@@ -107,6 +107,7 @@ def test_what_is_killed_on_a_cluster_changes_nothing(machines: Any, capsys: pyte
     assert exported("away.db", capsys) == exported("home.db", capsys)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_dies_is_a_sentence_and_the_batch_goes_on_elsewhere(
     machines: Any, capsys: pytest.CaptureFixture[str]
 ):

@@ -1,0 +1,65 @@
+"""What has become of a group of jobs: the records that its command printed, and why there are no more of them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from kahanmaps.experiments.dask_client import Result, distributed, told
+from kahanmaps.experiments.records import Outcome, Record
+
+TAIL = 2000  # characters of standard error kept
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a group ended without all its records.
+
+    `is_unfit`: by itself, as if the command could not be run at all; `is_the_workers`: they died, and it with them.
+    """
+
+    message: str
+    stderr: str
+    outcome: Outcome = Outcome.CRASHED
+    is_unfit: bool = False
+    is_the_workers: bool = False
+
+    def record(self, key: str) -> Record:
+        """The record of a job whose fault it was."""
+        return Record(
+            key,
+            self.outcome,
+            message=self.message,
+            stderr=self.stderr,
+            finished=datetime.now(UTC).isoformat(timespec="seconds"),
+        )
+
+
+def record_on(line: bytes) -> Record | None:
+    """The record on a line; None if it is something else, such as the half of one."""
+    if not line.startswith(b"{"):
+        return None
+    try:
+        return Record.from_json(json.loads(line))
+    except (ValueError, TypeError, LookupError):
+        return None
+
+
+def failure_of(result: Result, timeout: float | None) -> Failure:
+    """Why a group ended without all its records; `timeout` is the one that its command had."""
+    process, error = result.process, result.error
+    stderr = result.stderr.decode(errors="replace")[-TAIL:]
+    if process is not None:
+        message = f"the worker's command ended with status {process.returncode}"
+        if process.returncode == 0:
+            message += " and no record"
+        return Failure(message, stderr, is_unfit=process.returncode >= 0)
+    if isinstance(error, subprocess.TimeoutExpired):
+        message = f"the worker's command did not end within {timeout or 0:g} s"
+        return Failure(message, stderr, outcome=Outcome.TIMEOUT)
+    if isinstance(error, distributed().KilledWorker):
+        message = f"{error.allowed_failures + 1} workers died one after the other while they ran it"
+        return Failure(message, stderr, is_the_workers=True)
+    return Failure(f"the worker could not run its command: {told(error)}", stderr, is_unfit=True)

@@ -1,0 +1,120 @@
+"""Groups of jobs that a cluster is sent, each a few seconds of work, by what the last tasks of the same kind took.
+
+A group is plain text on its way out: what the command in `group` reads.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from typing import NamedTuple
+
+from kahanmaps.experiments.children import documents_of
+from kahanmaps.experiments.executor import Documents
+from kahanmaps.experiments.records import Limits, Task
+
+START_UP = 60.0  # seconds a group may take beyond the limits of its jobs, on a cold and busy worker,
+START_UP_OF_A_JOB = 5.0  # and for each job in it
+LARGEST_TEXT = 1 << 20  # bytes in a group, of what is sent and of what is expected back: this bounds memory
+MEMORY_OF_MEANS = 20  # a mean follows a batch that goes from cheap tasks to dear ones
+
+
+class KeptJob(NamedTuple):
+    """A job in flight. Its canonical text is a quarter as large as the task with its dictionaries."""
+
+    kind: str
+    text: str
+    limits: Limits
+
+
+@dataclass
+class JobGroup:
+    """Jobs that one command does, by key; what has come back is taken out."""
+
+    jobs: dict[str, KeptJob] = field(default_factory=dict)
+    documents: dict[str, str] = field(default_factory=dict)
+    seconds: float = 0.0
+    sent: int = 0  # bytes, about
+    expected: float = 0.0  # bytes, about
+    is_alone: bool = False  # so small that a failure is its only job's
+    is_suspect: bool = False  # its worker died, again and again
+
+    @property
+    def timeout(self) -> float | None:
+        """How long the command may take: what its jobs may, and a generous start; None if one of them is unlimited."""
+        total = START_UP
+        for job in self.jobs.values():
+            if job.limits.time is None:
+                return None
+            total += job.limits.time + START_UP_OF_A_JOB
+        return total
+
+    @property
+    def text(self) -> bytes:
+        """What the group command reads."""
+        jobs = [{"task": job.text, "limits": asdict(job.limits)} for job in self.jobs.values()]
+        return json.dumps({"documents": self.documents, "jobs": jobs}).encode()
+
+
+class Grouping:
+    """Fills groups to about `seconds` of work and at most `largest` jobs; `documents` gives the text of a document."""
+
+    def __init__(self, documents: Documents, seconds: float, largest: int) -> None:
+        self._documents = documents
+        self._group_seconds = seconds
+        self._largest_group = largest
+        self._means: dict[str, _Means] = {}
+
+    def learn(self, kind: str, seconds: float, size: int) -> None:
+        """One record more of this kind of task: how long it took, and its bytes."""
+        self._mean(kind).learn(seconds, size)
+
+    def fits(self, group: JobGroup, kind: str) -> bool:
+        """Whether the group comes nearer to its time with a job of this kind, and stays within its size."""
+        return (
+            group.seconds + self._seconds(kind) / 2 <= self._group_seconds
+            and group.expected + self._mean(kind).size <= LARGEST_TEXT
+        )
+
+    def is_full(self, group: JobGroup) -> bool:
+        """Whether the group is to be sent without another job."""
+        return (
+            len(group.jobs) >= self._largest_group
+            or group.seconds >= self._group_seconds
+            or group.sent >= LARGEST_TEXT
+            or group.expected >= LARGEST_TEXT
+        )
+
+    def add(self, group: JobGroup, task: Task, limits: Limits) -> None:
+        """Put a job into the group, with the documents that it needs."""
+        for wanted in documents_of(task):
+            if wanted not in group.documents:
+                group.documents[wanted] = self._documents(wanted)
+                group.sent += len(group.documents[wanted])
+        group.jobs[task.key] = KeptJob(task.kind, task.text, limits)
+        group.seconds += self._seconds(task.kind)
+        group.expected += self._mean(task.kind).size
+        group.sent += len(task.text)
+
+    def _mean(self, kind: str) -> _Means:
+        return self._means.setdefault(kind, _Means())
+
+    def _seconds(self, kind: str) -> float:
+        """How long a task of this kind will take; a whole group's time while nothing is known of it."""
+        mean = self._mean(kind)
+        return mean.seconds if mean.seen else self._group_seconds
+
+
+@dataclass
+class _Means:
+    """What a record of one kind of task takes, on average over the last ones."""
+
+    seconds: float = 0.0
+    size: float = 0.0
+    seen: int = 0
+
+    def learn(self, seconds: float, size: int) -> None:
+        """One record more."""
+        self.seen = min(self.seen + 1, MEMORY_OF_MEANS)
+        self.seconds += (seconds - self.seconds) / self.seen
+        self.size += (size - self.size) / self.seen
