@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,6 +18,7 @@ from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
     from kahanmaps.experiments.executor import Executor
+    from kahanmaps.experiments.records import Job
     from kahanmaps.experiments.spec import Spec
     from kahanmaps.experiments.store import Planned, Store
 
@@ -71,64 +73,66 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
 
 def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     """Do what is missing; the exit status."""
-    from kahanmaps.experiments.run import Batch, plan
+    from kahanmaps.experiments.run import plan
     from kahanmaps.experiments.spec import MAX_TASKS, read_spec
-    from kahanmaps.experiments.store import Store
+    from kahanmaps.experiments.store import Store, StoreError
 
     spec = None if path is None else read_spec(path, max_tasks=options["max_tasks"] or MAX_TASKS)
     if spec is not None:
         _require_names(options["only"], spec)
-    quiet, shard = options["quiet"], options["shard"] or (1, 1)
     with Store.open(db, create=spec is not None) as store:
         planned = {} if spec is None else plan(spec, store)
         names = list(options["only"]) or ([e.name for e in spec.experiments] if spec is not None else None)
-        todo = store.count_pending(names, retry_failed=options["retry_failed"], shard=shard)
-        if not quiet:
+        which: dict[str, Any] = {"experiments": names, "shard": options["shard"] or (1, 1)}
+        todo = store.count_pending(**which, retry_failed=options["retry_failed"])
+        if not options["quiet"]:
             _tell_plan(planned, todo, db)
-        batch = None
-        with BatchProgress(todo, quiet) as progress:
+        was_interrupted = False
+        with BatchProgress(todo, options["quiet"]) as progress:
             if todo:
-                batch = Batch(
-                    store.pending(names, retry_failed=options["retry_failed"], shard=shard), _executor(store, options)
-                )
-
-                def interrupt() -> None:
-                    assert batch is not None
-                    batch.interrupt()
-                    if not quiet and batch.in_flight:
-                        say(f"finishing {_tasks(batch.in_flight)} in flight (Ctrl-C again ends at once)")
-
-                with interruptible(interrupt):
-                    for records in batch:
-                        if records:
-                            store.add(records)
-                        progress.tell(records, batch.in_flight)
-                        if options["as_jsonl"]:
-                            for record in records:
-                                click.echo(json.dumps({"record": "result", **record.to_json()}))
-        missing = store.count_pending(names, shard=shard)
+                jobs = store.pending(**which, retry_failed=options["retry_failed"])
+                try:
+                    was_interrupted = _do(jobs, store, progress, options)
+                except StoreError as error:  # the disk is full or the database gone: no wrong use, but the end
+                    say(f"Error: {error}")
+                    return 3
+        missing = store.count_pending(**which)
         data = status_data(store, names or ())
-    interrupted = batch is not None and batch.was_interrupted and missing > 0
+    interrupted = was_interrupted and missing > 0
     failed = sum(count for e in data["experiments"] for name, count in e["outcomes"].items() if name != "ok")
     if options["as_json"]:
-        print_json(
-            {
-                **data,
-                "command": "batch run",
-                "spec": path,
-                "done": dict(progress.outcomes),
-                "missing": missing,
-                "interrupted": interrupted,
-                "seconds": round(progress.seconds, 3),
-            }
-        )
+        more = {"command": "batch run", "spec": path, "done": dict(progress.outcomes), "missing": missing}
+        print_json({**data, **more, "interrupted": interrupted, "seconds": round(progress.seconds, 3)})
     elif not options["as_jsonl"]:
         print_status(data)
-    if not quiet:
+    if not options["quiet"]:
         _tell_end(path, db, progress, missing, failed, interrupted, options)
     if interrupted:
         return 130
     return 3 if failed or missing else 0
+
+
+def _do(jobs: Iterator[Job], store: Store, progress: BatchProgress, options: Mapping[str, Any]) -> bool:
+    """Do the jobs, each record stored before the next job is handed out; whether somebody interrupted."""
+    from kahanmaps.experiments.run import Batch
+
+    with closing(_executor(store, options)) as executor:
+        batch = Batch(jobs, executor)
+
+        def interrupt() -> None:
+            batch.interrupt()
+            if not options["quiet"] and batch.in_flight:
+                say(f"finishing {_tasks(batch.in_flight)} in flight (Ctrl-C again ends at once)")
+
+        with interruptible(interrupt):
+            for records in batch:
+                if records:
+                    store.add(records)
+                progress.tell(records, batch.in_flight)
+                if options["as_jsonl"]:
+                    for record in records:
+                        click.echo(json.dumps({"record": "result", **record.to_json()}))
+    return batch.was_interrupted
 
 
 def _executor(store: Store, options: Mapping[str, Any]) -> Executor:

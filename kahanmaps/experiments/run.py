@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 from kahanmaps.experiments.children import GROUP_SECONDS, LocalChildren
@@ -126,13 +127,13 @@ def run(
         spec = parse_spec(spec) if isinstance(spec, str) and "\n" in spec else read_spec(spec)
     names = [experiment.name for experiment in spec.experiments] if only is None else only
     if db is None:
-        for records in Batch(_jobs(spec, names, shard), executor_for(spec.documents.__getitem__, jobs, scheduler)):
-            yield from records
+        with closing(executor_for(spec.documents.__getitem__, jobs, scheduler)) as executor:
+            for records in Batch(_jobs(spec, names, shard), executor):
+                yield from records
         return
-    with Store.open(db, create=True) as store:
+    with Store.open(db, create=True) as store, closing(executor_for(store.document, jobs, scheduler)) as executor:
         plan(spec, store)
-        todo = store.pending(names, retry_failed=retry_failed, shard=shard)
-        for records in Batch(todo, executor_for(store.document, jobs, scheduler)):
+        for records in Batch(store.pending(names, retry_failed=retry_failed, shard=shard), executor):
             if records:
                 store.add(records)
             yield from records

@@ -400,6 +400,18 @@ def test_a_second_ctrl_c_is_immediate(batch):
     assert "finishing 2 tasks in flight" in err
 
 
+def test_a_database_that_is_taken_away_ends_the_batch_with_status_3_and_a_sentence(batch):
+    Path("study.toml").write_text(PAUSE)
+    process = start("study.toml", "-j", "2")
+    Path("study.db").rename("elsewhere.db")
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 3
+    assert "removed or replaced" in err
+    assert "Traceback" not in err
+    Path("elsewhere.db").rename("study.db")
+    assert batch("run", PAUSE, "-q").status == 0  # what had been done is still there
+
+
 def test_two_batches_do_not_write_to_one_database(batch):
     Path("study.toml").write_text(PAUSE)
     process = start("study.toml", "-j", "1")
