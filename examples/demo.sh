@@ -30,4 +30,20 @@ run check-commute .demo/pair.toml | grep -v '^	' | cut -c 1-160
 echo; echo "== Section 6 of the paper, statement by statement"
 run verify .demo/pair.toml --section 6 -q | grep -v '^	' | grep -v '^note' | cut -c 1-160
 
+echo; echo "== many members at once: a batch, resumed by the same command, and its summary"
+cat > .demo/first.toml <<'END'
+[experiments.commute]
+task = "check-commute"
+system = "family"
+axes = { m = "2..3", seed = "0..9" }
+
+[experiments.heights]
+task = "heights"
+system = "family"
+options = { eps = "1/10", steps = 40 }
+axes = { m = "2..3", seed = "0..9" }
+END
+run batch run .demo/first.toml --db .demo/first.db -q
+run batch summary --db .demo/first.db -e heights --by m,growth --value constant --stable
+
 echo; echo "The files are in .demo; start your own with: .venv/bin/kahanmaps --help"
