@@ -179,14 +179,29 @@ def test_answers_of_megabytes_come_whole():
     assert result["digits"] == "7" * 3_000_000
 
 
-def test_a_child_serves_many_short_tasks_and_is_replaced_after_some_seconds_of_work():
-    jobs = [pause(20, seed) for seed in range(30)]
-    begin = time.monotonic()
-    done(jobs, children=1)
-    grouped = time.monotonic() - begin
-    begin = time.monotonic()
-    done(jobs[:10], children=1, group_seconds=0.0)  # a child for each
-    assert (time.monotonic() - begin) / 10 > grouped / 30
+class Counted(LocalChildren):
+    """Counts the children that it starts."""
+
+    started = 0
+
+    def _new_child(self):
+        self.started += 1
+        return super()._new_child()
+
+
+@pytest.mark.parametrize(("group_seconds", "children"), [(60.0, 1), (0.0, 8)])
+def test_a_child_serves_tasks_until_it_has_worked_for_some_seconds(group_seconds: float, children: int):
+    executor = Counted(1, {}.__getitem__, group_seconds=group_seconds)
+    for _ in Batch([pause(30, seed) for seed in range(8)], executor):
+        pass
+    assert executor.started == children
+
+
+def test_what_an_earlier_task_printed_is_not_told_of_a_later_one():
+    chatter, hang = fault(CHATTER), fault(HANG, limits=Limits(time=1.0))
+    records = done([chatter, hang], children=1)
+    assert records[hang.task.key].outcome is Outcome.TIMEOUT
+    assert records[hang.task.key].stderr == ""
 
 
 def test_a_crash_does_not_depend_on_what_the_child_did_before():
