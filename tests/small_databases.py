@@ -66,7 +66,7 @@ def small_chunks():
 
 
 PRELUDE = """
-import json, os, resource, sys, time
+import json, os, resource, sys, time, urllib.parse  # the last one for scripts that give up the right to load it later
 from kahanmaps.experiments import database
 from kahanmaps.experiments.records import Limits, Outcome, Record, Task
 from kahanmaps.experiments.store import Store, StoreError
