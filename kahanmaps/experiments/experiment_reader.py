@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.experiment import PARAMETERS, Experiment
@@ -17,6 +17,7 @@ from kahanmaps.experiments.spec_document import TIME_STEP, ExperimentTable, Spec
 
 DEFAULT_LIMITS = Limits(time=3600.0, memory=4 * 10**9)
 _EPS2 = "eps2"
+L = TypeVar("L")
 
 
 def read_experiment(spec: SpecDocument, name: str) -> Experiment | None:
@@ -182,16 +183,8 @@ class _ExperimentReader:
 
     def _read_limits(self, fixed: dict[str, Values]) -> Limits:
         own, common = self.table.sound("limits") or {}, self.table.spec.sound("limits") or {}
-        limits = {}
-        for name, read, default in (
-            ("time", read_time, DEFAULT_LIMITS.time),
-            ("memory", read_memory, DEFAULT_LIMITS.memory),
-        ):
-            raw = own.get(name, common.get(name))
-            try:
-                limits[name] = default if raw is None else read(raw)
-            except ValueError:
-                limits[name] = default  # told already, with the shape
+        time = _limit(read_time, own.get("time", common.get("time")), DEFAULT_LIMITS.time)
+        memory = _limit(read_memory, own.get("memory", common.get("memory")), DEFAULT_LIMITS.memory)
         place = self.table.given().get("max_digits")
         if "digits" in own and self.table.sound("limits", "digits") is None:
             pass  # told already, with the shape
@@ -205,7 +198,7 @@ class _ExperimentReader:
                 self.table.mistake("limits.digits", f"found {place} as well, expected one of the two")
         elif isinstance(digits := own.get("digits", common.get("digits")), int) and digits > 0:
             fixed["max_digits"] = Values(VOCABULARY["max_digits"], [(digits,)])
-        return Limits(**limits)  # type: ignore[arg-type]
+        return Limits(time, memory)
 
     def _require(self) -> None:
         if any(self.table.sound(part) is None and part in self.table.raw for part in ("options", "axes")):
@@ -235,6 +228,14 @@ class _ExperimentReader:
         ):
             if first in given and second in given:
                 self.table.mistake(given[second], f"found {given[first]} as well, expected one of {first} and {second}")
+
+
+def _limit(read: Callable[[Any], L], raw: Any, default: L) -> L:
+    """What is given, if it has the right shape; if not, that is told already."""
+    try:
+        return default if raw is None else read(raw)
+    except ValueError:
+        return default
 
 
 def _time_step(eps: Option) -> Option:

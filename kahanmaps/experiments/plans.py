@@ -33,12 +33,13 @@ class Planned:
 
 @dataclass(frozen=True)
 class Chosen:
-    """An experiment that was asked for; `offset` rows of the plan come before its own."""
+    """An experiment that was asked for; `tasks` different ones, `offset` rows of the plan before its own."""
 
     id: int
     name: str
     limits: Limits
     total: int
+    tasks: int
     offset: int
 
 
@@ -47,9 +48,9 @@ class Chosen:
 
 def choose(database: Database, experiments: Sequence[str] | None) -> list[Chosen]:
     """These experiments, or all, in their order in the database."""
-    rows = database.fetch("SELECT id, name, limits, total FROM experiment ORDER BY id")
+    rows = database.fetch("SELECT id, name, limits, total, tasks FROM experiment ORDER BY id")
     if experiments is not None:
-        known = [name for _, name, _, _ in rows]
+        known = [row[1] for row in rows]
         for name in experiments:
             if name not in known:
                 raise StoreError(
@@ -57,9 +58,9 @@ def choose(database: Database, experiments: Sequence[str] | None) -> list[Chosen
                 )
     chosen: list[Chosen] = []
     offset = 0
-    for id, name, limits, total in rows:
+    for id, name, limits, total, tasks in rows:
         if experiments is None or name in experiments:
-            chosen.append(Chosen(id, name, limits_of(database, limits), total, offset))
+            chosen.append(Chosen(id, name, limits_of(database, limits), total, tasks, offset))
             offset += total
     return chosen
 

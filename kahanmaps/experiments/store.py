@@ -273,11 +273,9 @@ class Store:
 
     def status(self) -> list[ExperimentStatus]:
         """How far each experiment has come."""
-        rows = self._database.fetch("SELECT name, tasks FROM experiment")
-        different = dict(rows)
-        return [self._status(chosen, different[chosen.name]) for chosen in choose(self._database, None)]
+        return [self._status(experiment) for experiment in choose(self._database, None)]
 
-    def _status(self, experiment: Chosen, tasks: int) -> ExperimentStatus:
+    def _status(self, experiment: Chosen) -> ExperimentStatus:
         # A task planned twice counts at its first row; the look at earlier rows costs most, and mostly there are none.
         once = """AND NOT EXISTS (
             SELECT 1 FROM plan AS q WHERE q.task = p.task AND q.experiment = p.experiment AND q.number < p.number
@@ -285,7 +283,7 @@ class Store:
         sql = f"""
             SELECT r.outcome, r.verdict, count(*), sum(r.seconds) FROM plan AS p
             JOIN result AS r INDEXED BY result_summary ON r.task = p.task
-            WHERE p.experiment = ? AND p.number BETWEEN ? AND ? {once if tasks < experiment.total else ""}
+            WHERE p.experiment = ? AND p.number BETWEEN ? AND ? {once if experiment.tasks < experiment.total else ""}
             GROUP BY r.outcome, r.verdict"""
         outcomes: Counter[Outcome] = Counter()
         verdicts: Counter[str] = Counter()
@@ -296,9 +294,9 @@ class Store:
                 if verdict is not None:
                     verdicts[verdict] += count
                 seconds += time
-        missing = tasks - outcomes.total()
+        missing = experiment.tasks - outcomes.total()
         return ExperimentStatus(
-            experiment.name, experiment.total, tasks, missing, dict(outcomes), dict(verdicts), seconds
+            experiment.name, experiment.total, experiment.tasks, missing, dict(outcomes), dict(verdicts), seconds
         )
 
     def find(self, prefix: str) -> list[Found]:

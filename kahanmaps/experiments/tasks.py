@@ -7,6 +7,7 @@ Results are small: counts, verdicts, numbers, and what a refutation needs to be 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from hashlib import sha256
 from typing import Any
 
@@ -52,49 +53,28 @@ def commute(
     return _of_report(check_commute(system, other, settings, eps2), report)
 
 
-@task("check-integrals")
-def integrals(
-    system: SystemFile,
-    eps: Any = None,
-    start: Any = None,
-    steps: int = 10,
-    seed: int = 0,
-    error_bits: int = DEFAULT_ERROR_BITS,
-    max_digits: int | None = None,
-    report: bool = False,
-) -> Result:
-    """Are the known or claimed integrals conserved?"""
-    return _of_report(check_integrals(system, _settings(eps, start, steps, seed, error_bits, max_digits)), report)
+def _of_one_system(name: str, check: Callable[[SystemFile, Settings], Report], question: str) -> None:
+    """The task of a check that asks `question` of one system, with the usual settings."""
+
+    def perform(
+        system: SystemFile,
+        eps: Any = None,
+        start: Any = None,
+        steps: int = 10,
+        seed: int = 0,
+        error_bits: int = DEFAULT_ERROR_BITS,
+        max_digits: int | None = None,
+        report: bool = False,
+    ) -> Result:
+        return _of_report(check(system, _settings(eps, start, steps, seed, error_bits, max_digits)), report)
+
+    perform.__doc__ = question
+    task(name)(perform)
 
 
-@task("check-measure")
-def measure(
-    system: SystemFile,
-    eps: Any = None,
-    start: Any = None,
-    steps: int = 10,
-    seed: int = 0,
-    error_bits: int = DEFAULT_ERROR_BITS,
-    max_digits: int | None = None,
-    report: bool = False,
-) -> Result:
-    """Is the measure dx/phi invariant?"""
-    return _of_report(check_measure(system, _settings(eps, start, steps, seed, error_bits, max_digits)), report)
-
-
-@task("check-poisson")
-def poisson(
-    system: SystemFile,
-    eps: Any = None,
-    start: Any = None,
-    steps: int = 10,
-    seed: int = 0,
-    error_bits: int = DEFAULT_ERROR_BITS,
-    max_digits: int | None = None,
-    report: bool = False,
-) -> Result:
-    """Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?"""
-    return _of_report(check_poisson(system, _settings(eps, start, steps, seed, error_bits, max_digits)), report)
+_of_one_system("check-integrals", check_integrals, "Are the known or claimed integrals conserved?")
+_of_one_system("check-measure", check_measure, "Is the measure dx/phi invariant?")
+_of_one_system("check-poisson", check_poisson, "Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?")
 
 
 @task("verify", needs=MEMBER)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from specs import ROTOR
 
 from kahanmaps.experiments.store import Store
 
@@ -18,3 +19,15 @@ def path(tmp_path) -> Path:
 def store(path):
     with Store.open(path, create=True) as store:
         yield store
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with system files in it."""
+    (tmp_path / "members").mkdir()
+    (tmp_path / "rotor.toml").write_text(ROTOR)
+    (tmp_path / "members" / "one.toml").write_text(ROTOR.replace("2", "3"))
+    (tmp_path / "members" / "two.toml").write_text(ROTOR.replace("2", "4"))
+    (tmp_path / "members" / "notes.txt").write_text("no system")
+    (tmp_path / "wrong.toml").write_text('variables = ["x"]\n[system]\nrhs = ["x^3"]\n')
+    return tmp_path

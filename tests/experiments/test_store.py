@@ -379,3 +379,18 @@ def test_a_database_that_is_taken_away_while_it_is_written_to_is_told(store, pat
         path.write_bytes(b"")
     with pytest.raises(StoreError, match="has been removed or replaced while it was being written to"):
         store.add([ok(2)])
+
+
+def test_an_experiment_that_is_planned_while_somebody_asks_for_the_status_does_no_harm(store, path):
+    with Store.open(path, readonly=True) as reader:
+        fetch = reader._database.fetch
+
+        def fetch_and_be_late(*question):
+            answer = fetch(*question)
+            if not store.experiments():
+                store.plan("new", "1", LIMITS, tasks(1, 2), {})
+            return answer
+
+        reader._database.fetch = fetch_and_be_late
+        reader.status()
+        assert [one.name for one in reader.status()] == ["new"]

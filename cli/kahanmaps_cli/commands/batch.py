@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -241,35 +242,23 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
     Exit status: 0 done, 2 wrong use, 3 some task has different results in two of them (those of TARGET are kept).
     """
     from kahanmaps.experiments.store import Store
+    from kahanmaps.maps.orbits import counted
     from kahanmaps.version import __version__
 
-    merged = []
     with Store.open(target, create=True) as store:
-        for source in sources:
-            found = store.merge(source)
-            merged.append(
-                {
-                    "source": source,
-                    "tasks": found.tasks,
-                    "results": found.results,
-                    "replaced": found.replaced,
-                    "conflicts": found.conflicts,
-                    "conflicting": list(found.conflicting),
-                }
-            )
-    conflicts = sum(one["conflicts"] for one in merged)  # type: ignore[misc]
+        merged = [(source, store.merge(source)) for source in sources]
+    conflicts = sum(found.conflicts for _, found in merged)
     if as_json:
-        print_json({"command": "batch merge", "version": __version__, "target": target, "merged": merged})
+        data = [{"source": source, **asdict(found)} for source, found in merged]
+        print_json({"command": "batch merge", "version": __version__, "target": target, "merged": data})
     else:
-        for one in merged:
-            click.echo(
-                f"{one['source']}\t{one['results']} new results\t{one['replaced']} failures replaced\t"
-                f"{one['conflicts']} conflicts"
-            )
+        for source, found in merged:
+            counts = f"new results: {found.results}\tfailures replaced: {found.replaced}\tconflicts: {found.conflicts}"
+            click.echo(f"{source}\t{counts}")
     if conflicts and not quiet:
-        keys = [key for one in merged for key in one["conflicting"]]  # type: ignore[attr-defined]
+        keys = [key for _, found in merged for key in found.conflicting]
         say(
-            f"{conflicts} tasks have different results in two databases, those of {target} were kept: "
+            f"{counted(conflicts, 'task')} with different results in two databases, those of {target} were kept: "
             f"{', '.join(keys[:3])}{', ...' if len(keys) > 3 else ''} (batch show KEY --db FILE)"
         )
     return 3 if conflicts else 0
