@@ -13,7 +13,8 @@ import re
 import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -342,19 +343,27 @@ def test_on_a_terminal_there_are_tables(batch):
         assert max(len(re.sub(r"\x1b\[[0-9;]*m", "", line)) for line in shown.out.splitlines()) <= 80
 
 
-def start(*words: str) -> subprocess.Popen[str]:
-    """A batch in a process of its own, once it is at work."""
-    process = subprocess.Popen(
-        [*COMMAND, "batch", "run", *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(),
-    )
-    deadline = time.monotonic() + 20
-    while time.monotonic() < deadline and _stored() < 4:
-        time.sleep(0.05)
-    return process
+@pytest.fixture
+def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Start a batch in a process of its own and wait until it is at work; it ends with the test."""
+    with ExitStack() as processes:
+
+        def run(*words: str) -> subprocess.Popen[str]:
+            process = subprocess.Popen(
+                [*COMMAND, "batch", "run", *words],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                env=environment(),
+            )
+            processes.callback(process.communicate)
+            processes.callback(process.kill)
+            deadline = time.monotonic() + 20
+            while time.monotonic() < deadline and _stored() < 4:
+                time.sleep(0.05)
+            return process
+
+        yield run
 
 
 def _stored() -> int:
@@ -368,7 +377,7 @@ def _stored() -> int:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_ends_the_tasks_in_flight_and_says_how_to_continue(batch, number: signal.Signals):
+def test_ctrl_c_ends_the_tasks_in_flight_and_says_how_to_continue(batch, start, number: signal.Signals):
     Path("study.toml").write_text(PAUSE)
     process = start("study.toml", "-j", "2")
     process.send_signal(number)
@@ -400,7 +409,7 @@ def test_a_second_ctrl_c_is_immediate(batch):
     assert "finishing 2 tasks in flight" in err
 
 
-def test_a_database_that_is_taken_away_ends_the_batch_with_status_3_and_a_sentence(batch):
+def test_a_database_that_is_taken_away_ends_the_batch_with_status_3_and_a_sentence(batch, start):
     Path("study.toml").write_text(PAUSE)
     process = start("study.toml", "-j", "2")
     Path("study.db").rename("elsewhere.db")
@@ -412,15 +421,13 @@ def test_a_database_that_is_taken_away_ends_the_batch_with_status_3_and_a_senten
     assert batch("run", PAUSE, "-q").status == 0  # what had been done is still there
 
 
-def test_two_batches_do_not_write_to_one_database(batch):
+def test_two_batches_do_not_write_to_one_database(batch, start):
     Path("study.toml").write_text(PAUSE)
     process = start("study.toml", "-j", "1")
     done = batch("run study.toml")
     assert done.status == 2
     assert str(process.pid) in done.err
     assert batch("status --db study.db").status == 0  # looking is allowed
-    process.kill()
-    process.communicate()
 
 
 def test_progress_is_a_line_now_and_then_where_there_is_no_terminal(monkeypatch: pytest.MonkeyPatch):
