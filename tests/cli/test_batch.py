@@ -322,6 +322,27 @@ def test_shards_are_merged_into_one_database(batch):
     assert batch("run", SPACE, "--db all.db -q --json").json["done"] == {}
 
 
+def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept(batch):
+    from kahanmaps.experiments.records import Limits, Record, Task
+    from kahanmaps.experiments.records import Outcome as Word
+    from kahanmaps.experiments.store import Store
+
+    task = Task("pause", None, {"seed": 1})
+    for name, value in (("one.db", 1), ("two.db", 2)):
+        with Store.open(name, create=True) as store:
+            store.plan("a", "1", Limits(), [task], {})
+            store.add([Record(task.key, Word.OK, {"value": value})])
+    done = batch("merge one.db two.db")
+    assert done.status == 3
+    assert done.rows == [["two.db", "new results: 0", "failures replaced: 0", "conflicts: 1"]]
+    assert "1 task with different results in two databases, those of one.db were kept" in done.err
+    assert task.key in done.err
+    assert batch("export --db one.db --jsonl").records[1]["result"] == {"value": 1}
+    (told,) = batch("merge one.db two.db --json -q").json["merged"]
+    assert (told["conflicts"], told["conflicting"]) == (1, [task.key])
+    assert batch("merge one.db one.db").status == 2
+
+
 def test_tasks_lists_what_can_be_done(batch):
     assert "family-space" in batch("tasks").out
     assert "(required)" in batch("tasks orbit").out

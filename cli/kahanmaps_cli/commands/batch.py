@@ -56,12 +56,12 @@ def command() -> None:
     """Thousands of experiments from one file: planned, run in child processes, stored, resumed.
 
     \b
-      kahanmaps batch run study.toml -j 2              results go to study.db; the same command continues
+      kahanmaps batch run study.toml -j 2              results go to study.db
       kahanmaps batch run study.toml --dry-run
       kahanmaps batch status --db study.db
       kahanmaps batch summary --db study.db --by m,eps
       kahanmaps batch export --db study.db --csv -o study.csv
-      kahanmaps batch tasks                            what an experiment can do, with all options
+      kahanmaps batch tasks                            what an experiment can do
 
     docs/batch.md describes the file, and how to use many machines.
     """
@@ -95,9 +95,9 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
 
     \b
       kahanmaps batch run study.toml --dry-run
-      kahanmaps batch run study.toml -j 2                   results in study.db
-      kahanmaps batch run study.toml --db all.db            the same again: does what is missing
-      kahanmaps batch run --db all.db --retry-failed        continue without the spec
+      kahanmaps batch run study.toml -j 2              results in study.db
+      kahanmaps batch run study.toml --db all.db       again: does what is missing
+      kahanmaps batch run --db all.db --retry-failed   continue without the spec
       kahanmaps batch run study.toml --shard 3/16 --db part3.db
       kahanmaps batch run study.toml --scheduler tcp://head:8786
 
@@ -183,7 +183,7 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
 
     \b
       kahanmaps batch export --db study.db --csv -o study.csv
-      kahanmaps batch export --db study.db --jsonl | jq 'select(.verdict == "refuted") | .key'
+      kahanmaps batch export --db study.db --jsonl | jq .verdict
       kahanmaps batch export --db study.db --parquet -o study.parquet
     """
     from kahanmaps_cli.batch_show import export_rows
@@ -212,8 +212,8 @@ def summary(db: str, by: str, as_markdown: bool, as_json: bool, **options: Any) 
 
     \b
       kahanmaps batch summary --db study.db --by m,eps
-      kahanmaps batch summary --db study.db --by experiment,m --value constant --markdown
-      kahanmaps batch summary --db study.db --by outcome,message       why tasks failed
+      kahanmaps batch summary --db study.db --by m --value constant --markdown
+      kahanmaps batch summary --db study.db --by outcome,message   why some failed
 
     --by takes options (eps), parts of the system (name, m, seed, parameters.a), entries of results (dimension,
     growth), and experiment, task, outcome, verdict, message.
