@@ -58,6 +58,41 @@ SOURCES: dict[str, str] = {
         "J. Tate. Variation of the canonical height of a point depending on a parameter. "
         "Amer. J. Math. 105 (1983), 287-294"
     ),
+    "kimura-hirota-2000": (
+        "K. Kimura, R. Hirota. Discretization of the Lagrange top. J. Phys. Soc. Japan 69 (2000), 3193-3199"
+    ),
+    "petrera-pfadler-suris-2009": (
+        "M. Petrera, A. Pfadler, Yu. B. Suris. On integrability of Hirota-Kimura-type discretizations: experimental "
+        "study of the discrete Clebsch system. Exp. Math. 18 (2009), 223-247. arXiv:0808.3345"
+    ),
+    "zander-2021": (
+        "R. Zander. On the singularity structure of Kahan discretizations of a class of quadratic vector fields. "
+        "Eur. J. Math. 7 (2021), 1046-1073. arXiv:2003.01659"
+    ),
+    "bellon-viallet-1999": "M. P. Bellon, C.-M. Viallet. Algebraic entropy. Comm. Math. Phys. 204 (1999), 425-437",
+    "fatou-1906": "P. Fatou. Series trigonometriques et series de Taylor. Acta Math. 30 (1906), 335-400",
+    "massey-1969": (
+        "J. L. Massey. Shift-register synthesis and BCH decoding. IEEE Trans. Inform. Theory 15 (1969), 122-127"
+    ),
+    "roberts-vivaldi-2009": (
+        "J. A. G. Roberts, F. Vivaldi. A combinatorial model for reversible rational maps over finite fields. "
+        "Nonlinearity 22 (2009), 1965-1982"
+    ),
+    "roberts-jogia-vivaldi-2003": (
+        "J. A. G. Roberts, D. Jogia, F. Vivaldi. The Hasse-Weil bound and integrability detection in rational maps. "
+        "J. Nonlinear Math. Phys. 10 (2003), suppl. 2, 166-180"
+    ),
+    "grammaticos-ramani-papageorgiou-1991": (
+        "B. Grammaticos, A. Ramani, V. Papageorgiou. Do integrable mappings have the Painleve property? "
+        "Phys. Rev. Lett. 67 (1991), 1825-1828"
+    ),
+    "benettin-1980": (
+        "G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn. Lyapunov characteristic exponents for smooth dynamical "
+        "systems and for Hamiltonian systems. Meccanica 15 (1980), 9-20"
+    ),
+    "pereira-2001": (
+        "J. V. Pereira. Vector fields, invariant varieties and linear systems. Ann. Inst. Fourier 51 (2001), 1385-1405"
+    ),
 }
 
 

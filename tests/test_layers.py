@@ -25,6 +25,7 @@ FLOORS = {
     "invariants": 4,
     "checks": 5,
     "paper": 5,
+    "laboratory": 5,
     "experiments": 6,
     "plots": 7,
 }

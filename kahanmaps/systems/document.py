@@ -27,6 +27,8 @@ from kahanmaps.family.cubics import default_variables
 from kahanmaps.sources import SOURCES
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
+from kahanmaps.systems.structured_facts import KEYS as STRUCTURED_KEYS
+from kahanmaps.systems.structured_facts import read_structured_facts
 
 KINDS = ("system", "hamiltonian", "family")
 _KEYS = {
@@ -35,7 +37,7 @@ _KEYS = {
     "hamiltonian": {"H", "J"},
     "family": {"A", "H", "signs"},
     "density": {"phi"},
-    "catalog": {"title", "sources", "convention", "facts"},
+    "catalog": {"title", "sources", "convention", "facts", *STRUCTURED_KEYS},
 }
 
 
@@ -347,6 +349,7 @@ class DocumentReader:
                 for item in value:
                     if item not in SOURCES:
                         self._mistake("catalog.sources", f"unknown source {item!r}, expected a key of sources.py")
+        read_structured_facts(section, self.variables, self._mistake, _show)
 
     def _normalised(self) -> dict[str, Any]:
         """The document with its name and the parameters that hold, long integers as text (JSON needs them so)."""

@@ -1,4 +1,4 @@
-"""Plain data as TOML text, as far as system files need it: text, integers, lists, tables one level deep.
+"""Plain data as TOML text, as far as system files need it: text, integers, lists, tables, lists of tables in them.
 
 Python reads TOML and does not write it; a dependency for forty lines would be one too many.
 """
@@ -27,9 +27,21 @@ def to_toml(document: Mapping[str, Any], top: Sequence[str], sections: Sequence[
             lines.append(f"{key} = {_toml_value(document[key])}")
     for section in sections:
         if section in document and document[section] is not None:
-            lines += ["", f"[{section}]"]
-            lines += [f"{_toml_key(key)} = {_toml_value(value)}" for key, value in document[section].items()]
+            plain = {key: value for key, value in document[section].items() if not _is_tables(value)}
+            lines += ["", f"[{section}]", *_lines(plain)]
+            for key, tables in document[section].items():
+                if key not in plain:
+                    for table in tables:
+                        lines += ["", f"[[{section}.{_toml_key(key)}]]", *_lines(table)]
     return "\n".join(lines) + "\n"
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
+
+
+def _lines(table: Mapping[str, Any]) -> list[str]:
+    return [f"{_toml_key(key)} = {_toml_value(value)}" for key, value in table.items()]
 
 
 def _toml_key(key: str) -> str:

@@ -57,9 +57,11 @@ def test_a_system_is_shown_for_scripts(kahanmaps, name):
         "facts",
         "convention",
         "sources",
+        "known",
         "document",
     }
     assert (shown["name"], shown["dim"]) == (name, len(shown["rhs"]))
+    assert shown["known"]["degrees"] == catalog.load(name).catalog["degrees"]
 
 
 @over_names
@@ -84,3 +86,117 @@ def test_the_catalogue_is_found_from_every_folder(kahanmaps, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     Path("lorenz").write_text("not this one")
     assert kahanmaps("systems lorenz --json").json["dim"] == 3
+
+
+# Structured facts
+
+
+def test_structured_facts_are_shown(kahanmaps):
+    lines = [line.strip() for line in kahanmaps("systems zhukovski_volterra_2").out.splitlines()]
+    assert "for generic parameters and eps:" in lines
+    assert "verdict: not integrable" in lines
+    growth = "(exponential growth, by the largest root of x^2 - 2*x - 1)"
+    assert f"degrees of the iterates: 3, 9, 23, 57, 139, ... {growth}" in lines
+    assert "a generic orbit lies in a variety of codimension 1" in lines
+    assert "1 relation along an orbit among: polynomials of degree <= 2" in lines
+    assert "  2 relations along an orbit among: x1^2, x2^2, x3^2, 1\n" in kahanmaps("systems euler_top").out
+    assert "no relation along an orbit among: polynomials of degree <= 4" in kahanmaps("systems lorenz").out
+
+
+def test_structured_facts_are_there_for_scripts(kahanmaps):
+    assert kahanmaps("systems zhukovski_volterra_2 --json").json["known"] == {
+        "degrees": [3, 9, 23, 57, 139],
+        "growth": "exponential",
+        "dynamical_degree": "x^2 - 2*x - 1",
+        "verdict": "not integrable",
+        "codimension": 1,
+        "relations": [{"monomials": "degree <= 2", "dimension": 1}],
+    }
+
+
+def test_a_file_without_structured_facts_has_nulls(kahanmaps, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('variables = ["x"]\n[system]\nrhs = ["x^2"]\n')
+    assert set(kahanmaps("systems", path, "--json").json["known"].values()) == {None}
+
+
+@pytest.mark.parametrize(
+    ("keys", "line"),
+    [
+        ('growth = "linear"', "degrees of the iterates: linear growth"),
+        ("degrees = [1, 2]", "degrees of the iterates: 1, 2, ..."),
+        ('dynamical_degree = "x - 2"', "degrees of the iterates: by the largest root of x - 2"),
+    ],
+)
+def test_each_structured_fact_can_stand_alone(kahanmaps, tmp_path, keys, line):
+    path = tmp_path / "mine.toml"
+    path.write_text(f'variables = ["x"]\n[system]\nrhs = ["x^2"]\n[catalog]\n{keys}\n')
+    assert kahanmaps("systems", path).out == f"mine\nx' = x^2\nfor generic eps:\n  {line}\n"
+
+
+# Terminals
+
+
+def test_on_a_terminal_lines_end_between_words(kahanmaps, monkeypatch):
+    whole = kahanmaps("systems lagrange_top").out
+    monkeypatch.setattr("kahanmaps_cli.commands.systems.on_terminal", lambda: True)
+    monkeypatch.setenv("COLUMNS", "60")
+    shown = kahanmaps("systems lagrange_top").out
+    assert max(map(len, shown.splitlines())) < 60 < max(map(len, whole.splitlines()))
+    assert shown.split() == whole.split()
+
+
+# LaTeX
+
+EULER = r"""\[
+\left\{
+\begin{aligned}
+\dot{x_1} &= x_2 x_3 \\
+\dot{x_2} &= -2 x_1 x_3 \\
+\dot{x_3} &= x_1 x_2
+\end{aligned}
+\right.
+\]
+\[
+F_1 = \frac{1 - \varepsilon^2 x_2^2}{1 + 2 \varepsilon^2 x_3^2}
+\]
+\[
+F_2 = \frac{1 + 2 \varepsilon^2 x_3^2}{1 + 2 \varepsilon^2 x_1^2}
+\]
+\[
+\phi = 1 + 4 \varepsilon^2 x_3^2 + 4 \varepsilon^4 x_3^4
+\]
+"""
+
+
+def test_a_system_in_latex(kahanmaps):
+    assert kahanmaps("systems euler_top --latex").out == EULER
+
+
+@over_names
+def test_every_system_is_written_in_latex_with_balanced_braces(kahanmaps, name):
+    text = kahanmaps("systems", name, "--latex").out
+    file = catalog.load(name)
+    plain = text.replace(r"\{", "").replace(r"\}", "")
+    assert plain.count("{") == plain.count("}")
+    formulas = 1 + len(file.integrals) + (file.density is not None) + (file.hamiltonian is not None)
+    assert text.count("\\[\n") == text.count("\\]\n") == formulas
+    assert text.count(r"\dot{") == file.system.dim
+
+
+def test_parameters_are_set_in_latex(kahanmaps):
+    assert r"\dot{x_1} &= \frac{1}{2} x_2 x_3" in kahanmaps("systems euler_top -p a1=1/2 --latex").out
+
+
+@pytest.mark.parametrize("options", ["--latex --toml", "--latex --json", "--toml --json"])
+def test_two_forms_at_once_are_refused(kahanmaps, options):
+    shown = kahanmaps("systems euler_top", *options.split())
+    assert shown.status == 2
+    assert "one of the three" in shown.err
+
+
+@pytest.mark.parametrize("option", ["--latex", "--toml", "-p a1=2"])
+def test_what_needs_a_name_says_so(kahanmaps, option):
+    shown = kahanmaps("systems", option)
+    assert shown.status == 2
+    assert "need the NAME of a system" in shown.err

@@ -27,6 +27,7 @@ from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.systems import files
 from kahanmaps.systems.files import SystemFile, parse_system, read_system
 from kahanmaps.systems.hamiltonian import standard_structure
+from kahanmaps.systems.structured_facts import relations
 from kahanmaps.systems.toml_text import to_toml
 
 SYSTEM = """
@@ -348,6 +349,7 @@ OK = 'variables = ["x", "y"]\n[system]\nrhs = ["x*y", "y"]\n'
 H_OK = 'variables = ["q", "p"]\n[hamiltonian]\nH = "q^3 + p^2"\nJ = "standard"\n'
 A_OK = "A = [[1, 0], [0, 1]]"
 F_OK = f'[family]\n{A_OK}\nH = "x1^3"\n'
+RELATION = "[[catalog.relations]]\nmonomials = {}\ndimension = {}\n"
 
 # (what is wrong, the file, the keys of the mistakes in order)
 WRONG = [
@@ -446,6 +448,44 @@ WRONG = [
     ("an unknown source", OK + '[catalog]\nsources = ["nobody-1900"]\n', ["catalog.sources"]),
     ("facts that are no list", OK + '[catalog]\nfacts = "nice"\n', ["catalog.facts"]),
     ("a title that is no text", OK + "[catalog]\ntitle = [1]\n", ["catalog.title"]),
+    ("degrees that are no list", OK + "[catalog]\ndegrees = 3\n", ["catalog.degrees"]),
+    ("no degrees", OK + "[catalog]\ndegrees = []\n", ["catalog.degrees"]),
+    ("a degree that is no integer", OK + '[catalog]\ndegrees = [1, "2"]\n', ["catalog.degrees"]),
+    ("a degree 0", OK + "[catalog]\ndegrees = [1, 0]\n", ["catalog.degrees"]),
+    ("a degree of 101 digits", OK + f"[catalog]\ndegrees = [1{100 * '0'}]\n", ["catalog.degrees"]),
+    ("an unknown growth", OK + '[catalog]\ngrowth = "cubic"\n', ["catalog.growth"]),
+    ("a verdict that is a table", OK + "[catalog]\nverdict = {a = 1}\n", ["catalog.verdict"]),
+    ("a number for a polynomial", OK + "[catalog]\ndynamical_degree = 2\n", ["catalog.dynamical_degree"]),
+    ("no polynomial", OK + '[catalog]\ndynamical_degree = "x^"\n', ["catalog.dynamical_degree"]),
+    ("a polynomial in t", OK + '[catalog]\ndynamical_degree = "t - 2"\n', ["catalog.dynamical_degree"]),
+    ("a constant polynomial", OK + '[catalog]\ndynamical_degree = "1"\n', ["catalog.dynamical_degree"]),
+    ("a polynomial that is 0", OK + '[catalog]\ndynamical_degree = "0"\n', ["catalog.dynamical_degree"]),
+    ("a reducible polynomial", OK + '[catalog]\ndynamical_degree = "x^2 - 1"\n', ["catalog.dynamical_degree"]),
+    ("a square", OK + '[catalog]\ndynamical_degree = "(x - 1)^2"\n', ["catalog.dynamical_degree"]),
+    ("a polynomial that is not monic", OK + '[catalog]\ndynamical_degree = "2*x - 1"\n', ["catalog.dynamical_degree"]),
+    ("a codimension above the dimension", OK + "[catalog]\ncodimension = 3\n", ["catalog.codimension"]),
+    ("a negative codimension", OK + "[catalog]\ncodimension = -1\n", ["catalog.codimension"]),
+    ("a codimension true", OK + "[catalog]\ncodimension = true\n", ["catalog.codimension"]),
+    ("relations that are no tables", OK + '[catalog]\nrelations = ["x"]\n', ["catalog.relations"]),
+    (
+        "an empty relation",
+        OK + "[[catalog.relations]]\n",
+        ["catalog.relations[1].monomials", "catalog.relations[1].dimension"],
+    ),
+    (
+        "two mistakes in the second relation",
+        OK
+        + '[[catalog.relations]]\nmonomials = "degree <= 2"\ndimension = 1\n'
+        + '[[catalog.relations]]\nmonomials = "degree 2"\ndimension = -1\nsize = 3\n',
+        ["catalog.relations[2].size", "catalog.relations[2].monomials", "catalog.relations[2].dimension"],
+    ),
+    ("monomials that are numbers", OK + RELATION.format("[1, 2]", 0), ["catalog.relations[1].monomials"]),
+    ("no monomials", OK + RELATION.format("[]", 0), ["catalog.relations[1].monomials"]),
+    ("a function 0", OK + RELATION.format('["x - x"]', 0), ["catalog.relations[1].monomials"]),
+    ("a function twice", OK + RELATION.format('["x^2", "x*x"]', 0), ["catalog.relations[1].monomials"]),
+    ("a function of another variable", OK + RELATION.format('["q"]', 0), ["catalog.relations[1].monomials"]),
+    ("too many monomials", OK + RELATION.format('"degree <= 999"', 0), ["catalog.relations[1].monomials"]),
+    ("as many relations as functions", OK + RELATION.format('["x", "1"]', 2), ["catalog.relations[1].dimension"]),
     ("an unclosed bracket", "variables = [", ["TOML"]),
     ("the same key twice", "name = 'a'\nname = 'b'\n", ["TOML"]),
     ("an unclosed text", 'name = "a\n', ["TOML"]),
@@ -652,3 +692,40 @@ def test_a_damaged_file_is_an_input_error_or_still_a_file(text, at, length, inse
     except InputError:
         return
     assert parse_system(file.to_toml()) == file
+
+
+# Structured facts
+
+
+def test_structured_facts_are_read_and_written():
+    text = """
+variables = ["x", "y"]
+[system]
+rhs = ["x*y", "y"]
+[catalog]
+degrees = [2, 4, 8]
+growth = "exponential"
+dynamical_degree = "x - 2"
+verdict = "not integrable"
+codimension = 0
+[[catalog.relations]]
+monomials = "degree <= 2"
+dimension = 0
+[[catalog.relations]]
+monomials = ["x^2 + y^2", "1"]
+dimension = 1
+"""
+    file = parse_system(text)
+    again = parse_system(file.to_toml())
+    assert again.catalog == file.catalog
+    found = relations(again.catalog, again.variables)
+    assert [(str(r.functions[0]), len(r.functions), r.dimension) for r in found] == [("1", 6, 0), ("x^2 + y^2", 2, 1)]
+
+
+def test_a_wrong_word_is_answered_with_those_that_are_known():
+    with pytest.raises(SystemFileError) as caught:
+        parse_system(OK + '[catalog]\ngrowth = "fast"\nverdict = "nice"\n', "mine")
+    assert str(caught.value).splitlines()[1:] == [
+        "  catalog.growth: found 'fast', expected one of bounded, linear, quadratic, exponential",
+        "  catalog.verdict: found 'nice', expected one of integrable, linearisable, not integrable",
+    ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import textwrap
 from typing import Any
 
 import click
@@ -15,22 +17,26 @@ from kahanmaps_cli.render import on_terminal, print_json, shorten
 @click.argument("name", required=False)
 @click.option("-p", "--parameter", "parameters", type=NameValue(), multiple=True, help="Set a parameter of the system.")
 @click.option("--toml", "as_toml", is_flag=True, help="The system file itself, to copy and change.")
+@click.option("--latex", "as_latex", is_flag=True, help="Equations, integrals and density in LaTeX.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
-def command(name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: bool, as_json: bool) -> None:
+def command(
+    name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: bool, as_latex: bool, as_json: bool
+) -> None:
     """List the named systems, or show one: its equations, what is known of it, and from where.
 
     \b
       kahanmaps systems
       kahanmaps systems euler_top
       kahanmaps systems euler_top -p a1=2 --toml > my-top.toml
+      kahanmaps systems lagrange_top --latex
     """
     from kahanmaps.systems.catalog import load, names
 
-    if as_toml and as_json:
-        raise click.UsageError("give --toml or --json, one of the two")
+    if as_toml + as_latex + as_json > 1:
+        raise click.UsageError("give --toml, --latex or --json, one of the three")
     if name is None:
-        if as_toml or parameters:
-            raise click.UsageError("--toml and -p need the NAME of a system")
+        if as_toml or as_latex or parameters:
+            raise click.UsageError("--toml, --latex and -p need the NAME of a system")
         rows = [(key, load(key)) for key in names()]
         if as_json:
             print_json({"version": __version__, "systems": [_summary(file) for _, file in rows]})
@@ -42,8 +48,10 @@ def command(name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: 
     file = load(name, dict(parameters))
     if as_toml:
         click.echo(file.to_toml(), nl=False)
+    elif as_latex:
+        click.echo(_latex(file))
     elif as_json:
-        print_json({**_summary(file), **_equations(file), "document": file.document})
+        print_json({**_summary(file), **_equations(file), "known": _known(file), "document": file.document})
     else:
         _show(file)
 
@@ -73,29 +81,94 @@ def _equations(file: Any) -> dict[str, Any]:
     }
 
 
+def _known(file: Any) -> dict[str, Any]:
+    """The structured facts, null where the file has none."""
+    from kahanmaps.systems.structured_facts import KEYS
+
+    return {key: file.document.get("catalog", {}).get(key) for key in KEYS}
+
+
+def _known_lines(file: Any) -> list[str]:
+    """The structured facts as lines for people."""
+    from kahanmaps.systems.structured_facts import relations
+
+    known = _known(file)
+    lines = []
+    if known["verdict"]:
+        lines.append(f"verdict: {known['verdict']}")
+    growth = f"{known['growth']} growth" if known["growth"] else ""
+    if known["dynamical_degree"]:
+        growth += f"{', ' * bool(growth)}by the largest root of {known['dynamical_degree']}"
+    if known["degrees"]:
+        degrees = ", ".join(str(degree) for degree in known["degrees"])
+        lines.append(f"degrees of the iterates: {degrees}, ...{f' ({growth})' * bool(growth)}")
+    elif growth:
+        lines.append(f"degrees of the iterates: {growth}")
+    if known["codimension"] is not None:
+        lines.append(f"a generic orbit lies in a variety of codimension {known['codimension']}")
+    for found in relations(file.catalog, file.variables):
+        count = "no relation" if not found.dimension else f"{found.dimension} relation{'s' * (found.dimension > 1)}"
+        what = f"polynomials of {found.text}" if found.text.startswith("degree") else found.text
+        lines.append(f"{count} along an orbit among: {what}")
+    return lines
+
+
+def _latex(file: Any) -> str:
+    """The system as displayed formulas."""
+    from kahanmaps.algebra.latex import latex_name, latex_polynomial, latex_rational_function
+
+    names = [latex_name(name) for name in file.variables]
+    rows = [rf"\dot{{{x}}} &= {latex_polynomial(f)}" for x, f in zip(names, file.system.rhs, strict=True)]
+    lines = [r"\[", r"\left\{", r"\begin{aligned}", " \\\\\n".join(rows), r"\end{aligned}", r"\right.", r"\]"]
+    formulas = [("H", latex_polynomial(file.hamiltonian.H))] if file.hamiltonian is not None else []
+    for name, integral in file.integrals.items():
+        formulas.append((latex_name(name) if name else "I", latex_rational_function(integral)))
+    if file.density is not None:
+        formulas.append((latex_name("phi"), latex_rational_function(file.density)))
+    for name, formula in formulas:
+        lines += [r"\[", f"{name} = {formula}", r"\]"]
+    return "\n".join(lines)
+
+
 def _formula(text: str) -> str:
     """A long formula is shortened on a terminal only."""
     return shorten(text, 300) if on_terminal() else text
+
+
+def _say(text: str) -> None:
+    """A line, on a terminal broken between words; what follows the first line is indented."""
+    if on_terminal():
+        width = max(shutil.get_terminal_size().columns - 1, 20)
+        pieces = textwrap.wrap(
+            text, width, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False, tabsize=4
+        )
+        text = "\n".join(pieces)
+    click.echo(text)
 
 
 def _show(file: Any) -> None:
     from kahanmaps.algebra.text import format_polynomial
 
     facts = _equations(file)
-    click.echo(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
+    _say(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
     for name, value in file.parameters.items():
         click.echo(f"  {name} = {value}")
     for name, text in zip(facts["variables"], facts["rhs"], strict=True):
-        click.echo(f"{name}' = {_formula(text)}")
+        _say(f"{name}' = {_formula(text)}")
     if file.hamiltonian is not None:
-        click.echo(f"H = {_formula(format_polynomial(file.hamiltonian.H))}")
+        _say(f"H = {_formula(format_polynomial(file.hamiltonian.H))}")
     for name, text in facts["integrals"].items():
-        click.echo(f"integral {name} = {_formula(text)}")
+        _say(f"integral {name} = {_formula(text)}")
     if facts["density"]:
-        click.echo(f"density phi = {_formula(facts['density'])}  (dx/phi is invariant)")
+        _say(f"density phi = {_formula(facts['density'])}  (dx/phi is invariant)")
+    known = _known_lines(file)
+    if known:
+        click.echo("for generic parameters and eps:" if file.parameters else "for generic eps:")
+    for line in known:
+        _say(f"  {line}")
     for fact in facts["facts"]:
-        click.echo(f"* {fact}")
+        _say(f"* {fact}")
     if facts["convention"]:
-        click.echo(f"step: {facts['convention']}")
+        _say(f"step: {facts['convention']}")
     for text in facts["sources"]:
-        click.echo(f"source: {text}")
+        _say(f"source: {text}")

@@ -1,7 +1,7 @@
 """The catalogue: named systems, one TOML file each in this folder, with equations, known facts and sources.
 
 >>> names()[:3]
-('dressing_chain_3', 'euler_top', 'harmonic')
+('clebsch_first_flow', 'dressing_chain_3', 'euler_top')
 >>> top = load("euler_top", {"a1": 1, "a2": 2, "a3": "-3/2"})
 >>> print(top.system)
 x1' = x2*x3
@@ -13,7 +13,9 @@ x3' = -3/2*x1*x2
 A file is data, in the format of every other system file; its name is that of the system. Each of its facts opens with
 its status: Proved (in the source named; where none is, by the argument given or by tests/systems/test_catalog.py, which
 expands claims with eps and the parameters as indeterminates), Refuted (at a point), Measured (a finite computation
-modulo a prime, which is no proof), Classical, or Origin (how the file was made).
+modulo a prime, which is no proof), Classical, or Origin (how the file was made). Degrees, growth, verdict and relations
+stand there for programs as well, see `kahanmaps.systems.structured_facts`; tests/systems/test_catalog_facts.py measures
+them again.
 """
 
 from __future__ import annotations

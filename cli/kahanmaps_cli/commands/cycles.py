@@ -1,0 +1,222 @@
+"""kahanmaps cycles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.options import load_system, output_options, system_options
+from kahanmaps_cli.params import ExactNumber
+from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.render import print_json
+
+if TYPE_CHECKING:
+    from flint import fmpq_mat
+
+    from kahanmaps.laboratory.cycle_laws import Comparison
+    from kahanmaps.laboratory.cycles import Census
+    from kahanmaps.systems.files import SystemFile
+
+_LENGTHS_SHOWN = 12
+
+
+@click.command("cycles")
+@system_options
+@click.option("--prime", "primes", type=int, multiple=True, required=True, metavar="P", help="The prime; repeatable.")
+@click.option("--eps", type=ExactNumber(), multiple=True, help="The paper's epsilon, exact; repeatable.")
+@click.option("--samples", type=int, metavar="N", help="Follow N random points instead of making the whole graph.")
+@click.option("--steps", type=int, metavar="K", help="... for at most K steps (default 8 (p + 1 + 2 sqrt p)).")
+@click.option("--reversor", metavar="ROWS", help="A matrix R with f(R x) = -R f(x): '1,0;0,-1'.")
+@click.option("--seconds", type=float, default=60.0, show_default=True, help="Time for the samples of one run.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@output_options
+def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
+    """The orbits of the Kahan map on projective space over a finite field, and how long its cycles are.
+
+    All points of P^n over GF(P), or random ones where they are more than two million. Without --eps two values are
+    tried for each prime: one alone may be special.
+
+    \b
+      kahanmaps cycles weierstrass --prime 101 --prime 499
+      kahanmaps cycles lotka_volterra --prime 997 --eps 1/10 --eps 1/7
+      kahanmaps cycles weierstrass --prime 10007 --samples 200 --json
+      kahanmaps cycles --vars x,y --rhs 'x*y' --rhs '-x^2' --prime 31
+
+    A point is lost where the map has no value; where forms have a common factor it is divided out first (up to
+    dimension 6). It falls if its orbit gets to a lost point, and is transient if its orbit gets to a cycle. The lengths
+    are held against the largest number of points of a curve of genus 1 (the fibres of integrable maps of the plane),
+    against the law of random reversible maps and against random permutations; "compatible" is no proof of anything.
+
+    Exit status: 0 done, 2 wrong use, 3 samples stopped by the clock.
+    """
+    from kahanmaps.laboratory.cycle_laws import compare
+    from kahanmaps.laboratory.cycles import cycle_census, default_eps
+    from kahanmaps.laboratory.reversors import find_reversor
+
+    if options["seed"] < 0:
+        raise click.UsageError(f"found --seed {options['seed']}, expected 0 or more")
+    if options["steps"] is not None and options["samples"] is None:
+        raise click.UsageError("--steps K is for --samples N")
+    if not options["seconds"] > 0:
+        raise click.UsageError(f"found --seconds {options['seconds']}, expected more than 0")
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    reversor = _matrix(options["reversor"]) if options["reversor"] is not None else find_reversor(file.system)
+    runs: list[tuple[Census, Comparison]] = []
+    with Progress(quiet) as progress:
+        for prime in dict.fromkeys(options["primes"]):
+            values = list(options["eps"]) or default_eps(prime)
+            for eps in values:
+                census = cycle_census(
+                    file.system,
+                    eps,
+                    prime,
+                    reversor=reversor,
+                    samples=options["samples"],
+                    steps=options["steps"],
+                    seed=options["seed"],
+                    seconds=options["seconds"],
+                    progress=progress,
+                )
+                runs.append((census, compare(census, options["seed"])))
+    common = [law for law in runs[0][1].compatible if all(law in found.compatible for _, found in runs)]
+    if as_json:
+        print_json(_record(file, options, reversor, runs, common))
+    else:
+        _print(file, reversor, runs, common)
+    stopped = any(census.stopped for census, _ in runs)
+    if stopped and not quiet:
+        say("stopped by the clock: give more --seconds, fewer --samples or a smaller prime")
+    return 3 if stopped else 0
+
+
+def _matrix(text: str) -> fmpq_mat:
+    """The matrix written row by row, rows separated by semicolons."""
+    from flint import fmpq_mat
+
+    from kahanmaps.algebra.text import parse_point
+
+    rows = [list(parse_point(row)) for row in text.split(";")]
+    if len({len(row) for row in rows}) != 1:
+        raise click.UsageError("found --reversor with rows of different lengths, expected a square matrix: 1,0;0,-1")
+    return fmpq_mat(rows)
+
+
+def _rows(matrix: fmpq_mat | None) -> list[list[str]] | None:
+    from kahanmaps.algebra.text import format_number
+
+    return None if matrix is None else [[format_number(entry) for entry in row] for row in matrix.tolist()]
+
+
+def _print(
+    file: SystemFile, reversor: fmpq_mat | None, runs: list[tuple[Census, Comparison]], common: list[str]
+) -> None:
+    from kahanmaps.algebra.text import format_number
+
+    click.echo(f"# {file.name}, the Kahan map on P^{file.system.dim} over GF(p), eps is half the time step")
+    rows = _rows(reversor)
+    shown = "none known" if rows is None else ";".join(",".join(row) for row in rows)
+    click.echo(f"reversing symmetry\t{shown}")
+    for census, found in runs:
+        click.echo(f"\n# p = {census.prime}, eps = {format_number(census.eps)}")
+        for name, text in _lines(census):
+            click.echo(f"{name}\t{text}")
+        for law, reason in found.reasons.items():
+            click.echo(f"{law}\t{found.verdict(law)}: {reason}")
+    click.echo(f"\n# compatible in all {len(runs)} runs with: {', '.join(common) or 'none of the laws'}")
+
+
+def _lines(census: Census) -> list[tuple[str, str]]:
+    lines = [("points", str(census.points) if census.complete else f"{census.points}, sampled {census.looked_at}")]
+    if census.is_undefined:
+        lines.append(("map", "singular everywhere modulo this prime"))
+    elif census.factor is None:
+        lines.append(("map", f"forms of degree {census.degree}; a common factor was not looked for"))
+    elif census.degree < census.dim:
+        lines.append(
+            ("map", f"forms of degree {census.degree}, a factor of degree {census.dim - census.degree} divided out")
+        )
+    lines += [("lost", str(census.lost)), ("falling", str(census.falling))]
+    lines.append(
+        ("transient", str(census.transient))
+        if census.complete
+        else ("open", f"{census.open} after {census.steps} steps")
+    )
+    lines.append(("periodic", str(census.periodic)))
+    if census.cycles:
+        lines.append(("cycles", f"{census.cycles}, longest {census.longest}, mean {census.mean:.2f}"))
+        if census.at_infinity:
+            lines.append(("at infinity", f"{sum(census.at_infinity.values())} of them"))
+        if census.symmetric is not None:
+            lines.append(("symmetric", f"{sum(census.symmetric.values())} of the others"))
+    shown = list(census.lengths.items())[-_LENGTHS_SHOWN:]
+    if shown:
+        what = "length x cycles" if census.complete else "length x points"
+        more = "... " if len(census.lengths) > len(shown) else ""
+        lines.append((what, more + " ".join(f"{length}x{n}" for length, n in shown)))
+    return lines
+
+
+def _record(
+    file: SystemFile,
+    options: dict[str, Any],
+    reversor: fmpq_mat | None,
+    runs: list[tuple[Census, Comparison]],
+    common: list[str],
+) -> dict[str, Any]:
+    from kahanmaps.algebra.text import format_number
+    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.version import __version__
+
+    return {
+        "command": "cycles",
+        "version": __version__,
+        "system": file.name,
+        "convention": CONVENTION,
+        "arithmetic": "exact modulo primes",
+        "seed": options["seed"],
+        "samples": options["samples"],
+        "reversor": _rows(reversor),
+        "primes": list(dict.fromkeys(options["primes"])),
+        "runs": [
+            {
+                "prime": census.prime,
+                "eps": format_number(census.eps),
+                "time_step": format_number(2 * census.eps),
+                "points": str(census.points),
+                "complete": census.complete,
+                "looked_at": census.looked_at,
+                "steps": census.steps,
+                "stopped": census.stopped,
+                "degree": census.degree,
+                "common_factor": census.factor,
+                "singular_everywhere": census.is_undefined,
+                "lost": census.lost,
+                "falling": census.falling,
+                "transient": census.transient,
+                "open": census.open,
+                "periodic": census.periodic,
+                "cycles": census.cycles,
+                "longest": census.longest,
+                "mean": census.mean,
+                "lengths": [[length, n] for length, n in census.lengths.items()],
+                "at_infinity": [[length, n] for length, n in census.at_infinity.items()],
+                "symmetric": None
+                if census.symmetric is None
+                else [[length, n] for length, n in census.symmetric.items()],
+                "fixed_points": census.fixed,
+                "bound": found.bound,
+                "share_within_bound": found.share_within,
+                "scale": found.scale,
+                "model_scale": found.model_scale,
+                "distance": found.distance,
+                "critical_distance": found.critical,
+                "compatible": list(found.compatible),
+                "not_compatible": list(found.refused),
+                "reasons": dict(found.reasons),
+            }
+            for census, found in runs
+        ],
+        "compatible_in_all_runs": common,
+        "document": dict(file.document),
+    }

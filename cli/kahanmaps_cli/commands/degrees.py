@@ -1,0 +1,94 @@
+"""kahanmaps degrees."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.render import print_json
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.degrees import DegreeGrowth
+    from kahanmaps.systems.files import SystemFile
+
+
+@click.command("degrees")
+@system_options
+@eps_options
+@click.option("--seconds", type=float, default=10.0, show_default=True, help="Stop after about so many seconds.")
+@click.option("--terms", type=int, help="Measure d_1, ..., d_N (default: until a recurrence is certain enough).")
+@click.option("--max-degree", type=int, default=20_000, show_default=True, help="Work out no larger degree.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@output_options
+def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
+    """Degrees of the iterates of the Kahan map of SYSTEM, their recurrence and the dynamical degree.
+
+    The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 63 bits, two of
+    each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
+
+    \b
+      kahanmaps degrees euler_top
+      kahanmaps degrees henon_heiles --seconds 20 --json
+      kahanmaps degrees weierstrass --eps 1/10 --terms 60
+      kahanmaps degrees --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)'
+
+    A recurrence is accepted where it holds for at least 2 terms more than determine it; how many is told.
+
+    Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
+    vary; 2 wrong use; 3 stopped early.
+    """
+    from kahanmaps.laboratory.degrees import degree_growth
+
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    with Progress(quiet) as progress:
+        found = degree_growth(
+            file.system,
+            eps,
+            seconds=options["seconds"],
+            max_terms=options["terms"],
+            max_degree=options["max_degree"],
+            seed=options["seed"],
+            progress=progress,
+        )
+    if as_json:
+        print_json(_record(file, options, found))
+    else:
+        lines = f"{len(found.primes)} random lines modulo primes of 63 bits"
+        at = "generic eps" if eps is None else f"eps = {eps} (time step 2 eps = {2 * eps})"
+        click.echo(f"# {file.name}, {at}, {lines}: measured, not proved")
+        click.echo(found.text)
+    if _is_done(found, options["terms"]):
+        return 0
+    if not quiet:
+        say(f"stopped early: {found.message}")
+    return 3
+
+
+def _is_done(found: DegreeGrowth, terms: int | None) -> bool:
+    if found.ended in ("recurrence", "terms", "constant", "singular"):
+        return True
+    return terms is None and found.recurrence is not None
+
+
+def _record(file: SystemFile, options: dict[str, Any], found: DegreeGrowth) -> dict[str, Any]:
+    from kahanmaps.algebra.text import format_number
+    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.version import __version__
+
+    return {
+        "command": "degrees",
+        "version": __version__,
+        "system": file.name,
+        "time_step": "generic" if found.eps is None else format_number(2 * found.eps),
+        "convention": CONVENTION,
+        "arithmetic": "modulo the primes of the lines",
+        "seconds": options["seconds"],
+        "terms_asked": options["terms"],
+        "max_degree": options["max_degree"],
+        **found.to_json(),
+        "document": dict(file.document),
+    }

@@ -1,0 +1,107 @@
+"""kahanmaps heights."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.params import PointText
+from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.render import print_json
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.height_survey import HeightSurvey
+    from kahanmaps.systems.files import SystemFile
+
+
+@click.command("heights")
+@system_options
+@eps_options
+@click.option("--starts", type=int, default=3, show_default=True, help="Number of random starts.")
+@click.option("--start", "given", type=PointText(), multiple=True, metavar="X", help="A start; may be repeated.")
+@click.option("--steps", type=int, default=60, show_default=True, help="Steps of each orbit.")
+@click.option("--max-digits", type=int, default=20_000, show_default=True, help="Digit budget of each orbit.")
+@click.option("--seconds", type=float, default=30.0, show_default=True, help="Begin no orbit after so many seconds.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random starts.")
+@output_options
+def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
+    """How fast the heights of exact orbits of the Kahan map of SYSTEM grow, from several starts.
+
+    The height is the bit length of the largest integer that a point needs. Quadratic growth goes with integrable
+    maps, exponential growth with others; bounded and linear growth are seen on special curves, too. Without --eps the
+    values 1/10 and 3/11 are taken and compared: one eps may be special. This is evidence, and no proof.
+
+    \b
+      kahanmaps heights weierstrass
+      kahanmaps heights henon_heiles --eps 1/10 --starts 5
+      kahanmaps heights euler_top --start 1,2,3 --start 1/2,1,-1 --steps 100
+      kahanmaps heights --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
+
+    Exit status: 0 all orbits that were decided agree, 2 wrong use, 3 undecided, or the orbits disagree, or the time was
+    over.
+    """
+    from kahanmaps.errors import InputError
+    from kahanmaps.family.structure import structure_of
+    from kahanmaps.invariants.heights import Growth
+    from kahanmaps.laboratory.height_survey import height_survey
+
+    if options["max_digits"] < 1:
+        raise InputError(f"found --max-digits {options['max_digits']}, expected at least 1")
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    with Progress(quiet) as progress:
+        found = height_survey(
+            file.system,
+            eps,
+            starts=options["given"] or options["starts"],
+            steps=options["steps"],
+            max_digits=options["max_digits"],
+            seconds=options["seconds"],
+            structure=structure_of(file.system, file.hamiltonian, file.member),
+            seed=options["seed"],
+            progress=progress,
+        )
+    if as_json:
+        print_json(_record(file, options, found))
+    else:
+        _print(file, found)
+    if not found.is_whole and not quiet:
+        say("stopped early: the time was over before all orbits were begun")
+    return 0 if found.is_whole and found.kind is not Growth.UNDECIDED else 3
+
+
+def _print(file: SystemFile, found: HeightSurvey) -> None:
+    from kahanmaps.algebra.text import format_number
+
+    values = dict.fromkeys(orbit.eps for orbit in found.orbits)
+    each = ", ".join(f"{value} (time step 2 eps = {2 * value})" for value in values)
+    click.echo(f"# {file.name}, eps = {each}, exact arithmetic: measured, not proved")
+    for orbit in found.orbits:
+        point = ",".join(format_number(entry) for entry in orbit.start)
+        click.echo("\t".join(["orbit", f"eps {orbit.eps}", f"start {point}", orbit.growth.text]))
+    click.echo(f"heights\t{found.text}")
+
+
+def _record(file: SystemFile, options: dict[str, Any], found: HeightSurvey) -> dict[str, Any]:
+    from kahanmaps.algebra.text import format_number
+    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.version import __version__
+
+    values = dict.fromkeys(orbit.eps for orbit in found.orbits)
+    return {
+        "command": "heights",
+        "version": __version__,
+        "system": file.name,
+        "eps": [format_number(value) for value in values],
+        "time_step": [format_number(2 * value) for value in values],
+        "convention": CONVENTION,
+        "arithmetic": "exact",
+        "seed": options["seed"],
+        "steps": options["steps"],
+        "max_digits": options["max_digits"],
+        "seconds": options["seconds"],
+        **found.to_json(),
+        "document": dict(file.document),
+    }

@@ -1,0 +1,143 @@
+"""kahanmaps lyapunov."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.ensemble_starts import drawn, read_starts
+from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.params import ExactNumber
+from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.render import print_json
+
+if TYPE_CHECKING:
+    from kahanmaps.maps.float_lyapunov import Lyapunov
+    from kahanmaps.systems.files import SystemFile
+
+_MAX_STEPS = 10**9
+_DEFAULT_STARTS = 16
+
+
+@click.command("lyapunov")
+@system_options
+@click.option("--starts", type=click.Path(), metavar="FILE", help="One point a line (text, csv), or .npy; - is stdin.")
+@click.option("--random", "count", type=int, metavar="N", help="Instead: N random starts (default 16).")
+@click.option("--box", type=ExactNumber(), metavar="R", help="... with coordinates from -R to R (default 1).")
+@click.option("--seed", type=int, metavar="S", help="... with this seed (default 0).")
+@eps_options
+@click.option("--steps", type=int, default=10_000, show_default=True, help="How many steps to count.")
+@click.option("--transient", type=int, metavar="K", help="Steps before those, not counted (default: a tenth).")
+@click.option("--seconds", type=float, default=60.0, show_default=True, help="Time for all steps.")
+@output_options
+def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
+    """Lyapunov exponents of float orbits of the Kahan map, by the exact tangent map.
+
+    Per unit of time, which is 1/(2 eps) steps, and per step: means over the starts, their spread, and how far the first
+    half of the steps is from all of them.
+
+    \b
+      kahanmaps lyapunov lorenz --eps 1/400 --box 5 --steps 20000
+      kahanmaps lyapunov euler_top --eps 1/10 --random 100 --seed 1
+      kahanmaps lyapunov henon_heiles --eps 1/10 --box 1/3 --json
+
+    Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
+    those of integrable maps tend to 0 like log(steps)/steps. The sum is checked against log |det dPhi|.
+
+    Exit status: 0 all orbits went through, 2 wrong use, 3 some ended early or the clock stopped all.
+    """
+    from kahanmaps.maps.float_lyapunov import lyapunov_exponents
+
+    eps = the_eps(options["eps"], options["time_step"])
+    steps = options["steps"]
+    transient = steps // 10 if options["transient"] is None else options["transient"]
+    _require_sense(options, steps, transient)
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    if options["starts"] is not None:
+        starts = read_starts(options["starts"], file.variables, None)
+    else:
+        count = _DEFAULT_STARTS if options["count"] is None else options["count"]
+        box = 1 if options["box"] is None else options["box"]
+        starts = drawn(count, file.system.dim, box, options["seed"] or 0, None)
+    with Progress(quiet) as progress:
+        found = lyapunov_exponents(
+            file.system,
+            eps,
+            starts,
+            steps,
+            transient=transient,
+            seconds=options["seconds"],
+            progress=progress,
+        )
+    if as_json:
+        print_json(_record(file, eps, options, found))
+    else:
+        _print(file, eps, found)
+    if found.ended and not quiet:
+        say(f"{found.ended} of {found.orbits} orbits left the range of floats or met a pole")
+    if found.stopped and not quiet:
+        say(f"stopped by the clock after {found.steps} counted steps: give more --seconds")
+    return 3 if found.ended or found.stopped else 0
+
+
+def _require_sense(options: dict[str, Any], steps: int, transient: int) -> None:
+    if options["starts"] is not None and any(options[name] is not None for name in ("count", "box", "seed")):
+        raise click.UsageError("--random, --box and --seed draw starts: they do not go with --starts FILE")
+    if not 2 <= steps <= _MAX_STEPS or not 0 <= transient <= _MAX_STEPS:
+        raise click.UsageError(f"found {steps} steps after {transient}, expected 2 to {_MAX_STEPS} after 0 or more")
+    if not options["seconds"] > 0:
+        raise click.UsageError(f"found --seconds {options['seconds']}, expected more than 0")
+
+
+def _print(file: SystemFile, eps: Any, found: Lyapunov) -> None:
+    click.echo(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), double precision")
+    click.echo(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
+    click.echo(f"steps\t{found.steps} after {found.transient}")
+    click.echo("# exponent\tper unit of time\tper step\tspread\tchange from half")
+    columns = zip(found.mean, found.mean * (2 * found.eps), found.spread, found.change, strict=True)
+    for k, numbers in enumerate(columns, 1):
+        click.echo("\t".join([str(k), *(f"{number:.6g}" for number in numbers)]))
+    volume = found.log_volume.mean() if len(found.log_volume) else float("nan")
+    click.echo(f"sum\t{found.mean.sum():.6g}")
+    click.echo(f"log |det dPhi|\t{volume:.6g}\tresidual {found.residual:.2g}")
+
+
+def _numbers(values: Any) -> list[float | None]:
+    """JSON knows no NaN."""
+    return [float(value) if isfinite(value) else None for value in values]
+
+
+def _record(file: SystemFile, eps: Any, options: dict[str, Any], found: Lyapunov) -> dict[str, Any]:
+    from kahanmaps.algebra.text import format_number
+    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.version import __version__
+
+    random = options["starts"] is None
+    box = "1" if options["box"] is None else format_number(options["box"])
+    return {
+        "command": "lyapunov",
+        "version": __version__,
+        "system": file.name,
+        "variables": list(file.variables),
+        "eps": format_number(eps),
+        "time_step": format_number(2 * eps),
+        "convention": CONVENTION,
+        "arithmetic": "float",
+        "starts": {"random": found.orbits, "box": box} if random else {"file": options["starts"]},
+        "seed": (options["seed"] or 0) if random else None,
+        "orbits": found.orbits,
+        "ended": found.ended,
+        "steps": found.steps,
+        "transient": found.transient,
+        "stopped": found.stopped,
+        "per_time": _numbers(found.mean),
+        "per_step": _numbers(found.mean * (2 * found.eps)),
+        "spread": _numbers(found.spread),
+        "change_from_half": _numbers(found.change),
+        "sum": _numbers([found.mean.sum()])[0],
+        "log_volume": _numbers([found.log_volume.mean()])[0] if len(found.log_volume) else None,
+        "residual": found.residual,
+        "document": dict(file.document),
+    }

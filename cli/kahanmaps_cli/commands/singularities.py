@@ -1,0 +1,182 @@
+"""kahanmaps singularities."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.render import on_terminal, print_json, shorten
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.fates import Hypersurface
+    from kahanmaps.laboratory.singularities import SingularityRun
+    from kahanmaps.systems.files import SystemFile
+
+
+@click.command("singularities")
+@system_options
+@eps_options
+@click.option("--steps", type=int, default=12, show_default=True, help="How many steps to follow each hypersurface.")
+@click.option("--seconds", type=float, default=60.0, show_default=True, help="Time for each eps.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@output_options
+def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
+    """Are the singularities of the Kahan map confined, and after how many steps?
+
+    The hypersurfaces that the map contracts are found over Q, its poles det(I - eps f'(x)) = 0 among them, and followed
+    along power series modulo large primes: what dimension do their images have, and when is it full again? Without
+    --eps two values are tried and compared.
+
+    \b
+      kahanmaps singularities euler_top
+      kahanmaps singularities lotka_volterra --eps 1/10 --steps 20
+      kahanmaps singularities --vars x,y --rhs 'y' --rhs '6*x^2 - 2' --json
+
+    "ranks" are the dimensions of the images after 1, 2, ... steps, "poles" the orders of their poles. Z is the
+    hyperplane at infinity. Confined
+    singularities are evidence for, and no proof of integrability: those of henon_heiles are confined, and its degrees
+    grow exponentially. "not confined" means within so many steps.
+
+    Where the polynomials are too large, ? stands for all hypersurfaces that share their multiplicity and their fate,
+    known by random points.
+
+    Exit status: 0 done, 2 wrong use, 3 undecided (stopped by the clock, or two points or two eps that differ).
+    """
+    from kahanmaps.laboratory.fates import UNDECIDED
+    from kahanmaps.laboratory.singularities import default_eps, singularities, symbolic_denominator
+
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    if options["seed"] < 0:
+        raise click.UsageError(f"found --seed {options['seed']}, expected 0 or more")
+    if not options["seconds"] > 0:
+        raise click.UsageError(f"found --seconds {options['seconds']}, expected more than 0")
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    with Progress(quiet) as progress:
+        runs = [
+            singularities(
+                file.system,
+                value,
+                steps=options["steps"],
+                seed=options["seed"],
+                seconds=options["seconds"],
+                progress=progress,
+            )
+            for value in ((eps,) if eps is not None else default_eps(options["seed"]))
+        ]
+    agree = len({run.shape for run in runs}) == 1
+    verdict = runs[0].verdict if agree else UNDECIDED
+    symbolic = symbolic_denominator(file.system) if eps is None else None
+    if as_json:
+        print_json(_record(file, options, runs, symbolic, verdict))
+    else:
+        _print(file, runs, symbolic, verdict, options["steps"])
+    if verdict == UNDECIDED and not quiet:
+        say(f"undecided: {_why(runs, agree)}")
+    return 3 if verdict == UNDECIDED else 0
+
+
+def _why(runs: list[SingularityRun], agree: bool) -> str:
+    if any(run.stopped for run in runs):
+        return "stopped by the clock: give more --seconds"
+    if not agree:
+        return "the two eps tell different things: try others with --eps"
+    return next(h.note for run in runs for h in run.hypersurfaces if h.note)
+
+
+def _ranks(found: Hypersurface) -> str:
+    return " ".join(str(step.rank) for step in found.steps)
+
+
+def _poles(found: Hypersurface) -> str:
+    return " ".join("?" if step.pole is None else str(step.pole) for step in found.steps)
+
+
+def _told(found: Hypersurface, steps: int) -> str:
+    if found.status == "confined":
+        return f"contracted by step {found.contracted_at}, confined after {found.confined_at} steps"
+    if found.status == "not confined":
+        return f"contracted by step {found.contracted_at}, not confined within {steps} steps"
+    return found.status + (f": {found.note}" if found.note else "")
+
+
+def _print(
+    file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str, steps: int
+) -> None:
+    from kahanmaps.algebra.text import format_number
+
+    def cut(text: str) -> str:
+        return shorten(text, 60) if on_terminal() else text
+
+    click.echo(f"# {file.name}, dimension {file.system.dim}, eps is half the time step")
+    if symbolic is not None:
+        factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
+        click.echo(f"det(I - eps f')\t{cut(factors) or 'constant'}")
+    for run in runs:
+        click.echo(f"\n# eps = {format_number(run.eps)}: map of degree {run.map_degree}, {run.verdict}")
+        click.echo(f"det(I - eps f')\t{cut(run.denominator)}")
+        for found in run.hypersurfaces:
+            kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
+            kind += " in all" if found.polynomial == "?" else ""
+            click.echo(f"{cut(found.polynomial)}\t{kind}\t{_told(found, steps)}")
+            if found.steps:
+                click.echo(f"  ranks {_ranks(found)}\tpoles {_poles(found)}")
+    click.echo(f"\n# {verdict}")
+
+
+def _record(
+    file: SystemFile,
+    options: dict[str, Any],
+    runs: list[SingularityRun],
+    symbolic: list[tuple[str, int]] | None,
+    verdict: str,
+) -> dict[str, Any]:
+    from kahanmaps.algebra.text import format_number
+    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.version import __version__
+
+    return {
+        "command": "singularities",
+        "version": __version__,
+        "system": file.name,
+        "convention": CONVENTION,
+        "arithmetic": "exact; series modulo primes",
+        "seed": options["seed"],
+        "steps": options["steps"],
+        "verdict": verdict,
+        "symbolic_denominator": symbolic,
+        "runs": [
+            {
+                "eps": format_number(run.eps),
+                "time_step": format_number(2 * run.eps),
+                "verdict": run.verdict,
+                "denominator": run.denominator,
+                "map_degree": run.map_degree,
+                "critical_degree": run.critical_degree,
+                "stopped": run.stopped,
+                "singular_everywhere": run.is_undefined,
+                "hypersurfaces": [
+                    {
+                        "polynomial": found.polynomial,
+                        "degree": found.degree,
+                        "is_pole": found.is_pole,
+                        "multiplicity": found.multiplicity,
+                        "status": found.status,
+                        "contracted_at": found.contracted_at,
+                        "confined_at": found.confined_at,
+                        "ranks": [step.rank for step in found.steps],
+                        "poles": [step.pole for step in found.steps],
+                        "denominators": [step.denominator for step in found.steps],
+                        "common": [step.common for step in found.steps],
+                        "primes": [str(prime) for prime in found.primes],
+                        "note": found.note,
+                    }
+                    for found in run.hypersurfaces
+                ],
+            }
+            for run in runs
+        ],
+        "document": dict(file.document),
+    }

@@ -1,0 +1,345 @@
+"""Rational functions over Q from their values modulo primes, with few values.
+
+The values come from a black box: modulo a prime p, at a point of GF(p)^s, a vector of numbers. What is sought are the
+rational functions of s symbols that these numbers are the values of. Modulo one prime:
+
+    axes    every entry is a fraction of two polynomials along each axis through one random point (the anchor): of the
+            least degrees that explain the values, with one value more than they need. This gives the exponents of
+            each symbol, so that functions of eps^2 are seen at once;
+    stages  symbols join one by one, the others staying at the anchor. The monomials that can occur are those of the
+            stage before times the exponents of the new symbol, up to a total degree known from a line; a linear system
+            N(s_k) - v_k D(s_k) = 0 gives the coefficients, hence the monomials that do occur. One more value must
+            agree.
+
+Every value ever taken serves as an equation later, and entries with one denominator share its unknowns. Modulo further
+primes the monomials are known. Coefficients follow by Chinese remainders, and the functions must give the values of
+the black box at fresh points modulo fresh primes. For values of a rational function over Q a wrong answer passes with a
+probability of about degree/2^60 at each of these points, by schwartz-1980; whether the black box is rational at all is
+known from these points only. So an answer is strong evidence, not proof.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from flint import nmod_poly
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.modular_fit import (
+    BlackBox,
+    Budget,
+    Exponents,
+    Point,
+    Quotient,
+    Shape,
+    Stop,
+    Unlucky,
+    Values,
+    fit,
+    team,
+)
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.residues import chinese, random_prime, rational_reconstruction, rational_vector
+from kahanmaps.errors import BadPrime
+
+__all__ = ["Reconstruction", "rational_reconstruction", "rational_vector", "reconstruct"]
+
+
+_UNLUCKY_PRIMES = 3  # so many primes may fail before the black box is blamed
+_CONFIRMATIONS = 5  # values modulo a fresh prime each; a box like the Legendre symbol passes any one half of the time
+
+
+@dataclass(frozen=True)
+class Reconstruction:
+    """What `reconstruct` found: the functions, or None and the reason why not.
+
+    `samples` counts the calls of the black box, those without a value included; `primes` are those that were used.
+    """
+
+    functions: tuple[RationalFunction, ...] | None
+    reason: str
+    samples: int
+    primes: tuple[int, ...]
+
+
+def reconstruct(
+    black_box: BlackBox,
+    names: Sequence[str],
+    *,
+    seed: int = 0,
+    max_degree: int = 40,
+    max_samples: int = 3000,
+    deadline: float | None = None,
+) -> Reconstruction:
+    """The rational functions over Q of the symbols `names` that a black box gives the values of.
+
+    Args:
+        black_box: `black_box(prime, point)` returns the values modulo the prime, always equally many integers, at a
+            point of as many integers as there are names; None where there is no value (a pole, say).
+        names: the symbols; without any, the numbers themselves are found from their residues.
+        seed: decides the primes (of 61 bits) and points.
+        max_degree: along any line the degrees of numerator and denominator add up to at most twice this number.
+        max_samples: bound for the number of calls.
+        deadline: a value of `time.monotonic()` at which to give up, looked at between calls.
+
+    Returns:
+        A `Reconstruction`: functions in lowest terms, or None and a reason. A black box that is not rational, or that
+        disagrees with itself modulo different primes, gives None. The answer is exact and has been compared with the
+        black box at fresh points modulo fresh primes: it is strong evidence, not proof.
+
+    Raises:
+        InputError: where the black box returns values of different lengths.
+
+    >>> def box(p, point):
+    ...     x, y = point
+    ...     return [(x + y) * pow(3 * x * y + 1, -1, p), 5 * pow(7, -1, p)]
+    >>> found = reconstruct(box, ["x", "y"])
+    >>> [f"({f.numerator})/({f.denominator})" for f in found.functions], found.samples
+    (['(x + y)/(3*x*y + 1)', '(5/7)/(1)'], 17)
+    >>> reconstruct(lambda p, point: [pow(point[0], (p + 5) // 2, p)], ["x"]).reason
+    'not the values of a rational function of degree at most 40 along a line'
+    """
+    rng = random.Random(seed)
+    budget = Budget(max_samples, deadline)
+    primes: list[int] = []
+
+    def fresh() -> Values:
+        prime = random_prime(rng)
+        while prime in primes:
+            prime = random_prime(rng)
+        primes.append(prime)
+        return Values(black_box, prime, budget)
+
+    reason = ""
+    try:
+        for _ in range(_UNLUCKY_PRIMES):
+            try:
+                functions = _lift(_first_prime(fresh(), len(names), max_degree, rng), fresh, tuple(names), primes, rng)
+                return Reconstruction(functions, "", budget.spent, tuple(primes))
+            except Unlucky as unlucky:
+                reason = str(unlucky)
+    except Stop as stop:
+        reason = str(stop)
+    return Reconstruction(None, reason, budget.spent, tuple(primes))
+
+
+# -- modulo the first prime --------------------------------------------------------------------------------------------
+
+
+def _first_prime(values: Values, symbols: int, max_degree: int, rng: random.Random) -> list[Quotient]:
+    """The functions modulo one prime."""
+    p = values.prime
+    values.take(values.anywhere(symbols, rng))
+    anchor = values.points[0]
+    one: Exponents = (0,) * symbols
+    entries = range(len(values.values[0]))
+    found = [Quotient(Shape((one,) if v else (), (one,)), (v,) if v else (), (1,)) for v in values.values[0]]
+    axes = []
+    for j in range(symbols):
+        direction = tuple(int(i == j) for i in range(symbols))
+        axes.append(_along_line(values, anchor, direction, max_degree, rng))
+    # Large degrees first: the last symbol multiplies all monomials found until then.
+    order = sorted(range(symbols), key=lambda j: -max((_size(N) + _size(D) for N, D in axes[j]), default=0))
+    keys: list[list[str]] = [[] for _ in entries]
+    for stage, j in enumerate(order):
+        active = order[: stage + 1]
+        for i in entries:
+            keys[i].append(str(axes[j][i][1]))
+        moving = [i for i in entries if _size(axes[j][i][0]) or _size(axes[j][i][1])]
+        for i in moving:
+            if found[i].shape.unknowns <= 2 and set(found[i].shape.above + found[i].shape.below) <= {one}:
+                found[i] = _on_axis(axes[j][i], j, symbols, p)
+        moving = [i for i in moving if any(sum(m) != m[j] for m in (*found[i].shape.above, *found[i].shape.below))]
+        if not moving:
+            continue
+        shapes = {i: _extended(found[i].shape, axes[j][i], j) for i in moving}
+        bound = max(sum(_size(axes[a][i][0]) + _size(axes[a][i][1]) for a in active) + 2 for i in moving)
+        if max(shape.unknowns for shape in shapes.values()) > bound:
+            direction = tuple(rng.randrange(1, p) if i in active else 0 for i in range(symbols))
+            line = _along_line(values, anchor, direction, max_degree, rng)
+            for i in moving:
+                keys[i].append(str(line[i][1]))
+                shapes[i] = Shape(
+                    tuple(m for m in shapes[i].above if sum(m) <= _size(line[i][0])),
+                    tuple(m for m in shapes[i].below if sum(m) <= _size(line[i][1])),
+                )
+        groups: dict[tuple[str, ...], list[int]] = {}
+        for i in moving:
+            groups.setdefault(tuple(keys[i]), []).append(i)
+        teams = [team(group, [_up_to_factor(axes[j][i][0]) for i in group], shapes) for group in groups.values()]
+        fixed = {i: anchor[i] for i in order[stage + 1 :]}
+        for i, quotient in fit(values, shapes, teams, symbols, rng, fixed).items():
+            found[i] = quotient
+    return found
+
+
+def _size(polynomial: nmod_poly) -> int:
+    return max(0, int(polynomial.degree()))
+
+
+def _up_to_factor(polynomial: nmod_poly) -> str:
+    return str(polynomial / polynomial.leading_coefficient()) if int(polynomial.degree()) >= 0 else ""
+
+
+def _along_line(
+    values: Values, anchor: Point, direction: Point, max_degree: int, rng: random.Random
+) -> list[tuple[nmod_poly, nmod_poly]]:
+    """All entries as fractions (N, D) of polynomials in t at the points anchor + t direction; D is monic.
+
+    Along an axis t is counted from the origin, so that exponents of t are exponents of the symbol.
+    """
+    p = values.prime
+    moving = [i for i, d in enumerate(direction) if d]
+    start = anchor[moving[0]] if len(moving) == 1 else 0
+    where = [start]
+
+    def draw() -> Point:
+        t = rng.randrange(p)
+        while t in where:
+            t = rng.randrange(p)
+        where.append(t)
+        return tuple((a + (t - start) * d) % p for a, d in zip(anchor, direction, strict=True))
+
+    count = len(values.values[0])
+    vanishing = nmod_poly([-start, 1], p)
+    through = [nmod_poly([v], p) for v in values.values[0]]
+    found: list[tuple[nmod_poly, nmod_poly] | None] = [None] * count
+    n = 1
+    while any(pair is None for pair in found):
+        if n > 2 * max_degree + 2:
+            raise Stop(f"not the values of a rational function of degree at most {max_degree} along a line")
+        values.take(draw)
+        t, n = where[-1], n + 1
+        slope = 1 / vanishing(t)
+        for i in range(count):
+            if found[i] is None:
+                values.budget.check()
+                through[i] += vanishing * ((values.values[-1][i] - through[i](t)) * slope)
+        vanishing *= nmod_poly([-t, 1], p)
+        for i in range(count):
+            if found[i] is None:
+                found[i] = _least_fraction(through[i], vanishing, n)
+    return [pair for pair in found if pair is not None]
+
+
+def _least_fraction(through: nmod_poly, vanishing: nmod_poly, n: int) -> tuple[nmod_poly, nmod_poly] | None:
+    """The fraction N/D = through modulo `vanishing` with deg N + deg D <= n - 2, D monic: the euclidean algorithm."""
+    p = through.modulus()
+    before, after = (vanishing, nmod_poly([0], p)), (through, nmod_poly([1], p))
+    while True:
+        N, D = after
+        if _size(N) + _size(D) <= n - 2:
+            if int(D.gcd(vanishing).degree()) > 0:
+                return None
+            lead = D.leading_coefficient()
+            return N / lead, D / lead
+        if int(N.degree()) <= 0:
+            return None
+        quotient, rest = divmod(before[0], N)
+        before, after = after, (rest, before[1] - quotient * D)
+
+
+def _on_axis(pair: tuple[nmod_poly, nmod_poly], j: int, symbols: int, prime: int) -> Quotient:
+    """A function of one symbol from its fraction along the axis."""
+    N, D = ([int(c) for c in polynomial.coeffs()] for polynomial in pair)
+    powers = [tuple(e if i == j else 0 for i in range(symbols)) for e in range(max(len(N), len(D)))]
+    quotient = Quotient.of(Shape(tuple(powers[: len(N)]), tuple(powers[: len(D)])), N, D, prime)
+    assert quotient is not None  # D is monic
+    return quotient
+
+
+def _extended(shape: Shape, pair: tuple[nmod_poly, nmod_poly], j: int) -> Shape:
+    """The monomials that can occur when symbol j joins, with its exponents along the axis."""
+
+    def times(monomials: tuple[Exponents, ...], polynomial: nmod_poly) -> tuple[Exponents, ...]:
+        exponents = [e for e, c in enumerate(polynomial.coeffs()) if int(c)]
+        return tuple((*m[:j], e, *m[j + 1 :]) for m in monomials for e in exponents)
+
+    return Shape(times(shape.above, pair[0]), times(shape.below, pair[1]))
+
+
+# -- modulo further primes ---------------------------------------------------------------------------------------------
+
+
+def _lift(
+    first: list[Quotient], fresh: Callable[[], Values], names: tuple[str, ...], primes: list[int], rng: random.Random
+) -> tuple[RationalFunction, ...]:
+    """The functions over Q. Raises Unlucky where values modulo other primes do not fit."""
+    modulus = primes[-1]
+    shapes = {i: quotient.shape for i, quotient in enumerate(first)}
+    residues = [[*quotient.above, *quotient.below] for quotient in first]
+    groups: dict[object, list[int]] = {}
+    for i, quotient in enumerate(first):
+        groups.setdefault((quotient.shape.below, quotient.below), []).append(i)
+    teams = [
+        team(group, [str(first[i].numerator_up_to_factor(modulus)) for i in group], shapes) for group in groups.values()
+    ]
+    misfits = 0
+    while True:
+        functions = _recognised(list(shapes.values()), residues, modulus, names)
+        try:
+            if functions is None:
+                values = fresh()
+            elif (refuting := _refuting(functions, fresh, rng)) is not None:
+                values = refuting
+            else:
+                return functions
+            found = fit(values, shapes, teams, len(names), rng)
+            if any(found[i].shape.lead != shape.lead for i, shape in shapes.items()):
+                raise Unlucky(f"the prime {values.prime} divides a leading coefficient")
+        except Unlucky:
+            misfits += 1
+            if misfits >= _UNLUCKY_PRIMES:
+                raise
+            continue
+        for i, shape in shapes.items():
+            coefficients = dict(zip(found[i].shape.above, found[i].above, strict=True))
+            lower = dict(zip(found[i].shape.below, found[i].below, strict=True))
+            new = [*(coefficients.get(m, 0) for m in shape.above), *(lower.get(m, 0) for m in shape.below)]
+            residues[i] = chinese(residues[i], modulus, new, values.prime)
+        modulus *= values.prime
+
+
+def _recognised(
+    shapes: list[Shape], residues: list[list[int]], modulus: int, names: tuple[str, ...]
+) -> tuple[RationalFunction, ...] | None:
+    """The functions whose coefficients have these residues, if simple ones do."""
+    context = ring(names)
+    functions = []
+    for shape, entries in zip(shapes, residues, strict=True):
+        coefficients = rational_vector(entries, modulus)
+        if coefficients is None:
+            return None
+        size = len(shape.above)
+        N = context.from_dict({m: c for m, c in zip(shape.above, coefficients[:size], strict=True) if c != 0})
+        D = context.from_dict({m: c for m, c in zip(shape.below, coefficients[size:], strict=True) if c != 0})
+        common = N.gcd(D)
+        functions.append(RationalFunction(N / common, D / common))
+    return tuple(functions)
+
+
+def _refuting(
+    functions: tuple[RationalFunction, ...], fresh: Callable[[], Values], rng: random.Random
+) -> Values | None:
+    """The black box modulo a prime where the functions do not give its value, if one of some fresh primes is such."""
+    for _ in range(_CONFIRMATIONS):
+        values = fresh()
+        if not _confirmed(functions, values, rng):
+            return values
+    return None
+
+
+def _confirmed(functions: tuple[RationalFunction, ...], values: Values, rng: random.Random) -> bool:
+    """Whether the functions give the value of the black box at one more point."""
+    values.take(values.anywhere(len(functions[0].names) if functions else 0, rng))
+    field = GF(values.prime)
+    point = [field.convert(entry) for entry in values.points[-1]]
+    try:
+        found = [function.value(field, point) for function in functions]
+    except BadPrime as error:
+        raise Unlucky(str(error)) from error
+    return all(
+        mine is not None and field.convert(mine) == value for mine, value in zip(found, values.values[-1], strict=True)
+    )

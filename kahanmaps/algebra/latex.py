@@ -1,0 +1,125 @@
+r"""Names, polynomials and rational functions as LaTeX for formulas, exactly.
+
+    x1 -> x_1    x12 -> x_{12}    eps -> \varepsilon    alpha2 -> \alpha_2    al -> al    my_H -> \mathrm{my\_H}
+
+The text belongs into math mode. Products are written with a space, so that a reader, and a program, can take the
+factors apart again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
+from kahanmaps.errors import InputError
+
+# TeX has no commands for the letters that look Latin, such as omicron and capital Alpha.
+_GREEK = re.compile(
+    "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|iota|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|upsilon|phi|chi|psi|omega"
+    "|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Upsilon|Phi|Psi|Omega"
+)
+_WITH_INDEX = re.compile(r"([A-Za-z]+)([0-9]*)")
+_ESCAPES = {
+    "\\": r"\textbackslash{}",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+    "$": r"\$",
+    **{mark: "\\" + mark for mark in "_{}&#%"},
+}
+
+
+def latex_name(name: str) -> str:
+    r"""A name as LaTeX: final digits become an index, eps \varepsilon, Greek names Greek letters.
+
+    `name` is printable text; what is not letters followed by digits is set upright, with TeX's special characters
+    escaped. Different names give different text. Raises InputError for text that is empty or not printable.
+
+    >>> print(latex_name("x1"), latex_name("eps"), latex_name("Gamma12"), latex_name("al"), latex_name("modified_H"))
+    x_1 \varepsilon \Gamma_{12} al \mathrm{modified\_H}
+    """
+    if not name or not name.isprintable():
+        raise InputError(f"found the name {name[:40]!r}, expected printable text")
+    match = _WITH_INDEX.fullmatch(name)
+    if match is None:
+        return r"\mathrm{" + "".join(_ESCAPES.get(mark, mark) for mark in name) + "}"
+    letters, digits = match.groups()
+    if letters == "eps":
+        letters = r"\varepsilon"
+    elif _GREEK.fullmatch(letters):
+        letters = "\\" + letters
+    return letters + ("_" + _braced(digits) if digits else "")
+
+
+def latex_number(value: fmpq) -> str:
+    r"""An exact number as LaTeX.
+
+    >>> print(latex_number(fmpq(-3, 2)), latex_number(fmpq(7)))
+    -\frac{3}{2} 7
+    """
+    size = str(abs(value.p)) if value.q == 1 else rf"\frac{{{abs(value.p)}}}{{{value.q}}}"
+    return f"-{size}" if value < 0 else size
+
+
+def latex_polynomial(polynomial: fmpq_mpoly) -> str:
+    r"""A polynomial over Q as LaTeX, exact: its terms by increasing powers of eps, else in the order of its ring.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> print(latex_polynomial(parse_polynomial("x1^3/3 - eps^12*x1 + 1/2", ["x1", "eps"])))
+    \frac{1}{3} x_1^3 + \frac{1}{2} - \varepsilon^{12} x_1
+    """
+    names = names_of(polynomial)
+    order = sorted(range(len(names)), key=lambda k: names[k] != "eps")
+    ordered = [latex_name(names[k]) for k in order]
+    text = ""
+    for monomial, coefficient in _terms(polynomial):
+        term = _term(abs(coefficient), [monomial[k] for k in order], ordered)
+        if coefficient < 0:
+            text += f" - {term}" if text else f"-{term}"
+        else:
+            text += f" + {term}" if text else term
+    return text or "0"
+
+
+def latex_rational_function(function: RationalFunction) -> str:
+    r"""A quotient of polynomials over Q as LaTeX, exact, without fractions inside the fraction.
+
+    The denominator starts with a positive term. Common factors stay, as they do in `RationalFunction`.
+
+    >>> from kahanmaps.algebra.text import parse_rational_function
+    >>> print(latex_rational_function(parse_rational_function("(x/2 + 1)/(1 - eps^2*x)", ["x", "eps"])))
+    \frac{x + 2}{2 - 2 \varepsilon^2 x}
+    """
+    if function.is_polynomial:  # the denominator is 1 then
+        return latex_polynomial(function.numerator)
+    factor = fmpq(common_denominator(function.numerator))
+    if _terms(function.denominator)[0][1] < 0:
+        factor = -factor
+    above, below = function.numerator * factor, function.denominator * factor
+    return rf"\frac{{{latex_polynomial(above)}}}{{{latex_polynomial(below)}}}"
+
+
+def _terms(polynomial: fmpq_mpoly) -> list[tuple[tuple[int, ...], fmpq]]:
+    """Exponents and coefficients, those without eps first: what remains for eps = 0 is read first."""
+    names = names_of(polynomial)
+    at = names.index("eps") if "eps" in names else None
+    terms = [(tuple(int(exponent) for exponent in monomial), value) for monomial, value in polynomial.terms()]
+    return terms if at is None else sorted(terms, key=lambda term: term[0][at])
+
+
+def _term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:
+    """One term with a positive coefficient; a coefficient 1 is left out before factors."""
+    factors = [
+        name if exponent == 1 else f"{name}^{_braced(str(exponent))}"
+        for name, exponent in zip(names, exponents, strict=True)
+        if exponent
+    ]
+    if not factors or coefficient != 1:
+        factors.insert(0, latex_number(coefficient))
+    return " ".join(factors)
+
+
+def _braced(digits: str) -> str:
+    return digits if len(digits) == 1 else f"{{{digits}}}"

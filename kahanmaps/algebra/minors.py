@@ -1,0 +1,43 @@
+"""The kernel of an n x (n + 1) matrix by its maximal minors, over any commutative ring and without division."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any
+
+Product = Callable[[Any, Any], Any]
+
+
+def kernel_minors(rows: Sequence[Sequence[Any]], times: Product = operator.mul) -> list[Any]:
+    """The vector of signed maximal minors of an n x (n + 1) matrix, which the matrix sends to zero.
+
+    `rows` are n >= 1 rows of n + 1 elements of any commutative ring (numbers, polynomials, arrays): exact if the ring
+    is. `times` multiplies two of them. All minors of the first k rows are kept, so that 2^(n+1) n/2 products are taken.
+    Returns the n + 1 minors, the k-th without column k and with the sign (-1)^k.
+
+    >>> kernel_minors([[1, 2, 3], [4, 5, 6]])
+    [-3, 6, -3]
+    """
+    width = len(rows) + 1
+    minors: dict[int, Any] = {1 << j: entry for j, entry in enumerate(rows[0])}
+    for k, row in enumerate(rows[1:], start=2):
+        larger: dict[int, Any] = {}
+        for mask in range(1 << width):
+            if mask.bit_count() != k:
+                continue
+            total: Any = None
+            place = 0
+            for j in range(width):
+                if not mask >> j & 1:
+                    continue
+                term = times(row[j], minors[mask ^ 1 << j])
+                if (k - 1 + place) % 2:
+                    total = -term if total is None else total - term
+                else:
+                    total = term if total is None else total + term
+                place += 1
+            larger[mask] = total
+        minors = larger
+    full = (1 << width) - 1
+    return [-minors[full ^ 1 << j] if j % 2 else minors[full ^ 1 << j] for j in range(width)]

@@ -1,0 +1,104 @@
+"""Rational numbers from their residues: Wang's reconstruction, many numbers over one denominator, Chinese remainders.
+
+Nothing here proves that a number found is the one meant: a residue fits infinitely many fractions, and these functions
+return the simplest. Whoever calls them has to check the answer, for instance modulo another prime.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+
+from flint import fmpq, fmpz, fmpz_mat
+
+_TOGETHER = 7  # residues in one lattice: heights up to m^(7/8), where Wang's bound is m^(1/2)
+_SPARE_BITS = 4  # by which a common denominator must beat what chance would give
+
+
+def random_prime(rng: random.Random, bits: int = 61) -> int:
+    """A random prime with this number of bits, at least 2; a given `rng` in a given state always gives the same one.
+
+    >>> random_prime(random.Random(1)).bit_length()
+    61
+    """
+    while True:
+        candidate = rng.getrandbits(bits) | (1 << (bits - 1)) | (bits > 2)
+        if fmpz(candidate).is_prime():
+            return candidate
+
+
+def rational_reconstruction(residue: int, modulus: int) -> fmpq | None:
+    """The fraction n/d = residue modulo `modulus` with |n| and d at most sqrt((modulus - 1)/2), if there is one.
+
+    There is at most one. Exact; `modulus` is at least 2 and need not be prime.
+
+    >>> rational_reconstruction(pow(3, -1, 101) * 2, 101)
+    2/3
+    >>> rational_reconstruction(12, 101) is None
+    True
+    """
+    bound = int(fmpz((modulus - 1) // 2).isqrt())
+    above, below = (modulus, 0), (residue % modulus, 1)
+    while below[0] > bound:
+        quotient = above[0] // below[0]
+        above, below = below, (above[0] - quotient * below[0], above[1] - quotient * below[1])
+    n, d = below
+    if d == 0 or abs(d) > bound or fmpz(n).gcd(fmpz(d)) != 1:
+        return None
+    return fmpq(n, d)
+
+
+def rational_vector(residues: Sequence[int], modulus: int) -> tuple[fmpq, ...] | None:
+    """The simplest fractions with these residues, taken together; None where no simple ones stand out.
+
+    Numbers over one common denominator may be higher than alone: for k of them up to about modulus^(k/(k+1)), found as
+    a short vector of a lattice. Exact, but a guess: see the top of the file.
+
+    >>> m = 2**61 - 1
+    >>> numbers = [fmpq(n, 10**12 + 39) for n in (10**12, 314159265358, -271828182845, 141421356237)]
+    >>> residues = [int(x.p) * pow(int(x.q), -1, m) % m for x in numbers]
+    >>> rational_vector(residues, m) == tuple(numbers), rational_reconstruction(residues[0], m) == numbers[0]
+    (True, False)
+    """
+    telling = [i for i, residue in enumerate(residues) if residue not in (0, 1, modulus - 1)]
+    step = -(-len(telling) // _TOGETHER) or 1
+    chosen = [residues[i] for i in telling[::step]]
+    below = _common_denominator(chosen, modulus) if len(chosen) > 1 else None
+    if below is None:
+        below = 1
+        bound = int(fmpz((modulus - 1) // 2).isqrt())
+    else:
+        bound = int(fmpz(modulus ** len(chosen)).root(len(chosen) + 1)) >> _SPARE_BITS
+    found = []
+    for residue in residues:
+        n = residue * below % modulus
+        n = n - modulus if n > modulus // 2 else n
+        if abs(n) > bound:
+            fraction = rational_reconstruction(n, modulus)
+            if fraction is None:
+                return None
+            below *= int(fraction.q)  # the others most likely need it too
+            found.append(fraction / (below // int(fraction.q)))
+        else:
+            found.append(fmpq(n, below))
+    return tuple(found)
+
+
+def _common_denominator(residues: Sequence[int], modulus: int) -> int | None:
+    """The q > 0 for which q and all q r modulo `modulus` are smallest, if that is smaller than chance allows."""
+    k = len(residues)
+    rows = [[1, *residues], *([0] + [modulus if i == j else 0 for i in range(k)] for j in range(k))]
+    shortest = min(fmpz_mat(rows).lll().tolist(), key=lambda row: max(abs(entry) for entry in row))
+    q = abs(int(shortest[0]))
+    size = max(abs(int(entry)) for entry in shortest)
+    return q if q and size ** (k + 1) << (_SPARE_BITS * (k + 1)) <= modulus**k else None
+
+
+def chinese(old: Sequence[int], modulus: int, new: Sequence[int], prime: int) -> list[int]:
+    """The residues modulo `modulus * prime` that are `old` modulo the first and `new` modulo the second.
+
+    >>> chinese([1, 2], 3, [4, 0], 5)
+    [4, 5]
+    """
+    inverse = pow(modulus, -1, prime)
+    return [x + modulus * ((y - x) * inverse % prime) for x, y in zip(old, new, strict=True)]

@@ -1,0 +1,347 @@
+"""All rational solutions of a small system of polynomial equations over Q, exactly: factor and branch.
+
+Equations that factor are branched on, linear ones are substituted, and where nothing factors a Groebner basis of
+bounded size is computed. A finite set of solutions is then read off from a matrix of multiplication in the quotient
+ring, whose rational eigenvalues are the values of a linear form at the rational solutions. What is left is told, never
+dropped: linear families with free variables, equations that this does not solve, and how many solutions are not
+rational. Every step loses no rational solution.
+"""
+
+from __future__ import annotations
+
+import itertools
+import random
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpz_mpoly_ctx, fmpz_mpoly_vec
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import nullspace
+from kahanmaps.algebra.polynomials import common_denominator, degree, evaluate, names_of, primitive_part
+
+# Of a Groebner basis: polynomials, terms of one, bits of a coefficient. FLINT cannot be interrupted.
+GROEBNER_LIMITS = (120, 400, 4_000)
+MAX_PARTS = 400  # points, families and unsolved parts together
+MAX_QUOTIENT = 130  # dimension of the quotient ring, so the number of solutions over the complex numbers
+
+
+@dataclass(frozen=True)
+class Component:
+    """Solutions: `values` are the variables as polynomials of degree at most 1 in those that stay free.
+
+    `equations` hold for the free variables (none: a linear family, or one point where nothing is free).
+    """
+
+    values: tuple[fmpq_mpoly, ...]
+    equations: tuple[fmpq_mpoly, ...] = ()
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        """The indices of the variables that stay free."""
+        used = [False] * self.values[0].context().nvars()
+        for value in (*self.values, *self.equations):
+            for i, exponent in enumerate(value.degrees()):
+                used[i] = used[i] or exponent > 0
+        return tuple(i for i, u in enumerate(used) if u)
+
+    @property
+    def point(self) -> tuple[fmpq, ...]:
+        """The values where the free variables are 0."""
+        zero = (0,) * self.values[0].context().nvars()
+        return tuple(value[zero] if not value.is_zero() else fmpq(0) for value in self.values)
+
+    def slopes(self, i: int) -> list[fmpq]:
+        """The direction of the family that belongs to its free variable i."""
+        return [v.derivative(i).leading_coefficient() if v.degrees()[i] else fmpq(0) for v in self.values]
+
+    def contains(self, other: Component) -> bool:
+        """Whether the linear family `other`, or the point, lies in this linear family."""
+        size = len(self.values)
+        slopes = [self.slopes(i) for i in self.free]
+        space = fmpq_mat(size, len(slopes), [slope[k] for k in range(size) for slope in slopes])
+        offset = [a - b for a, b in zip(other.point, self.point, strict=True)]
+        vectors = [offset, *(other.slopes(i) for i in other.free)]
+        wider = fmpq_mat([[*space.tolist()[k], *(v[k] for v in vectors)] for k in range(size)])
+        return int(wider.rank()) == len(slopes)
+
+
+@dataclass
+class Solutions:
+    """What was found: linear families and points, what was not solved, and what is not rational."""
+
+    components: list[Component] = field(default_factory=list)
+    unsolved: list[Component] = field(default_factory=list)
+    irrational: list[str] = field(default_factory=list)
+    reason: str = ""  # why something is unsolved
+
+    @property
+    def complete(self) -> bool:
+        """Whether every rational solution is in one of the components."""
+        return not self.unsolved
+
+
+def solve_system(equations: Sequence[fmpq_mpoly], variables: Sequence[fmpq_mpoly], deadline: float) -> Solutions:
+    """The rational solutions of `equations` = 0, polynomials in the ring whose generators are `variables`.
+
+    Exact. `deadline` is a value of time.monotonic(): what is not solved by then is returned as unsolved.
+
+    >>> from kahanmaps.algebra.polynomials import ring
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> found = solve_system([x**2 - 1, x*y - y], (x, y), time.monotonic() + 10)
+    >>> [component.values for component in found.components]
+    [(-1, 0), (1, y)]
+    >>> solve_system([x**2 - 2, y], (x, y), time.monotonic() + 10).irrational
+    ['x^2 - 2']
+    """
+    solver = _Solver(deadline)
+    solver.solve(list(equations), tuple(variables))
+    found = solver.found
+    found.components = without_contained(found.components)
+    found.irrational = list(dict.fromkeys(found.irrational))
+    return found
+
+
+def independent(polynomials: Iterable[fmpq_mpoly]) -> list[fmpq_mpoly]:
+    """The reduced basis of the linear span, leading monomials first, with coprime integer coefficients.
+
+    >>> from kahanmaps.algebra.polynomials import ring
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> independent([x**2 + x, x**2 + y, x - y])
+    [x^2 + y, x - y]
+    """
+    nonzero = [p for p in polynomials if not p.is_zero()]
+    if not nonzero:
+        return []
+    context = nonzero[0].context()
+    # A polynomial with all the monomials has them in the order of the ring.
+    order = context.from_dict({m: fmpq(1) for p in nonzero for m in p.monoms()}).monoms()
+    places = {tuple(m): k for k, m in enumerate(order)}
+    matrix = fmpq_mat(len(nonzero), len(places))
+    for i, p in enumerate(nonzero):
+        for monomial, value in p.terms():
+            matrix[i, places[tuple(monomial)]] = value
+    reduced, rank = matrix.rref()
+    basis = []
+    for i in range(rank):
+        row = {m: reduced[i, k] for k, m in enumerate(order) if reduced[i, k] != 0}
+        basis.append(primitive_part(context.from_dict(row))[1])
+    return basis
+
+
+def normal_form(p: fmpq_mpoly, basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
+    """The remainder on division by all of `basis`: the normal form, where that is a Groebner basis.
+
+    >>> from kahanmaps.algebra.polynomials import ring
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> normal_form(x**2*y + x, [x*y - 1])
+    2*x
+    """
+    context = p.context()
+    done = context.constant(0)
+    leads = [(tuple(g.monoms()[0]), g) for g in basis]
+    while not p.is_zero():
+        top, value = tuple(p.monoms()[0]), p.leading_coefficient()
+        for lead, g in leads:
+            if all(a <= b for a, b in zip(lead, top, strict=True)):
+                rest = context.from_dict({tuple(b - a for a, b in zip(lead, top, strict=True)): fmpq(1)})
+                p = p - g * rest * (value / g.leading_coefficient())
+                break
+        else:
+            head = context.from_dict({top: value})
+            done, p = done + head, p - head
+    return done
+
+
+def decoupling(forms: Sequence[fmpq_mpoly], count: int) -> fmpq_mat | None:
+    """Coordinates in which cubic forms may fall apart: a matrix whose columns are the new basis, or None.
+
+    If the span of the forms has a basis each of which depends on its own coordinates, the Hessians of its members are
+    simultaneously block diagonal in these. They are the kernels of the factors of the characteristic polynomial
+    of the quotient of two of them. Any invertible matrix is a valid answer, and this one passes a third Hessian.
+    """
+    if not forms or count < 2:
+        return None
+    rng = random.Random("decoupling")
+
+    def hessian() -> fmpq_mat:
+        """Of a random combination, at a random point."""
+        total = forms[0].context().constant(0)
+        for p in forms:
+            total = total + p * fmpq(rng.randint(1, 99))
+        point = [fmpq(rng.randint(-99, 99)) for _ in range(count)]
+        second = (total.derivative(i).derivative(j) for i in range(count) for j in range(count))
+        return fmpq_mat(count, count, [evaluate(p, QQ, point) for p in second])
+
+    first = hessian()
+    if first.det() == 0:
+        return None
+    ratio = first.solve(hessian())
+    _, factors = ratio.charpoly().factor()
+    blocks = []
+    for factor, multiplicity in factors:
+        part = fmpq_mat(count, count)
+        power = QQ.identity(count)
+        for coefficient in (factor**multiplicity).coeffs():
+            part = part + power * coefficient
+            power = power * ratio
+        blocks.append(nullspace(QQ, part))
+    T = fmpq_mat([list(column) for block in blocks for column in block]).transpose()
+    # Coordinates that do not decouple would only make the numbers longer.
+    inside = [k for k, block in enumerate(blocks) for _ in block]
+    check = T.transpose() * hessian() * T
+    apart = all(check[i, j] == 0 for i in range(count) for j in range(count) if inside[i] != inside[j])
+    return T if apart and len(blocks) > 1 else None
+
+
+class _Solver:
+    def __init__(self, deadline: float) -> None:
+        self.deadline = deadline
+        self.found = Solutions()
+        self.stopped = ""
+
+    def solve(self, equations: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], based: bool = False) -> None:
+        """Add the solutions of `equations` to what was found; `based` says that they are a Groebner basis already."""
+        if self.stopped:  # told once
+            return
+        equations = equations if based else independent(equations)
+        if any(p.is_constant() for p in equations):
+            return
+        if not equations:
+            self.found.components.append(Component(values))
+            return
+        if time.monotonic() > self.deadline:
+            self.stopped = "the time is over"
+        elif len(self.found.components) + len(self.found.unsolved) > MAX_PARTS:
+            self.stopped = f"there are more than {MAX_PARTS} parts"
+        if self.stopped:
+            self._give_up(equations, values, self.stopped)
+            return
+        for p in sorted(equations, key=degree):
+            if degree(p) == 1:
+                self._substitute(p, equations, values)
+                return
+        best: list[fmpq_mpoly] | None = None
+        for p in equations:
+            _, powers = p.factor()
+            factors = [factor for factor, _ in powers]
+            if len(factors) == 1 and powers[0][1] == 1:
+                continue
+            if best is None or _badness(factors) < _badness(best):
+                best = factors
+        if best is not None:
+            for factor in sorted(best, key=lambda q: (degree(q), str(q))):
+                # The remainders: or the same product, mixed with other equations, would be branched on again.
+                self.solve([factor, *(divmod(p, factor)[1] for p in equations)], values)
+            return
+        for p in equations:
+            if sum(e > 0 for e in p.degrees()) == 1:  # irreducible in one variable: no rational root
+                self.found.irrational.append(str(primitive_part(p)[1]))
+                return
+        if based:
+            self._finite(equations, values)
+            return
+        basis = _groebner(equations)
+        if basis is None:
+            self._give_up(equations, values, "a Groebner basis would be too large")
+            return
+        self.solve(basis, values, based=True)
+
+    def _substitute(self, linear: fmpq_mpoly, equations: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
+        context = linear.context()
+        gens = list(context.gens())
+        k = max(i for i, e in enumerate(linear.degrees()) if e)
+        slope = linear.derivative(k).leading_coefficient()
+        gens[k] = gens[k] - linear / slope
+        self.solve(
+            [p.compose(*gens, ctx=context) for p in equations], tuple(v.compose(*gens, ctx=context) for v in values)
+        )
+
+    def _finite(self, basis: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
+        """Branch on the rational values of a linear form, where the Groebner basis says that solutions are finite."""
+        free = sorted({i for p in basis for i, e in enumerate(p.degrees()) if e})
+        quotient = _quotient(basis, free)
+        if quotient is None:
+            self._give_up(basis, values, "the solutions are not isolated points, and not linear families")
+            return
+        if len(quotient) > MAX_QUOTIENT:
+            self._give_up(basis, values, f"there are {len(quotient)} solutions over the complex numbers")
+            return
+        gens = basis[0].context().gens()
+        form = sum((gens[i] * (k * k + 1) for k, i in enumerate(free)), basis[0].context().constant(0))
+        matrix = _multiplication(form, quotient, basis)
+        _, factors = matrix.charpoly().factor()
+        for factor, _ in factors:
+            if factor.degree() > 1:
+                self.found.irrational.append(f"a group of {factor.degree()} conjugate solutions")
+            else:
+                self.solve([*basis, form + factor[0] / factor[1]], values)
+
+    def _give_up(self, equations: Sequence[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], reason: str) -> None:
+        part = Component(values, tuple(equations))
+        if part not in self.found.unsolved:
+            self.found.unsolved.append(part)
+        self.found.reason = reason
+
+
+def _badness(factors: Sequence[fmpq_mpoly]) -> tuple[int, int]:
+    return (max(degree(p) for p in factors), sum(len(p) for p in factors))
+
+
+def _groebner(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
+    """The reduced Groebner basis, or None if it exceeds the limits."""
+    context = equations[0].context()
+    integers = fmpz_mpoly_ctx.get(names_of(equations[0]), Ordering.degrevlex)
+
+    vector = fmpz_mpoly_vec([_integral(p, integers) for p in equations], integers)
+    result: Any = vector.buchberger_naive(GROEBNER_LIMITS)
+    basis, done = result
+    if not done:
+        return None
+    return [context.from_dict({tuple(m): fmpq(c) for m, c in p.terms()}) for p in basis.autoreduction()]
+
+
+def _integral(p: fmpq_mpoly, integers: fmpz_mpoly_ctx) -> Any:
+    below = common_denominator(p)
+    return integers.from_dict({tuple(m): c.p * (below // c.q) for m, c in p.terms()})
+
+
+def _quotient(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list[tuple[int, ...]] | None:
+    """The monomials that no leading monomial divides; None if they are infinitely many."""
+    leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
+    for i in free:
+        if not any(all(e == 0 for j, e in enumerate(m) if j != i) for m in leading):
+            return None
+    count = len(leading[0])
+    layer, found = [(0,) * count], []
+    while layer:
+        layer = [m for m in layer if not any(all(a <= b for a, b in zip(lead, m, strict=True)) for lead in leading)]
+        found += layer
+        if len(found) > 4 * MAX_QUOTIENT:
+            return found
+        raised = (tuple(e + (j == i) for j, e in enumerate(m)) for m, i in itertools.product(layer, free))
+        layer = list(dict.fromkeys(raised))
+    return found
+
+
+def _multiplication(form: fmpq_mpoly, quotient: Sequence[tuple[int, ...]], basis: Sequence[fmpq_mpoly]) -> fmpq_mat:
+    """The matrix of multiplication by `form` in the quotient ring."""
+    context = form.context()
+    places = {m: k for k, m in enumerate(quotient)}
+    matrix = fmpq_mat(len(quotient), len(quotient))
+    for k, m in enumerate(quotient):
+        for monomial, value in normal_form(form * context.from_dict({m: fmpq(1)}), basis).terms():
+            matrix[places[tuple(int(e) for e in monomial)], k] = value
+    return matrix
+
+
+def without_contained(components: Sequence[Component]) -> list[Component]:
+    """Each solution once: no component twice, and none inside a larger one."""
+    ordered = sorted(components, key=lambda c: -len(c.free))
+    kept: list[Component] = []
+    for component in ordered:
+        if not any(larger.contains(component) for larger in kept):
+            kept.append(component)
+    return sorted(kept, key=lambda c: (len(c.free), [str(v) for v in c.values]))

@@ -1,0 +1,261 @@
+"""Affine functions that the flow of a quadratic system conserves, or keeps zero: exactly, over Q.
+
+The Kahan map inherits both. If v . f = 0, it conserves v . x. If l = v . x + w has l' = l L along the flow (an affine
+Darboux function: the hyperplane l = 0 is invariant; L is its affine cofactor), the defining equation gives
+
+    l(x~) (1 - eps L(x)) = l(x) (1 + eps L(x~)),
+
+since v . (x~ - x)/(2 eps) is the polar form (l(x) L(x~) + l(x~) L(x))/2 of l L.
+
+Invariant hyperplanes are found by an extactic determinant (pereira-2001): on l = 0 the Taylor coefficients x_1, x_2,
+... of the solution through x are all orthogonal to v, so that l divides the polynomial det(x_1, ..., x_n), with the
+affine integrals taken out first. On a random line its rational zeros are the only candidates, and at each of them v is
+what is orthogonal to all x_k.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
+from kahanmaps.algebra.polynomials import degree, primitive_part
+from kahanmaps.systems.hamiltonian import linear_combinations
+from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
+
+# The determinant has degree m (m + 3)/2 along a line for m variables: 90 for this bound, a few seconds.
+MAX_EXTACTIC_DIMENSION = 12
+_LINE = 10**6  # the size of the integers that give a random line
+
+
+@dataclass(frozen=True)
+class AffineDarboux:
+    """An affine function l with l' = l L along the flow: `function` is l, of coprime integers, `cofactor` is L."""
+
+    function: fmpq_mpoly
+    cofactor: fmpq_mpoly
+
+
+@dataclass(frozen=True)
+class AffineDarbouxList:
+    """Affine Darboux functions, every one exact. `complete`: there are no others over Q; else `reason` tells why not.
+
+    Constants and the affine integrals (cofactor 0) are left out. Completeness rests on one random line not being
+    parallel to an invariant hyperplane: its direction has random integers up to 10^6, so that this happens for a given
+    hyperplane with a probability below 10^-6.
+    """
+
+    functions: tuple[AffineDarboux, ...]
+    complete: bool
+    reason: str
+
+
+def affine_integrals(system: QuadraticSystem) -> tuple[tuple[fmpz, ...], ...]:
+    """A basis of all v for which v . x is conserved by the flow, hence by the Kahan map for every eps.
+
+    Args:
+        system: a quadratic system over Q.
+
+    Returns:
+        Vectors of coprime integers, a basis of { v : v . f = 0 }: exact, and all there are. Source: cmoq-2013.
+
+    >>> affine_integrals(QuadraticSystem.from_text(["x", "y"], ["x*y", "-x*y"]))
+    ((1, 1),)
+    """
+    exponents = sorted({monomial for component in system.rhs for monomial in component.monoms()})
+    if not exponents:
+        n = system.dim
+        return tuple(tuple(fmpz(int(i == j)) for j in range(n)) for i in range(n))
+    rows = [[fmpq(component[monomial]) for component in system.rhs] for monomial in exponents]
+    return tuple(primitive_integers(v) for v in nullspace(QQ, fmpq_mat(rows)))
+
+
+@dataclass(frozen=True)
+class QuotientForms:
+    """The linear forms modulo the affine integrals z = V x: represented by the coordinates x_i with i in `free`.
+
+    `section` is the n x m matrix S of dx/dy for these coordinates y at fixed z, so that a form v is v S modulo the
+    integrals, and the system for y has the Jacobi matrix (rows `free` of f') S.
+    """
+
+    integrals: tuple[tuple[fmpz, ...], ...]
+    free: tuple[int, ...]
+    section: fmpq_mat
+
+    def rows(self, matrix: fmpq_mat) -> fmpq_mat:
+        """The rows of a matrix that belong to the free coordinates."""
+        return fmpq_mat([[matrix[i, j] for j in range(matrix.ncols())] for i in self.free])
+
+    @property
+    def coordinates(self) -> fmpq_mat:
+        """The matrix T of (y, z) = T x; its inverse begins with the columns of `section`."""
+        n = self.section.nrows()
+        units = [[fmpq(int(i == j)) for j in range(n)] for i in self.free]
+        return fmpq_mat([*units, *([fmpq(entry) for entry in vector] for vector in self.integrals)])
+
+
+def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
+    """The linear forms of n variables modulo the independent forms `integrals`; the first coordinates that do.
+
+    >>> quotient_by([(fmpz(1), fmpz(1), fmpz(0))], 3).free
+    (0, 2)
+    """
+    free: list[int] = []
+    rows: list[list[fmpq]] = [[fmpq(entry) for entry in vector] for vector in integrals]
+    for j in range(n):
+        more = [*rows, [fmpq(int(i == j)) for i in range(n)]]
+        if rank(QQ, fmpq_mat(more)) == len(more):
+            rows = more
+            free.append(j)
+    quotient = QuotientForms(tuple(integrals), tuple(free), fmpq_mat(n, len(free)))
+    inverse = quotient.coordinates.inv()
+    section = fmpq_mat(n, len(free), [inverse[i, j] for i in range(n) for j in range(len(free))])
+    return QuotientForms(tuple(integrals), tuple(free), section)
+
+
+def affine_darboux(system: QuadraticSystem, *, seed: int = 0) -> AffineDarbouxList:
+    """All affine functions over Q whose zero set the flow keeps: l' = l L with an affine L, exactly.
+
+    Args:
+        system: a quadratic system over Q.
+        seed: decides the random line that candidates are read off from; what is listed is exact for every seed.
+
+    Returns:
+        An `AffineDarbouxList`. Not complete where the extactic determinant vanishes identically (there may be
+        infinitely many, as for x' = x, y' = y), or above dimension 12 (affine integrals not counted): then it lists
+        those among the factors of the right-hand sides. Source: pereira-2001.
+
+    >>> found = affine_darboux(QuadraticSystem.from_text(["x", "y"], ["x*(2 - y)", "y*(3*x - 1)"]))
+    >>> [(str(d.function), str(d.cofactor)) for d in found.functions], found.complete
+    ([('x', '-y + 2'), ('y', '3*x - 1')], True)
+    """
+    n = system.dim
+    quotient = quotient_by(affine_integrals(system), n)
+    m = len(quotient.free)
+    if m == 0:
+        return AffineDarbouxList((), True, "")
+    coordinates = [[fmpq(int(i == j)) for i in range(n)] for j in range(n)]
+    only = "only factors of the right-hand sides were tried"
+    if m > MAX_EXTACTIC_DIMENSION:
+        found = _factors_that_are(system, coordinates)
+        return AffineDarbouxList(found, False, f"more than {MAX_EXTACTIC_DIMENSION} variables: {only}")
+    local = system.over(QQ)
+    rng = random.Random(seed)
+    start, direction = ([fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)] for _ in range(2))
+    along = _determinant_along(local, start, direction, quotient.free)
+    if along.degree() < 0:
+        reason = f"the extactic determinant vanishes identically, there may be infinitely many: {only}"
+        return AffineDarbouxList(_factors_that_are(system, coordinates), False, reason)
+    complete = True
+    candidates = []
+    for t in _rational_roots(along):
+        normals, all_of_them = _normals(local, [a + t * d for a, d in zip(start, direction, strict=True)], quotient)
+        complete = complete and all_of_them
+        candidates += normals
+    reason = "" if complete else "the flow degenerates on an invariant hyperplane: others may hide behind it"
+    return AffineDarbouxList(_factors_that_are(system, candidates), complete, reason)
+
+
+def _taylor(local: SystemOver, x: Sequence[fmpq], order: int) -> list[fmpq_mat]:
+    """The Taylor coefficients x_1, ..., x_order of the solution through x, as columns."""
+    series = [fmpq_mat(local.dim, 1, list(x))]
+    forms: list[fmpq_mat] = []
+    for k in range(order):
+        forms.append(local.hessian_times(series[k].entries()))
+        total = local.B * series[k] + (local.c if k == 0 else local.c * 0)
+        for a in range(k + 1):
+            total = total + forms[a] * series[k - a] * fmpq(1, 2)
+        series.append(total * fmpq(1, k + 1))
+    return series[1:]
+
+
+def _rows(local: SystemOver, x: Sequence[fmpq], free: Sequence[int]) -> fmpq_mat:
+    """The coordinates `free` of the Taylor coefficients, one coefficient a row."""
+    series = _taylor(local, x, len(free))
+    return fmpq_mat([[column[i, 0] for i in free] for column in series])
+
+
+def _determinant_along(
+    local: SystemOver, start: Sequence[fmpq], direction: Sequence[fmpq], free: Sequence[int]
+) -> fmpq_poly:
+    """The extactic determinant at start + t direction, by interpolation in t."""
+    m = len(free)
+    nodes = range(m * (m + 3) // 2 + 1)
+    values = [_rows(local, [a + t * d for a, d in zip(start, direction, strict=True)], free).det() for t in nodes]
+    # Divided differences at 0, 1, 2, ...
+    for k in range(1, len(values)):
+        differences = [(after - before) / k for before, after in pairwise(values[k - 1 :])]
+        values[k:] = differences
+    along = fmpq_poly([])
+    for t in reversed(nodes):
+        along = along * fmpq_poly([-t, 1]) + values[t]
+    return along
+
+
+def _rational_roots(polynomial: fmpq_poly) -> list[fmpq]:
+    return [-factor[0] / factor[1] for factor, _ in polynomial.factor()[1] if factor.degree() == 1]
+
+
+def _normals(local: SystemOver, x: Sequence[fmpq], quotient: QuotientForms) -> tuple[list[tuple[fmpq, ...]], bool]:
+    """The vectors that may be normal to an invariant hyperplane through x, modulo the affine integrals, and whether
+    they are all.
+
+    Where more than one is orthogonal to all Taylor coefficients (the flow on the hyperplane is degenerate itself), the
+    normal is one of them that is a left eigenvector of f'(x), since v f'(x) = L(x) v on l = 0.
+    """
+    orthogonal = nullspace(QQ, _rows(local, x, quotient.free))
+    all_of_them = True
+    if len(orthogonal) > 1:
+        basis = fmpq_mat([list(v) for v in orthogonal])
+        action = quotient.rows(local.jacobian(x)) * quotient.section
+        orthogonal = []
+        for eigenvalue in _rational_roots(fmpq_poly(action.charpoly().coeffs())):
+            combinations = nullspace(QQ, (basis * action - basis * eigenvalue).transpose())
+            all_of_them = all_of_them and len(combinations) <= 1
+            orthogonal += [tuple((fmpq_mat([list(c)]) * basis).entries()) for c in combinations]
+    normals = []
+    for v in orthogonal:
+        entries = dict(zip(quotient.free, v, strict=True))
+        normals.append(tuple(entries.get(i, fmpq(0)) for i in range(local.dim)))
+    return normals, all_of_them
+
+
+def _factors_that_are(system: QuadraticSystem, normals: Sequence[Sequence[fmpq]]) -> tuple[AffineDarboux, ...]:
+    """The affine Darboux functions among the factors of v . f, for v among `normals`: where l' = l L, l is one."""
+    found: dict[str, AffineDarboux] = {}
+    for normal in normals:
+        (component,) = linear_combinations(fmpq_mat([list(normal)]), system.rhs)
+        if component.is_zero():
+            continue
+        for factor, _ in component.factor()[1]:
+            if degree(factor) == 1:
+                function = primitive_part(factor)[1]
+                cofactor = affine_cofactor(system, function)
+                if cofactor is not None and not cofactor.is_zero():
+                    found[str(function)] = AffineDarboux(function, cofactor)
+    return tuple(sorted(found.values(), key=lambda d: _coefficients(d.function), reverse=True))
+
+
+def affine_cofactor(system: QuadraticSystem, function: fmpq_mpoly) -> fmpq_mpoly | None:
+    """The polynomial L with l' = l L along the flow for an affine l = `function`, or None. Exact.
+
+    >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "x"])
+    >>> x, y = system.rhs[1].context().gens()
+    >>> affine_cofactor(system, x), affine_cofactor(system, y)
+    (y, None)
+    """
+    slope = fmpq_mat([_coefficients(function)[: system.dim]])
+    (derivative,) = linear_combinations(slope, system.rhs)
+    quotient, remainder = divmod(derivative, function)
+    return quotient if remainder.is_zero() else None
+
+
+def _coefficients(function: fmpq_mpoly) -> list[fmpq]:
+    """The coefficients of an affine function, those of the variables first."""
+    n = function.context().nvars()
+    return [fmpq(function[tuple(int(i == j) for i in range(n))]) for j in range(n + 1)]

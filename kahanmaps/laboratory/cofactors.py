@@ -1,0 +1,215 @@
+"""Cofactors that discrete Darboux polynomials of a Kahan map can be expected to have.
+
+P o Phi = C P with polynomials P and a rational function C. The zeros and poles of C lie on what Phi contracts, which
+the Jacobi determinant det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)) shows. Candidates are the products of
+
+    D_i(x~, -eps)/D_i(x, eps)   for the irreducible factors D_i of det(I - eps f'(x)) over Q,
+    l(x~)/l(x)                  for the affine l with l' = l L, which are Darboux polynomials themselves.
+
+A polynomial that is even in eps has a cofactor with C(x, eps) C(x~, -eps) = 1, as these have. Source: celledoni-2019.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from flint import fmpq, fmpq_mpoly, fmpz
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
+from kahanmaps.laboratory.modular_points import (
+    ModularMap,
+    Point,
+    exponents_up_to,
+    monomial_values,
+    null_space,
+)
+from kahanmaps.laboratory.parametric import ParametricSystem
+
+_SPARE = 8
+_DETERMINANT_BUDGET = 20_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Cofactor:
+    """The function g(x~, -eps)/g(x, eps), for a polynomial g in the variables, the symbols and eps.
+
+    Without a polynomial it is det dPhi itself. `weight` is the degree of g in the variables.
+    """
+
+    name: str
+    weight: int
+    polynomial: fmpq_mpoly | None
+
+    def sides(self, map_: ModularMap, x: Point, image: Point) -> tuple[int, int]:
+        """Numerator and denominator of the value at a point."""
+        if self.polynomial is None:
+            return map_.determinant(image, -1), map_.determinant(x)
+        field, g = GF(map_.prime), self.polynomial
+
+        def at(point: Point, eps: int) -> int:
+            return int(evaluate(g, field, [field.convert(c) for c in (*point, *map_.values, eps)]))
+
+        return at(image, -map_.eps), at(x, map_.eps)
+
+
+DETERMINANT = Cofactor("det dPhi", 1, None)
+
+
+def determinant_polynomial(system: ParametricSystem) -> fmpq_mpoly | None:
+    """det(I - eps f'(x)) in (variables, symbols, eps); None where it is too large to be expanded."""
+    names = (*system.variables, *system.symbols, "eps")
+    field = FunctionField(names, _DETERMINANT_BUDGET)
+    jacobian = system.jacobian(names)
+    eps = field.variables[-1].above
+    one, n = field.context.constant(1), system.dim
+    entries = [
+        Function(field, (one if i == j else 0 * one) - eps * jacobian[i][j], one) for i in range(n) for j in range(n)
+    ]
+    try:
+        D: fmpq_mpoly = FunctionMatrix(field, n, n, entries).det().above
+    except BudgetExceeded:
+        return None
+    return D
+
+
+def determinant_factors(system: ParametricSystem) -> tuple[Cofactor, ...]:
+    """The cofactors of the irreducible factors over Q of det(I - eps f'(x)); det dPhi alone where it is too large."""
+    n = system.dim
+    D = determinant_polynomial(system)
+    if D is None:
+        return (Cofactor("det dPhi", n, None),)
+    found = []
+    origin: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
+    for factor, _ in D.factor()[1]:
+        weight = max(sum(int(e) for e in monomial[:n]) for monomial in factor.monoms())
+        if weight == 0:
+            continue  # a number that depends on eps
+        # D is 1 at eps = 0, so that every factor is a number there: divide by it, and cofactors become 1 at eps = 0.
+        constant = factor.subs(origin)
+        found.append(Cofactor(format_polynomial(factor), weight, factor / constant.leading_coefficient()))
+    return tuple(sorted(found, key=lambda one: (one.weight, one.name)))
+
+
+def cofactor_of_affine(function: fmpq_mpoly, system: ParametricSystem) -> Cofactor:
+    """The cofactor of an affine Darboux function, given in the variables of the system."""
+    from kahanmaps.algebra.polynomials import ring
+
+    context = ring((*system.variables, *system.symbols, "eps"))
+    images = context.gens()[: system.dim]
+    return Cofactor(format_polynomial(function), 1, function.compose(*images, ctx=context))
+
+
+@dataclass(frozen=True)
+class CofactorProduct:
+    """A product of powers of cofactors; `powers` goes with a list of them."""
+
+    powers: tuple[int, ...]
+    weight: int
+
+    def text(self, cofactors: Sequence[Cofactor]) -> str:
+        """The product in words, e.g. C[x1]*C[x3]^2 with C[g] = g(x~, -eps)/g(x, eps)."""
+        parts = [
+            f"C[{one.name}]" + (f"^{power}" if power > 1 else "")
+            for one, power in zip(cofactors, self.powers, strict=True)
+            if power
+        ]
+        return "*".join(parts) or "1"
+
+
+def products(cofactors: Sequence[Cofactor], max_weight: int) -> list[CofactorProduct]:
+    """All products of weight at most `max_weight`, by increasing weight; the first is 1."""
+    found: list[tuple[int, ...]] = [()]
+    for one in cofactors:
+        found = [
+            (*powers, power)
+            for powers in found
+            for power in range(max_weight // one.weight + 1)
+            if sum(p * c.weight for p, c in zip((*powers, power), cofactors, strict=False)) <= max_weight
+        ]
+    weighed = [CofactorProduct(p, sum(e * c.weight for e, c in zip(p, cofactors, strict=True))) for p in found]
+    return sorted(weighed, key=lambda one: (one.weight, tuple(-p for p in one.powers)))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Random points with their images and the values of all cofactors there, for many searches on one map."""
+
+    map: ModularMap
+    pairs: list[tuple[Point, Point]]
+    sides: list[list[tuple[int, int]]]  # by cofactor, then by point
+
+    @classmethod
+    def of(cls, map_: ModularMap, cofactors: Sequence[Cofactor], count: int) -> Sample:
+        """So many points."""
+        pairs = list(map_.pairs(count))
+        return cls(map_, pairs, [[one.sides(map_, x, image) for x, image in pairs] for one in cofactors])
+
+    def values(self, product: CofactorProduct) -> list[tuple[int, int]]:
+        """Numerator and denominator of a product, at each point."""
+        prime = self.map.prime
+        found = [(1, 1)] * len(self.pairs)
+        for power, column in zip(product.powers, self.sides, strict=True):
+            if power:
+                found = [
+                    (a * pow(c, power, prime) % prime, b * pow(d, power, prime) % prime)
+                    for (a, b), (c, d) in zip(found, column, strict=True)
+                ]
+        return found
+
+
+def cofactor_space(sample: Sample, product: CofactorProduct, degree: int) -> DarbouxSpace:
+    """All polynomials P of degree at most `degree` with P(x~) = C(x) P(x); their basis may be empty.
+
+    The sample must have more points than there are monomials.
+    """
+    dim, prime = sample.map.dim, sample.map.prime
+    support = exponents_up_to(dim, degree)
+    rows = []
+    for (x, image), (above, below) in zip(sample.pairs[: len(support) + _SPARE], sample.values(product), strict=False):
+        here, there = monomial_values(support, x, prime), monomial_values(support, image, prime)
+        rows.append([(below * b - above * a) % prime for a, b in zip(here, there, strict=True)])
+    return DarbouxSpace.spanned_by(dim, degree, null_space(rows, len(support), prime), prime)
+
+
+def points_needed(dim: int, degree: int) -> int:
+    """How many points a sample needs for polynomials of this degree."""
+    return len(exponents_up_to(dim, degree)) + _SPARE
+
+
+def search_cofactors(
+    map_: ModularMap,
+    cofactors: Sequence[Cofactor],
+    known: Sequence[DarbouxSpace],
+    wanted: int,
+    max_degree: int,
+    seconds: float,
+) -> Iterator[tuple[CofactorProduct, DarbouxSpace]]:
+    """Spaces with a common cofactor whose ratios are new integrals, by increasing degree; until `wanted` are found.
+
+    A space is new if the integrals of `known` and of those found before do not account for its own.
+    """
+    deadline = time.monotonic() + seconds
+    found = list(known)
+    independent = gradient_rank(map_, found)
+    sample = Sample.of(map_, cofactors, points_needed(map_.dim, max_degree))
+    candidates = products(cofactors, max_degree)
+    for degree in range(1, max_degree + 1):
+        for product in candidates:
+            if independent >= wanted or time.monotonic() > deadline:
+                return
+            if product.weight > degree + 1:
+                continue
+            space = cofactor_space(sample, product, degree)
+            if len(space.basis) < 2:
+                continue
+            more = gradient_rank(map_, [*found, space])
+            if more > independent:
+                independent = more
+                found.append(space)
+                yield product, space

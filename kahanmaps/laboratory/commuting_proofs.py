@@ -1,0 +1,225 @@
+"""Do the Kahan maps of f and of one g, or of a linear family of g, commute: by a lemma, else at random points.
+
+Lemmas, each with hypotheses that are verified exactly (docs/mathematics.md has the first one with C^2 = I):
+
+splitting    g = C f, C^3 = C, C f' = f' C. The space is the sum of the eigenspaces of C to 1, -1 and 0, and on them f
+             is three separate systems and g is f, -f and 0; so Phi_g is Phi_f, its inverse and the identity.
+affine       One of the fields is affine. Its Kahan map is affine, x -> P x + q, and commutes with the other map for
+             every eps if P g(x) = g(P x + q). That is an identity of polynomials of degree at most 2n in eps once
+             det(I - eps B)^2 is multiplied in, so it holds if it does at 2n + 1 values of eps. It is linear in g.
+dimension 1  The Kahan map of a x^2 + b x + c is the Moebius map of I + eps M, M = [[b, 2c], [-2a, -b]], linear in the
+             field; proportional fields have commuting maps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
+
+from kahanmaps.algebra.fields import QQ, Field
+from kahanmaps.algebra.matrices import rank
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.small_systems import Component
+from kahanmaps.checks import theorems
+from kahanmaps.checks.claims import Evidence, Finding
+from kahanmaps.checks.commute import commutativity
+from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.checks.judge import judge
+from kahanmaps.checks.settings import Settings
+from kahanmaps.invariants.sizes import VARIABLE, Size, step_size
+from kahanmaps.laboratory.commuting_equations import coefficients_of, combination, system_of
+from kahanmaps.laboratory.commuting_space import CommutingSpace, field_at
+from kahanmaps.maps.kahan import KahanMap, KahanMapOver
+from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
+
+_FORMULA = "Phi_f o Phi_g = Phi_g o Phi_f"
+
+
+def judge_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> Finding:
+    """The finding that the Kahan maps of f and g commute at equal eps, for every eps.
+
+    `settings.seed` and `settings.error_bits` are used. Proved, refuted with a witness, or supported with the bound on
+    the probability of error. Source: schwartz-1980.
+
+    >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2 + x"])
+    >>> str(judge_field(f, f.scaled(-1), Settings()).verdict), str(judge_field(f, f.scaled(2), Settings()).verdict)
+    ('proved', 'refuted')
+    """
+    claim = "the Kahan maps of f and g commute"
+    trivial = _trivially(f, g)
+    if trivial is not None:
+        return Finding(claim, theorems.PROVED, trivial, formula=_FORMULA)
+    identity = commutativity(f, g, None, ("f", "g"))
+    proof = splitting(f, g) or affine(f, [g]) or _in_dimension_one(f, g)
+    return judge(claim, identity, settings, proof, formula=_FORMULA)
+
+
+def judge_family(f: QuadraticSystem, space: CommutingSpace, family: Component, settings: Settings) -> Finding:
+    """The finding that the Kahan maps of f and of every member of a linear family commute, for every eps."""
+    members = [field_at(space, family.point), *(field_at(space, family.slopes(i)) for i in family.free)]
+    proof = affine(f, members) or (_in_dimension_one(f, f) if f.dim == 1 else None)
+    claim = "the Kahan maps of f and of every member g of the family commute"
+    return judge(claim, _family_identity(f, space, family), settings, proof, formula=_FORMULA)
+
+
+def splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
+    """The evidence that g = C f with C^3 = C, C f' = f' C, and so the maps commute; None where that is not so.
+
+    >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
+    >>> splitting(f, QuadraticSystem.from_text(["x", "y"], ["0", "-y^2"])).data["hypotheses"][1]
+    'C^3 = C'
+    """
+    C = theorems.linear_relation(f, g)
+    if C is None:
+        return None
+    # C f'(x) = f'(x) C: for B, and for each of the constant matrices df'/dx_k.
+    n = f.dim
+    slopes = [fmpq_mat(n, n, [f.Q[i][j, k] for i in range(n) for j in range(n)]) for k in range(n)]
+    return theorems.evidence(
+        "the splitting lemma",
+        [
+            ("g = C f with a constant matrix C", coefficients_of(f.transformed(C)) == coefficients_of(g)),
+            ("C^3 = C", bool(C * C * C == C)),
+            ("C f'(x) = f'(x) C for every x", all(C * slope == slope * C for slope in (f.B, *slopes))),
+        ],
+    )
+
+
+def affine(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | None:
+    """The evidence by an affine map: f is affine, or there is one g and it is; None where that proves nothing."""
+    if is_affine(f):
+        name, pairs = "f", [(f, g) for g in fields]
+    elif len(fields) == 1 and is_affine(fields[0]):
+        name, pairs = "g", [(fields[0], f)]
+    else:
+        return None
+    count = 2 * f.dim + 1
+    return theorems.evidence(
+        "the lemma of affine maps",
+        [
+            (f"{name} is affine", True),
+            (
+                f"P h(x) = h(P x + q) for its map x -> P x + q and the other field h, at {count} values of eps",
+                all(_symmetric_at(a, h, count) for a, h in pairs),
+            ),
+        ],
+    )
+
+
+def is_affine(system: QuadraticSystem) -> bool:
+    """Whether there are no quadratic terms."""
+    return all(form.rank() == 0 for form in system.Q)
+
+
+def _symmetric_at(a: QuadraticSystem, h: QuadraticSystem, count: int) -> bool:
+    """Whether the affine Kahan map of `a` is a symmetry of h, at so many values of eps."""
+    n, checked, k = a.dim, 0, 0
+    identity = QQ.identity(n)
+    while checked < count:
+        k += 1
+        below = identity - a.B * fmpq(1, k)
+        if below.det() == 0:
+            continue
+        P = below.solve(identity + a.B * fmpq(1, k))
+        q = below.solve(fmpq_mat(n, 1, list(a.c))) * fmpq(2, k)
+        if transported(h, P, q.entries()) != coefficients_of(h.transformed(P)):
+            return False
+        checked += 1
+    return True
+
+
+def transported(h: QuadraticSystem, P: fmpq_mat, q: Sequence[fmpq]) -> list[list[fmpq]]:
+    """The coefficients of x -> h(P x + q).
+
+    >>> transported(QuadraticSystem.from_text(["x"], ["x^2"]), fmpq_mat([[2]]), [fmpq(1)])
+    [[4, 4, 1]]
+    """
+    n = h.dim
+    column = fmpq_mat(n, 1, list(q))
+    forms, constants = [], []
+    linear = fmpq_mat(n, n)
+    for i, form in enumerate(h.Q):
+        forms.append(P.transpose() * form * P)
+        row = column.transpose() * form * P * fmpq(2)
+        for j in range(n):
+            linear[i, j] = row[0, j]
+        constants.append((column.transpose() * form * column)[0, 0])
+    moved = h.B * column
+    system = QuadraticSystem(
+        h.variables,
+        tuple(forms),
+        linear + h.B * P,
+        tuple(value + moved[i, 0] + h.c[i] for i, value in enumerate(constants)),
+    )
+    return coefficients_of(system)
+
+
+def _trivially(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
+    for factor, why in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
+        if coefficients_of(g) == coefficients_of(f.scaled(factor)):
+            return Evidence(theorems.METHOD, why)
+    return None
+
+
+def _in_dimension_one(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
+    if f.dim > 1:
+        return None
+    proportional = rank(QQ, fmpq_mat([*coefficients_of(f), *coefficients_of(g)])) <= 1
+    return theorems.evidence("the lemma of Moebius maps", [("f and g are proportional, in dimension 1", proportional)])
+
+
+def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: Component) -> Identity:
+    """Commutativity as an identity in x, eps and the free parameters, which follow the coordinates of the point."""
+    n, free = f.dim, family.free
+    zero = family.values[0].context().constant(0)
+    table = combination(space.fields, family.values, zero)
+    count = len(family.values)
+
+    def sides(field: Field, point: tuple[Any, ...], eps: Any) -> Sides:
+        parameters = [field.zero] * count
+        for i, value in zip(free, point[n:], strict=True):
+            parameters[i] = value
+        phi_f, phi_g = KahanMap(f, eps, field), KahanMapOver(_over(field, table, parameters, n), eps)
+        x = point[:n]
+        return phi_g.step(phi_f.step(x)), phi_f.step(phi_g.step(x))
+
+    bound, common = _dominating(f, table)
+
+    def step_g(point: Size) -> Size:
+        # D (I - eps g') has entries with the parameters to the first power, and coefficients below those of the bound.
+        return step_size(bound, VARIABLE, point) * Size(n, n * common)
+
+    after_f, after_g = step_size(f, VARIABLE, VARIABLE), step_g(VARIABLE)
+    left, right = step_g(after_f), step_size(f, VARIABLE, after_g)
+    poles = after_f.degree + after_g.degree + left.degree + right.degree
+    labels = ("Phi_g(Phi_f(x))", "Phi_f(Phi_g(x))")
+    return Identity(n + len(free), sides, left * right + right * left, poles, None, *labels)
+
+
+def _over(field: Field, table: Sequence[Sequence[fmpq_mpoly]], parameters: Sequence[Any], n: int) -> SystemOver:
+    """The system whose coefficients are the polynomials of the table at these parameters."""
+    two = field.convert(2)
+    tensor = [field.zero] * (n**3)
+    linear, constants = [], []
+    for i, row in enumerate(table):
+        values = [evaluate(p, field, parameters) for p in row]
+        pairs = ((j, k) for j in range(n) for k in range(j, n))
+        for value, (j, k) in zip(values, pairs, strict=False):
+            tensor[(i * n + j) * n + k] = tensor[(i * n + k) * n + j] = value * two if j == k else value
+        linear += values[-n - 1 : -1]
+        constants.append(values[-1])
+    matrices = field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants)
+    return SystemOver.from_tensor(field, *matrices)
+
+
+def _dominating(f: QuadraticSystem, table: Sequence[Sequence[fmpq_mpoly]]) -> tuple[QuadraticSystem, float]:
+    """A system with integer coefficients above those of D g in size, D the common denominator of g; and log2 D."""
+    common = fmpz(1)
+    for row in table:
+        for p in row:
+            for coefficient in p.coeffs():
+                common = common.lcm(coefficient.q)
+    rows = [[sum((abs(c) * common for c in p.coeffs()), fmpq(0)) for p in row] for row in table]
+    return system_of(f.variables, [[2 * c for c in row] for row in rows]), float(common.bit_length())

@@ -1,0 +1,153 @@
+"""The curve t -> Phi^n(a + b t) that a Kahan map makes of a random line over GF(p), step after step, exactly.
+
+The curve is kept as dim + 1 polynomials without a common factor. A step solves (I - eps f'(x)) x~ = (I + eps B) x +
+2 eps c in power series in t, to as many terms as the next curve needs, and finds its polynomials from the shortest
+recurrence (massey-1969) of the series of a random quotient of two affine functions: its generating function has the
+common denominator of the coordinates. All terms to spare of all coordinates are tried.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from typing import Any
+
+from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
+
+from kahanmaps.checks.decide import random_prime_field
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+_MARGIN = 8  # terms of a series beyond those that determine the curve: each is right by chance once in 2^62
+
+
+class Stopped(Exception):
+    """Why no further curve is to be had: "time", "degree", and what else the search for degrees adds."""
+
+    def __init__(self, ended: str, message: str) -> None:
+        self.ended, self.message = ended, message
+
+
+class Line:
+    """The curve t -> Phi^n(a + b t) over GF(p) as polynomials (X_0 : ... : X_dim), X_0 below, without common factor."""
+
+    def __init__(
+        self, system: QuadraticSystem, eps: fmpq | None, rng: random.Random, deadline: float, max_degree: int
+    ) -> None:
+        field = random_prime_field(rng)
+        p, n = field.prime, system.dim
+        self.prime = p
+        eps_p = field.random(rng) if eps is None else field.convert(eps)
+        self.eps = int(eps_p)
+        self._rng, self._deadline, self._max_degree = rng, deadline, max_degree
+        self._context = fmpz_mod_poly_ctx(fmpz_mod_ctx(p))
+        local = system.over(field)
+        one = field.one
+        # Linear forms in X, as pairs (index, coefficient) of what is not zero; the constant goes with X_0.
+        self._matrix = [
+            [
+                _sparse(
+                    [(i == j) * one - eps_p * local.B[i, j], *(-eps_p * local.tensor[i * n + j, k] for k in range(n))]
+                )
+                for j in range(n)
+            ]
+            for i in range(n)
+        ]
+        self._right = [
+            _sparse([2 * eps_p * local.c[i, 0], *((i == j) * one + eps_p * local.B[i, j] for j in range(n))])
+            for i in range(n)
+        ]
+        self.steps = 0
+        self.degree = 1
+        self._X = [nmod_poly([1], p), *(nmod_poly([rng.randrange(p), rng.randrange(1, p)], p) for _ in range(n))]
+
+    def step(self, guess: int) -> None:
+        """One step on. Raises ZeroDivisionError where the line starts at a point without image, Stopped at a limit."""
+        most = 2 * self._max_degree + _MARGIN + 1
+        length = min(2 * guess + _MARGIN + 1, most)
+        while True:
+            self._require_time()
+            curve = self._curve(self._image(length), length)
+            if curve is not None:
+                break
+            if length == most:
+                raise Stopped("degree", f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
+            length = min(2 * length, most)
+        self._X = curve
+        self.degree = max(0, *(int(entry.degree()) for entry in curve))
+        self.steps += 1
+
+    def _require_time(self) -> None:
+        if time.monotonic() > self._deadline:
+            raise Stopped("time", f"the time was over at iterate {self.steps + 1}")
+
+    def _image(self, length: int) -> list[nmod_poly]:
+        """The coordinates of the next iterate as power series, to `length` terms."""
+        X = [entry.truncate(length) for entry in self._X]
+        zero = nmod_poly([0], self.prime)
+
+        def value(form: list[tuple[int, nmod]]) -> nmod_poly:
+            return sum((X[k] * c for k, c in form), zero)
+
+        rows = [
+            [value(form) for form in (*forms, right)] for forms, right in zip(self._matrix, self._right, strict=True)
+        ]
+        n = len(rows)
+        for column in range(n):
+            candidates = [i for i in range(column, n) if int(rows[i][column][0])]
+            if not candidates:
+                raise ZeroDivisionError("the point t = 0 of the line has no image")
+            # The row with the fewest entries fills in the fewest others.
+            chosen = min(candidates, key=lambda i: sum(not entry.is_zero() for entry in rows[i]))
+            rows[column], rows[chosen] = rows[chosen], rows[column]
+            pivot = rows[column]
+            inverse = pivot[column].inverse_series_trunc(length)
+            for j in range(column + 1, n + 1):
+                if not pivot[j].is_zero():
+                    pivot[j] = pivot[j].mul_low(inverse, length)
+            for row in rows[column + 1 :]:
+                self._eliminate(row, row[column], pivot, range(column + 1, n + 1), length)
+        for column in range(n - 1, 0, -1):
+            for row in rows[:column]:
+                self._eliminate(row, row[column], rows[column], range(n, n + 1), length)
+        return [row[n] for row in rows]
+
+    def _eliminate(
+        self, row: list[nmod_poly], factor: nmod_poly, pivot: list[nmod_poly], at: range, length: int
+    ) -> None:
+        self._require_time()
+        if not factor.is_zero():
+            for j in at:
+                if not pivot[j].is_zero():
+                    row[j] = row[j] - factor.mul_low(pivot[j], length)
+
+    def _curve(self, x: list[nmod_poly], length: int) -> list[nmod_poly] | None:
+        """The polynomials with these quotients, or None where there are not enough terms to be certain."""
+        for _ in range(2):
+            above, below = (self._functional(x) for _ in range(2))
+            if int(below[0]) == 0:
+                continue
+            inverse = below.inverse_series_trunc(length)
+            values = [int(c) for c in above.mul_low(inverse, length).coeffs()]
+            # The quotient may be as high above as below: without its first term it is a proper fraction over t.
+            values = (values + [0] * (length - len(values)))[1:]
+            minimal = self._context.minpoly(values)
+            degree = int(minimal.degree())
+            if 2 * degree + _MARGIN > len(values):
+                return None
+            denominator = nmod_poly([int(c) for c in reversed(minimal.coeffs())], self.prime)
+            first = denominator.mul_low(inverse, length)
+            curve = [first, *(first.mul_low(entry, length) for entry in x)]
+            # Only for functionals in special position is the denominator not that of all coordinates.
+            if all(entry.degree() <= degree for entry in curve):
+                return curve
+        return None
+
+    def _functional(self, x: list[nmod_poly]) -> nmod_poly:
+        total = nmod_poly([self._rng.randrange(self.prime)], self.prime)
+        for entry in x:
+            total = total + entry * nmod(self._rng.randrange(self.prime), self.prime)
+        return total
+
+
+def _sparse(coefficients: list[Any]) -> list[tuple[int, nmod]]:
+    return [(k, c) for k, c in enumerate(coefficients) if c != 0]

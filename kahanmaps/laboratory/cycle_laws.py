@@ -1,0 +1,163 @@
+"""What the lengths of cycles over a finite field are compatible with: three laws, and none of them is proved.
+
+Cycles of a map with an integral whose level curves have genus 1 or 0 are no longer than such a curve has points, p + 1
++ 2 sqrt p. For a product of two random involutions the share of points on cycles of length at most x z tends to
+1 - e^-x (1 + x), where z = 2 N/(fixed points of both). A random permutation of N points has about log N cycles. Each
+comparison is evidence modulo one prime at one eps. Sources: roberts-jogia-vivaldi-2003 for the first law,
+roberts-vivaldi-2009 for the second.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from kahanmaps.laboratory.cycles import Census
+
+LAWS = ("integrable bound", "random reversible", "random permutation")
+_REDUCIBLE = 10  # so many level curves may be reducible
+_ENOUGH = 0.05  # of all points have to be periodic before lengths say something of level curves
+_FEW = 20  # cycles, below which no distribution is compared
+_REPEATS = 200
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Which laws the lengths of one census are compatible with, and a sentence for each law that says why.
+
+    Laws that are neither `compatible` nor `refused` could not be tried.
+
+    `share_within` is the share of periodic points on cycles of at most `bound` = p + 1 + floor(2 sqrt p) points;
+    `distance` the largest distance of the distribution of scaled lengths from 1 - e^-x (1 + x), `critical` what so many
+    cycles of a random reversible map stay below in 99 of 100 cases (None: not compared).
+    """
+
+    bound: int
+    share_within: float | None
+    scale: float | None
+    model_scale: float | None
+    distance: float | None
+    critical: float | None
+    compatible: tuple[str, ...]
+    refused: tuple[str, ...]
+    reasons: Mapping[str, str]
+
+    def verdict(self, law: str) -> str:
+        """ "compatible", "not compatible" or "not tried"."""
+        return "compatible" if law in self.compatible else "not compatible" if law in self.refused else "not tried"
+
+
+def compare(census: Census, seed: int = 0) -> Comparison:
+    """Which of the three laws the lengths of a census are compatible with, one prime and one eps at a time.
+
+    Counts are exact; the critical distance is found with `seed` by drawing lengths of random reversible maps.
+    Returns a Comparison; where a law cannot be tried (too few cycles, samples) its reason says why.
+    Source: roberts-vivaldi-2009, roberts-jogia-vivaldi-2003.
+
+    >>> from kahanmaps.laboratory.cycles import cycle_census
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> census = cycle_census(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]), "1/10", 499)
+    >>> compare(census).compatible
+    ('integrable bound',)
+    """
+    from kahanmaps.maps.modular_projective import hasse_weil
+
+    bound = hasse_weil(census.prime)
+    reasons: dict[str, str] = {}
+    verdicts: dict[str, bool] = {}
+    lengths = _affine(census)
+    weight = sum((length if census.complete else 1) * n for length, n in lengths.items())
+    if not weight:
+        none = "no cycle with an affine point was seen"
+        return Comparison(bound, None, None, None, None, None, (), (), dict.fromkeys(LAWS, none))
+    within = sum((length if census.complete else 1) * n for length, n in lengths.items() if length <= bound)
+    share = within / (weight + census.open)
+    settled = "affine periodic points" if census.complete else "sampled points that meet no indeterminacy"
+    reasons[LAWS[0]] = (
+        f"{100 * share:.1f}% of the {settled} lie on cycles of at most p + 1 + 2 sqrt p = {bound} points, "
+        "as many as a curve of genus 1 may have"
+    )
+    if weight < _ENOUGH * census.looked_at:
+        reasons[LAWS[0]] += f"; but only {weight} of {census.looked_at} points are periodic, too few to tell"
+    elif census.open and census.steps < bound:
+        reasons[LAWS[0]] += f"; but {census.open} were left after {census.steps} steps, too early to tell"
+    else:
+        # A reducible curve is longer: some of the p level curves may be.
+        verdicts[LAWS[0]] = share >= max(0.95, 1 - _REDUCIBLE / census.prime)
+    scale, model, distance, critical = _reversible(census, seed, reasons)
+    if distance is not None and critical is not None:
+        verdicts[LAWS[1]] = distance <= critical
+    if census.cycles is None:
+        reasons[LAWS[2]] = "cycles are not counted where points are sampled"
+    else:
+        cycles = sum(lengths.values())
+        expected = math.log(weight) + 0.5772
+        reasons[LAWS[2]] = (
+            f"{cycles} cycles, where a random permutation of {weight} points has {expected:.1f} on average"
+        )
+        if weight < 50:
+            reasons[LAWS[2]] += "; too few points to tell"
+        else:
+            verdicts[LAWS[2]] = abs(cycles - expected) <= 3 * math.sqrt(expected)
+    held = tuple(law for law in LAWS if verdicts.get(law) is True)
+    refused = tuple(law for law in LAWS if verdicts.get(law) is False)
+    return Comparison(bound, share, scale, model, distance, critical, held, refused, reasons)
+
+
+def _reversible(
+    census: Census, seed: int, reasons: dict[str, str]
+) -> tuple[float | None, float | None, float | None, float | None]:
+    """Scale, scale of the model, distance and critical distance for the law of random reversible maps."""
+    law = LAWS[1]
+    model = 2 * census.points / sum(census.fixed) if census.fixed and sum(census.fixed) else None
+    if census.symmetric is None:
+        reasons[law] = "no reversing symmetry is known" if census.complete else "not compared where points are sampled"
+        return None, None, None, None
+    lengths = census.symmetric
+    count = sum(lengths.values())
+    if count < _FEW:
+        reasons[law] = f"{count} symmetric cycles, too few to compare"
+        return None, model, None, None
+    # Orbits that fall out shorten the cycles of a random map as well: they end at the same rate everywhere, so the law
+    # stays and only its scale is another. So the scale is the mean length, and that of the model is told beside it.
+    scale = sum(length * n for length, n in lengths.items()) / count
+    distance = _distance([(length / scale, n) for length, n in lengths.items()])
+    critical = _critical(count, seed)
+    shown = "" if model is None else f", where 2 N/(fixed points) = {model:.1f}"
+    reasons[law] = (
+        f"scaled by their mean {scale:.1f}{shown}, the lengths of {count} symmetric cycles are {distance:.3f} away "
+        f"from 1 - e^-x (1 + x); of random maps 99 in 100 are less than {critical:.3f} away"
+    )
+    return scale, model, distance, critical
+
+
+def _affine(census: Census) -> dict[int, int]:
+    """The cycles with an affine point: a plane at infinity that the map leaves invariant has a law of its own."""
+    left = {length: n - census.at_infinity.get(length, 0) for length, n in census.lengths.items()}
+    return {length: n for length, n in left.items() if n}
+
+
+def _distance(lengths: Sequence[tuple[float, int]]) -> float:
+    """The largest distance between 1 - e^-x (1 + x) and the share of points on cycles of scaled length at most x."""
+    total = sum(x * n for x, n in lengths)
+    below = worst = 0.0
+    for x, n in sorted(lengths):
+        law = 1 - math.exp(-x) * (1 + x)
+        worst = max(worst, abs(law - below / total))
+        below += x * n
+        worst = max(worst, abs(law - below / total))
+    return worst
+
+
+def _critical(count: int, seed: int) -> float:
+    """The distance that 99 of 100 random reversible maps with so many cycles stay below."""
+    rng = random.Random(f"cycles {seed}")
+    drawn = min(count, 400)
+    distances = []
+    for _ in range(_REPEATS):
+        lengths = [rng.expovariate(1.0) for _ in range(drawn)]
+        mean = sum(lengths) / drawn
+        distances.append(_distance([(length / mean, 1) for length in lengths]))
+    return sorted(distances)[int(0.99 * _REPEATS)] * math.sqrt(drawn / count)

@@ -1,0 +1,255 @@
+"""Degrees of the iterates of a Kahan map: d_n is the degree of Phi^n as a map of projective space to itself.
+
+It is measured as the degree of the rational curve t -> Phi^n(a + b t) for a random line over GF(p) (`curves`), with p
+and (where eps is not given) the residue of eps random. A line in special position, or a prime that divides what it
+should not, can only make a degree too small. So two lines, each with a prime and an eps of its own, are compared, and
+where they differ the larger degree stands.
+
+The growth of d_n measures complexity: lim d_n^(1/n), the dynamical degree, is 1 for integrable maps as far as is
+known, and its logarithm is the algebraic entropy (bellon-viallet-1999).
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.text import format_number
+from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.laboratory.curves import Line, Stopped
+from kahanmaps.laboratory.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence, rate_json
+from kahanmaps.maps.orbits import counted
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+DEFAULT_SECONDS = 10.0
+DEFAULT_MAX_DEGREE = 20_000
+_MOST_TERMS = 10_000
+_LINES = 2
+_REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
+
+
+@dataclass(frozen=True)
+class DegreeGrowth:
+    """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a Kahan map, and what they say of its complexity.
+
+    `eps` is None for generic eps (a random residue for each line). `ended` is "recurrence" (one was found, with
+    terms to spare), "terms" (as many as asked for), "time", "degree" (the next is over the limit), "constant" (the
+    iterate is a constant map), "singular" (the next iterate exists nowhere) or "lines" (the lines do not agree).
+    The degrees are measured: evidence, and no proof.
+    """
+
+    degrees: tuple[int, ...]
+    eps: fmpq | None
+    ended: str
+    message: str
+    seed: int
+    primes: tuple[int, ...]
+    residues: tuple[int, ...]
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def recurrence(self) -> Recurrence | None:
+        """The shortest linear recurrence of the degrees with terms left to check it, or None."""
+        return find_recurrence(self.degrees)
+
+    @property
+    def growth(self) -> GrowthClass:
+        """How the degrees grow if the recurrence goes on; `GrowthClass.UNKNOWN` without one."""
+        if self.ended == "constant":
+            return GrowthClass.ZERO
+        return GrowthClass.UNKNOWN if self.recurrence is None else self.recurrence.growth
+
+    @property
+    def dynamical_degree(self) -> GrowthRate | None:
+        """lim d_n^(1/n) as an algebraic number if the recurrence goes on, else None."""
+        return None if self.recurrence is None else self.recurrence.rate
+
+    @property
+    def estimate(self) -> str | None:
+        """d_n/d_{n-1} for the last n, rounded: an estimate of the dynamical degree and no more."""
+        if len(self.degrees) < 3 or self.degrees[-2] == 0:
+            return None
+        return f"{self.degrees[-1] / self.degrees[-2]:.6g}"
+
+    @property
+    def growth_text(self) -> str:
+        """The kind of growth with its power or rate: one phrase."""
+        found, rate = self.recurrence, self.dynamical_degree
+        if self.growth is GrowthClass.ZERO:
+            return "zero from some iterate on: that iterate is a constant map"
+        if found is None:
+            estimate = f"; d_n/d_(n-1) is {self.estimate} at the end, an estimate only" if self.estimate else ""
+            return f"no recurrence found in {counted(len(self.degrees), 'term')}{estimate}"
+        if found.growth is GrowthClass.EXPONENTIAL:
+            return "exponential growth" + (f", dynamical degree {rate.text}" if rate is not None else "")
+        power = f" of degree {found.power}" if found.growth is GrowthClass.POLYNOMIAL else ""
+        return f"{found.growth} growth{power}, dynamical degree 1"
+
+    @property
+    def text(self) -> str:
+        """Lines for people, a word and a tab at the front: degrees, growth, recurrence, how it ended."""
+        lines = [("degrees", ", ".join(map(str, self.degrees))), ("growth", self.growth_text)]
+        if self.recurrence is not None:
+            lines.append(("recurrence", self.recurrence.text))
+            if self.recurrence.closed_form:
+                lines.append(("closed form", self.recurrence.closed_form))
+        lines += [("ended", self.message), *(("note", note) for note in self.notes)]
+        return "\n".join(f"{word}\t{rest}" for word, rest in lines)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; primes are text, for they exceed what readers of JSON hold exactly."""
+        rate = self.dynamical_degree
+        return {
+            "degrees": list(self.degrees),
+            "eps": "generic" if self.eps is None else format_number(self.eps),
+            "ended": self.ended,
+            "message": self.message,
+            "seed": self.seed,
+            "lines": [
+                {"prime": str(p), "eps_residue": str(e)} for p, e in zip(self.primes, self.residues, strict=True)
+            ],
+            "growth": str(self.growth),
+            "growth_text": self.growth_text,
+            "dynamical_degree": None if rate is None else rate_json(rate),
+            "estimate": self.estimate,
+            "recurrence": None if self.recurrence is None else self.recurrence.to_json(),
+            "notes": list(self.notes),
+        }
+
+
+def degree_growth(
+    system: QuadraticSystem,
+    eps: Any = None,
+    *,
+    seconds: float = DEFAULT_SECONDS,
+    max_terms: int | None = None,
+    max_degree: int = DEFAULT_MAX_DEGREE,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> DegreeGrowth:
+    """The degrees of the iterates of the Kahan map of `system`, for one exact `eps` (time step 2 eps) or generic eps.
+
+    Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare; with `max_terms`
+    instead after the degrees d_1, ..., d_max_terms. Stops in any case after about `seconds`, or before a degree above
+    `max_degree`. Modulo random primes of 63 bits, so the answer is measured and not proved; the same for the same
+    `seed`, except for where the time ends it. Raises InputError for wrong values.
+
+    Source: bellon-viallet-1999.
+
+    >>> from kahanmaps.systems.catalog import load
+    >>> found = degree_growth(load("euler_top").system)
+    >>> found.degrees[:6], str(found.growth), found.recurrence.closed_form
+    ((1, 3, 9, 19, 33, 51), 'quadratic', '2*n^2 + 1')
+    """
+    exact = None if eps is None else rational(eps)
+    if exact == 0:
+        raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+    if not (seconds > 0 and math.isfinite(seconds)):
+        raise InputError(f"found {seconds} seconds, expected a positive number")
+    if max_terms is not None and not 0 <= max_terms <= _MOST_TERMS:
+        raise InputError(f"found {max_terms} terms, expected 0 to {_MOST_TERMS}")
+    if max_degree < 1:
+        raise InputError(f"found the largest degree {max_degree}, expected at least 1")
+    return _Search(system, exact, time.monotonic() + seconds, max_degree, seed).run(max_terms, progress)
+
+
+class _Search:
+    """The lines, and the degrees found on them so far."""
+
+    def __init__(self, system: QuadraticSystem, eps: fmpq | None, deadline: float, max_degree: int, seed: int) -> None:
+        self._system, self._eps = system, eps
+        self._deadline, self._max_degree, self._seed = deadline, max_degree, seed
+        self._rng = random.Random(f"degrees {seed}")
+        self._replaced = 0
+        self.degrees = [1]
+        self.notes: list[str] = []
+
+    def run(self, max_terms: int | None, progress: Callable[[str], None]) -> DegreeGrowth:
+        """Step after step until something ends it."""
+        lines = [self._line() for _ in range(_LINES)]
+        try:
+            while True:
+                if max_terms is None:
+                    self._stop_if_certain()
+                elif len(self.degrees) > max_terms:
+                    raise Stopped("terms", f"{counted(max_terms, 'iterate')} asked for and measured")
+                if len(self.degrees) > _MOST_TERMS:
+                    raise Stopped("terms", f"{_MOST_TERMS} iterates, and no more are worked out")
+                progress(f"degrees: iterate {len(self.degrees)}, degree {self.degrees[-1]} before it")
+                self._step(lines)
+                if self.degrees[-1] == 0 and max_terms is None:
+                    raise Stopped("constant", f"iterate {len(self.degrees) - 1} is a constant map")
+        except Stopped as end:
+            ended, message = end.ended, end.message
+        return DegreeGrowth(
+            tuple(self.degrees),
+            self._eps,
+            ended,
+            message,
+            self._seed,
+            tuple(line.prime for line in lines),
+            tuple(line.eps for line in lines),
+            tuple(self.notes),
+        )
+
+    def _stop_if_certain(self) -> None:
+        found = find_recurrence(self.degrees)
+        if found is not None and found.checked >= max(6, found.order):
+            raise Stopped("recurrence", f"a recurrence of order {found.order} holds for {found.checked} terms to spare")
+
+    def _line(self) -> Line:
+        while True:
+            try:
+                return Line(self._system, self._eps, self._rng, self._deadline, self._max_degree)
+            except BadPrime:
+                continue
+
+    def _step(self, lines: list[Line]) -> None:
+        """All lines one step on; those in special position are replaced by others."""
+        n = len(self.degrees)
+        while True:
+            found = [self._degree(line, n) for line in lines]
+            best = max(found)
+            if best >= 0 and min(found) == best:
+                self.degrees.append(best)
+                return
+            self._replaced += 1
+            if best < 0 and self._replaced > _LINES:
+                raise Stopped("singular", f"iterate {n} exists nowhere: det(I - eps f'(x)) = 0 on the image before")
+            if self._replaced > _REPLACEMENTS:
+                raise Stopped("lines", f"random lines do not agree on the degree of iterate {n}: {found}")
+            if best >= 0:
+                self.notes.append(f"a line gave a smaller degree of iterate {n} and was replaced by another: {found}")
+            for k, degree in enumerate(found):
+                if degree < best or best < 0:
+                    lines[k] = self._line()
+
+    def _degree(self, line: Line, n: int) -> int:
+        """The degree of iterate n on a line, which is walked there; -1 where that cannot be done on this line."""
+        try:
+            while line.steps < n:
+                line.step(self._guess(line.steps + 1))
+                if line.steps < n and line.degree != self.degrees[line.steps]:
+                    return -1
+        except ZeroDivisionError:
+            return -1
+        return line.degree
+
+    def _guess(self, n: int) -> int:
+        """What the degree of iterate n hardly exceeds; a guess too low costs a second attempt."""
+        known = self.degrees
+        if n < len(known):
+            return known[n]
+        if n == 1:
+            return self._system.dim
+        most = known[1] * known[-1]
+        # Degrees are as good as log-concave, so that the last ratio bounds the next one.
+        return min(most, known[-1] * known[-1] // known[-2] + 4) if known[-2] else most

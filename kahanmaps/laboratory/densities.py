@@ -1,0 +1,230 @@
+"""Invariant measures dx/phi of a Kahan map with a polynomial phi, or its reciprocal, in closed form.
+
+dx/phi is invariant if phi(x~) = det dPhi(x) phi(x): phi is a discrete Darboux polynomial with the cofactor det dPhi.
+All of them up to a degree are one null space modulo a prime. Source: celledoni-2019.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Any
+
+from flint import fmpq, fmpz
+
+from kahanmaps.algebra.latex import latex_rational_function
+from kahanmaps.algebra.polynomials import RationalFunction, primitive_part
+from kahanmaps.algebra.polynomials import degree as degree_of
+from kahanmaps.algebra.text import format_rational_function
+from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.laboratory.closed_forms import closed_forms
+from kahanmaps.laboratory.cofactors import (
+    DETERMINANT,
+    CofactorProduct,
+    Sample,
+    cofactor_space,
+    determinant_polynomial,
+    points_needed,
+)
+from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.hamiltonian_structure import constant_structures
+from kahanmaps.laboratory.identities import density_verdict
+from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
+from kahanmaps.systems.files import SystemFile
+
+_MAX_UNKNOWNS = 1000
+_MAX_DEGREE = 12
+_ONCE = CofactorProduct((1,), 1)
+
+
+@dataclass(frozen=True)
+class FoundDensity:
+    """A density phi(x, eps): the measure dx/phi is invariant, with the verdict on that."""
+
+    function: RationalFunction
+    verdict: Verdict
+    evidence: Evidence
+
+    @property
+    def text(self) -> str:
+        """The formula of phi."""
+        return format_rational_function(self.function)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "phi": self.text,
+            "latex": latex_rational_function(self.function),
+            "verdict": str(self.verdict),
+            "evidence": self.evidence.to_json(),
+        }
+
+
+@dataclass(frozen=True)
+class DensitySearch:
+    """What `find_densities` found.
+
+    `densities` are all phi of the least degree that has some; `degree` is the largest that was tried, and `reason`
+    says why the search ended without a density. `eps` is None for every eps.
+    """
+
+    file: SystemFile
+    symbols: tuple[str, ...]
+    eps: fmpq | None
+    densities: tuple[FoundDensity, ...]
+    degree: int
+    reason: str
+    primes: tuple[int, ...]
+    seed: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "densities": [one.to_json() for one in self.densities],
+            "degree_tried": self.degree,
+            "reason": self.reason,
+            "primes": [str(prime) for prime in self.primes],
+        }
+
+    def toml_section(self) -> str:
+        """The first density as a section [density] of a system file, which `check-measure` accepts."""
+        return f'[density]\nphi = "{self.densities[0].text}"\n' if self.densities else ""
+
+
+def find_densities(
+    file: SystemFile,
+    *,
+    symbols: Sequence[str] = (),
+    eps: Any = None,
+    max_degree: int | None = None,
+    seconds: float = 30.0,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> DensitySearch:
+    """The polynomials phi of the least degree for which the Kahan map preserves dx/phi; failing these, 1/phi.
+
+    Args:
+        file: the system.
+        symbols: names of parameters that formulas are to contain; the others have the values of the file.
+        eps: an exact number, or None for formulas that contain eps (the time step is 2 eps).
+        max_degree: of phi; by default as the number of unknowns allows, at most 12.
+        seconds: the time that the search may take, about.
+        seed: of everything random.
+        progress: is told what is being tried.
+
+    Returns:
+        A `DensitySearch`; formulas are exact, proved or supported. Finding none up to a degree is measured.
+
+    Raises:
+        InputError: for unknown symbols and eps = 0.
+
+    Source: celledoni-2019.
+
+    >>> from kahanmaps.systems.catalog import load
+    >>> found = find_densities(load("lotka_volterra"))
+    >>> [(one.text, str(one.verdict)) for one in found.densities]
+    [('x*y', 'proved')]
+    """
+    laboratory = Laboratory(file, symbols, eps, seed)
+    deadline = time.monotonic() + seconds
+    dim = file.system.dim
+    top = max_degree if max_degree is not None else _MAX_DEGREE
+    top = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0)
+    tried, reason = -1, ""
+
+    def result(densities: Sequence[FoundDensity]) -> DensitySearch:
+        return DensitySearch(
+            file,
+            laboratory.symbols,
+            laboratory.eps,
+            tuple(densities),
+            tried,
+            "" if densities else reason,
+            laboratory.primes,
+            seed,
+        )
+
+    theorem = _theorem(laboratory)
+    if theorem is not None:
+        tried = degree_of(theorem.function.numerator)
+        return result([theorem])
+    try:
+        for degree in range(top + 1):
+            if time.monotonic() > deadline:
+                reason = f"the time was over at degree {degree}"
+                return result([])
+            progress(f"densities of degree {degree}")
+            for inverse in (False, True):
+                first, second = (_space(map_, degree, inverse) for map_ in laboratory.maps)
+                if first.basis and len(first.basis) == len(second.basis):
+                    tried = degree
+                    found, reason = _formulas(laboratory, first, degree, inverse, deadline)
+                    return result(found)
+            tried = degree
+    except NoPoint as error:
+        reason = str(error)
+        return result([])
+    reason = f"no polynomial of degree at most {tried}, and no reciprocal of one, is a density"
+    return result([])
+
+
+def _theorem(laboratory: Laboratory) -> FoundDensity | None:
+    """det(I - eps f') of a Hamiltonian system with numbers for parameters, made primitive; None for others."""
+    if laboratory.symbols or constant_structures(laboratory.file.system).hamiltonian is None:
+        return None
+    D = determinant_polynomial(laboratory.system)
+    if D is None:
+        return None
+    if laboratory.eps is not None:
+        at: dict[str | int, int | fmpz | fmpq] = {"eps": laboratory.eps}
+        D = D.subs(at)
+    if D.is_zero():
+        return None
+    _, phi = primitive_part(D)
+    evidence = Evidence(
+        "theorem", "f = J grad H with a constant skew matrix J: dx/det(I - eps f'(x)) is invariant (cmoq-2013)"
+    )
+    return FoundDensity(RationalFunction(phi, phi.context().constant(1)), Verdict.PROVED, evidence)
+
+
+def _space(map_: ModularMap, degree: int, inverse: bool) -> DarbouxSpace:
+    """The P of degree at most `degree` with P(x~) = det dPhi P(x), or with the reciprocal of det dPhi."""
+    sample = Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree))
+    if inverse:
+        sample = Sample(map_, sample.pairs, [[(below, above) for above, below in sample.sides[0]]])
+    return cofactor_space(sample, _ONCE, degree)
+
+
+def _formulas(
+    laboratory: Laboratory, model: DarbouxSpace, degree: int, inverse: bool, deadline: float
+) -> tuple[list[FoundDensity], str]:
+    count = len(laboratory.symbols)
+
+    def spaces_at(prime: int, values: tuple[int, ...]) -> list[DarbouxSpace] | None:
+        eps = values[count] if len(values) > count else 1
+        if eps % prime == 0:
+            return None
+        return [_space(laboratory.map_at(prime, values[:count], eps), degree, inverse)]
+
+    forms = closed_forms(
+        [model],
+        spaces_at,
+        laboratory.system.variables,
+        laboratory.symbols,
+        laboratory.eps_enters,
+        seed=laboratory.seed,
+        seconds=max(1.0, deadline - time.monotonic()),
+    )
+    if forms.bases is None:
+        return [], f"there is a density of degree {degree} modulo primes, but no closed form: {forms.reason}"
+    found = []
+    for P in forms.bases[0]:
+        one = P.context().constant(1)
+        phi = RationalFunction(one, P) if inverse else RationalFunction(P, one)
+        verdict, evidence = density_verdict(laboratory.system, phi, laboratory.eps, laboratory.seed)
+        if verdict is not Verdict.REFUTED:
+            found.append(FoundDensity(phi, verdict, evidence))
+    return found, ""

@@ -1,0 +1,153 @@
+"""How heights grow along exact orbits from several starts and for several eps, and whether these agree.
+
+One orbit says little: it may lie on a special curve, and one eps may be special (for q'' = -w^2 q + Q(q) with
+eps^2 w^2 = 1 the fourth iterate of the Kahan map is the identity). The kind of growth of one orbit is decided by the
+rules of `kahanmaps.invariants.heights`; here orbits are drawn and compared.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.text import format_number
+from kahanmaps.checks.settings import random_starts
+from kahanmaps.errors import InputError
+from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.invariants.heights import Growth, HeightGrowth, height_growth
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import counted
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+DEFAULT_EPS = (fmpq(1, 10), fmpq(3, 11))
+DEFAULT_STARTS = 3
+DEFAULT_STEPS = 60
+DEFAULT_MAX_DIGITS = 20_000
+DEFAULT_SECONDS = 30.0
+_MOST_STARTS = 1000
+_DRAWS = 20  # starts tried in place of one whose orbit meets a singular point
+
+
+@dataclass(frozen=True)
+class SurveyedOrbit:
+    """One orbit of the survey: its eps, its start and the growth of its heights."""
+
+    eps: fmpq
+    start: tuple[fmpq, ...]
+    growth: HeightGrowth
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        numbers = [format_number(entry) for entry in self.start]
+        return {"eps": format_number(self.eps), "start": numbers, **self.growth.to_json()}
+
+
+@dataclass(frozen=True)
+class HeightSurvey:
+    """The orbits of the survey, in the order of eps and then of starts; `is_whole` is False where time ended it."""
+
+    orbits: tuple[SurveyedOrbit, ...]
+    is_whole: bool
+
+    @property
+    def kinds(self) -> tuple[Growth, ...]:
+        """The different kinds of growth that were decided, in the order of their first orbits."""
+        found = [orbit.growth.kind for orbit in self.orbits]
+        return tuple(dict.fromkeys(kind for kind in found if kind is not Growth.UNDECIDED))
+
+    @property
+    def kind(self) -> Growth:
+        """The kind that all decided orbits have, one or more for each eps; otherwise undecided."""
+        every = {orbit.eps for orbit in self.orbits}
+        decided = {orbit.eps for orbit in self.orbits if orbit.growth.kind is not Growth.UNDECIDED}
+        return self.kinds[0] if len(self.kinds) == 1 and decided == every else Growth.UNDECIDED
+
+    @property
+    def text(self) -> str:
+        """One sentence: the kind, and how many orbits say so; or where they disagree."""
+        total = len(self.orbits)
+        if len(self.kinds) > 1:
+            counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
+            return f"undecided: {'the eps' if self._eps_differ else 'the starts'} disagree ({', '.join(counts)})"
+        decided = sum(orbit.growth.kind is not Growth.UNDECIDED for orbit in self.orbits)
+        if self.kind is Growth.UNDECIDED:
+            return f"undecided: {decided} of {counted(total, 'orbit')} decided"
+        eps = len({orbit.eps for orbit in self.orbits})
+        many = f"{decided} of {counted(total, 'orbit')}" if decided < total else counted(total, "orbit")
+        return f"{self.kind}: {many}, {counted(eps, 'value')} of eps"
+
+    @property
+    def _eps_differ(self) -> bool:
+        """Whether each eps has a kind of its own, the same for all its starts."""
+        kinds: dict[fmpq, set[Growth]] = {}
+        for orbit in self.orbits:
+            if orbit.growth.kind is not Growth.UNDECIDED:
+                kinds.setdefault(orbit.eps, set()).add(orbit.growth.kind)
+        return all(len(found) == 1 for found in kinds.values())
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "kind": str(self.kind),
+            "kinds": [str(kind) for kind in self.kinds],
+            "text": self.text,
+            "whole": self.is_whole,
+            "orbits": [orbit.to_json() for orbit in self.orbits],
+        }
+
+
+def height_survey(
+    system: QuadraticSystem,
+    eps: Any = None,
+    *,
+    starts: Sequence[Sequence[Any]] | int = DEFAULT_STARTS,
+    steps: int = DEFAULT_STEPS,
+    max_digits: int | None = DEFAULT_MAX_DIGITS,
+    seconds: float = DEFAULT_SECONDS,
+    structure: Structure | NoStructure | None = None,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> HeightSurvey:
+    """The growth of heights along exact orbits over Q from given starts, or so many random ones, for one or two eps.
+
+    `eps` is one exact number (time step 2 eps) or None for 1/10 and 3/11. Orbits end at `max_digits` digits a number;
+    no orbit is begun after `seconds`. A random start whose orbit meets a singular point is replaced by another.
+    Raises InputError for wrong values.
+
+    >>> from kahanmaps.systems.catalog import load
+    >>> found = height_survey(load("weierstrass").system, starts=2, steps=40)
+    >>> found.kind, found.text
+    (<Growth.QUADRATIC: 'quadratic'>, 'quadratic: 4 orbits, 2 values of eps')
+    """
+    if isinstance(starts, int) and not 1 <= starts <= _MOST_STARTS:
+        raise InputError(f"found {starts} starts, expected 1 to {_MOST_STARTS}")
+    if not isinstance(starts, int) and not starts:
+        raise InputError("found no starts, expected at least one")
+    if not seconds > 0:
+        raise InputError(f"found {seconds} seconds, expected a positive number")
+    deadline = time.monotonic() + seconds
+    orbits: list[SurveyedOrbit] = []
+    for value in DEFAULT_EPS if eps is None else (rational(eps),):
+        kahan_map = KahanMap(system, value)
+        draws = random_starts(system.dim, seed)
+        given = [None] * starts if isinstance(starts, int) else [kahan_map.point(start) for start in starts]
+        for k, start in enumerate(given):
+            if orbits and time.monotonic() > deadline:
+                return HeightSurvey(tuple(orbits), False)
+            progress(f"heights: eps = {value}, orbit {k + 1} of {len(given)}")
+            for candidate in _candidates(draws) if start is None else (start,):
+                found = height_growth(kahan_map, candidate, steps, structure=structure, max_digits=max_digits)
+                if found.end.status != "singular":
+                    break
+            orbits.append(SurveyedOrbit(value, tuple(candidate), found))
+    return HeightSurvey(tuple(orbits), True)
+
+
+def _candidates(draws: Iterator[tuple[fmpq, ...]]) -> Iterator[tuple[fmpq, ...]]:
+    for _ in range(_DRAWS):
+        yield next(draws)

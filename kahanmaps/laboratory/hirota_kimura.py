@@ -1,0 +1,220 @@
+"""Hirota-Kimura bases: which polynomials of a given set vanish along orbits, modulo primes.
+
+For a set of polynomials phi_1, ..., phi_M the null space K(x) of an orbit consists of the c with sum c_j phi_j = 0 at
+every point of it. Its reduced echelon basis depends on the orbit only, so that every coefficient that is not the same
+number for all orbits is an integral of the map. The codimension of the orbit's variety, which is the number of
+independent integrals that such relations see, is the rank of the gradients of the relations at a point of the orbit.
+
+All this is measured: modulo two primes, for two eps and several orbits; it proves nothing. Source:
+petrera-pfadler-suris-2009.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Any
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.laboratory.modular_points import (
+    ModularMap,
+    Point,
+    combine,
+    echelon,
+    exponents_up_to,
+    gradient_values,
+    monomial_values,
+    null_space,
+    rank,
+)
+
+_SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
+MAX_UNKNOWNS = 1800
+_MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
+
+
+@dataclass(frozen=True)
+class OrbitRelations:
+    """The polynomials of degree at most `degree` that vanish along one orbit.
+
+    `vectors` is the reduced echelon basis on the monomials `exponents_up_to(dim, degree)`; `codimension` the rank of
+    their gradients at a point of the orbit; `period` is the number of points of an orbit that closed, else None.
+    """
+
+    degree: int
+    vectors: list[list[int]]
+    codimension: int
+    period: int | None
+    start: Point
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The dimensions of the spaces of polynomials of degree 1, 2, ... that vanish along a generic orbit.
+
+    `codimension` is that of the orbit's variety as far as these polynomials show it; `relations` holds, for the two
+    maps that were compared, those of the last degree.
+    """
+
+    dim: int
+    nullities: tuple[int, ...]
+    codimensions: tuple[int, ...]
+    period: int | None
+    agree: bool
+    complete: bool
+
+    @property
+    def codimension(self) -> int:
+        """The number of independent integrals that the relations show."""
+        return max(self.codimensions, default=0)
+
+    @property
+    def first_degree(self) -> int | None:
+        """The least degree in which a polynomial vanishes along orbits."""
+        return next((d for d, nullity in enumerate(self.nullities, 1) if nullity), None)
+
+    @property
+    def degree(self) -> int:
+        """The largest degree that was tried."""
+        return len(self.nullities)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "nullities": list(self.nullities),
+            "codimensions": list(self.codimensions),
+            "codimension": self.codimension,
+            "period": self.period,
+            "maps_agree": self.agree,
+            "complete": self.complete,
+        }
+
+
+def relations_on_orbit(map_: ModularMap, degree: int, start: Point | None = None) -> OrbitRelations:
+    """The polynomials of degree at most `degree` that vanish along an orbit (a random one) modulo a prime.
+
+    Raises NoPoint where orbits meet the singular set.
+    """
+    support = exponents_up_to(map_.dim, degree)
+    count = len(support) + _SPARE
+    points = map_.orbit(count, start)
+    period = len(points) if len(points) < count else None
+    rows = [monomial_values(support, x, map_.prime) for x in points]
+    vectors = null_space(rows, len(support), map_.prime)
+    return OrbitRelations(degree, vectors, _codimension(map_, vectors, support, points[-1]), period, points[0])
+
+
+def span_of_relations(map_: ModularMap, degree: int, seconds: float = 30.0) -> tuple[list[list[int]], int]:
+    """(W, r): the reduced echelon basis W of the span of the relations of all orbits, and their number r for one."""
+    deadline = time.monotonic() + seconds
+    first = relations_on_orbit(map_, degree)
+    found, still = first.vectors, 0
+    while found and still < 2 and time.monotonic() < deadline:
+        more = echelon([*found, *relations_on_orbit(map_, degree).vectors], map_.prime)
+        still = still + 1 if len(more) == len(found) else 0
+        found = more
+    return found, len(first.vectors)
+
+
+def orbit_profile(
+    maps: Sequence[ModularMap],
+    *,
+    max_degree: int | None = None,
+    seconds: float = 20.0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Profile:
+    """Dimensions and codimensions for degree 1, 2, ..., on one orbit of each of the maps, which are to agree.
+
+    Ends where the codimension leaves curves (dim - 1) or points, at `max_degree`, or when the time is over.
+    """
+    dim = maps[0].dim
+    deadline = time.monotonic() + seconds
+    nullities: list[int] = []
+    codimensions: list[int] = []
+    agree, period, took, complete = True, None, 0.0, True
+    top = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
+    for degree in range(1, top + 1):
+        unknowns = comb(dim + degree, degree)
+        growth = (unknowns / comb(dim + degree - 1, degree - 1)) ** 3
+        if unknowns > MAX_UNKNOWNS or time.monotonic() + took * min(growth, 8) > deadline:
+            complete = False
+            break
+        progress(f"relations of degree {degree} along orbits")
+        began = time.monotonic()
+        found = [relations_on_orbit(map_, degree) for map_ in maps]
+        took = time.monotonic() - began
+        agree = agree and len({(len(one.vectors), one.codimension) for one in found}) == 1
+        # A special orbit has more relations, never fewer.
+        nullities.append(min(len(one.vectors) for one in found))
+        codimensions.append(min(one.codimension for one in found))
+        period = period or max((one.period or 0 for one in found), default=0) or None
+        if codimensions[-1] >= dim - 1:
+            break
+    return Profile(dim, tuple(nullities), tuple(codimensions), period, agree, complete)
+
+
+@dataclass(frozen=True)
+class Basis:
+    """A Hirota-Kimura basis: the set, and the null space of a generic orbit.
+
+    `vectors` is the reduced echelon basis for one orbit modulo `prime`, `constant` tells for each of its entries
+    whether it is the same number for all orbits; the others are integrals.
+    """
+
+    functions: tuple[str, ...]
+    dimension: int
+    constant: tuple[tuple[bool, ...], ...]
+    agree: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "functions": list(self.functions),
+            "dimension": self.dimension,
+            "integrals": [[not same for same in row] for row in self.constant],
+            "orbits_agree": self.agree,
+        }
+
+
+def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpoly], names: Sequence[str]) -> Basis:
+    """The null space of the given polynomials along orbits, on two orbits of each of the maps.
+
+    `functions` are polynomials in the variables of the system, `names` what to call them.
+    """
+    bases: list[list[list[int]]] = []
+    constant: list[list[bool]] | None = None
+    for map_ in maps:
+        field = GF(map_.prime)
+        pair: list[list[list[int]]] = []
+        for _ in range(2):
+            rows = [
+                [int(evaluate(function, field, [field.convert(c) for c in x])) for function in functions]
+                for x in map_.orbit(len(functions) + _SPARE)
+            ]
+            pair.append(null_space(rows, len(functions), map_.prime))
+        bases += pair
+        if len(pair[0]) == len(pair[1]):
+            same = [[a == b for a, b in zip(u, v, strict=True)] for u, v in zip(*pair, strict=True)]
+            constant = same if constant is None or len(constant) != len(same) else constant
+    dimension = min(len(basis) for basis in bases)
+    rows_of = constant if constant is not None and len(constant) == dimension else []
+    return Basis(
+        tuple(names), dimension, tuple(tuple(row) for row in rows_of), len({len(basis) for basis in bases}) == 1
+    )
+
+
+def _codimension(map_: ModularMap, vectors: list[list[int]], support: tuple[tuple[int, ...], ...], point: Point) -> int:
+    """The rank of the gradients at the point, of random combinations where there are many vectors."""
+    if not vectors:
+        return 0
+    prime, rng = map_.prime, random.Random(map_.prime)
+    if len(vectors) > map_.dim + 2:
+        weights = [[rng.randrange(prime) for _ in vectors] for _ in range(map_.dim + 2)]
+        vectors = combine(weights, vectors, prime)
+    return rank([gradient_values(vector, support, point, prime)[1] for vector in vectors], prime)

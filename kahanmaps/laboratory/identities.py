@@ -1,0 +1,138 @@
+"""Formulas that were found are put to the proof: as identities in x, eps and the symbols.
+
+The two sides are expanded over the field of rational functions, the cofactor form of the claim first, which is the
+smaller one: for I = P/Q that P(x~) Q(x) = Q(x~) P(x). Where that exceeds the budget, random points modulo primes
+support the identity, with a bound for the error where no parameter is a symbol.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import GF, Field
+from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate, ring
+from kahanmaps.algebra.residues import random_prime
+from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.conserve import conservation
+from kahanmaps.checks.decide import decide
+from kahanmaps.checks.preserve import density_identity
+from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep
+from kahanmaps.invariants.integrals import ClaimedIntegral
+from kahanmaps.invariants.measures import ClaimedDensity
+from kahanmaps.laboratory.parametric import ParametricSystem
+from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+_BUDGET = 60_000_000
+_MAX_DIMENSION = 6
+_POINTS = 6
+
+
+def integral_verdict(
+    system: ParametricSystem, integral: RationalFunction, eps: fmpq | None, seed: int = 0
+) -> tuple[Verdict, Evidence]:
+    """Whether I(x~) = I(x), for every value of the symbols of the system and, if `eps` is None, every eps.
+
+    `integral` is a function of (variables, symbols, eps). Proved by expansion, or supported, or refuted.
+    """
+    return _verdict(system, integral, eps, seed, False)
+
+
+def density_verdict(
+    system: ParametricSystem, density: RationalFunction, eps: fmpq | None, seed: int = 0
+) -> tuple[Verdict, Evidence]:
+    """Whether phi(x~) det(I - eps f'(x)) = phi(x) det(I + eps f'(x~)), that is, whether dx/phi is invariant."""
+    return _verdict(system, density, eps, seed, True)
+
+
+def _verdict(
+    system: ParametricSystem, function: RationalFunction, eps: fmpq | None, seed: int, is_density: bool
+) -> tuple[Verdict, Evidence]:
+    scope = _scope(system, eps)
+    if not _holds_at_points(system, function, eps, seed, is_density):
+        return Verdict.REFUTED, Evidence("random points over GF(p)", f"does not hold at a random point, {scope}")
+    if system.dim <= _MAX_DIMENSION:
+        field = FunctionField((*system.variables, *system.symbols, "eps"), _BUDGET)
+        try:
+            sides = _sides(
+                system,
+                function,
+                field,
+                field.variables[: system.dim],
+                field.variables[system.dim : -1],
+                field.variables[-1] if eps is None else field.convert(eps),
+                is_density,
+            )
+            if field.equal(*sides):
+                return Verdict.PROVED, Evidence("expansion", f"both sides are the same rational function, {scope}")
+        except (BudgetExceeded, SingularMatrix, ZeroDivisionError):
+            pass
+    if system.symbols:
+        return Verdict.SUPPORTED, Evidence(
+            "random points over GF(p)",
+            f"held at {_POINTS} random points modulo random primes of 61 bits, {scope}",
+            {"points": _POINTS},
+        )
+    quadratic = QuadraticSystem.from_polynomials(
+        [polynomial.compose(*ring(system.variables).gens(), ctx=ring(system.variables)) for polynomial in system.rhs]
+    )
+    if is_density:
+        identity = density_identity(quadratic, ClaimedDensity(function), eps)
+    else:
+        identity = conservation(quadratic, ClaimedIntegral("I", function), eps)
+    decision = decide(identity, seed)
+    return decision.verdict, decision.evidence
+
+
+def _scope(system: ParametricSystem, eps: fmpq | None) -> str:
+    step = "for every eps" if eps is None else f"for eps = {eps}"
+    return f"{step} and every {', '.join(system.symbols)}" if system.symbols else step
+
+
+def _sides(
+    system: ParametricSystem,
+    function: RationalFunction,
+    field: Field,
+    point: Sequence[Any],
+    values: Sequence[Any],
+    eps: Any,
+    is_density: bool,
+) -> tuple[Any, Any]:
+    """Both sides at a point over a field."""
+    map_ = KahanMapOver(system.over(field, values), eps)
+    image = map_.step(point)
+    P, Q = function.numerator, function.denominator
+    here, there = (*point, *values, eps), (*image, *values, eps)
+    left = evaluate(P, field, there) * evaluate(Q, field, here)
+    right = evaluate(P, field, here) * evaluate(Q, field, there)
+    if is_density:
+        left = left * map_.determinant(point)
+        right = right * map_.inverse.determinant(image)
+    return left, right
+
+
+def _holds_at_points(
+    system: ParametricSystem, function: RationalFunction, eps: fmpq | None, seed: int, is_density: bool
+) -> bool:
+    rng = random.Random(f"identity {seed}")
+    good = 0
+    for _ in range(10 * _POINTS):
+        field: Field = GF(random_prime(rng))
+        point = [field.random(rng) for _ in range(system.dim)]
+        values = [field.random(rng) for _ in system.symbols]
+        try:
+            step = field.random(rng) if eps is None else field.convert(eps)
+            left, right = _sides(system, function, field, point, values, step, is_density)
+        except (BadPrime, SingularStep, SingularMatrix, ZeroDivisionError):
+            continue
+        if left != right:
+            return False
+        good += 1
+        if good == _POINTS:
+            return True
+    return False

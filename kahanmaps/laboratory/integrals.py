@@ -1,0 +1,360 @@
+"""Integrals of a Kahan map in closed form, found without being told anything but the right-hand sides.
+
+How many there are is measured first (the codimension of orbits, hirota_kimura.py). Then spaces of polynomials with a
+common cofactor are sought modulo a prime (search.py); their ratios are the integrals. The coefficients are functions of
+eps and of the parameters that are left as symbols; they are interpolated (closed_forms.py), and what comes out is put
+to the proof as an identity (identities.py). A Hamiltonian system with constant structure has the integral of cmoq-2013
+in any case.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly, fmpz
+
+from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.latex import latex_rational_function
+from kahanmaps.algebra.polynomials import RationalFunction, degree
+from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.text import format_rational_function
+from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.laboratory.affine_functions import affine_darboux
+from kahanmaps.laboratory.closed_forms import closed_forms
+from kahanmaps.laboratory.cofactors import Cofactor, cofactor_of_affine, determinant_factors
+from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.hamiltonian_structure import constant_structures
+from kahanmaps.laboratory.hirota_kimura import Profile, orbit_profile
+from kahanmaps.laboratory.identities import integral_verdict
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, rank
+from kahanmaps.laboratory.parametric import ParametricSystem
+from kahanmaps.laboratory.search import Found, repeat, search
+from kahanmaps.systems.files import SystemFile
+
+_TRIES = 3
+
+
+@dataclass(frozen=True)
+class FoundIntegral:
+    """An integral I(x, eps), a function of (variables, symbols, eps), with the verdict on I(x~) = I(x)."""
+
+    name: str
+    function: RationalFunction
+    origin: str
+    verdict: Verdict
+    evidence: Evidence
+
+    @property
+    def text(self) -> str:
+        """The formula."""
+        return format_rational_function(self.function)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "name": self.name,
+            "integral": self.text,
+            "latex": latex_rational_function(self.function),
+            "degrees": [degree(self.function.numerator), degree(self.function.denominator)],
+            "origin": self.origin,
+            "verdict": str(self.verdict),
+            "evidence": self.evidence.to_json(),
+        }
+
+
+@dataclass(frozen=True)
+class IntegralSearch:
+    """What `find_integrals` found.
+
+    `integrals` are functionally independent; `codimension` is how many independent integrals the orbits show
+    (measured), `profile` how they show it. `reason` says what is missing and why. `eps` is None for every eps.
+    """
+
+    file: SystemFile
+    symbols: tuple[str, ...]
+    eps: fmpq | None
+    integrals: tuple[FoundIntegral, ...]
+    profile: Profile
+    reason: str
+    primes: tuple[int, ...]
+    seed: int
+
+    @property
+    def codimension(self) -> int:
+        """How many independent integrals the orbits show, not fewer than were found."""
+        return max(self.profile.codimension, len(self.integrals))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether there is a closed form for every integral that the orbits show."""
+        return len(self.integrals) >= self.codimension
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "integrals": [one.to_json() for one in self.integrals],
+            "found": len(self.integrals),
+            "codimension": self.codimension,
+            "relations": self.profile.to_json(),
+            "reason": self.reason,
+            "primes": [str(prime) for prime in self.primes],
+        }
+
+    def toml_section(self) -> str:
+        """The integrals as a section [integrals] of a system file, which `check-integrals` accepts."""
+        lines = ["[integrals]", *(f'{one.name} = "{one.text}"' for one in self.integrals)]
+        return "\n".join(lines) + "\n"
+
+
+class Laboratory:
+    """The maps on which a system is examined: two primes, each with its own eps and its own values of the symbols.
+
+    With `eps` (exact; the time step is 2 eps) all maps are at that eps.
+    """
+
+    def __init__(self, file: SystemFile, symbols: Sequence[str] = (), eps: Any = None, seed: int = 0) -> None:
+        self.file = file
+        self.symbols = tuple(name for name in dict.fromkeys(symbols) if name != "eps")
+        self.eps = None if eps is None else rational(eps)
+        if self.eps == 0:
+            raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+        if self.eps is not None and "eps" in symbols:
+            raise InputError("found eps both as a number and as a symbol, expected one of the two")
+        self.seed = seed
+        self.system = ParametricSystem.of(file, self.symbols)
+        rng = random.Random(f"laboratory {seed}")
+        self.maps: list[ModularMap] = []
+        while len(self.maps) < 2:
+            prime = random_prime(rng)
+            values = [rng.randrange(2, prime) for _ in self.symbols]
+            try:
+                self.maps.append(self.map_at(prime, values, rng.randrange(2, prime)))
+            except BadPrime:
+                continue
+
+    def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:
+        """The map modulo a prime; the residue `eps` counts only where eps is no given number. Raises BadPrime."""
+        if self.eps is not None:
+            eps = int(GF(prime).convert(self.eps))
+            if eps == 0:
+                raise BadPrime(f"the prime {prime} divides the numerator of eps", prime)
+        return ModularMap(self.system, prime, eps, values, self.seed)
+
+    @property
+    def eps_enters(self) -> str:
+        """How eps enters formulas: "not", where it is a number, "by weight" for homogeneous f, else as a "symbol"."""
+        if self.eps is not None:
+            return "not"
+        n = self.system.dim
+        terms = [monomial for polynomial in self.system.rhs for monomial in polynomial.monoms()]
+        return "by weight" if all(sum(int(e) for e in m[:n]) == 2 for m in terms) else "symbol"
+
+    @property
+    def primes(self) -> tuple[int, ...]:
+        """The primes of the maps."""
+        return tuple(map_.prime for map_ in self.maps)
+
+    def cofactors(self) -> list[Cofactor]:
+        """The cofactors that polynomials are tried with."""
+        affine = [
+            cofactor_of_affine(one.function, self.system)
+            for one in affine_darboux(self.file.system).functions
+            if self._stays_darboux(one.function)
+        ]
+        return [*affine, *determinant_factors(self.system)]
+
+    def _stays_darboux(self, function: fmpq_mpoly) -> bool:
+        """Whether l divides l' with the symbols free, not only at the values that the file gives them."""
+        if not self.symbols:
+            return True
+        context = self.system.rhs[0].context()
+        gens = context.gens()[: self.system.dim]
+        l_ = function.compose(*gens, ctx=context)
+        slope = sum(
+            (l_.derivative(k) * polynomial for k, polynomial in enumerate(self.system.rhs)), context.constant(0)
+        )
+        return bool((slope % l_).is_zero())
+
+
+def find_integrals(
+    file: SystemFile,
+    *,
+    symbols: Sequence[str] = (),
+    eps: Any = None,
+    max_degree: int | None = None,
+    seconds: float = 60.0,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> IntegralSearch:
+    """Independent integrals of the Kahan map of a system, in closed form, each with its verdict.
+
+    Args:
+        file: the system.
+        symbols: names of parameters that formulas are to contain; the others have the values of the file.
+        eps: an exact number, the formulas are then for this eps only; None: formulas contain eps (time step 2 eps).
+        max_degree: the largest degree of relations along orbits; by default as dimension and time allow.
+        seconds: the time that the search may take, about.
+        seed: of everything random.
+        progress: is told what is being tried.
+
+    Returns:
+        An `IntegralSearch`. Its formulas are exact and proved or supported as identities; the number of integrals
+        that orbits show is measured modulo two primes.
+
+    Raises:
+        InputError: for unknown symbols and eps = 0.
+
+    Source: petrera-pfadler-suris-2009, celledoni-2019, cmoq-2013.
+
+    >>> from kahanmaps.systems.catalog import load
+    >>> found = find_integrals(load("nahm_tetrahedral"))
+    >>> [(one.text, str(one.verdict)) for one in found.integrals], found.codimension
+    ([('(-3*x^2*y + y^3)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
+    """
+    laboratory = Laboratory(file, symbols, eps, seed)
+    deadline = time.monotonic() + seconds
+    primes = laboratory.primes
+
+    def result(integrals: Sequence[FoundIntegral], profile: Profile, reason: str) -> IntegralSearch:
+        return IntegralSearch(file, laboratory.symbols, laboratory.eps, tuple(integrals), profile, reason, primes, seed)
+
+    empty = Profile(file.system.dim, (), (), None, True, False)
+    try:
+        profile = orbit_profile(laboratory.maps, max_degree=max_degree, seconds=seconds / 3, progress=progress)
+        if profile.codimension == 0:
+            return result(_theorem(laboratory, [], 1), profile, "")
+        cofactors = laboratory.cofactors()
+        found = search(laboratory.maps[0], profile, cofactors, (deadline - time.monotonic()) / 2, progress)
+        formulas, reason = _formulas(laboratory, found, cofactors, deadline, progress)
+    except NoPoint as error:
+        return result([], empty, str(error))
+    integrals = _independent(laboratory, formulas, progress)
+    integrals += _theorem(laboratory, integrals, profile.codimension)
+    if len(integrals) < profile.codimension and not reason:
+        reason = (
+            f"{profile.codimension - len(integrals)} of the {profile.codimension} integrals that orbits show have no "
+            "closed form P/Q of the degrees that were tried: coefficients of Hirota-Kimura bases are such integrals"
+        )
+    return result(integrals, profile, reason)
+
+
+def _formulas(
+    laboratory: Laboratory,
+    found: Found,
+    cofactors: Sequence[Cofactor],
+    deadline: float,
+    progress: Callable[[str], None],
+) -> tuple[list[tuple[RationalFunction, str]], str]:
+    """All ratios of the spaces in closed form, with how they were found, and a reason where that failed."""
+    if not found.steps:
+        return [], ""
+    reference = laboratory.maps[0].prime
+    if repeat(found, laboratory.maps[1], cofactors, reference) is None:
+        return [], "what was found at one eps was not found at another"
+    progress("interpolating closed forms")
+    count = len(laboratory.symbols)
+
+    def spaces_at(prime: int, values: tuple[int, ...]) -> list[DarbouxSpace] | None:
+        eps = values[count] if len(values) > count else 1
+        if eps % prime == 0:
+            return None
+        again = repeat(found, laboratory.map_at(prime, values[:count], eps), cofactors, reference)
+        return None if again is None else again.all_spaces
+
+    forms = closed_forms(
+        found.all_spaces,
+        spaces_at,
+        laboratory.system.variables,
+        laboratory.symbols,
+        laboratory.eps_enters,
+        seed=laboratory.seed,
+        seconds=max(1.0, deadline - time.monotonic()),
+    )
+    if forms.bases is None:
+        return [], f"integrals were found modulo primes, but no closed form: {forms.reason}"
+    origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
+    return [
+        (_ratio(P, basis[0]), origin) for basis, origin in zip(forms.bases, origins, strict=True) for P in basis[1:]
+    ], ""
+
+
+def _ratio(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
+    """P/Q, or Q/P where P is the one that becomes a number for eps = 0."""
+    origin: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
+    if P.subs(origin).is_constant() and not Q.subs(origin).is_constant():
+        return RationalFunction(Q, P)
+    return RationalFunction(P, Q)
+
+
+def _independent(
+    laboratory: Laboratory, formulas: Sequence[tuple[RationalFunction, str]], progress: Callable[[str], None]
+) -> list[FoundIntegral]:
+    """The integrals that do not depend on those before them, with their verdicts; none that was refuted."""
+    found: list[FoundIntegral] = []
+    rows: list[list[int]] = []
+    map_ = laboratory.maps[0]
+    point = map_.random_point()
+    by_size = sorted(formulas, key=lambda pair: (degree(pair[0].numerator), len(pair[0].numerator)))
+    for function, origin in by_size:
+        row = _gradient(map_, function, point)
+        if rank([*rows, row], map_.prime) == len(rows):
+            continue
+        progress("verifying an integral")
+        verdict, evidence = integral_verdict(laboratory.system, function, laboratory.eps, laboratory.seed)
+        if verdict is not Verdict.REFUTED:
+            rows.append(row)
+            found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, verdict, evidence))
+    return found
+
+
+def _gradient(map_: ModularMap, function: RationalFunction, point: Sequence[int]) -> list[int]:
+    """A multiple of the gradient of P/Q with respect to the variables, modulo the prime."""
+    from kahanmaps.algebra.polynomials import evaluate
+
+    field = GF(map_.prime)
+    at = [field.convert(c) for c in (*point, *map_.values, map_.eps)]
+    P, Q = evaluate(function.numerator, field, at), evaluate(function.denominator, field, at)
+    return [
+        int(
+            evaluate(function.numerator.derivative(k), field, at) * Q
+            - evaluate(function.denominator.derivative(k), field, at) * P
+        )
+        for k in range(map_.dim)
+    ]
+
+
+def _theorem(laboratory: Laboratory, known: Sequence[FoundIntegral], wanted: int) -> list[FoundIntegral]:
+    """The modified Hamiltonian, where the system has one with numbers for parameters and it is a new integral."""
+    if laboratory.symbols or len(known) >= wanted:
+        return []
+    structures = constant_structures(laboratory.file.system)
+    integral = structures.integral
+    if integral is None:
+        return []
+    system = laboratory.file.system
+    field = FunctionField((*system.variables, "eps"), reduces=False)
+    eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
+    try:
+        value = integral.value(field, eps, field.variables[:-1])
+        common = value.above.gcd(value.below)
+        function = RationalFunction(value.above / common, value.below / common)
+    except BudgetExceeded:
+        return []
+    map_ = laboratory.maps[0]
+    point = map_.random_point()
+    rows = [_gradient(map_, one.function, point) for one in known]
+    if rank([*rows, _gradient(map_, function, point)], map_.prime) == len(rows):
+        return []
+    evidence = Evidence(
+        "theorem",
+        "f = J grad H with a constant skew matrix J: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)",
+        {"H": str(structures.hamiltonian.H) if structures.hamiltonian else ""},
+    )
+    name = f"I{len(known) + 1}"
+    return [FoundIntegral(name, function, "modified Hamiltonian (cmoq-2013)", Verdict.PROVED, evidence)]

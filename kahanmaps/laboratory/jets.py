@@ -1,0 +1,140 @@
+"""Curves in projective space with their tangent directions, carried by the Kahan map over GF(p)((t)).
+
+A jet is a power series in t, known up to a power of t, with one slope a tangent direction: an element of GF(p)[[t]][d1,
+..., dm]/(d_i d_j). Coordinates are homogeneous, so that nothing is ever divided but a common power of t.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import nmod_mat, nmod_poly
+
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.maps.projective import Forms
+
+
+class PrecisionTooLow(ArithmeticError):
+    """The series are not known far enough in t: start again with more terms."""
+
+
+class NotGeneric(ArithmeticError):
+    """The point lies in a special position on its hypersurface: take another."""
+
+
+class Jet:
+    """A power series modulo t^precision and its slopes; sums and products keep the lower precision."""
+
+    __slots__ = ("precision", "slopes", "value")
+
+    def __init__(self, value: nmod_poly, slopes: Sequence[nmod_poly], precision: int) -> None:
+        self.value, self.slopes, self.precision = value, slopes, precision
+
+    def __add__(self, other: Jet) -> Jet:
+        slopes = [a + b for a, b in zip(self.slopes, other.slopes, strict=True)]
+        return Jet(self.value + other.value, slopes, min(self.precision, other.precision))
+
+    def __neg__(self) -> Jet:
+        return Jet(-self.value, [-slope for slope in self.slopes], self.precision)
+
+    def __sub__(self, other: Jet) -> Jet:
+        return self + (-other)
+
+    def __mul__(self, other: Jet) -> Jet:
+        n = min(self.precision, other.precision)
+        a, b = self.value, other.value
+        slopes = [a.mul_low(q, n) + b.mul_low(p, n) for p, q in zip(self.slopes, other.slopes, strict=True)]
+        return Jet(a.mul_low(b, n), slopes, n)
+
+    def times(self, factor: int) -> Jet:
+        """The jet times a constant."""
+        return Jet(self.value * factor, [slope * factor for slope in self.slopes], self.precision)
+
+    def over_power(self, power: int) -> Jet:
+        """The jet divided by t^power. Raises NotGeneric where a slope is not divisible."""
+        if any(int(slope[k]) for slope in self.slopes for k in range(power)):
+            raise NotGeneric("the valuation differs at neighbouring points")
+        slopes = [slope.right_shift(power) for slope in self.slopes]
+        return Jet(self.value.right_shift(power), slopes, self.precision - power)
+
+
+def valuation(series: nmod_poly, precision: int) -> int | None:
+    """The exponent of the first term that is not zero below t^precision, None if there is none.
+
+    >>> valuation(nmod_poly([0, 0, 3], 7), 5)
+    2
+    """
+    return next((k for k in range(min(len(series), precision)) if int(series[k])), None)
+
+
+@dataclass(frozen=True)
+class Step:
+    """What is found after one step: valuations in t (None: not below the precision), and the rank of the differential.
+
+    `common` is the power of t divided out of all coordinates, `pole` the valuation of Z at the image when the least of
+    all coordinates is 0 (the order of the pole), `denominator` that of det(I - eps f') at the point before the step,
+    `rank` the rank of the differential of the map from the hypersurface to the limits of its points.
+    """
+
+    common: int
+    pole: int | None
+    denominator: int | None
+    rank: int
+
+
+def follow(
+    forms: Forms,
+    point: Sequence[int],
+    direction: Sequence[int],
+    tangents: Sequence[Sequence[int]],
+    prime: int,
+    steps: int,
+    precision: int,
+) -> list[Step]:
+    """The steps of the curve point + t direction and of its neighbours point + d_i tangent_i + t direction; exact.
+
+    `forms` are those of `linear_forms` over GF(p), points and vectors residues (X : Z); eps is in the forms.
+    Raises PrecisionTooLow and NotGeneric.
+    """
+    X = [
+        Jet(
+            nmod_poly([x, v], prime).truncate(precision),
+            [nmod_poly([tangent[k]], prime) for tangent in tangents],
+            precision,
+        )
+        for k, (x, v) in enumerate(zip(point, direction, strict=True))
+    ]
+    found = []
+    zero = nmod_poly([], prime)
+    for _ in range(steps):
+        rows = []
+        for row in forms:
+            entries = []
+            for form in row:
+                total = Jet(zero, [zero] * len(tangents), X[0].precision)
+                for coefficient, x in zip(form, X, strict=True):
+                    if coefficient != 0:
+                        total = total + x.times(int(coefficient))
+                entries.append(total)
+            rows.append(entries)
+        image = kernel_minors(rows)
+        known = image[0].precision
+        sizes = [valuation(jet.value, known) for jet in image]
+        denominator = sizes[-1]
+        seen = [size for size in sizes if size is not None]
+        if not seen or min(seen) + 1 > known - 1:
+            raise PrecisionTooLow
+        common = min(seen)
+        X = [jet.over_power(common) for jet in image]
+        pole = None if denominator is None else denominator - common
+        found.append(Step(common, pole, denominator, _rank(X, prime)))
+    return found
+
+
+def _rank(X: Sequence[Jet], prime: int) -> int:
+    """The rank at t = 0 in projective space: the limit itself counts for nothing."""
+    rows: list[list[Any]] = [[jet.value[0] for jet in X]]
+    rows += [[jet.slopes[i][0] for jet in X] for i in range(len(X[0].slopes))]
+    return int(nmod_mat(len(rows), len(X), [int(entry) for row in rows for entry in row], prime).rank()) - 1

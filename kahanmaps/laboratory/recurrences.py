@@ -1,0 +1,304 @@
+"""Linear recurrences of integer sequences: the shortest one, how the sequence grows, and its growth rate exactly.
+
+A sequence of integers that satisfies a linear recurrence over Q satisfies one of the same length with integer
+coefficients and leading coefficient 1 (fatou-1906). So the shortest recurrence is looked for modulo one large prime
+(massey-1969), lifted to integers, and then tried exactly on every term. Held-out terms speak for it; nothing here
+proves that it goes on.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from itertools import count
+from typing import Any
+
+import flint
+from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz_mod_ctx, fmpz_mod_poly_ctx, fmpz_poly
+
+from kahanmaps.algebra.text import format_number
+from kahanmaps.errors import InputError
+
+_PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
+_BITS = 256  # of the balls for roots
+_MOST_CLASSES = 12  # residue classes in a closed form
+
+
+class GrowthClass(StrEnum):
+    """How a sequence with a linear recurrence grows; UNKNOWN where there is no recurrence."""
+
+    ZERO = "zero"  # from some term on
+    BOUNDED = "bounded"
+    LINEAR = "linear"
+    QUADRATIC = "quadratic"
+    POLYNOMIAL = "polynomial"
+    EXPONENTIAL = "exponential"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class GrowthRate:
+    """The largest modulus of a characteristic root, where it is one itself: lim a_n^(1/n) for positive sequences.
+
+    `minimal_polynomial` is irreducible over Q; `enclosure` is text of a ball that contains the number for certain;
+    `multiplicity` is that of the root (more than 1: the growth has a polynomial factor).
+    """
+
+    minimal_polynomial: fmpz_poly
+    enclosure: str
+    digits: str
+    multiplicity: int
+
+    @property
+    def text(self) -> str:
+        """The number, exactly where it is an integer, else rounded with its minimal polynomial."""
+        if self.minimal_polynomial.degree() == 1:
+            return str(-self.minimal_polynomial[0])
+        return f"{self.digits}, root of {self.minimal_polynomial}"
+
+
+@dataclass(frozen=True)
+class Recurrence:
+    """A linear recurrence of a_0, a_1, ..., shortest possible, that holds for all `terms` terms at hand.
+
+    `characteristic` is monic with integer coefficients, [c_0, c_1, ..., 1] standing for
+    a_{n+order} + ... + c_1 a_{n+1} + c_0 a_n = 0. A factor x^k means that the first k terms (`preperiod`) are exempt
+    from the recurrence of the others. `checked` of the terms were not needed to find it.
+
+    >>> found = find_recurrence([2 * n * n + 1 for n in range(12)])
+    >>> found.characteristic, found.order, found.checked, str(found.growth)
+    (x^3 + (-3)*x^2 + 3*x + (-1), 3, 6, 'quadratic')
+    >>> found.closed_form, found.rate.text
+    ('2*n^2 + 1', '1')
+    """
+
+    values: tuple[int, ...]
+    characteristic: fmpz_poly
+
+    @property
+    def terms(self) -> int:
+        """The number of terms it was found from and tried on."""
+        return len(self.values)
+
+    @property
+    def order(self) -> int:
+        """Its length, the preperiod counted."""
+        return int(self.characteristic.degree())
+
+    @property
+    def checked(self) -> int:
+        """The number of terms that were not needed to find it, and satisfy it."""
+        return self.terms - 2 * self.order
+
+    @cached_property
+    def factors(self) -> tuple[tuple[fmpz_poly, int], ...]:
+        """The irreducible factors of the characteristic polynomial over Q with their multiplicities, x left out."""
+        found = self.characteristic.factor()[1]
+        return tuple((factor, int(k)) for factor, k in found if factor[0] != 0)
+
+    @cached_property
+    def preperiod(self) -> int:
+        """The number of terms at the beginning that do not belong to the recurrence of the others."""
+        return next(k for k in count() if self.characteristic[k] != 0)
+
+    @cached_property
+    def is_polynomial(self) -> bool:
+        """Whether all roots other than 0 are roots of unity: decided exactly."""
+        return all(_cyclotomic_index(factor) for factor, _ in self.factors)
+
+    @property
+    def power(self) -> int:
+        """k for growth as n^k (times an exponential, if the growth is exponential); 0 for the zero sequence."""
+        if not self.factors:
+            return 0
+        if self.is_polynomial or self.rate is None:
+            return max(k for _, k in self.factors) - 1
+        return self.rate.multiplicity - 1
+
+    @property
+    def growth(self) -> GrowthClass:
+        """The kind of growth."""
+        if not self.factors:
+            return GrowthClass.ZERO
+        if not self.is_polynomial:
+            return GrowthClass.EXPONENTIAL
+        classes = (GrowthClass.BOUNDED, GrowthClass.LINEAR, GrowthClass.QUADRATIC)
+        return classes[self.power] if self.power < 3 else GrowthClass.POLYNOMIAL
+
+    @cached_property
+    def rate(self) -> GrowthRate | None:
+        """The growth rate; None for the zero sequence, and where no positive root has the largest modulus."""
+        if not self.factors:
+            return None
+        if self.is_polynomial:
+            return GrowthRate(fmpz_poly([-1, 1]), "1", "1", max(k for _, k in self.factors))
+        return _largest_root(self.factors)
+
+    @cached_property
+    def closed_form(self) -> str | None:
+        """a_n as a polynomial in n, one for each class of n modulo the period; None for exponential growth.
+
+        It holds from n = `preperiod` on. None also where there are more than 12 classes.
+        """
+        if not self.is_polynomial or not self.factors:
+            return "0" if not self.factors else None
+        period = math.lcm(*(_cyclotomic_index(factor) for factor, _ in self.factors))
+        size = max(k for _, k in self.factors)
+        if period > _MOST_CLASSES:
+            return None
+        forms = []
+        values = self._extended(self.preperiod + period * (size + 1))
+        for residue in range(period):
+            first = next(n for n in count(self.preperiod) if n % period == residue)
+            at = [first + period * k for k in range(size)]
+            forms.append(_polynomial_text(_interpolated(at, [values[n] for n in at])))
+        if len(set(forms)) == 1:
+            return forms[0]
+        return "; ".join(f"{form} for n = {residue} mod {period}" for residue, form in enumerate(forms))
+
+    @property
+    def text(self) -> str:
+        """The recurrence as an equation, with what speaks for it."""
+        terms = [f"{_signed(-self.characteristic[k])}*a(n-{self.order - k})" for k in range(self.order - 1, -1, -1)]
+        terms = [term for term in terms if not term.startswith(("+0*", "-0*"))]
+        right = "".join(terms).replace("+1*", "+").replace("-1*", "-").removeprefix("+") or "0"
+        after = f" for n >= {self.order}"
+        return f"a(n) = {right}{after}, from {self.terms} terms of which {self.checked} were not needed to find it"
+
+    def predict(self, n: int) -> int:
+        """a_n as the recurrence continues the sequence.
+
+        >>> find_recurrence([1, 2, 4, 8, 16]).predict(10)
+        1024
+        """
+        return self._extended(n + 1)[n]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; coefficients are text, from x^0 up."""
+        rate = self.rate
+        return {
+            "order": self.order,
+            "preperiod": self.preperiod,
+            "terms": self.terms,
+            "checked": self.checked,
+            "characteristic": [str(c) for c in self.characteristic.coeffs()],
+            "factors": [{"factor": str(factor), "multiplicity": k} for factor, k in self.factors],
+            "growth": str(self.growth),
+            "power": self.power,
+            "rate": None if rate is None else rate_json(rate),
+            "closed_form": self.closed_form,
+            "text": self.text,
+        }
+
+    def _extended(self, length: int) -> list[int]:
+        values = list(self.values)
+        below = [int(c) for c in self.characteristic.coeffs()[:-1]]
+        while len(values) < length:
+            last = values[len(values) - self.order :]
+            values.append(-sum(c * value for c, value in zip(below, last, strict=True)))
+        return values
+
+
+def find_recurrence(values: Sequence[int]) -> Recurrence | None:
+    """The shortest linear recurrence over Q of an integer sequence a_0, a_1, ..., or None.
+
+    It is accepted where it holds for all terms, and for at least 2 terms and at least a third of its order more than
+    the 2 order terms that determine it. The first terms may be exempt (`preperiod`); they count in the order.
+    Raises InputError where a value is not an integer.
+
+    >>> find_recurrence([1, 6, 36, 216, 1296]).rate.text
+    '6'
+    >>> find_recurrence([1, 2, 3, 5, 8, 13, 21]).rate.text
+    '1.61803398874989484820, root of x^2 + (-1)*x + (-1)'
+    >>> find_recurrence([2, 3, 5, 7, 11, 13, 17, 19]) is None
+    True
+    """
+    for value in values:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise InputError(f"found {value!r} in the sequence, expected integers")
+    if len(values) < 2:
+        return None
+    polynomial = _context().minpoly(list(values))
+    order = int(polynomial.degree())
+    if len(values) < 2 * order + needed_checks(order):
+        return None
+    lifted = [int(c) for c in polynomial.coeffs()]
+    lifted = [c - _PRIME if 2 * c > _PRIME else c for c in lifted]
+    for n in range(len(values) - order):
+        if sum(c * value for c, value in zip(lifted, values[n : n + order + 1], strict=True)) != 0:
+            return None
+    return Recurrence(tuple(values), fmpz_poly(lifted))
+
+
+def needed_checks(order: int) -> int:
+    """The number of held-out terms without which a recurrence of this order is not accepted."""
+    return max(2, -(-order // 3))
+
+
+def rate_json(rate: GrowthRate) -> dict[str, Any]:
+    """A growth rate as plain data."""
+    return {
+        "value": rate.digits,
+        "enclosure": rate.enclosure,
+        "minimal_polynomial": [str(c) for c in rate.minimal_polynomial.coeffs()],
+        "multiplicity": rate.multiplicity,
+    }
+
+
+@functools.cache
+def _context() -> fmpz_mod_poly_ctx:
+    return fmpz_mod_poly_ctx(fmpz_mod_ctx(_PRIME))
+
+
+def _cyclotomic_index(factor: fmpz_poly) -> int:
+    """n where the polynomial is the n-th cyclotomic one, else 0."""
+    return int(factor.is_cyclotomic())
+
+
+def _largest_root(factors: Sequence[tuple[fmpz_poly, int]]) -> GrowthRate | None:
+    """The positive root that no other root exceeds in modulus, certified by balls."""
+    best: tuple[arb, fmpz_poly, int] | None = None
+    with flint.ctx.workprec(_BITS):
+        moduli = []
+        for factor, multiplicity in factors:
+            found: Any = factor.complex_roots()  # pairs, whatever the stubs say
+            for root, _ in found:
+                moduli.append(abs(root))
+                # FLINT isolates real roots as such: their imaginary part is the exact 0.
+                if root.imag == 0 and root.real > 0 and (best is None or root.real > best[0]):
+                    best = (root.real, factor, multiplicity)
+        if best is None or any(modulus > best[0] for modulus in moduli):
+            return None
+        value, factor, multiplicity = best
+        if factor.degree() == 1:
+            whole = str(-factor[0])
+            return GrowthRate(factor, whole, whole, multiplicity)
+        return GrowthRate(factor, value.str(40), value.str(21, radius=False), multiplicity)
+
+
+def _interpolated(at: Sequence[int], values: Sequence[int]) -> fmpq_poly:
+    """The polynomial of degree below len(at) with these values."""
+    size = len(at)
+    powers = fmpq_mat(size, size, [fmpq(n) ** k for n in at for k in range(size)])
+    return fmpq_poly(powers.solve(fmpq_mat(size, 1, [fmpq(value) for value in values])).entries())
+
+
+def _polynomial_text(polynomial: fmpq_poly) -> str:
+    terms = []
+    for k in range(polynomial.degree(), -1, -1):
+        c = polynomial[k]
+        if c != 0:
+            power = "" if k == 0 else "n" if k == 1 else f"n^{k}"
+            number = format_number(abs(c))
+            body = number if not power else power if number == "1" else f"{number}*{power}"
+            terms.append((" - " if c < 0 else " + ") + body)
+    text = "".join(terms)
+    return text.removeprefix(" + ") if not text.startswith(" - ") else "-" + text[3:]
+
+
+def _signed(number: Any) -> str:
+    return f"+{number}" if number >= 0 else str(number)

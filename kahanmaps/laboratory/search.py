@@ -1,0 +1,195 @@
+"""The search for spaces of polynomials with a common cofactor, recorded so that it can be repeated on another map.
+
+A search runs on one map: modulo a prime, at one eps, at one value of each symbol. What it found are steps: affine
+integrals, the relations of a degree, a product of cofactors. Repeating the steps on maps with other primes, eps and
+values of the symbols gives the coefficients of the same polynomials there, from which closed forms are interpolated.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import comb
+
+from flint import fmpq
+
+from kahanmaps.algebra.residues import rational_reconstruction
+from kahanmaps.laboratory.cofactors import (
+    Cofactor,
+    CofactorProduct,
+    Sample,
+    cofactor_space,
+    points_needed,
+    search_cofactors,
+)
+from kahanmaps.laboratory.darboux_spaces import LARGEST_SPAN, DarbouxSpace, darboux_spaces, gradient_rank
+from kahanmaps.laboratory.hirota_kimura import Profile
+from kahanmaps.laboratory.modular_points import ModularMap, null_space
+
+# Degrees up to which polynomials with a given cofactor are sought, by dimension.
+_COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 5, 5: 4, 6: 3}
+_FEW = 20  # with more relations than these, cofactors come first
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a search; `product` is None except for cofactors. `text` says how for people."""
+
+    kind: str  # "affine", "relations" or "cofactor"
+    degree: int
+    product: CofactorProduct | None
+    text: str
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found on one map: a list of spaces for each step, and how many independent integrals they give."""
+
+    steps: list[Step]
+    spaces: list[list[DarbouxSpace]]
+    independent: int
+    unresolved: int
+
+    @property
+    def all_spaces(self) -> list[DarbouxSpace]:
+        """The spaces of all steps."""
+        return [space for spaces in self.spaces for space in spaces]
+
+
+def affine_space(map_: ModularMap) -> DarbouxSpace | None:
+    """The span of 1 and the affine integrals: v.x with v.f = 0; None where there are none."""
+    n, prime = map_.dim, map_.prime
+    local = map_.local
+    columns = [[int(local.tensor[i * n + j, k]) for i in range(n)] for j in range(n) for k in range(j, n)]
+    columns += [[int(local.B[i, j]) for i in range(n)] for j in range(n)]
+    columns.append([int(local.c[i, 0]) for i in range(n)])
+    vectors = null_space(columns, n, prime)
+    if not vectors:
+        return None
+    return DarbouxSpace.spanned_by(n, 1, [[1] + [0] * n, *([0, *vector] for vector in vectors)], prime)
+
+
+def search(
+    map_: ModularMap,
+    profile: Profile,
+    cofactors: Sequence[Cofactor],
+    seconds: float,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Found:
+    """Spaces whose ratios are as many independent integrals as the profile shows, as far as they can be found."""
+    deadline = time.monotonic() + seconds
+    steps: list[Step] = []
+    spaces: list[list[DarbouxSpace]] = []
+    wanted, unresolved = profile.codimension, 0
+
+    def known() -> list[DarbouxSpace]:
+        return [space for group in spaces for space in group]
+
+    def done() -> bool:
+        return gradient_rank(map_, known()) >= wanted or time.monotonic() > deadline
+
+    affine = affine_space(map_)
+    if affine is not None:
+        steps.append(Step("affine", 1, None, "v.x with v.f(x) = 0"))
+        spaces.append([affine])
+    later: list[int] = []
+    for degree, nullity in enumerate(profile.nullities, 1):
+        if degree == 1 or not nullity:
+            continue
+        if nullity >= LARGEST_SPAN:
+            break
+        if nullity > _FEW:
+            later.append(degree)
+            continue
+        if done():
+            break
+        progress(f"closed forms from the relations of degree {degree}")
+        unresolved += _take_relations(map_, degree, steps, spaces, deadline)
+    if not done():
+        top = _COFACTOR_DEGREE.get(map_.dim, 2)
+        progress(f"polynomials of degree up to {top} with {comb(map_.dim + top, top)} terms and known cofactors")
+        for product, space in search_cofactors(map_, cofactors, known(), wanted, top, deadline - time.monotonic()):
+            steps.append(Step("cofactor", space.degree, product, f"common cofactor {product.text(cofactors)}"))
+            spaces.append([space])
+    for degree in later:
+        if done():
+            break
+        progress(f"closed forms from the relations of degree {degree}")
+        unresolved += _take_relations(map_, degree, steps, spaces, deadline)
+    return Found(steps, spaces, gradient_rank(map_, known()), unresolved)
+
+
+def _take_relations(
+    map_: ModularMap, degree: int, steps: list[Step], spaces: list[list[DarbouxSpace]], deadline: float
+) -> int:
+    known = [space for group in spaces for space in group]
+    found = darboux_spaces(map_, degree, known, max(1.0, deadline - time.monotonic()))
+    before = gradient_rank(map_, known)
+    if found.spaces and gradient_rank(map_, [*known, *found.spaces]) > before:
+        steps.append(Step("relations", degree, None, f"relations of degree {degree} along orbits"))
+        spaces.append(sorted(found.spaces, key=_pattern))
+    return found.unresolved
+
+
+def repeat(found: Found, map_: ModularMap, cofactors: Sequence[Cofactor], reference: int) -> Found | None:
+    """The same steps on another map; None where they give spaces of another shape (a special value).
+
+    `reference` is the prime of `found`, by which spaces of the same shape are told apart.
+    """
+    spaces: list[list[DarbouxSpace]] = []
+    top = max((step.degree for step in found.steps if step.kind == "cofactor"), default=0)
+    sample = Sample.of(map_, cofactors, points_needed(map_.dim, top)) if top else None
+    for step, model in zip(found.steps, found.spaces, strict=True):
+        known = [space for group in spaces for space in group]
+        if step.kind == "affine":
+            affine = affine_space(map_)
+            group = [affine] if affine is not None else []
+        elif step.product is not None:
+            assert sample is not None
+            group = [cofactor_space(sample, step.product, step.degree)]
+        else:
+            group = darboux_spaces(map_, step.degree, known).spaces
+        ordered = _in_order(group, model, map_.prime, reference)
+        if ordered is None:
+            return None
+        spaces.append(ordered)
+    return Found(found.steps, spaces, found.independent, found.unresolved)
+
+
+def _pattern(space: DarbouxSpace) -> tuple[tuple[bool, ...], ...]:
+    return tuple(tuple(bool(entry) for entry in vector) for vector in space.basis)
+
+
+def _in_order(
+    group: list[DarbouxSpace], model: list[DarbouxSpace], prime: int, reference: int
+) -> list[DarbouxSpace] | None:
+    """The spaces in the order of the model, by the places of their zeros and, where these agree, by their numbers."""
+    if sorted(map(_pattern, group)) != sorted(map(_pattern, model)):
+        return None
+    waiting = list(group)
+    ordered = []
+    for space in model:
+        alike = [one for one in waiting if _pattern(one) == _pattern(space)]
+        if len(alike) > 1:
+            alike.sort(key=lambda one: -_equal_entries(one, space, prime, reference))
+        waiting.remove(alike[0])
+        ordered.append(alike[0])
+    return ordered
+
+
+def _equal_entries(one: DarbouxSpace, model: DarbouxSpace, prime: int, reference: int) -> int:
+    """How many coefficients seem to be the same rational number."""
+    count = 0
+    for mine, its in zip(one.basis, model.basis, strict=True):
+        for a, b in zip(mine, its, strict=True):
+            if b and b != 1:
+                value = rational_reconstruction(b, reference)
+                if value is not None and _reduced(value, prime) == a:
+                    count += 1
+    return count
+
+
+def _reduced(value: fmpq, prime: int) -> int | None:
+    below = int(value.q) % prime
+    return int(value.p) * pow(below, -1, prime) % prime if below else None

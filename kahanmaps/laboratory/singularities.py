@@ -1,0 +1,195 @@
+"""Singularity confinement: what becomes of the hypersurfaces that the Kahan map contracts, and of its poles.
+
+A hypersurface on which the differential of the map degenerates may be contracted to something smaller: two points on it
+have the same image, and memory is lost. The singularity is confined if, followed along curves through the hypersurface,
+later images are a hypersurface again. Degrees of iterates drop below their maximum only where contracted hypersurfaces
+meet points without a value. Hypersurfaces are found exactly over Q, for an exact eps; what becomes of them is computed
+at random points modulo large primes, which is evidence and no proof.
+Source: grammaticos-ramani-papageorgiou-1991, and for Kahan maps zander-2021.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.fates import NOT_CONTRACTED, UNDECIDED, Hypersurface, fate_of, unwritten
+from kahanmaps.maps.projective import homogeneous_map
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+MAX_DIMENSION = 6
+MAX_STEPS = 200
+DEFAULT_STEPS = 12
+_MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
+
+
+@dataclass(frozen=True)
+class SingularityRun:
+    """The singularities of a Kahan map at one exact eps, half the time step.
+
+    `denominator` is det(I - eps f'(x)) as text; `critical_degree` the degree of the Jacobian determinant of the
+    homogeneous map (None where it was too large to expand: contracted hypersurfaces are then known by random points).
+    """
+
+    eps: fmpq
+    denominator: str
+    map_degree: int
+    critical_degree: int | None
+    hypersurfaces: tuple[Hypersurface, ...]
+    stopped: bool
+    is_undefined: bool
+
+    @property
+    def verdict(self) -> str:
+        """ "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided"."""
+        if self.is_undefined:
+            return "singular everywhere"
+        states = {h.status for h in self.hypersurfaces if h.status != NOT_CONTRACTED}
+        if self.stopped or UNDECIDED in states:
+            return UNDECIDED
+        if not self.hypersurfaces:
+            return "no singularities"
+        if not states:
+            return "nothing contracted"
+        return "some confined" if len(states) > 1 else states.pop()
+
+    @property
+    def shape(self) -> tuple[Any, ...]:
+        """What does not depend on eps if eps is generic: degrees, kinds and patterns."""
+        return tuple(
+            sorted(
+                (h.degree, h.is_pole, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
+                for h in self.hypersurfaces
+            )
+        )
+
+
+def singularities(
+    system: QuadraticSystem,
+    eps: Any,
+    *,
+    steps: int = DEFAULT_STEPS,
+    seed: int = 0,
+    seconds: float = 60.0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> SingularityRun:
+    """The contracted hypersurfaces and poles of a Kahan map at one exact eps (half the time step), and their fate.
+
+    They are followed for `steps` steps. Hypersurfaces are exact, their fate is that of two random points modulo two
+    random primes; "not confined" means within so many steps. Stops after about `seconds` seconds. Returns a
+    SingularityRun; raises InputError for dimensions above 6 and a wrong number of steps.
+    Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
+
+    >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
+    >>> run.denominator, run.verdict
+    ('-9/100*x + 11/100*y + 99/100', 'not confined')
+    """
+    exact_eps = rational(eps)
+    if system.dim > MAX_DIMENSION:
+        raise InputError(f"found a system of dimension {system.dim}, expected at most {MAX_DIMENSION}")
+    if not 1 <= steps <= MAX_STEPS:
+        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
+    end = time.monotonic() + seconds
+    forms, common = homogeneous_map(system, exact_eps, QQ)
+    degree = max(int(form.total_degree()) for form in forms)
+    denominator = _affine(forms[-1] * common, system)
+    is_undefined = bool(forms[-1].is_zero())  # det(I - eps f'(x)) = 0 for all x
+    factors: dict[str, tuple[fmpq_mpoly, bool, int | None]] = {}
+    for factor, _ in [] if is_undefined else (forms[-1] * common).factor()[1]:
+        if not _is_infinity(factor):
+            factors[str(factor)] = (factor, True, 0)
+    critical_degree: int | None = 0
+    if not is_undefined and degree > 1:
+        progress("the Jacobian determinant of the homogeneous map")
+        critical = _critical(forms, degree)
+        critical_degree = None if critical is None else int(critical.total_degree())
+        if critical is None:
+            factors = {text: (factor, pole, None) for text, (factor, pole, _) in factors.items()}
+            infinity = forms[0].context().gens()[-1]
+            factors[str(infinity)] = (infinity, False, None)
+        else:
+            for factor, multiplicity in critical.factor()[1]:
+                pole = factors.get(str(factor), (factor, False, 0))[1]
+                factors[str(factor)] = (factor, pole, int(multiplicity))
+    rng = random.Random(f"singularities {seed} {exact_eps}")
+    found, stopped = [], False
+    for factor, pole, multiplicity in factors.values():
+        if time.monotonic() > end:
+            stopped = True
+            break
+        text = "Z" if _is_infinity(factor) else _affine(factor, system)
+        progress(f"following {text[:40]}")
+        fate = fate_of(system, exact_eps, factor, steps, rng, end)
+        found.append(Hypersurface(text, int(factor.total_degree()), pole, multiplicity, *fate))
+    if critical_degree is None and not stopped:
+        progress("following critical points")
+        found += unwritten(system, exact_eps, steps, rng, end)
+        stopped = time.monotonic() > end
+    return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, is_undefined)
+
+
+def symbolic_denominator(system: QuadraticSystem) -> list[tuple[str, int]] | None:
+    """The irreducible factors over Q of det(I - eps f'(x)) as a polynomial in x and eps, with multiplicities; exact.
+
+    None above dimension 4, where it may be long, and where a variable is called eps.
+
+    >>> symbolic_denominator(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]))
+    [('12*x*eps^2 - 1', 1)]
+    """
+    n = system.dim
+    if n > 4 or "eps" in system.variables:
+        return None
+    context = ring((*system.variables, "eps"))
+    x, eps = context.gens()[:-1], context.gens()[-1]
+    local = system.over(QQ)
+    rows = []
+    for i in range(n):
+        row = []
+        for j in range(n):
+            entry = context.constant(local.B[i, j])
+            for k in range(n):
+                entry = entry + x[k] * local.tensor[i * n + j, k]
+            row.append(context.constant(int(i == j)) - eps * entry)
+        rows.append([*row, context.constant(0)])
+    return [(format_polynomial(factor), int(power)) for factor, power in kernel_minors(rows)[-1].factor()[1]]
+
+
+def default_eps(seed: int) -> tuple[fmpq, fmpq]:
+    """Two different rational numbers of small height, the same ones for the same seed.
+
+    >>> default_eps(0)
+    (7/11, 4/13)
+    """
+    rng = random.Random(f"singularities eps {seed}")
+    first = fmpq(rng.randint(2, 9), 11)
+    return first, fmpq(rng.randint(2, 11), 13)
+
+
+def _critical(forms: Sequence[Any], degree: int) -> Any:
+    """The Jacobian determinant of the homogeneous map, None where it is too large."""
+    size = len(forms)
+    if comb(size * (degree - 1) + size - 1, size - 1) > _MAX_TERMS:
+        return None
+    zero = forms[0].context().constant(0)
+    return kernel_minors([[*(form.derivative(j) for j in range(size)), zero] for form in forms])[-1]
+
+
+def _is_infinity(factor: Any) -> bool:
+    return len(factor) == 1 and all(exponent == 0 for exponent in factor.monoms()[0][:-1])
+
+
+def _affine(form: Any, system: QuadraticSystem) -> str:
+    """The form at Z = 1 in the variables of the system, as text."""
+    context = ring(system.variables)
+    return format_polynomial(context.from_dict({tuple(m)[:-1]: c for m, c in form.terms()}))

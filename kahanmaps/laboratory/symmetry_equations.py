@@ -1,0 +1,115 @@
+"""The equations of a symmetry x -> S x + r of a quadratic system: checked, and solved for r or for S.
+
+f(S x + r) = sign S f(x) for all x; sign 1 for a symmetry, -1 for a reversing one. Everything is exact over Q.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import nullspace
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.small_systems import Component, solve_system
+from kahanmaps.laboratory.commuting_equations import coefficients_of
+from kahanmaps.laboratory.commuting_proofs import transported
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def is_symmetry(system: QuadraticSystem, S: fmpq_mat, r: Sequence[fmpq], sign: int) -> bool:
+    """Whether f(S x + r) = sign S f(x) for all x: sign 1 for a symmetry, -1 for a reversing one. Exact.
+
+    >>> f = QuadraticSystem.from_text(["x", "y"], ["y", "-x^2"])
+    >>> is_symmetry(f, fmpq_mat([[1, 0], [0, -1]]), [fmpq(0)] * 2, -1)
+    True
+    """
+    return S.det() != 0 and transported(system, S, r) == coefficients_of(system.transformed(S).scaled(sign))
+
+
+def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, deadline: float) -> tuple[fmpq, ...] | None:
+    """An r with f(S x + r) = sign S f(x), 0 if possible; None if none that is rational was found.
+
+    `deadline` is a value of time.monotonic(). Source: cmoq-2013.
+
+    >>> f = QuadraticSystem.from_text(["x"], ["x^2 + x"])
+    >>> translation(f, fmpq_mat([[-1]]), -1, float("inf"))
+    (-1,)
+    """
+    n = f.dim
+    zero = (fmpq(0),) * n
+    if is_symmetry(f, S, zero, sign):
+        return zero
+    # f''(S x, r) + B S x = sign S B x is linear in r, with one equation for each entry of a matrix.
+    missing = (S * f.B * fmpq(sign) - f.B * S).entries()
+    slopes = [(form * S * fmpq(2)).transpose() for form in f.Q]
+    rows = [[*(slopes[i][j, k] for k in range(n)), -missing[i * n + j]] for i in range(n) for j in range(n)]
+    solutions = nullspace(QQ, fmpq_mat(rows))
+    if not any(v[-1] != 0 for v in solutions):
+        return None
+    (special,) = [v for v in solutions if v[-1] != 0]
+    directions = [v for v in solutions if v[-1] == 0]
+    # f(r) = sign S c decides among them.
+    parameters = ring([f"t{k + 1}" for k in range(len(directions) + 1)])
+    gens = parameters.gens()
+    r = [parameters.constant(special[k] / special[-1]) for k in range(n)]
+    for t, v in zip(gens, directions, strict=False):
+        r = [a + t * v[k] for k, a in enumerate(r)]
+    constants = (S * fmpq_mat(n, 1, list(f.c)) * fmpq(sign)).entries()
+    equations = [p.compose(*r, ctx=parameters) - value for p, value in zip(f.rhs, constants, strict=True)]
+    solved = solve_system([*equations, gens[-1]], r, deadline)
+    if not solved.components:
+        return None
+    found = solved.components[0].point
+    return found if is_symmetry(f, S, found, sign) else None
+
+
+def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign: int) -> list[fmpq_mpoly]:
+    """Polynomials in the entries of S that vanish where f(S x) = sign S f(x) for all x.
+
+    `S` holds the generators of a ring, row by row. The divergence of f must go along with an invertible S as well:
+    this follows, and is linear in S.
+
+    >>> s = ring(["s"]).gens()[0]
+    >>> matrix_equations(QuadraticSystem.from_text(["x"], ["x^2"]), [[s]], 1)
+    [s^2 - s, 0, 0, 2*s - 2]
+    """
+    n = f.dim
+    zero = S[0][0].context().constant(0)
+    table = coefficients_of(f)
+    equations = []
+    pairs = [(j, k) for j in range(n) for k in range(j, n)]
+    for i in range(n):
+        for place, (j, k) in enumerate(pairs):
+            total = zero
+            for a, b in itertools.product(range(n), repeat=2):
+                if f.Q[i][a, b] != 0:
+                    total = total + S[a][j] * S[b][k] * (f.Q[i][a, b] * (1 if j == k else 2))
+            equations.append(total - sum((S[i][a] * table[a][place] for a in range(n)), zero) * fmpq(sign))
+        for j in range(n):
+            total = sum((S[a][j] * f.B[i, a] for a in range(n)), zero)
+            equations.append(total - sum((S[i][a] * f.B[a, j] for a in range(n)), zero) * fmpq(sign))
+        equations.append(zero + f.c[i] - sum((S[i][a] * f.c[a] for a in range(n)), zero) * fmpq(sign))
+    slopes = [sum((2 * f.Q[i][i, j] for i in range(n)), fmpq(0)) for j in range(n)]
+    for j in range(n):
+        equations.append(sum((S[a][j] * slopes[a] for a in range(n)), zero) - slopes[j] * fmpq(sign))
+    return equations
+
+
+def is_singular(part: Component, n: int) -> bool:
+    """Whether det S = 0 on the whole linear family of n x n matrices, its entries row by row.
+
+    >>> a = ring(["a"]).gens()[0]
+    >>> is_singular(Component((a, a, a, a)), 2), is_singular(Component((a, a, a, -a)), 2)
+    (True, False)
+    """
+    total = part.values[0].context().constant(0)
+    for order in itertools.permutations(range(n)):
+        swaps = sum(order[i] > order[j] for i in range(n) for j in range(i + 1, n))
+        product = part.values[0].context().constant(-1 if swaps % 2 else 1)
+        for i, j in enumerate(order):
+            product = product * part.values[i * n + j]
+        total = total + product
+    return bool(total.is_zero())

@@ -1,0 +1,148 @@
+"""Formulas in LaTeX: what is written is read back, by a small reader of its own, as the same polynomial."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from flint import fmpq
+from helpers import rationals
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.latex import latex_name, latex_number, latex_polynomial, latex_rational_function
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.errors import InputError
+
+NAMES = ["x1", "x12", "al", "eps", "beta", "my_H"]
+RING = ring(NAMES)
+BY_LATEX = {latex_name(name): gen for name, gen in zip(NAMES, RING.gens(), strict=True)}
+NUMBER = re.compile(r"\\frac\{([0-9]+)\}\{([0-9]+)\}|([0-9]+)")
+
+
+def read_back(text):
+    """The polynomial that the text of `latex_polynomial` stands for."""
+    total, sign = RING.constant(0), 1
+    if text.startswith("-"):
+        sign, text = -1, text[1:]
+    for piece in re.split(r" ([+-]) ", text):
+        if piece in "+-":
+            sign = 1 if piece == "+" else -1
+            continue
+        term = RING.constant(sign)
+        for k, factor in enumerate(piece.split(" ")):
+            number = NUMBER.fullmatch(factor)
+            if number:
+                assert k == 0
+                term = term * (fmpq(int(number[1]), int(number[2])) if number[1] else fmpq(int(number[3])))
+                assert factor != "1" or piece == "1", "1 before a factor"
+            elif factor in BY_LATEX:
+                term = term * BY_LATEX[factor]
+            else:
+                base, exponent = re.fullmatch(r"(.*)\^(?:([2-9])|\{([0-9]{2,})\})", factor).group(1, 2)
+                exponent = exponent or re.search(r"\{([0-9]+)\}$", factor)[1]
+                term = term * BY_LATEX[base] ** int(exponent)
+        total = total + term
+    return total
+
+
+def polynomials():
+    exponents = st.tuples(*[st.integers(0, 12)] * len(NAMES))
+    terms = st.dictionaries(exponents, rationals().filter(bool), max_size=6)
+    return terms.map(lambda found: RING.from_dict(found))
+
+
+@given(polynomials())
+def test_a_polynomial_is_read_back_equal(polynomial):
+    assert read_back(latex_polynomial(polynomial)) == polynomial
+
+
+@given(polynomials(), polynomials().filter(lambda polynomial: not polynomial.is_zero()))
+def test_a_rational_function_is_read_back_equal(above, below):
+    function = RationalFunction(above, below)
+    text = latex_rational_function(function)
+    if function.is_polynomial:
+        assert read_back(text) == function.numerator
+        return
+    # The bar of the whole is where the braces of \frac{...}{...} close.
+    depth, ends = 0, []
+    for at, mark in enumerate(text):
+        if mark in "{}" and text[at - 1] != "\\":
+            depth += 1 if mark == "{" else -1
+            if depth == 0:
+                ends.append(at)
+    assert text.startswith(r"\frac{")
+    top, bottom = text[6 : ends[0]], text[ends[0] + 2 : ends[1]]
+    assert ends == [ends[0], len(text) - 1]
+    assert r"\frac" not in top + bottom
+    assert RationalFunction(read_back(top), read_back(bottom)) == function
+
+
+@pytest.mark.parametrize(
+    ("text", "latex"),
+    [
+        ("0", "0"),
+        ("1", "1"),
+        ("-1", "-1"),
+        ("x", "x"),
+        ("-x", "-x"),
+        ("-x/2", r"-\frac{1}{2} x"),
+        ("x^10*y - 3*x*y + 2/3", r"x^{10} y - 3 x y + \frac{2}{3}"),
+    ],
+)
+def test_polynomials_are_written_as_people_write_them(text, latex):
+    assert latex_polynomial(parse_polynomial(text, ["x", "y"])) == latex
+
+
+@pytest.mark.parametrize(
+    ("text", "latex"),
+    [
+        ("x/2", r"\frac{1}{2} x"),
+        ("x/(2*y)", r"\frac{x}{2 y}"),
+        ("0/y", "0"),
+        ("-x/(1 - y)", r"\frac{x}{y - 1}"),
+        ("x/(1 - eps^2*y)", r"\frac{x}{1 - \varepsilon^2 y}"),
+        ("x/(eps*y - eps^2*x)", r"\frac{x}{\varepsilon y - \varepsilon^2 x}"),
+        ("(x/3 - 1/2)/y", r"\frac{2 x - 3}{6 y}"),
+    ],
+)
+def test_rational_functions_have_no_fractions_within_a_fraction(text, latex):
+    assert latex_rational_function(parse_rational_function(text, ["x", "y", "eps"])) == latex
+
+
+@pytest.mark.parametrize(
+    ("name", "latex"),
+    [
+        ("x", "x"),
+        ("m12", "m_{12}"),
+        ("x01", "x_{01}"),
+        ("eps", r"\varepsilon"),
+        ("epsilon", r"\epsilon"),
+        ("omega1", r"\omega_1"),
+        ("al", "al"),
+        ("omicron", "omicron"),
+        ("_", r"\mathrm{\_}"),
+        ("x_1", r"\mathrm{x\_1}"),
+        ("I 1 {50%}", r"\mathrm{I 1 \{50\%\}}"),
+        ("\\", r"\mathrm{\textbackslash{}}"),
+    ],
+)
+def test_names(name, latex):
+    assert latex_name(name) == latex
+
+
+@given(st.lists(st.from_regex(r"[A-Za-z_][A-Za-z_0-9]{0,8}", fullmatch=True), min_size=2, max_size=2, unique=True))
+def test_different_names_are_different_in_latex(names):
+    first, second = names
+    assert latex_name(first) != latex_name(second)
+
+
+@pytest.mark.parametrize("wrong", ["", "a\nb", "\x1b[31m"])
+def test_what_cannot_be_printed_is_no_name(wrong):
+    with pytest.raises(InputError, match="expected printable text"):
+        latex_name(wrong)
+
+
+def test_numbers():
+    assert [latex_number(fmpq(*pair)) for pair in ((-1, 2), (0, 1), (5, 1))] == [r"-\frac{1}{2}", "0", "5"]

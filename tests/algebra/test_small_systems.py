@@ -1,0 +1,96 @@
+"""Small systems of polynomial equations: every rational solution, and honest words about the rest."""
+
+from __future__ import annotations
+
+import itertools
+import time
+
+from flint import fmpq
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.small_systems import Component, decoupling, independent, solve_system
+
+RING = ring(["x", "y", "z"])
+x, y, z = RING.gens()
+
+
+def solve(*equations, seconds=10.0):
+    return solve_system(equations, (x, y, z), time.monotonic() + seconds)
+
+
+def points(found):
+    return {tuple(int(e) for e in c.point) for c in found.components if not c.free}
+
+
+@given(st.sets(st.tuples(*[st.integers(-3, 3)] * 3), min_size=1, max_size=4), st.integers(0, 5))
+@settings(max_examples=25, deadline=None)
+def test_all_points_of_a_finite_set_are_found(wanted, shear):
+    """The ideal of a finite set: all products of one linear form for each point."""
+    forms = [[x - a + shear * (y - b), y - b + shear * (z - c), z - c] for a, b, c in wanted]
+    equations = []
+    for choice in itertools.product(*forms):
+        total = RING.constant(1)
+        for form in choice:
+            total = total * form
+        equations.append(total)
+    found = solve(*equations)
+    assert points(found) == wanted
+    assert found.complete
+    assert not found.irrational
+
+
+def test_linear_families_points_and_points_inside_families():
+    found = solve(x * (x - 1), x * (y - 2), x * (z - 3))
+    assert [c.values for c in found.components] == [(1, 2, 3), (0, y, z)]
+    assert solve(x * y, x).components == [Component((RING.constant(0), y, z))]
+
+
+def test_solutions_outside_the_rationals_are_told():
+    found = solve(x**2 - 2, y, z)
+    assert (found.components, found.irrational, found.complete) == ([], ["x^2 - 2"], True)
+    # x^2 = y, y^2 = 2 x: (0, 0) and three conjugate points with x^3 = 2
+    found = solve(x**2 - y, y**2 - 2 * x, z)
+    assert points(found) == {(0, 0, 0)}
+    assert found.irrational
+
+
+def test_no_solution():
+    found = solve(x * y - 1, x)
+    assert (found.components, found.unsolved) == ([], [])
+
+
+def test_a_curve_is_not_solved_and_not_dropped():
+    found = solve(x**2 + y**2 - 1, z - x)
+    assert not found.complete
+    assert found.unsolved[0].equations == (x**2 + y**2 - 1,)
+    assert "not isolated points" in found.reason
+
+
+def test_the_time_is_a_reason():
+    found = solve(x**2 + y**2 - 1, z - x, seconds=-1.0)
+    assert (found.complete, found.reason) == (False, "the time is over")
+
+
+def test_families_contain_what_they_contain():
+    line = Component((x, 2 * x, RING.constant(1)))
+    assert line.contains(Component((RING.constant(3), RING.constant(6), RING.constant(1))))
+    assert not line.contains(Component((RING.constant(3), RING.constant(5), RING.constant(1))))
+    assert Component((x, y, RING.constant(1))).contains(line)
+    assert not line.contains(Component((x, y, RING.constant(1))))
+
+
+def test_cubes_of_linear_forms_are_decoupled():
+    forms = [x + 2 * y, x - z, 3 * y + z]
+    mixed = [forms[0] ** 3 + forms[1] ** 3, forms[1] ** 3 - forms[2] ** 3, sum((f**3 for f in forms), RING.constant(0))]
+    T = decoupling(mixed, 3)
+    moved = [sum((g * T[i, j] for j, g in enumerate((x, y, z))), RING.constant(0)) for i in range(3)]
+    spanned = independent(p.compose(*moved, ctx=RING) for p in mixed)
+    assert [len(p) for p in spanned] == [1, 1, 1]
+    assert decoupling([x * y * 0], 3) is None
+
+
+def test_point_and_slopes():
+    line = Component((2 * x + 1, y - x, RING.constant(4)))
+    assert (line.free, line.point, line.slopes(0)) == ((0, 1), (1, 0, 4), [fmpq(2), fmpq(-1), fmpq(0)])

@@ -1,0 +1,97 @@
+"""kahanmaps cycles: the counts as text and JSON, several primes and eps, and wrong use."""
+
+from __future__ import annotations
+
+import pytest
+from cli_helpers import shell
+
+from kahanmaps.laboratory.cycles import cycle_census
+from kahanmaps.systems.catalog import load
+from kahanmaps.version import __version__
+
+
+def test_counts_are_printed_for_two_eps_by_default(kahanmaps):
+    outcome = kahanmaps("cycles weierstrass --prime 31")
+    assert outcome.status == 0
+    census = cycle_census(load("weierstrass").system, "1/10", 31)
+    assert outcome.out.count("# p = 31, eps = ") == 2
+    assert f"lost\t{census.lost}\nfalling\t{census.falling}\n" in outcome.out
+    assert f"periodic\t{census.periodic}\ncycles\t{census.cycles}, longest {census.longest}" in outcome.out
+    assert "reversing symmetry\t1,0;0,-1\n" in outcome.out
+    assert "\n# compatible in all 2 runs with: integrable bound\n" in outcome.out
+
+
+def test_the_json_is_enough_to_redo_the_run(kahanmaps):
+    found = kahanmaps("cycles lotka_volterra --prime 101 --prime 199 --eps 1/7 --eps 3/13 --json").json
+    assert (found["command"], found["version"], found["primes"]) == ("cycles", __version__, [101, 199])
+    assert [(run["prime"], run["eps"]) for run in found["runs"]] == [
+        (101, "1/7"),
+        (101, "3/13"),
+        (199, "1/7"),
+        (199, "3/13"),
+    ]
+    assert found["reversor"] == [["0", "1"], ["1", "0"]]
+    for run in found["runs"]:
+        census = cycle_census(load("lotka_volterra").system, run["eps"], run["prime"])
+        assert dict(run["lengths"]) == census.lengths
+        assert run["lost"] + run["falling"] + run["transient"] + run["periodic"] == int(run["points"])
+        assert "random reversible" in run["compatible"]
+        assert "random permutation" in run["not_compatible"]
+    assert found["compatible_in_all_runs"] == ["random reversible"]
+    assert found["document"]["system"]
+
+
+def test_samples(kahanmaps):
+    found = kahanmaps("cycles weierstrass --prime 499 --samples 40 --eps 1/7 --seed 2 --json").json
+    (run,) = found["runs"]
+    assert (run["complete"], run["looked_at"], run["open"]) == (False, 40, 0)
+    assert run["cycles"] is None
+    assert found == kahanmaps("cycles weierstrass --prime 499 --samples 40 --eps 1/7 --seed 2 --json").json
+
+
+def test_a_clock_that_stops_is_status_three(kahanmaps):
+    outcome = kahanmaps("cycles lotka_volterra --prime 100003 --samples 20 --eps 1/7 --seconds 0.000001")
+    assert outcome.status == 3
+    assert "stopped by the clock" in outcome.err
+    assert kahanmaps("cycles lotka_volterra --prime 100003 --samples 20 --seconds 0.000001 -q").err == ""
+
+
+def test_an_inline_system_and_a_reversor(kahanmaps):
+    inline = "cycles --vars x,y --rhs y --rhs '6*x^2 - 2' --prime 31 --eps 1/7"
+    assert kahanmaps(inline, "--reversor '1,0;0,-1'").out == kahanmaps(inline).out
+
+
+def test_a_map_without_values_is_told(kahanmaps):
+    outcome = kahanmaps("cycles --vars x,y --rhs x --rhs y --prime 7 --eps 1")
+    assert outcome.status == 0
+    assert "singular everywhere modulo this prime" in outcome.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("weierstrass", "Missing option '--prime'"),
+        ("weierstrass --prime 2", "modulo 2 every Kahan map is the identity"),
+        ("weierstrass --prime 15", "15 is composite"),
+        ("weierstrass --prime 7 --eps 1/7", "divides 1/7"),
+        ("lorenz --prime 3 --eps 1/7", "a denominator of the system"),
+        ("weierstrass --prime 7 --eps 0", "eps = 0"),
+        ("weierstrass --prime 7 --samples 0", "expected 1 to"),
+        ("weierstrass --prime 7 --steps 5", "--steps K is for --samples N"),
+        ("weierstrass --prime 7 --seed -1", "found --seed -1"),
+        ("weierstrass --prime 7 --seconds 0", "found --seconds 0.0"),
+        ("weierstrass --prime 7 --reversor '1,0;0,1'", "does not reverse"),
+        ("weierstrass --prime 7 --reversor '1,0;0'", "rows of different lengths"),
+        ("weierstrass --prime 7 --reversor '1,a;0,1'", "found 'a'"),
+    ],
+)
+def test_wrong_use(kahanmaps, arguments, words):
+    outcome = kahanmaps(f"cycles {arguments}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err
+
+
+def test_help_fits_the_screen(tmp_path):
+    outcome = shell("kahanmaps cycles --help", tmp_path, COLUMNS="80")
+    assert outcome.status == 0
+    assert max(map(len, outcome.out.splitlines())) <= 80

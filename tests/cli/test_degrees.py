@@ -1,0 +1,85 @@
+"""kahanmaps degrees: the sequence, its recurrence, what is told where there is none, and exit statuses."""
+
+from __future__ import annotations
+
+import pytest
+
+from kahanmaps.version import __version__
+
+
+def test_the_degrees_of_the_euler_top(kahanmaps):
+    outcome = kahanmaps("degrees euler_top")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert outcome.out.splitlines() == [
+        "# euler_top, generic eps, 2 random lines modulo primes of 63 bits: measured, not proved",
+        "degrees\t1, 3, 9, 19, 33, 51, 73, 99, 129, 163, 201, 243",
+        "growth\tquadratic growth, dynamical degree 1",
+        "recurrence\ta(n) = 3*a(n-1)-3*a(n-2)+a(n-3) for n >= 3, from 12 terms of which 6 were not needed to find it",
+        "closed form\t2*n^2 + 1",
+        "ended\ta recurrence of order 3 holds for 6 terms to spare",
+    ]
+
+
+def test_the_json_has_what_is_needed_to_run_it_again(kahanmaps):
+    found = kahanmaps("degrees lotka_volterra --time-step 2/7 --terms 4 --seed 3 --json").json
+    assert found["document"]["name"] == found["system"] == "lotka_volterra"
+    assert (found["version"], found["command"], found["seed"]) == (__version__, "degrees", 3)
+    assert (found["eps"], found["time_step"]) == ("1/7", "2/7")
+    assert [set(line) for line in found["lines"]] == [{"prime", "eps_residue"}] * 2
+    assert found["degrees"] == [1, 2, 4, 8, 16]
+    assert (found["ended"], found["growth"], found["dynamical_degree"]["value"]) == ("terms", "exponential", "2")
+    assert found["recurrence"]["checked"] == 3
+
+
+def test_generic_eps_is_told_as_such(kahanmaps):
+    found = kahanmaps("degrees weierstrass --terms 3 --json").json
+    assert (found["eps"], found["time_step"]) == ("generic", "generic")
+    assert found["lines"][0]["eps_residue"] != found["lines"][1]["eps_residue"]
+
+
+def test_a_search_that_ends_without_a_recurrence_gives_3(kahanmaps):
+    outcome = kahanmaps("degrees henon_heiles --max-degree 100")
+    assert outcome.status == 3
+    assert "growth\tno recurrence found in 6 terms; d_n/d_(n-1) is 2.38462 at the end, an estimate only" in outcome.out
+    assert outcome.err == "stopped early: the degree of iterate 6 is above 100\n"
+    assert kahanmaps("degrees henon_heiles --max-degree 100 -q").err == ""
+
+
+def test_terms_asked_for_are_enough(kahanmaps):
+    assert kahanmaps("degrees henon_heiles --terms 4").status == 0
+    assert kahanmaps("degrees henon_heiles --terms 40 --max-degree 20").status == 3
+
+
+def test_a_recurrence_with_few_terms_to_spare_is_enough_when_the_degree_ends_it(kahanmaps):
+    outcome = kahanmaps("degrees lorenz --max-degree 100")
+    assert (outcome.status, "dynamical degree 3" in outcome.out) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("command", "growth"),
+    [
+        ("--vars x --rhs x --eps=-1", "zero from some iterate on: that iterate is a constant map"),
+        ("--vars x --rhs x --eps 1", "no recurrence found in 1 term"),
+        ("--vars x,y --rhs 0 --rhs 0", "bounded growth, dynamical degree 1"),
+    ],
+)
+def test_degenerate_maps_are_no_errors(kahanmaps, command, growth):
+    outcome = kahanmaps(f"degrees {command}")
+    assert (outcome.status, f"growth\t{growth}\n" in outcome.out) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("degrees", "missing SYSTEM"),
+        ("degrees lorenz --eps 0", "found eps = 0"),
+        ("degrees lorenz --eps 1 --time-step 2", "not both"),
+        ("degrees lorenz --seconds 0", "found 0.0 seconds"),
+        ("degrees lorenz --terms -2", "found -2 terms"),
+        ("degrees lorenz --max-degree 0", "the largest degree 0"),
+    ],
+)
+def test_wrong_use_gives_2(kahanmaps, command, words):
+    outcome = kahanmaps(command)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err

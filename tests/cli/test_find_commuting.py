@@ -1,0 +1,117 @@
+"""kahanmaps find-commuting: what commutes, what is trivial, what stays open, and the exit status."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+
+from kahanmaps.version import __version__
+
+
+def test_the_associated_systems_of_a_member_that_does_not_say_so(kahanmaps):
+    rhs = kahanmaps("systems paper_m2 --json").json["rhs"]
+    words = " ".join(f"--rhs='{text}'" for text in rhs)
+    out = kahanmaps(f"find-commuting --vars x1,x2,x3,x4 {words}").out.splitlines()
+    assert out[0] == "# find-commuting: inline, g = B f with a constant matrix B, every eps (the time step is 2 eps)"
+    assert out[1:5] == [
+        "bracket\tthe g with [f, g] = 0 have dimension 2",
+        "proved\ttrivial\tg = 0",
+        "proved\ttrivial\tg = f",
+        "proved\ttrivial\tg = -f",
+    ]
+    found = [line.split("\t")[2] for line in out if line.startswith("proved\tg and -g")]
+    assert len(found) == 3  # 9 solutions: 0, f, -f and three pairs
+    assert any("B = [[-5, 6, 0, 0], [-4, 5, 0, 0], [0, 4, -5, -4], [-4, 0, 6, 5]]" in line for line in out)
+    assert out[-1] == "# complete: no other rational g = B f with a constant matrix B commutes"
+
+
+def test_what_is_printed_can_be_pasted(kahanmaps, tmp_path):
+    out = kahanmaps("find-commuting paper_m2").out.splitlines()
+    pasted = next(line.split("\t")[2] for line in out if line.startswith("proved\tg and -g"))
+    outcome = kahanmaps("check-commute", *(f"'{word}'" for word in shlex.split(pasted)), "paper_m2 --json")
+    assert outcome.status == 0
+    assert outcome.json["holds"] is True
+
+
+def test_families_are_printed_with_their_parameters(kahanmaps):
+    out = kahanmaps("find-commuting lagrange_top --shape quadratic").out
+    assert "supported\tfamily\tg = t1*g1 + t2*g2 for all t1, t2\n" in out
+    assert "\tg2\t--vars m1,m2,m3,p1,p2,p3 --rhs='m2' --rhs='-m1' --rhs='0' --rhs='p2' --rhs='-p1' --rhs='0'\n" in out
+    based = kahanmaps("find-commuting --vars x,y,z --rhs x --rhs 2*y --rhs x^2").out
+    assert "proved\tfamily\tg = base + t1*g1 for all t1\n" in based
+
+
+def test_where_chi_does_not_split_the_note_says_so(kahanmaps):
+    outcome = kahanmaps("find-commuting paper_m3_irreducible")
+    assert outcome.status == 0
+    assert "note\tmore solutions, not rational: a group of 3 conjugate solutions" in outcome.out
+
+
+def test_the_json_has_the_documented_shape(kahanmaps):
+    found = kahanmaps("find-commuting --vars x,y --rhs x^2+1 --rhs 'y^2 - x*y' --seed 4 --json").json
+    assert found.pop("document")["variables"] == ["x", "y"]
+    solutions = found.pop("solutions")
+    assert found == {
+        "command": "find-commuting",
+        "version": __version__,
+        "system": "inline",
+        "eps": "every",
+        "time_step": "every",
+        "convention": "eps is the paper's epsilon, the time step is 2 eps",
+        "arithmetic": "exact",
+        "seed": 4,
+        "error_bits": 100,
+        "seconds": 60.0,
+        "shape": "linear",
+        "status": "complete",
+        "verdict": "proved",
+        "bracket_space": {"dimension": 1, "basis": [["x^2 + 1", "-x*y + y^2"]]},
+        "families": [],
+        "every_g_commutes": False,
+        "irrational": [],
+        "discarded": 0,
+        "order": 4,
+        "undecided": [],
+    }
+    assert [(g["trivial"], g["verdict"]) for g in solutions] == [("0", "proved"), ("f", "proved"), ("-f", "proved")]
+    assert solutions[1]["B"] == [["1", "0"], ["0", "1"]]
+    assert solutions[2]["rhs"] == ["-x^2 - 1", "x*y - y^2"]
+
+
+def test_any_quadratic_g_has_no_b(kahanmaps):
+    found = kahanmaps("find-commuting riccati --shape quadratic --json").json
+    assert found["families"][0]["directions"] == [{"rhs": ["x^2 + x - 1"], "B": None}]
+    assert found["families"][0]["verdict"] == "proved"
+
+
+def test_what_stays_open_gives_3(kahanmaps):
+    command = "find-commuting --vars a,b,c,d --rhs a^2 --rhs 0 --rhs 0 --rhs 0 --shape quadratic"
+    outcome = kahanmaps(command)
+    assert outcome.status == 3
+    assert outcome.out.endswith("# undecided: there may be more, see standard error\n")
+    assert "undecided: the fields g with [f, g] = 0 have dimension 31" in outcome.err
+    quiet = kahanmaps(command, "-q --json")
+    assert (quiet.status, quiet.err, quiet.json["status"], quiet.json["verdict"]) == (3, "", "undecided", "undecided")
+
+
+def test_the_zero_system(kahanmaps):
+    outcome = kahanmaps("find-commuting --vars x,y --rhs 0 --rhs 0 --shape quadratic")
+    assert outcome.status == 0
+    assert outcome.out.endswith("# complete: every g commutes\n")
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("find-commuting", "missing SYSTEM"),
+        ("find-commuting lorenz --shape cubic", "'cubic' is not one of"),
+        ("find-commuting lorenz --seconds 0", "found 0.0 seconds, expected a positive number"),
+        ("find-commuting lorenz --error-bits 0", "found an error bound of 0 bits"),
+        ("find-commuting --vars x --rhs x^3", "degree 3"),
+    ],
+)
+def test_wrong_use_gives_2(kahanmaps, command, words):
+    outcome = kahanmaps(command)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err

@@ -1,0 +1,79 @@
+"""kahanmaps find-symmetry: groups and generators in text and JSON, and the exit status."""
+
+from __future__ import annotations
+
+import pytest
+
+from kahanmaps.version import __version__
+
+
+def test_the_lorenz_system(kahanmaps):
+    outcome = kahanmaps("find-symmetry lorenz")
+    assert outcome.status == 0
+    assert outcome.out.splitlines() == [
+        "# find-symmetry: lorenz, every eps (the time step is 2 eps); everything here is proved",
+        "group\torder 2: 2 symmetries and 0 reversing ones among signed permutations",
+        "generator\t(x, y, z) -> (-x, -y, z)",
+        "symmetry\t(x, y, z) -> (x, y, z)\tobvious",
+        "symmetry\t(x, y, z) -> (-x, -y, z)",
+        "searched\taffine infinitesimal symmetries and scalings: all",
+        "searched\tsigned permutations, with a translation: all",
+        "searched\trational matrices S, without a translation: all",
+        "# complete: every search came to its end",
+    ]
+
+
+def test_one_parameter_groups_scalings_and_reversals(kahanmaps):
+    out = kahanmaps("find-symmetry three_wave").out
+    assert "one-parameter group\tlinear, the flow of (v1, -v2, 0, -u1, u2, 0)\n" in out
+    assert "scaling\tthe flow of (u1, u2, u3, v1, v2, v3) by t takes the map at eps to that at e^-t eps\n" in out
+    assert "group\torder 64: 32 symmetries and 32 reversing ones among signed permutations\n" in out
+    out = kahanmaps("find-symmetry riccati").out
+    assert "generator\treversing (x) -> (-x - 1)\n" in out
+
+
+def test_long_lists_are_cut_and_said_to_be(kahanmaps):
+    words = " ".join(f"--rhs={v}^2" for v in "abcde")
+    out = kahanmaps(f"find-symmetry --vars a,b,c,d,e {words}").out
+    assert "group\torder 240: 120 symmetries and 120 reversing ones" in out
+    assert "symmetry\tand 80 more (--json has more)\n" in out
+
+
+def test_the_json_has_the_documented_shape(kahanmaps):
+    found = kahanmaps("find-symmetry weierstrass --json").json
+    assert (found["command"], found["version"], found["eps"]) == ("find-symmetry", __version__, "every")
+    assert found["group"] == {
+        "of": "signed permutations",
+        "order": 2,
+        "symmetries": 1,
+        "reversing_symmetries": 1,
+        "generators": found["reversing_symmetries"],
+    }
+    assert found["reversing_symmetries"][0]["text"] == "(x, y) -> (x, -y)"
+    assert found["reversing_symmetries"][0]["verdict"] == "proved"
+    assert (found["infinitesimal"], found["scaling"], found["listed"]) == ([], None, 2)
+    assert found["document"]["name"] == "weierstrass"
+
+
+def test_a_search_that_is_too_large_gives_3(kahanmaps):
+    names = [f"x{i}" for i in range(17)]
+    words = " ".join(f"--rhs={v}^2" for v in names)
+    outcome = kahanmaps(f"find-symmetry --vars {','.join(names)} {words}")
+    assert outcome.status == 3
+    assert outcome.out.endswith("# undecided: see standard error\n")
+    assert "undecided: signed permutations are tried up to dimension 12, found 17" in outcome.err
+    assert kahanmaps(f"find-symmetry --vars {','.join(names)} {words} -q").err == ""
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("find-symmetry", "missing SYSTEM"),
+        ("find-symmetry lorenz --seconds 0", "found 0.0 seconds, expected a positive number"),
+        ("find-symmetry nowhere.toml", "nowhere.toml"),
+    ],
+)
+def test_wrong_use_gives_2(kahanmaps, command, words):
+    outcome = kahanmaps(command)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err

@@ -1,0 +1,97 @@
+"""kahanmaps heights: orbits from several starts and for two eps, their agreement, and their disagreement."""
+
+from __future__ import annotations
+
+import pytest
+
+from kahanmaps.errors import InputError
+from kahanmaps.invariants.heights import Growth
+from kahanmaps.laboratory.height_survey import height_survey
+from kahanmaps.systems.catalog import load
+from kahanmaps.version import __version__
+
+OSCILLATOR = "--vars q,p --rhs p --rhs '2*q^2-q'"  # q'' = -q + 2 q^2; the fourth iterate at eps = 1 is the identity
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("weierstrass", "quadratic"), ("lorenz", "exponential"), ("harmonic", "linear")]
+)
+def test_the_kinds_of_growth(kahanmaps, name, kind):
+    outcome = kahanmaps(f"heights {name} --starts 2 --steps 40 --max-digits 3000")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert len(outcome.rows) == 5
+    assert outcome.rows[-1] == ["heights", f"{kind}: 4 orbits, 2 values of eps"]
+    assert outcome.out.startswith(f"# {name}, eps = 1/10 (time step 2 eps = 1/5), 3/11 (time step 2 eps = 6/11), exact")
+
+
+def test_the_json_has_what_is_needed_to_run_it_again(kahanmaps):
+    found = kahanmaps("heights weierstrass --time-step 1/5 --start 1,1/2 --start 1/3,2 --steps 30 --json").json
+    assert (found["version"], found["eps"], found["time_step"]) == (__version__, ["1/10"], ["1/5"])
+    assert [orbit["start"] for orbit in found["orbits"]] == [["1", "1/2"], ["1/3", "2"]]
+    assert (found["kind"], found["kinds"], found["whole"]) == ("quadratic", ["quadratic"], True)
+    assert found["text"] == "quadratic: 2 orbits, 1 value of eps"
+    assert found["document"]["name"] == "weierstrass"
+
+
+def test_starts_that_disagree_are_told(kahanmaps):
+    # the axis y = 0 is invariant, and on it Lotka-Volterra is linear
+    outcome = kahanmaps("heights lotka_volterra --start 1,2 --start 3,0 --steps 40 --max-digits 3000")
+    assert outcome.status == 3
+    assert outcome.rows[-1][1] == "undecided: the starts disagree (2 exponential, 2 linear)"
+
+
+def test_a_special_eps_is_seen_as_such(kahanmaps):
+    outcome = kahanmaps(f"heights {OSCILLATOR} --eps 1 --steps 40")
+    assert (outcome.status, outcome.rows[-1][1]) == (0, "periodic: 3 orbits, 1 value of eps")
+    assert kahanmaps(f"heights {OSCILLATOR} --steps 40").rows[-1][1] == "quadratic: 6 orbits, 2 values of eps"
+
+
+def test_eps_that_disagree_are_told(monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.height_survey.DEFAULT_EPS", (1, 2))
+    from kahanmaps.systems.quadratic import QuadraticSystem
+
+    found = height_survey(QuadraticSystem.from_text(["q", "p"], ["p", "2*q^2 - q"]), starts=2, steps=40)
+    assert (found.kind, found.kinds) == (Growth.UNDECIDED, (Growth.PERIODIC, Growth.QUADRATIC))
+    assert found.text == "undecided: the eps disagree (2 periodic, 2 quadratic)"
+
+
+def test_too_few_steps_decide_nothing(kahanmaps):
+    outcome = kahanmaps("heights weierstrass --steps 4 --starts 1")
+    assert (outcome.status, outcome.rows[-1][1]) == (3, "undecided: 0 of 2 orbits decided")
+
+
+def test_the_time_ends_it(kahanmaps):
+    outcome = kahanmaps("heights weierstrass --steps 20 --seconds 0.0001")
+    assert (outcome.status, len(outcome.rows)) == (3, 2)
+    assert outcome.err == "stopped early: the time was over before all orbits were begun\n"
+
+
+def test_a_map_without_a_value_anywhere_is_no_error(kahanmaps):
+    outcome = kahanmaps("heights --vars x --rhs x --eps 1")
+    assert outcome.status == 3
+    assert "det(I - eps f'(x)) = 0" in outcome.out
+
+
+def test_wrong_values_in_the_library():
+    system = load("weierstrass").system
+    for options in ({"starts": 0}, {"starts": []}, {"seconds": 0}):
+        with pytest.raises(InputError):
+            height_survey(system, **options)
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("heights", "missing SYSTEM"),
+        ("heights lorenz --eps 0", "found eps = 0"),
+        ("heights lorenz --start 1,2", "with 2 coordinates, expected 3"),
+        ("heights lorenz --starts 0", "found 0 starts"),
+        ("heights lorenz --steps -1", "found -1 steps"),
+        ("heights lorenz --max-digits 0", "found --max-digits 0"),
+        ("heights lorenz --seconds 0", "found 0.0 seconds"),
+    ],
+)
+def test_wrong_use_gives_2(kahanmaps, command, words):
+    outcome = kahanmaps(command)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err

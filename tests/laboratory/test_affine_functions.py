@@ -1,0 +1,158 @@
+"""Affine integrals and affine Darboux functions: known ones, none too many, and what the Kahan map makes of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from flint import fmpq, fmpq_mat
+from helpers import EULER_TOP, FORCED_PLANE, HENON_HEILES, LORENZ, random_point, systems
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kahanmaps
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import rank
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.laboratory.affine_functions import (
+    affine_cofactor,
+    affine_darboux,
+    affine_integrals,
+    quotient_by,
+)
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.files import read_system
+from kahanmaps.systems.hamiltonian import linear_combinations
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+CATALOG = Path(kahanmaps.__file__).parent / "systems" / "catalog"
+
+
+def catalogue(name: str) -> QuadraticSystem:
+    return read_system(CATALOG / f"{name}.toml").system
+
+
+def darboux(system: QuadraticSystem) -> dict[str, str]:
+    found = affine_darboux(system)
+    assert found.complete
+    assert found.reason == ""
+    return {str(d.function): str(d.cofactor) for d in found.functions}
+
+
+@pytest.mark.parametrize("particles", [3, 4])
+def test_the_volterra_chain(particles: int) -> None:
+    system = catalogue(f"volterra_periodic_{particles}")
+    assert affine_integrals(system) == ((1,) * particles,)
+    assert list(darboux(system)) == list(system.variables)  # x_i' = x_i (...), and no others
+
+
+def test_known_hyperplanes() -> None:
+    assert darboux(catalogue("lotka_volterra")) == {"x": "-y + 1", "y": "x - 1"}
+    # (x1 + x3)' = x2 (x1 + x3), since the coefficients of x1' and x3' are equal.
+    assert darboux(EULER_TOP) == {
+        "x1 + x3": "x2",
+        "x1 - x3": "-x2",
+    }
+    # H = y (3 x^2 - y^2)/3: the two other lines of the triangle have slopes of sqrt(3).
+    assert darboux(catalogue("nahm_tetrahedral")) == {"y": "-2*x"}
+    assert darboux(QuadraticSystem.from_text(["x"], ["x^2 - 1"])) == {"x + 1": "x - 1", "x - 1": "x + 1"}
+
+
+@pytest.mark.parametrize("system", [LORENZ, HENON_HEILES, FORCED_PLANE, catalogue("riccati"), catalogue("harmonic")])
+def test_systems_without(system: QuadraticSystem) -> None:
+    # Over Q: those of x' = x^2 + x - 1 lie over Q(sqrt(5)), those of the harmonic oscillator over Q(i).
+    assert affine_integrals(system) == ()
+    assert darboux(system) == {}
+
+
+def test_functions_that_are_hidden_by_an_integral() -> None:
+    """z is conserved, and then x and x - z are invariant: different hyperplanes, the same modulo z."""
+    system = QuadraticSystem.from_text(["x", "y", "z"], ["x*(x - z)", "y^2 + x + 1", "0"])
+    assert affine_integrals(system) == ((0, 0, 1),)
+    assert darboux(system) == {"x": "x - z", "x - z": "x"}
+
+
+def test_where_hyperplanes_are_not_counted() -> None:
+    scaling = affine_darboux(QuadraticSystem.from_text(["x", "y"], ["x", "y"]))
+    assert not scaling.complete
+    assert "infinitely many" in scaling.reason
+    assert [str(d.function) for d in scaling.functions] == ["x", "y"]
+    names = [f"x{i}" for i in range(25)]
+    large = affine_darboux(QuadraticSystem.from_text(names, [f"{x}*({x} + x{i // 2})" for i, x in enumerate(names)]))
+    assert not large.complete
+    assert {str(d.function) for d in large.functions} >= {"x0", "x24"}
+    zero = QuadraticSystem.from_text(["x", "y"], ["0", "0"])
+    assert affine_integrals(zero) == ((1, 0), (0, 1))
+    assert darboux(zero) == {}
+
+
+def test_a_hyperplane_of_equilibria() -> None:
+    system = QuadraticSystem.from_text(["x", "y", "z"], ["x*(1 + y)", "x*(z - 2)", "x*(y - 3*z)"])
+    found = affine_darboux(system)
+    assert [str(d.function) for d in found.functions] == ["x"]
+    assert not found.complete  # the flow does not move on x = 0, where others may hide
+    assert "degenerates" in found.reason
+
+
+def test_cofactors_are_those_of_the_flow() -> None:
+    x, y = QuadraticSystem.from_text(["x", "y"], ["x*y", "y^2 - 1"]).rhs[0].context().gens()
+    system = QuadraticSystem.from_polynomials([x * y, y**2 - 1])
+    assert affine_cofactor(system, y - 1) == y + 1
+    assert affine_cofactor(system, x + y) is None
+
+
+@st.composite
+def with_hyperplane(draw: st.DrawFn) -> tuple[QuadraticSystem, fmpq_mat]:
+    """A system x_i' = x_i L_i and x_j' = anything, in random linear coordinates, and the forms x_i there."""
+    system = draw(systems((2, 3)))
+    n = system.dim
+    entries = draw(st.lists(st.integers(-3, 3), min_size=n * n, max_size=n * n))
+    T = fmpq_mat(n, n, entries)
+    if T.det() == 0:
+        T = T * 0 + fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+    gens = system.rhs[0].context().gens()
+    first = gens[0] * (system.rhs[0].derivative(1) + draw(st.integers(-3, 3)))
+    rhs = (first, *system.rhs[1:])
+    moved = linear_combinations(T, gens)  # y = T x
+    context = gens[0].context()
+    in_x = tuple(component.compose(*moved, ctx=context) for component in rhs)
+    return QuadraticSystem.from_polynomials(linear_combinations(T.inv(), in_x)), T
+
+
+@settings(max_examples=40)
+@given(with_hyperplane(), st.integers(0, 100))
+def test_planted_hyperplanes_are_found_and_kept_by_the_kahan_map(
+    case: tuple[QuadraticSystem, fmpq_mat], seed: int
+) -> None:
+    system, T = case
+    n = system.dim
+    planted = [T[0, j] for j in range(n)]
+    found = affine_darboux(system)
+    integrals = affine_integrals(system)
+    if found.complete:
+        # An integral, or one of those found up to integrals.
+        forms = [[fmpq(entry) for entry in v] for v in integrals]
+        normals = [[d.function.derivative(j).leading_coefficient() for j in range(n)] for d in found.functions]
+        assert any(
+            rank(QQ, fmpq_mat([*forms, *extra, planted])) == len(forms) + len(extra)
+            for extra in [[], *([v] for v in normals)]
+        )
+    phi = KahanMap(system, fmpq(1, 7))
+    x = random_point(n, seed)
+    if phi.determinant(x) != 0:
+        image = phi.step(x)
+        for v in integrals:
+            assert sum(c * a for c, a in zip(v, x, strict=True)) == sum(c * a for c, a in zip(v, image, strict=True))
+        for d in found.functions:
+            before, after = (evaluate(d.function, QQ, point) for point in (x, image))
+            assert after * (1 - fmpq(1, 7) * evaluate(d.cofactor, QQ, x)) == before * (
+                1 + fmpq(1, 7) * evaluate(d.cofactor, QQ, image)
+            )
+
+
+def test_coordinates_modulo_integrals() -> None:
+    integrals = affine_integrals(catalogue("volterra_periodic_4"))
+    quotient = quotient_by(integrals, 4)
+    assert quotient.free == (0, 1, 2)
+    assert quotient.coordinates * quotient.section == fmpq_mat([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]])
+    assert quotient_by((), 2).section == fmpq_mat([[1, 0], [0, 1]])

@@ -1,0 +1,353 @@
+"""Orbits on P^n over GF(p): the arrays against a plain walk with FLINT, and cycles of maps whose lengths are known."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import pytest
+from flint import fmpq_mat
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.laboratory.cycle_laws import LAWS, compare
+from kahanmaps.laboratory.cycles import cycle_census, default_eps
+from kahanmaps.laboratory.reversors import find_reversor, is_reversor
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.modular_projective import ProjectiveMap, graph_of, hasse_weil
+from kahanmaps.maps.projective import homogeneous_map
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def system_of(*rhs: str) -> QuadraticSystem:
+    return QuadraticSystem.from_text(["x", "y", "z"][: len(rhs)], list(rhs))
+
+
+# --- a walk by hand: Python integers, the forms evaluated one monomial after the other -----------------------------
+
+
+def all_points(n: int, p: int):
+    for point in itertools.product(range(p), repeat=n + 1):
+        lead = next((entry for entry in reversed(point) if entry), 0)
+        if lead == 1:
+            yield point
+
+
+def by_hand(system: QuadraticSystem, eps: str, p: int) -> dict[tuple[int, ...], tuple[int, ...] | None]:
+    forms, _ = homogeneous_map(system, eps, GF(p))
+    image: dict[tuple[int, ...], tuple[int, ...] | None] = {}
+    for point in all_points(system.dim, p):
+        values = [
+            sum(int(c) * math.prod(x ** int(e) for x, e in zip(point, m, strict=True)) for m, c in form.terms()) % p
+            for form in forms
+        ]
+        lead = next((entry for entry in reversed(values) if entry), 0)
+        image[point] = tuple(value * pow(lead, -1, p) % p for value in values) if lead else None
+    return image
+
+
+def census_by_hand(image) -> tuple[int, int, int, dict[int, int]]:
+    """Lost, falling and transient points, and the number of cycles by length."""
+    lost = sum(found is None for found in image.values())
+    falling = transient = 0
+    lengths: dict[int, int] = {}
+    for start in image:
+        seen = {start: 0}
+        point = image[start]
+        while point is not None and point not in seen:
+            seen[point] = len(seen)
+            point = image[point]
+        if point is None:
+            falling += image[start] is not None
+        elif point == start:
+            lengths[len(seen)] = lengths.get(len(seen), 0) + 1
+        else:
+            transient += 1
+    return lost, falling, transient, {length: n // length for length, n in sorted(lengths.items())}
+
+
+SYSTEMS = {
+    "weierstrass": lambda: load("weierstrass").system,
+    "lotka_volterra": lambda: load("lotka_volterra").system,
+    "euler_top": lambda: load("euler_top").system,
+    "harmonic": lambda: load("harmonic").system,
+    "riccati": lambda: load("riccati").system,
+    "a common factor Z": lambda: system_of("y", "x^2"),
+    "zero": lambda: system_of("0", "0"),
+}
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize(("prime", "eps"), [(5, "2/3"), (7, "1/10"), (7, "3"), (11, "1/7")])
+def test_the_census_is_that_of_a_walk_by_hand(name, prime, eps):
+    system = SYSTEMS[name]()
+    if system.dim == 3 and prime == 11:
+        prime = 3
+    found = cycle_census(system, eps, prime)
+    assert (found.lost, found.falling, found.transient, found.lengths) == census_by_hand(by_hand(system, eps, prime))
+    assert found.points == sum(1 for _ in all_points(system.dim, prime)) == found.looked_at
+    assert found.lost + found.falling + found.transient + found.periodic == found.points
+
+
+coefficients = st.integers(-3, 3)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(coefficients, min_size=12, max_size=12), st.sampled_from([5, 7, 11]))
+def test_images_are_those_of_the_affine_map_wherever_it_has_a_value(numbers, prime):
+    terms = ["x^2", "x*y", "y^2", "x", "y", "1"]
+    rhs = [" + ".join(f"({c})*{t}" for c, t in zip(half, terms, strict=True)) for half in (numbers[:6], numbers[6:])]
+    system = system_of(*rhs)
+    import numpy as np
+
+    chart, kahan = ProjectiveMap(system, "1/3", prime), KahanMap(system, "1/3", GF(prime))
+    points = np.array([[x, y, 1] for x in range(prime) for y in range(prime)]).T
+    image = chart.images(points)
+    for column in range(points.shape[1]):
+        try:
+            expected = [int(e) for e in kahan.step([int(points[0, column]), int(points[1, column])])]
+        except SingularStep:
+            continue
+        assert image[:, column].tolist() == [*expected, 1]
+
+
+def test_points_are_numbered_through():
+    import numpy as np
+
+    chart = ProjectiveMap(load("lorenz").system, "1/7", 5)
+    numbers = np.arange(chart.count)
+    assert chart.numbers(chart.points(numbers)).tolist() == numbers.tolist()
+    assert chart.numbers(np.zeros((4, 1), dtype=np.int64)).tolist() == [-1]
+
+
+def test_the_affine_space_comes_last():
+    import numpy as np
+
+    chart = ProjectiveMap(load("weierstrass").system, "1/7", 5)
+    assert chart.points(np.arange(6, 31))[-1].tolist() == [1] * 25
+
+
+@pytest.mark.parametrize(
+    ("image", "lengths", "lost", "falling"),
+    [
+        ([0], [1], 0, 0),
+        ([-1], [], 1, 0),
+        ([1, 2, 0], [3], 0, 0),
+        ([1, 2, 3, -1], [], 1, 3),
+        ([1, 0, 3, 2, 0, 4], [2, 2], 0, 0),
+    ],
+)
+def test_graphs_of_small_maps(image, lengths, lost, falling):
+    import numpy as np
+
+    graph = graph_of(np.array(image))
+    assert (sorted(graph.lengths[1].tolist()), graph.lost, graph.falling) == (lengths, lost, falling)
+
+
+# --- known lengths ---------------------------------------------------------------------------------------------------
+
+
+def test_the_oscillator_has_the_cycles_of_a_rotation():
+    """The map is the Cayley transform (1 + i eps)/(1 - i eps) on x + i y: every affine cycle but 0 has its order.
+
+    At the line at infinity the order is that of the map up to scalars, (1 + i eps)^2 over 1 + eps^2.
+    """
+    p, eps = 103, 15  # p = 3 mod 4: the order divides p + 1
+    found = cycle_census(load("harmonic").system, eps, p)
+
+    def times(a, b):
+        return ((a[0] * b[0] - a[1] * b[1]) % p, (a[0] * b[1] + a[1] * b[0]) % p)
+
+    norm = pow(1 + eps * eps, -1, p)
+    turn = ((1 - eps * eps) * norm % p, 2 * eps * norm % p)
+    order, power = 1, turn
+    while power != (1, 0):
+        power, order = times(power, turn), order + 1
+    assert (p + 1) % order == 0
+    affine = {length: n - found.at_infinity.get(length, 0) for length, n in found.lengths.items()}
+    assert {length: n for length, n in affine.items() if n} == {1: 1, order: (p * p - 1) // order}
+    assert found.lost == found.falling == found.transient == 0
+
+
+def test_a_period_of_four_at_one_eps_is_not_taken_for_a_law():
+    """eps^2 w = 1 makes the fourth iterate the identity; the default eps leave out such residues."""
+    p = 101
+    special = cycle_census(load("harmonic").system, "1", p)
+    assert set(special.lengths) <= {1, 2, 4}
+    for eps in default_eps(p):
+        assert cycle_census(load("harmonic").system, eps, p).longest > 4
+
+
+def test_every_default_eps_differs_up_to_sign():
+    for prime in (3, 5, 7, 11, 13, 101, 10007):
+        residues = [int(GF(prime).convert(eps)) for eps in default_eps(prime, 3)]
+        assert len({min(r, prime - r) for r in residues}) == len(residues) >= 1
+
+
+@pytest.mark.parametrize("name", ["weierstrass", "planar_cubic_hamiltonian", "nahm_tetrahedral"])
+@pytest.mark.parametrize("prime", [101, 199])
+def test_cycles_of_planar_integrable_maps_fit_on_curves_of_genus_one(name, prime):
+    for eps in default_eps(prime):
+        found = compare(cycle_census(load(name).system, eps, prime))
+        assert "integrable bound" in found.compatible
+        assert found.share_within is not None
+        assert found.share_within > 0.98  # some level curves are reducible
+
+
+def test_lotka_volterra_goes_like_a_random_reversible_map_and_not_along_curves():
+    system = load("lotka_volterra").system
+    R = find_reversor(system)
+    for eps in default_eps(499):
+        census = cycle_census(system, eps, 499, reversor=R)
+        found = compare(census)
+        assert found.compatible == ("random reversible",)
+        assert set(found.refused) == {"integrable bound", "random permutation"}
+        assert census.longest > hasse_weil(499)
+        assert found.model_scale == pytest.approx(499.5, abs=1)
+        assert census.lost == 3  # the base points of a quadratic map of the plane
+
+
+def test_without_a_reversing_symmetry_its_law_is_not_tried():
+    found = compare(cycle_census(load("lotka_volterra").system, "1/10", 199))
+    assert found.verdict("random reversible") == "not tried"
+    assert "no reversing symmetry is known" in found.reasons["random reversible"]
+
+
+def test_the_law_is_refused_for_an_integrable_reversible_map():
+    system = load("weierstrass").system
+    found = compare(cycle_census(system, "1/7", 199, reversor=find_reversor(system)))
+    assert "random reversible" in found.refused
+
+
+def test_a_moebius_map_is_one_rotation_of_the_projective_line():
+    """PGL2 acts on p + 1 points: cycles have one length apart from fixed points."""
+    for eps in default_eps(103):
+        found = cycle_census(load("riccati").system, eps, 103)
+        assert found.lost == 0
+        assert found.degree == 1
+        assert len([length for length in found.lengths if length > 1]) <= 1
+
+
+def test_a_map_that_degenerates_modulo_the_prime_is_a_constant():
+    """For x' = x^2 + x - 1 that is where 5 eps^2 = 1, as 2/11 modulo 101: all is divided out, and one point is left."""
+    found = cycle_census(load("riccati").system, "2/11", 101)
+    assert (found.degree, found.lengths, found.transient) == (0, {1: 1}, 101)
+
+
+def test_an_invariant_plane_at_infinity_is_kept_apart():
+    """Of homogeneous divergence the Lorenz map is an involution at infinity, which must not look like a law."""
+    census = cycle_census(load("lorenz").system, "1/7", 31)
+    found = compare(census)
+    assert max(census.at_infinity) <= 2
+    assert "integrable bound" not in found.compatible
+
+
+def test_the_zero_system_has_fixed_points_only():
+    census = cycle_census(SYSTEMS["zero"](), "1/7", 5)
+    assert (census.lengths, census.degree) == ({1: 31}, 1)
+    assert compare(census).share_within == 1.0
+
+
+def test_a_map_without_a_value_anywhere_is_a_value():
+    """x' = x with eps = 1 modulo p: I - eps f' = 0."""
+    census = cycle_census(system_of("x", "y"), 1, 7)
+    assert census.is_undefined
+    assert compare(census).compatible == ()
+
+
+# --- samples -------------------------------------------------------------------------------------------------------
+
+
+def test_samples_agree_with_the_whole_graph():
+    system = load("weierstrass").system
+    whole = cycle_census(system, "1/7", 31)
+    some = cycle_census(system, "1/7", 31, samples=400, seed=3)
+    assert set(some.lengths) <= set(whole.lengths)
+    assert some.open == 0
+    assert abs(some.periodic / 400 - whole.periodic / whole.points) < 0.1
+    assert some == cycle_census(system, "1/7", 31, samples=400, seed=3)
+    found = compare(some)
+    assert found.compatible == ("integrable bound",)
+    assert found.refused == ()
+
+
+def test_the_clock_stops_samples():
+    census = cycle_census(load("lotka_volterra").system, "1/7", 100_003, samples=50, seconds=0.0)
+    assert census.stopped
+    assert census.steps < 100
+    assert census.open > 0
+    assert compare(census).refused == ()
+
+
+def test_orbits_left_too_early_refuse_nothing():
+    found = compare(cycle_census(load("weierstrass").system, "1/7", 499, samples=200, steps=250))
+    assert found.verdict("integrable bound") == "not tried"
+    assert "too early to tell" in found.reasons["integrable bound"]
+
+
+# --- reversing symmetries --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("euler_top", [[-1, 0, 0], [0, -1, 0], [0, 0, -1]]),
+        ("weierstrass", [[1, 0], [0, -1]]),
+        ("lotka_volterra", [[0, 1], [1, 0]]),
+        ("lorenz", None),
+    ],
+)
+def test_reversing_symmetries_that_are_signed_permutations(name, expected):
+    found = find_reversor(load(name).system)
+    assert found == (None if expected is None else fmpq_mat(expected))
+
+
+def test_a_reversor_reverses_the_map():
+    system = load("lotka_volterra").system
+    kahan = KahanMap(system, "1/7")
+    x, y = kahan.step(["2/3", "1/5"])
+    assert kahan.step([y, x]) == kahan.point(["1/5", "2/3"])
+    assert not is_reversor(system, fmpq_mat([[1, 0], [0, 1]]))
+    assert not is_reversor(system, fmpq_mat([[1, 0], [0, -1]]))
+
+
+@pytest.mark.parametrize(
+    ("matrix", "words"),
+    [
+        ([[1, 0, 0], [0, 1, 0], [0, 0, 1]], "expected 2 x 2"),
+        ([[0, 2], [1, 0]], "expected an involution"),
+        ([[1, 0], [0, 1]], "does not reverse the system"),
+    ],
+)
+def test_a_wrong_reversor_is_refused(matrix, words):
+    with pytest.raises(InputError, match=words):
+        cycle_census(load("weierstrass").system, "1/7", 11, reversor=fmpq_mat(matrix))
+
+
+# --- wrong use -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("eps", "prime", "kind", "words"),
+    [
+        ("1/7", 2, InputError, "modulo 2 every Kahan map is the identity"),
+        ("1/7", 9, InputError, "9 is composite"),
+        ("1/7", 7, BadPrime, "divides 1/7"),
+        ("7/3", 7, BadPrime, "divides 7/3"),
+        ("0", 7, InputError, "eps = 0"),
+        ("1/7", 3, BadPrime, "a denominator of the system"),
+        ("1/7", 2**61 - 1, InputError, "expected one from 3 to"),
+    ],
+)
+def test_wrong_primes_and_eps_are_refused(eps, prime, kind, words):
+    with pytest.raises(kind, match=words):
+        cycle_census(load("lorenz").system, eps, prime)
+
+
+def test_laws_have_names_and_reasons():
+    found = compare(cycle_census(load("weierstrass").system, "1/7", 11))
+    assert set(found.reasons) == set(LAWS)
+    assert {found.verdict(law) for law in LAWS} <= {"compatible", "not compatible", "not tried"}

@@ -1,0 +1,257 @@
+"""Degrees of iterates: known sequences, an implementation of its own with gcds, and maps that are not there.
+
+The sequences were computed by others, modulo two primes each, or are in the literature: 2 n^2 + 1 of the Euler top,
+1 + sqrt 2, and the tribonacci number of zander-2021.
+"""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpz_poly, nmod_poly
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory import curves
+from kahanmaps.laboratory.degrees import degree_growth
+from kahanmaps.laboratory.recurrences import GrowthClass
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+CATALOG = {
+    "riccati": [1, 1, 1],
+    "harmonic": [1, 1, 1],
+    "planar_cubic_hamiltonian": [2, 4, 8, 13, 20, 28, 38, 49],
+    "weierstrass": [2, 3, 5, 7, 11, 15, 20, 25],
+    "nahm_tetrahedral": [2, 4, 8, 13, 20, 28, 38, 49],
+    "euler_top": [3, 9, 19, 33, 51, 73, 99, 129],
+    "zhukovski_volterra_1": [3, 9, 19, 33, 51, 73, 99, 129],
+    "volterra_periodic_3": [3, 7, 15, 25, 39, 55, 75, 97],
+    "volterra_periodic_4": [4, 13, 28, 49, 76, 109, 148, 193],
+    "dressing_chain_3": [3, 7, 15, 25, 39, 55, 75, 97],
+    "three_wave": [6, 16, 36, 61, 96, 136],
+    "lotka_volterra": [2, 4, 8, 16, 32, 64],
+    "henon_heiles": [3, 7, 17, 39, 93, 215],
+    "lorenz": [3, 9, 27, 81, 243],
+    "paper_m2": [4, 7, 16, 25, 40],
+    "paper_m3": [6, 10, 24, 37, 60],
+}
+
+
+def volterra(size: int) -> QuadraticSystem:
+    """x_i' = x_i (x_{i+1} - x_{i-1}), indices modulo the size."""
+    names = [f"x{i}" for i in range(size)]
+    return QuadraticSystem.from_text(
+        names, [f"{names[i]}*({names[(i + 1) % size]} - {names[i - 1]})" for i in range(size)]
+    )
+
+
+def zhukovski_volterra_2() -> QuadraticSystem:
+    """a = (1, 2, -3), b = (1, 3)."""
+    return QuadraticSystem.from_text(["x", "y", "z"], ["y*z - 3*z", "2*z*x + z", "-3*x*y + 3*x - y"])
+
+
+def lagrange_top() -> QuadraticSystem:
+    """alpha = 2, gamma = 3."""
+    return QuadraticSystem.from_text(
+        ["m1", "m2", "m3", "p1", "p2", "p3"],
+        ["m2*m3 + 3*p2", "-m1*m3 - 3*p1", "0", "2*p2*m3 - p3*m2", "p3*m1 - 2*p1*m3", "p1*m2 - p2*m1"],
+    )
+
+
+def zander() -> QuadraticSystem:
+    """gamma = (1, 2, 0) for the lines x, y, x + 2 y: (x + 2 y)/y times J grad (x y^2)."""
+    return QuadraticSystem.from_text(["x", "y"], ["2*x*(x + 2*y)", "-y*(x + 2*y)"])
+
+
+def polynomial_degrees(system: QuadraticSystem, count: int, seed: int) -> list[int]:
+    """The degrees by Cramer's rule on homogeneous coordinates, common factors divided out: no power series."""
+    rng = random.Random(seed)
+    field = GF(2**61 - 1)
+    p, n = field.prime, system.dim
+    eps, local = field.random(rng), system.over(field)
+    zero, one = nmod_poly([0], p), field.one
+    X = [nmod_poly([1], p), *(nmod_poly([rng.randrange(p), rng.randrange(p)], p) for _ in range(n))]
+    found = []
+    for _ in range(count):
+        matrix = [
+            [
+                X[0] * ((i == j) * one - eps * local.B[i, j])
+                - sum((X[k + 1] * (eps * local.tensor[i * n + j, k]) for k in range(n)), zero)
+                for j in range(n)
+            ]
+            for i in range(n)
+        ]
+        right = [
+            sum((X[j + 1] * ((i == j) * one + eps * local.B[i, j]) for j in range(n)), X[0] * (2 * eps * local.c[i, 0]))
+            for i in range(n)
+        ]
+        image = [determinant(matrix)]
+        for j in range(n):
+            image.append(determinant([[*row[:j], b, *row[j + 1 :]] for row, b in zip(matrix, right, strict=True)]))
+        common = image[0]
+        for entry in image[1:]:
+            common = common.gcd(entry)
+        X = [entry // common for entry in image]
+        found.append(max(entry.degree() for entry in X))
+    return found
+
+
+def determinant(rows: list[list[nmod_poly]]) -> nmod_poly:
+    """By expansion along the first row."""
+    if len(rows) == 1:
+        return rows[0][0]
+    minors = (determinant([[*row[:j], *row[j + 1 :]] for row in rows[1:]]) for j in range(len(rows)))
+    signed = (entry * minor * (-1) ** j for j, (entry, minor) in enumerate(zip(rows[0], minors, strict=True)))
+    return sum(signed, nmod_poly([0], rows[0][0].modulus()))
+
+
+@pytest.mark.parametrize("name", CATALOG)
+def test_the_degrees_of_the_catalogue(name):
+    known = CATALOG[name]
+    found = degree_growth(load(name).system, max_terms=len(known), seed=5)
+    assert (list(found.degrees), found.ended, found.notes) == ([1, *known], "terms", ())
+
+
+@pytest.mark.parametrize(
+    ("system", "known"),
+    [
+        (zhukovski_volterra_2(), [3, 9, 23, 57, 139, 337, 815, 1969]),
+        (volterra(5), [5, 21, 85, 341]),
+        (lagrange_top(), [6, 18, 38, 66, 102]),
+        (zander(), [2, 4, 8, 15, 28, 52, 96, 177]),
+    ],
+)
+def test_the_degrees_of_other_systems(system, known):
+    assert list(degree_growth(system, max_terms=len(known)).degrees) == [1, *known]
+
+
+@pytest.mark.parametrize("name", ["weierstrass", "lotka_volterra", "euler_top", "lorenz", "henon_heiles", "riccati"])
+def test_polynomials_with_gcds_give_the_same(name):
+    system = load(name).system
+    count = 3 if system.dim > 2 else 5
+    assert list(degree_growth(system, max_terms=count).degrees[1:]) == polynomial_degrees(system, count, seed=1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_polynomials_with_gcds_give_the_same_for_random_systems(seed):
+    rng = random.Random(seed)
+    names = ["x", "y", "z"][: 1 + seed % 3]
+    monomials = [*names, *(f"{a}*{b}" for a in names for b in names), "1"]
+    rhs = ["+".join(f"({rng.randint(-2, 2)})*{m}" for m in monomials) for _ in names]
+    system = QuadraticSystem.from_text(names, rhs)
+    assert list(degree_growth(system, max_terms=3).degrees[1:]) == polynomial_degrees(system, 3, seed)
+
+
+def test_a_recurrence_with_terms_to_spare_ends_the_search():
+    found = degree_growth(load("euler_top").system)
+    assert (found.ended, found.growth, found.recurrence.closed_form) == (
+        "recurrence",
+        GrowthClass.QUADRATIC,
+        "2*n^2 + 1",
+    )
+    assert found.recurrence.checked >= 6
+    assert found.dynamical_degree.text == "1"
+    assert len(set(found.primes)) == len(set(found.residues)) == 2
+
+
+def test_one_plus_the_root_of_two():
+    found = degree_growth(zhukovski_volterra_2(), max_terms=8)
+    assert found.dynamical_degree.minimal_polynomial == fmpz_poly([-1, -2, 1])
+    assert "2.41421356237309504880" in found.growth_text
+
+
+def test_without_a_recurrence_there_is_an_estimate_that_says_so():
+    found = degree_growth(load("henon_heiles").system, max_terms=6)
+    assert (found.recurrence, found.growth, found.dynamical_degree) == (None, GrowthClass.UNKNOWN, None)
+    assert found.growth_text.startswith("no recurrence found in 7 terms; d_n/d_(n-1) is 2.31")
+    assert found.growth_text.endswith("an estimate only")
+
+
+@pytest.mark.slow
+def test_planar_integrable_maps_go_far():
+    found = degree_growth(load("planar_cubic_hamiltonian").system, max_terms=60, seconds=60)
+    assert [4 * d for d in found.degrees] == [3 * n * n + 4 + n % 2 for n in range(61)]
+
+
+def test_a_single_eps_may_be_special():
+    """q'' = -q + 2 q^2 at eps = 1: the fourth iterate is the identity, but not for generic eps."""
+    system = QuadraticSystem.from_text(["q", "p"], ["p", "2*q^2 - q"])
+    at_one = degree_growth(system, 1)
+    assert (at_one.degrees[4], at_one.growth) == (1, GrowthClass.BOUNDED)
+    assert degree_growth(system).growth is GrowthClass.QUADRATIC
+
+
+def test_eps_as_a_rational_number():
+    found = degree_growth(load("lorenz").system, "1/7", max_terms=3)
+    assert (found.degrees, found.to_json()["eps"]) == ((1, 3, 9, 27), "1/7")
+
+
+@pytest.mark.parametrize(
+    ("rhs", "eps", "degrees", "ended"),
+    [
+        (["0"], None, (1,) * 8, "recurrence"),
+        (["1"], None, (1,) * 8, "recurrence"),
+        (["x"], 1, (1,), "singular"),
+        (["x"], -1, (1, 0), "constant"),
+        (["0", "0"], None, (1,) * 8, "recurrence"),
+        (["x^2", "y"], 1, (1,), "singular"),
+    ],
+)
+def test_degenerate_maps_are_values(rhs, eps, degrees, ended):
+    system = QuadraticSystem.from_text(["x", "y"][: len(rhs)], rhs)
+    found = degree_growth(system, eps)
+    assert (found.degrees, found.ended) == (degrees, ended)
+    assert found.text
+    assert found.growth is {"constant": GrowthClass.ZERO, "singular": GrowthClass.UNKNOWN}.get(
+        ended, GrowthClass.BOUNDED
+    )
+
+
+def test_the_time_and_the_degree_are_limits():
+    henon_heiles = load("henon_heiles").system
+    found = degree_growth(henon_heiles, seconds=0.05)
+    assert (found.ended, found.degrees[:3]) == ("time", (1, 3, 7))
+    found = degree_growth(load("riccati").system, seconds=0.05, max_terms=10_000)
+    assert (found.ended, found.growth) == ("time", GrowthClass.BOUNDED)
+    found = degree_growth(henon_heiles, max_degree=50)
+    assert (found.ended, found.degrees, found.message) == (
+        "degree",
+        (1, 3, 7, 17, 39),
+        "the degree of iterate 5 is above 50",
+    )
+
+
+def test_lines_in_special_position_are_replaced(monkeypatch):
+    """Modulo 101 every line has a good chance to be special; larger degrees win, and it is told."""
+    primes = iter([101, 101, 103, 107, 2**61 - 1, 2**61 - 1, 2**61 - 1, 2**61 - 1, 2**61 - 1])
+    monkeypatch.setattr(curves, "random_prime_field", lambda _: GF(next(primes)))
+    system = load("euler_top").system
+    found = degree_growth(system, max_terms=7, seed=1)
+    assert found.degrees == (1, 3, 9, 19, 33, 51, 73, 99)
+    assert any("was replaced by another" in note for note in found.notes)
+
+
+def test_the_same_seed_gives_the_same_and_progress_is_told():
+    told: list[str] = []
+    system = load("weierstrass").system
+    first = degree_growth(system, max_terms=5, seed=3, progress=told.append)
+    assert first == degree_growth(system, max_terms=5, seed=3)
+    assert first.primes != degree_growth(system, max_terms=5, seed=4).primes
+    assert told[-1] == "degrees: iterate 5, degree 7 before it"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"eps": 0}, "found eps = 0"),
+        ({"seconds": 0}, "expected a positive number"),
+        ({"seconds": float("nan")}, "expected a positive number"),
+        ({"max_terms": -1}, "found -1 terms"),
+        ({"max_degree": 0}, "the largest degree 0"),
+    ],
+)
+def test_wrong_use(options, words):
+    with pytest.raises(InputError, match=words):
+        degree_growth(load("weierstrass").system, **options)

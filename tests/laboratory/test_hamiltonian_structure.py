@@ -1,0 +1,172 @@
+"""Constant Hamiltonian structures: those of the catalogue, of random systems, and none where there is none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from flint import fmpq, fmpq_mat
+from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA, random_point
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import kahanmaps
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import rank
+from kahanmaps.algebra.polynomials import gradient, monomials, ring
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, constant_structures
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.files import read_system
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+CATALOG = Path(kahanmaps.__file__).parent / "systems" / "catalog"
+
+
+def checked(system: QuadraticSystem) -> ConstantStructures:
+    """What is found, after checking every claim of it exactly."""
+    found = constant_structures(system)
+    for K, H in zip(found.forms, found.functions, strict=True):
+        assert linear_combinations(K, system.rhs) == gradient(H)
+    if found.hamiltonian is None:
+        assert found.reason
+        assert (found.integral, found.density, found.casimirs) == (None, None, ())
+        return found
+    assert found.reason == ""
+    assert found.hamiltonian.system.rhs == system.rhs
+    J = found.hamiltonian.J
+    assert len(found.casimirs) == system.dim - rank(QQ, J)
+    for casimir in found.casimirs:
+        slopes = fmpq_mat([[slope.leading_coefficient() for slope in gradient(casimir)]])
+        assert all(entry == 0 for entry in (slopes * J).entries())
+        assert linear_combinations(slopes, system.rhs)[0].is_zero()
+    return found
+
+
+def conserved(found: ConstantStructures, seed: int = 1) -> bool:
+    """Whether the Kahan map conserves the integral and the measure at one exact point."""
+    integral, density = found.integral, found.density
+    assert integral is not None
+    assert density is not None
+    eps = fmpq(1, 9)
+    phi = KahanMap(found.system, eps)
+    x = random_point(found.system.dim, seed)
+    if phi.determinant(x) == 0 or phi.determinant(phi.step(x)) == 0:
+        return True
+    image = phi.step(x)
+    same = integral.value(QQ, eps, x) == integral.value(QQ, eps, image)
+    return same and density.value(QQ, eps, image) == density.value(QQ, eps, x) * phi.jacobian(x).det()
+
+
+@pytest.mark.parametrize(
+    "name", ["henon_heiles", "weierstrass", "planar_cubic_hamiltonian", "nahm_tetrahedral", "paper_m2", "three_wave"]
+)
+def test_the_hamiltonian_systems_of_the_catalogue(name: str) -> None:
+    file = read_system(CATALOG / f"{name}.toml")
+    known = file.hamiltonian
+    assert known is not None
+    found = checked(file.system)
+    assert found.hamiltonian is not None
+    assert found.hamiltonian.is_standard == known.is_standard
+    if known.is_standard:
+        assert (found.hamiltonian.H - known.H).is_constant()
+    assert found.casimirs == ()
+    assert conserved(found)
+
+
+def test_a_member_of_the_commuting_family_has_m_structures() -> None:
+    # As many as the associated systems of petrera-suris-2016.
+    assert [len(checked(read_system(CATALOG / f"paper_m{m}.toml").system).forms) for m in (2, 3)] == [2, 3]
+
+
+def test_degenerate_structures() -> None:
+    for name in ("dressing_chain_3", "volterra_periodic_3"):
+        found = checked(read_system(CATALOG / f"{name}.toml").system)
+        assert [str(casimir) for casimir in found.casimirs] == ["x1 + x2 + x3"]
+        assert conserved(found)
+    assert found.hamiltonian is not None
+    assert str(found.hamiltonian.H) == "-x1*x2*x3"
+    assert found.hamiltonian.J == fmpq_mat([[0, 1, -1], [-1, 0, 1], [1, -1, 0]])
+
+
+@pytest.mark.parametrize("system", [LORENZ, EULER_TOP, LOTKA_VOLTERRA])
+def test_systems_without_constant_structure(system: QuadraticSystem) -> None:
+    found = checked(system)
+    assert found.hamiltonian is None
+    assert found.proved
+    assert "no affine integral" in found.reason
+
+
+def test_structures_that_cannot_be_for_parity() -> None:
+    found = checked(read_system(CATALOG / "volterra_periodic_4.toml").system)
+    assert found.hamiltonian is None
+    assert found.proved
+    assert "parity" in found.reason
+
+
+def test_kernels_in_between_are_not_looked_for() -> None:
+    """The dimension is odd, and of the two integrals every combination might span the kernel."""
+    system = QuadraticSystem.from_text(["x", "y", "z", "s", "t"], ["x^2 + y", "y^2", "x*y", "0", "0"])
+    found = checked(system)
+    assert found.hamiltonian is None
+    assert not found.proved
+
+
+def test_forms_without_an_invertible_one() -> None:
+    # K f is a gradient for the K of the first plane only: the second one's divergence is not zero.
+    system = QuadraticSystem.from_text(["q", "p", "x", "y"], ["p", "-q^2", "x^2 + y", "x*y"])
+    found = checked(system)
+    assert len(found.forms) == 1
+    assert [str(H) for H in found.functions] == ["-1/3*q^3 - 1/2*p^2"]
+    assert (found.hamiltonian, found.proved) == (None, True)
+    assert "invertible" in found.reason
+
+
+def test_degenerate_input() -> None:
+    zero = checked(QuadraticSystem.from_text(["x", "y"], ["0", "0"]))
+    assert zero.hamiltonian is not None
+    assert zero.hamiltonian.H.is_zero()
+    odd = checked(QuadraticSystem.from_text(["x", "y", "z"], ["0", "0", "0"]))
+    assert odd.hamiltonian is not None
+    assert len(odd.casimirs) == 3
+    assert checked(QuadraticSystem.from_text(["x"], ["x^2"])).hamiltonian is None
+    constant = checked(QuadraticSystem.from_text(["x", "y"], ["1", "2"]))
+    assert constant.hamiltonian is not None
+    names = [f"x{i}" for i in range(31)]
+    with pytest.raises(InputError, match="dimension 31"):
+        constant_structures(QuadraticSystem.from_text(names, names))
+
+
+@st.composite
+def hamiltonians(draw: st.DrawFn) -> CubicHamiltonian:
+    """A random cubic H and a random skew J, perhaps singular."""
+    n = draw(st.integers(1, 5))
+    context = ring([f"x{i}" for i in range(n)])
+    exponents = [m for d in range(1, 4) for m in monomials(n, d)]
+    terms = draw(st.dictionaries(st.sampled_from(exponents), st.integers(-5, 5).filter(bool), max_size=12))
+    J = fmpq_mat(n, n)
+    for i in range(n):
+        for j in range(i):
+            J[i, j] = draw(st.integers(-3, 3))
+            J[j, i] = -J[i, j]
+    return CubicHamiltonian(context.from_dict({m: fmpq(c) for m, c in terms.items()}), J)
+
+
+@settings(max_examples=80)
+@given(hamiltonians(), st.integers(0, 50))
+def test_random_structures(hamiltonian: CubicHamiltonian, seed: int) -> None:
+    found = checked(hamiltonian.system)
+    if hamiltonian.J.det() != 0:
+        assert found.hamiltonian is not None
+        assert found.casimirs == ()
+    if found.hamiltonian is None:
+        assert not found.proved  # there is one, with a kernel that was not tried
+    else:
+        assert conserved(found, seed)
+
+
+@given(st.integers(0, 20))
+def test_the_seed_changes_no_form(seed: int) -> None:
+    system = read_system(CATALOG / "paper_m3.toml").system
+    assert constant_structures(system, seed=seed).forms == constant_structures(system).forms

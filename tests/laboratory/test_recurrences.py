@@ -1,0 +1,107 @@
+"""Shortest recurrences of integer sequences: known ones come back, and nothing is made of what has none."""
+
+from __future__ import annotations
+
+import pytest
+from flint import fmpz_poly
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.recurrences import GrowthClass, find_recurrence, needed_checks
+
+PRIMES = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53]
+
+
+def terms(below: list[int], start: list[int], length: int) -> list[int]:
+    """The sequence with a_n = sum below[k] a_{n-1-k} from its first terms."""
+    values = list(start)
+    while len(values) < length:
+        values.append(sum(c * values[-1 - k] for k, c in enumerate(below)))
+    return values
+
+
+@pytest.mark.parametrize(
+    ("values", "order", "growth", "closed_form"),
+    [
+        ([1] * 5, 1, "bounded", "1"),
+        ([0, 0, 0, 0], 0, "zero", "0"),
+        ([1, 0, 0, 0, 0, 0], 1, "zero", "0"),
+        ([2 * n + 1 for n in range(8)], 2, "linear", "2*n + 1"),
+        ([2 * n * n + 1 for n in range(9)], 3, "quadratic", "2*n^2 + 1"),
+        ([n**3 - n for n in range(12)], 4, "polynomial", "n^3 - n"),
+        ([-(-3 * n * n // 4) + 1 for n in range(12)], 4, "quadratic", None),
+        ([(-1) ** n * n for n in range(8)], 2, "linear", "n for n = 0 mod 2; -n for n = 1 mod 2"),
+        ([1, 2, 1, 2, 1, 2], 2, "bounded", "1 for n = 0 mod 2; 2 for n = 1 mod 2"),
+        ([6**n for n in range(5)], 1, "exponential", None),
+    ],
+)
+def test_known_sequences(values, order, growth, closed_form):
+    found = find_recurrence(values)
+    assert (found.order, str(found.growth)) == (order, growth)
+    assert found.checked == len(values) - 2 * order >= needed_checks(order)
+    if closed_form is not None:
+        assert found.closed_form == closed_form
+
+
+def test_the_growth_rate_is_an_algebraic_number_with_certain_digits():
+    # 1 + sqrt 2: 3, 9, 23, 57, 139, 337, 815, 1969 are the degrees of zhukovski_volterra_2
+    found = find_recurrence([1, 3, 9, 23, 57, 139, 337, 815, 1969, 4755])
+    assert found.growth is GrowthClass.EXPONENTIAL
+    assert found.rate.minimal_polynomial == fmpz_poly([-1, -2, 1])
+    assert found.rate.digits.startswith("2.41421356237309504880")
+    assert found.rate.enclosure.startswith("[2.41421356237309504880168872420969807")
+    assert found.to_json()["rate"]["minimal_polynomial"] == ["-1", "-2", "1"]
+
+
+def test_a_polynomial_factor_of_exponential_growth_is_a_multiplicity():
+    found = find_recurrence([n * 2**n for n in range(8)])
+    assert (found.rate.text, found.rate.multiplicity, found.power) == ("2", 2, 1)
+
+
+def test_no_rate_where_no_positive_root_is_the_largest():
+    found = find_recurrence([(-2) ** n for n in range(6)])
+    assert (found.growth, found.rate, found.closed_form) == (GrowthClass.EXPONENTIAL, None, None)
+
+
+def test_first_terms_may_be_exempt():
+    found = find_recurrence([7, 5, *(2**n for n in range(10))])
+    assert (found.preperiod, found.order, found.rate.text) == (2, 3, "2")
+    found = find_recurrence([9, *([4] * 8)])
+    assert (found.preperiod, str(found.growth), found.closed_form) == (1, "bounded", "4")
+
+
+@pytest.mark.parametrize("values", [[], [1], [1, 2, 4], PRIMES, [8, 4, 2, 1], [1, 2, 4, 8, 15]])
+def test_nothing_is_made_of_too_few_terms_or_of_no_recurrence(values):
+    assert find_recurrence(values) is None
+
+
+def test_one_wrong_term_is_noticed():
+    values = [2 * n * n + 1 for n in range(12)]
+    values[9] += 1
+    assert find_recurrence(values) is None
+
+
+def test_wrong_values_are_refused():
+    with pytest.raises(InputError, match=r"found 1\.5 in the sequence"):
+        find_recurrence([1, 1.5])
+
+
+@given(
+    st.lists(st.integers(-5, 5), min_size=1, max_size=4),
+    st.data(),
+)
+def test_the_recurrence_found_continues_the_sequence(below, data):
+    start = data.draw(st.lists(st.integers(-9, 9), min_size=len(below), max_size=len(below)))
+    size = 2 * len(below) + needed_checks(len(below))
+    values = terms(below, start, size + 10)
+    found = find_recurrence(values[:size])
+    assert found is not None
+    assert found.order <= len(below)
+    assert [found.predict(n) for n in range(size + 10)] == values
+
+
+def test_the_equation_is_told_with_what_speaks_for_it():
+    assert find_recurrence(terms([1, 1], [1, 2], 9)).text == (
+        "a(n) = a(n-1)+a(n-2) for n >= 2, from 9 terms of which 5 were not needed to find it"
+    )

@@ -1,0 +1,247 @@
+"""Confinement: the integrable systems of the catalogue against those of maximal degree, and series against points."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.fates import CONFINED, NOT_CONFINED
+from kahanmaps.laboratory.jets import NotGeneric, PrecisionTooLow, follow
+from kahanmaps.laboratory.singularities import default_eps, singularities, symbolic_denominator
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.projective import homogeneous_map, linear_forms
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+PRIME = 2_305_843_009_213_693_951
+
+
+def runs(name: str, **options):
+    return [singularities(load(name).system, eps, **options) for eps in default_eps(0)]
+
+
+def test_the_forms_are_those_of_the_map():
+    for name in ("lorenz", "weierstrass", "henon_heiles", "paper_m2"):
+        system = load(name).system
+        forms, _ = homogeneous_map(system, "1/7", QQ)
+        point = [fmpq(2, k + 3) for k in range(system.dim)]
+        values = [form(*point, fmpq(1)) for form in forms]
+        assert tuple(value / values[-1] for value in values[:-1]) == KahanMap(system, "1/7").step(point)
+
+
+INTEGRABLE = [
+    "weierstrass",
+    "nahm_tetrahedral",
+    "planar_cubic_hamiltonian",
+    "euler_top",
+    "volterra_periodic_3",
+    "volterra_periodic_4",
+    "dressing_chain_3",
+    "zhukovski_volterra_1",
+    "paper_m2",
+]
+
+
+@pytest.mark.parametrize("name", INTEGRABLE)
+def test_singularities_of_integrable_maps_are_confined(name):
+    """zander-2021 for the planar systems; the others have integrals, and degrees that grow polynomially."""
+    found = runs(name)
+    assert [run.verdict for run in found] == ["confined", "confined"]
+    assert found[0].shape == found[1].shape
+
+
+@pytest.mark.parametrize("name", ["lotka_volterra", "lorenz"])
+def test_nothing_is_confined_where_degrees_are_the_largest_possible(name):
+    """The degrees 2^n and 3^n say that no contracted hypersurface ever meets a point without a value."""
+    for run in runs(name):
+        assert run.verdict == "not confined"
+        assert {h.status for h in run.hypersurfaces} == {NOT_CONFINED}
+        assert all(step.common == 0 for h in run.hypersurfaces for step in h.steps)
+
+
+def dense(n: int, seed: int) -> QuadraticSystem:
+    """A system without zero coefficients, which has no reason to be special."""
+    rng = random.Random(seed)
+    names = ["x", "y", "z", "w"][:n]
+    monomials = ["1", *names, *(f"{a}*{b}" for i, a in enumerate(names) for b in names[i:])]
+    rhs = [" + ".join(f"({rng.choice((-1, 1)) * rng.randint(1, 9)})*{m}" for m in monomials) for _ in names]
+    return QuadraticSystem.from_text(names, rhs)
+
+
+@pytest.mark.parametrize(("n", "seed"), [(2, 0), (2, 1), (3, 0), (3, 1), pytest.param(4, 0, marks=pytest.mark.slow)])
+def test_systems_without_structure_confine_nothing(n, seed):
+    run = singularities(dense(n, seed), "4/13", steps=8)
+    assert run.verdict == "not confined"
+    assert [h.status for h in run.hypersurfaces if not h.is_pole] == [NOT_CONFINED]
+
+
+def test_one_eps_may_be_special():
+    """At eps = 1 the fourth iterate of the henon_heiles map is the identity: everything comes back at once."""
+    special = singularities(load("henon_heiles").system, 1)
+    assert special.verdict in ("confined", "nothing contracted")
+    assert special.shape != runs("henon_heiles")[0].shape
+
+
+def test_confinement_does_not_make_a_map_integrable():
+    """The degrees of henon_heiles, 3, 7, 17, 39, 93, are below 3^n, yet grow exponentially."""
+    assert [run.verdict for run in runs("henon_heiles")] == ["confined", "confined"]
+
+
+def test_the_top_contracts_two_quadrics_for_two_steps():
+    for run in runs("euler_top"):
+        assert run.critical_degree == 8
+        poles = [h for h in run.hypersurfaces if h.is_pole]
+        quadrics = [h for h in run.hypersurfaces if not h.is_pole]
+        assert [(h.degree, h.status) for h in poles] == [(3, "not contracted")]
+        assert [(h.degree, h.multiplicity, h.contracted_at, h.confined_at) for h in quadrics] == [(2, 2, 1, 3)] * 2
+        assert [step.rank for step in quadrics[0].steps[:4]] == [0, 0, 2, 2]
+
+
+def test_the_degrees_of_the_critical_locus_add_up():
+    """The Jacobian determinant of n + 1 forms of degree d has degree (n + 1)(d - 1)."""
+    for name in ("weierstrass", "lotka_volterra", "lorenz", "henon_heiles", "euler_top"):
+        for run in runs(name, steps=1):
+            n = load(name).system.dim
+            assert run.critical_degree == (n + 1) * (run.map_degree - 1)
+            assert sum(h.degree * (h.multiplicity or 0) for h in run.hypersurfaces) == run.critical_degree
+
+
+def test_the_pole_of_the_weierstrass_map():
+    assert symbolic_denominator(load("weierstrass").system) == [("12*x*eps^2 - 1", 1)]
+    (pole,) = [h for h in singularities(load("weierstrass").system, "1/2").hypersurfaces if h.is_pole]
+    assert pole.polynomial == "3*x - 1"
+    assert pole.status == CONFINED
+
+
+def test_a_contracted_line_really_has_one_image():
+    """Two points of the line 63 x + 14 y = 162 of the Lotka-Volterra map at eps = 7/11 go to one point."""
+    system = load("lotka_volterra").system
+    (run,) = [singularities(system, "7/11")]
+    assert "63*x + 14*y - 162" in [h.polynomial for h in run.hypersurfaces]
+    kahan = KahanMap(system, "7/11")
+    images = {kahan.step([x, (162 - 63 * fmpq(x)) / 14]) for x in (1, 2, 5)}
+    assert len(images) == 1
+    assert len({kahan.step([x, (163 - 63 * fmpq(x)) / 14]) for x in (1, 2, 5)}) == 3
+
+
+@pytest.mark.parametrize(
+    ("rhs", "verdict"),
+    [
+        (["0", "0"], "no singularities"),
+        (["y", "-x"], "no singularities"),
+        (["1", "2"], "no singularities"),
+        (["y^2", "0"], "nothing contracted"),  # a shear: f' is nilpotent and the map a polynomial automorphism
+        (["x^2", "y^2"], "not confined"),
+    ],
+)
+def test_simple_systems(rhs, verdict):
+    system = QuadraticSystem.from_text(["x", "y"], rhs)
+    run = singularities(system, "1/7", steps=6)
+    if verdict in ("no singularities",):
+        assert run.hypersurfaces == ()
+    if rhs[0] == "y^2":
+        assert run.denominator == "1"
+        assert all(h.polynomial == "Z" for h in run.hypersurfaces)
+    elif rhs[0] == "x^2":
+        assert {h.status for h in run.hypersurfaces} <= {CONFINED, NOT_CONFINED}
+    else:
+        assert run.verdict == verdict
+
+
+def test_one_dimension_has_nothing_to_contract():
+    assert singularities(load("riccati").system, "1/7").verdict == "nothing contracted"
+
+
+def test_singular_everywhere_is_a_value():
+    run = singularities(QuadraticSystem.from_text(["x", "y"], ["x", "y"]), 1)
+    assert run.verdict == "singular everywhere"
+
+
+def test_where_the_determinant_is_too_large_random_points_tell():
+    """The three-wave system has all the integrals it needs (petrera-pfadler-suris-2011)."""
+    run = singularities(load("three_wave").system, "1/7", steps=5)
+    assert (run.critical_degree, run.verdict) == (None, "confined")
+    assert [h.degree for h in run.hypersurfaces if h.polynomial == "?"] == [15, 10]
+
+
+@pytest.mark.parametrize("name", ["euler_top", "weierstrass", "lotka_volterra", "lorenz", "dressing_chain_3"])
+def test_random_points_tell_what_polynomials_do(name, monkeypatch):
+    system = load(name).system
+    written = singularities(system, "4/13")
+    monkeypatch.setattr("kahanmaps.laboratory.singularities._MAX_TERMS", 0)
+    unwritten = singularities(system, "4/13")
+    assert unwritten.verdict == written.verdict
+
+    def fates(run):
+        return {
+            (h.multiplicity, h.status, h.contracted_at, h.confined_at, tuple(step.rank for step in h.steps))
+            for h in run.hypersurfaces
+            if not h.is_pole and h.polynomial != "Z"
+        }
+
+    assert fates(unwritten) == fates(written)
+    degrees = sum(h.degree for h in unwritten.hypersurfaces if h.polynomial == "?")
+    assert degrees == sum(h.degree for h in written.hypersurfaces if not h.is_pole and h.polynomial != "Z")
+
+
+def test_zeros_without_points_are_undecided(monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.singularities._MAX_TERMS", 0)
+    monkeypatch.setattr("kahanmaps.laboratory.fates._followed", lambda *_: (_ for _ in ()).throw(NotGeneric()))
+    run = singularities(load("weierstrass").system, "4/13")
+    assert run.verdict == "undecided"
+
+
+def test_the_clock_stops_it():
+    run = singularities(load("euler_top").system, "1/7", seconds=0.0)
+    assert run.stopped
+    assert run.verdict == "undecided"
+
+
+def test_the_same_seed_gives_the_same():
+    system = load("weierstrass").system
+    assert singularities(system, "1/7", seed=4) == singularities(system, "1/7", seed=4)
+
+
+@pytest.mark.parametrize(("steps", "words"), [(0, "found 0 steps"), (10_000, "expected 1 to 200")])
+def test_wrong_steps_are_refused(steps, words):
+    with pytest.raises(InputError, match=words):
+        singularities(load("euler_top").system, "1/7", steps=steps)
+
+
+def test_large_dimensions_are_refused():
+    names = [f"x{k}" for k in range(7)]
+    with pytest.raises(InputError, match="expected at most 6"):
+        singularities(QuadraticSystem.from_text(names, [f"{name}^2" for name in names]), "1/7")
+
+
+# --- the series ------------------------------------------------------------------------------------------------------
+
+
+def test_a_generic_point_loses_no_rank_and_follows_the_map():
+    system = load("lorenz").system
+    field = GF(PRIME)
+    forms = linear_forms(system, "1/7", field)
+    steps = follow(forms, [3, 5, 7, 1], [11, 2, 9, 4], [[1, 0, 0, 0], [0, 1, 0, 0]], PRIME, 4, 8)
+    assert [(step.common, step.pole, step.denominator, step.rank) for step in steps] == [(0, 0, 0, 2)] * 4
+
+
+def test_dependent_tangents_have_a_smaller_rank():
+    forms = linear_forms(load("lorenz").system, "1/7", GF(PRIME))
+    steps = follow(forms, [3, 5, 7, 1], [11, 2, 9, 4], [[1, 0, 0, 0], [2, 0, 0, 0]], PRIME, 2, 8)
+    assert [step.rank for step in steps] == [1, 1]
+
+
+def test_series_too_short_say_so_and_special_points_too():
+    """On the pole of the Weierstrass map four steps divide by t twice; a direction along it never leaves it."""
+    system = load("weierstrass").system
+    forms = linear_forms(system, "1/2", GF(PRIME))
+    third = pow(3, -1, PRIME)
+    with pytest.raises(PrecisionTooLow):
+        follow(forms, [third, 5, 1], [1, 1, 0], [[0, 1, 0]], PRIME, 12, 2)
+    assert [s.rank for s in follow(forms, [third, 5, 1], [1, 1, 0], [[0, 1, 0]], PRIME, 4, 16)] == [0, 0, 0, 1]
+    with pytest.raises((PrecisionTooLow, NotGeneric)):
+        follow(forms, [third, 5, 1], [0, 1, 0], [[1, 0, 0]], PRIME, 4, 16)

@@ -1,0 +1,220 @@
+"""Symmetries and reversing symmetries: known groups, a brute-force oracle, and the map itself as a witness."""
+
+from __future__ import annotations
+
+import itertools
+import random
+
+import pytest
+from flint import fmpq, fmpq_mat
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kahanmaps import KahanMap
+from kahanmaps.errors import InputError, SingularStep
+from kahanmaps.laboratory.symmetries import linear_symmetries
+from kahanmaps.laboratory.symmetry_equations import is_symmetry
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def system(names, *rhs):
+    return QuadraticSystem.from_text(names.split(), rhs)
+
+
+def apply(S, r, x):
+    column = S * fmpq_mat(len(r), 1, list(x))
+    return tuple(column[i, 0] + r[i] for i in range(len(r)))
+
+
+def holds_for_the_map(f, S, r, target, seed=0):
+    """T Phi(., eps) = Phi(., target(eps)) T at rational points, exactly."""
+    rng = random.Random(seed)
+    compared = 0
+    while compared < 3:
+        x = [fmpq(rng.randint(-9, 9), rng.randint(1, 5)) for _ in range(f.dim)]
+        eps = fmpq(1 + compared, 7)
+        try:
+            left = apply(S, r, KahanMap(f, eps).step(x))
+            right = KahanMap(f, target(eps)).step(apply(S, r, x))
+        except SingularStep:
+            continue
+        if left != right:
+            return False
+        compared += 1
+    return True
+
+
+# Signed permutations: the orders are those of groups worked out by hand. volterra_periodic_N: the dihedral group of
+# N particles times the reversal -I. The Euler top of the catalogue: J x J with two equal moments up to sign.
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [
+        ("volterra_periodic_3", 12),
+        ("volterra_periodic_4", 16),
+        ("lorenz", 2),
+        ("lotka_volterra", 2),
+        ("henon_heiles", 4),
+        ("weierstrass", 2),
+        ("nahm_tetrahedral", 4),
+        ("paper_m2", 2),
+        ("planar_cubic_hamiltonian", 1),
+        ("euler_top", 16),
+        ("three_wave", 64),
+    ],
+)
+def test_groups_of_the_catalogue_and_the_map_obeys_them(name, order):
+    f = load(name, {}).system
+    found = linear_symmetries(f)
+    assert (found.order, len(found.signed), found.complete) == (order, order, True)
+    for t in (*found.generators, *found.others):
+        sign = -1 if t.reversing else 1
+        assert holds_for_the_map(f, t.S, t.r, lambda eps, sign=sign: sign * eps)
+
+
+def test_every_element_is_generated():
+    found = linear_symmetries(system("x y z", "y*z", "z*x", "x*y"))
+    assert (found.order, len(found.symmetries), len(found.reversing)) == (48, 24, 24)
+    group = {str(g.S) for g in found.signed}
+    made, waiting = set(), [fmpq_mat([[1, 0, 0], [0, 1, 0], [0, 0, 1]])]
+    while waiting:
+        S = waiting.pop()
+        if str(S) not in made:
+            made.add(str(S))
+            waiting += [S * g.S for g in found.generators]
+    assert made == group
+
+
+@given(st.integers(0, 10**9))
+@settings(max_examples=25, deadline=None)
+def test_signed_permutations_agree_with_brute_force(seed):
+    rng = random.Random(seed)
+    n = rng.choice((2, 3))
+    names = ["x", "y", "z"][:n]
+    terms = [a + b for a in ("", "x", "y", "z")[: n + 1] for b in ("x", "y", "z")[:n]]
+    texts = ["*".join(term) for term in terms]
+    rhs = ["0" + "".join(f" + {rng.choice((-1, 1))}*{t}" for t in rng.sample(texts, 2)) for _ in range(n)]
+    f = QuadraticSystem.from_text(names, rhs)
+    wanted = set()
+    for order, signs in itertools.product(itertools.permutations(range(n)), itertools.product((1, -1), repeat=n)):
+        S = fmpq_mat(n, n)
+        for i, (place, s) in enumerate(zip(order, signs, strict=True)):
+            S[place, i] = fmpq(s)
+        wanted |= {(str(S), sign < 0) for sign in (1, -1) if is_symmetry(f, S, [fmpq(0)] * n, sign)}
+    found = linear_symmetries(f, seconds=20)
+    assert {(str(t.S), t.reversing) for t in found.signed if not any(e != 0 for e in t.r)} == wanted
+    for t in found.symmetries + found.reversing:
+        assert is_symmetry(f, t.S, t.r, -1 if t.reversing else 1)
+
+
+def test_a_translation_is_found_where_it_is_needed():
+    """x' = x^2 + x is even about -1/2: x -> -x - 1 takes the map to its inverse."""
+    f = load("riccati", {}).system
+    (_, t) = linear_symmetries(f).signed
+    assert (t.text, t.reversing, t.obvious) == ("(x) -> (-x - 1)", True, False)
+    assert holds_for_the_map(f, t.S, t.r, lambda eps: -eps)
+    found = linear_symmetries(system("x y", "x^2 + x", "y^2 - 3*y"))
+    assert [t.text for t in found.reversing] == ["(x, y) -> (-x - 1, -y + 3)"]
+
+
+def test_matrices_that_are_no_signed_permutations():
+    """Conjugate a system with the group of order 12 of the triangle by a shear: the matrices are still found."""
+    f = load("zander_111", {}).system
+    found = linear_symmetries(f)
+    assert (found.order, len(found.others), found.complete) == (2, 10, True)
+    for t in found.others:
+        sign = -1 if t.reversing else 1
+        assert holds_for_the_map(f, t.S, t.r, lambda eps, sign=sign: sign * eps)
+
+
+def test_infinitesimal_symmetries_are_those_of_the_three_wave_system():
+    """Two independent phase rotations, whose phases add up to nothing (petrera-pfadler-suris-2011)."""
+    f = load("three_wave", {}).system
+    found = linear_symmetries(f)
+    assert [x.rhs for x in found.infinitesimal] == [
+        ["v1", "-v2", "0", "-u1", "u2", "0"],
+        ["v1", "0", "-v3", "-u1", "0", "u3"],
+    ]
+    # A rotation by a rational angle: cos = 3/5, sin = 4/5, of z1 and backwards of z2.
+    c, s = fmpq(3, 5), fmpq(4, 5)
+    S = fmpq_mat([[int(i == j) for i in range(6)] for j in range(6)])
+    for k, sign in ((0, 1), (1, -1)):
+        S[k, k] = S[k + 3, k + 3] = c
+        S[k, k + 3], S[k + 3, k] = s * sign, -s * sign
+    assert is_symmetry(f, S, [fmpq(0)] * 6, 1)
+    assert holds_for_the_map(f, S, [fmpq(0)] * 6, lambda eps: eps)
+
+
+def test_scalings_change_eps():
+    """x' = y, y' = x^2 has the weights 2 and 3: (x, y) -> (c^2 x, c^3 y) takes the map at eps to that at eps/c."""
+    f = system("x y", "y", "x^2")
+    scaling = linear_symmetries(f).scaling
+    assert scaling.rhs == ["2*x", "3*y"]
+    assert holds_for_the_map(f, fmpq_mat([[4, 0], [0, 8]]), [fmpq(0)] * 2, lambda eps: eps / 2)
+    assert linear_symmetries(load("lorenz", {}).system).scaling is None
+    assert linear_symmetries(load("euler_top", {}).system).scaling.rhs == ["x1", "x2", "x3"]
+
+
+def test_translations_and_linear_fields_are_told_apart():
+    found = linear_symmetries(system("x y", "x^2", "1"))
+    assert [(x.rhs, x.is_linear, x.weight) for x in found.infinitesimal] == [(["0", "1"], False, 0)]
+    # What could be a family of matrices is searched all the same: there is no linear field.
+    assert any("rational matrices" in text for text in found.searched)
+    rotations = linear_symmetries(system("x y", "y", "-x"))
+    assert [x.rhs for x in rotations.infinitesimal] == [["y", "-x"], ["x", "y"]]
+    assert any("not searched" in text for text in rotations.searched)
+
+
+def test_what_is_no_symmetry_is_refused():
+    f = load("euler_top", {}).system
+    zero = [fmpq(0)] * 3
+    S = fmpq_mat([[1, 0, 0], [0, -1, 0], [0, 0, -1]])
+    assert is_symmetry(f, S, zero, 1)
+    assert not is_symmetry(f, S, zero, -1)
+    assert not is_symmetry(f, S, [fmpq(1), *zero[1:]], 1)
+    S[0, 1] = fmpq(1, 1000)
+    assert not is_symmetry(f, S, zero, 1)
+    assert not holds_for_the_map(f, S, zero, lambda eps: eps)
+    assert not is_symmetry(f, fmpq_mat(3, 3), zero, 1)  # singular, though f(0) = 0
+
+
+@pytest.mark.parametrize("names", ["x", "x y"])
+def test_the_zero_system(names):
+    n = len(names.split())
+    found = linear_symmetries(system(names, *["0"] * n))
+    assert (len(found.infinitesimal), found.order, found.complete) == (n * n + n, [0, 2, 8][n], True)
+
+
+def test_too_large_is_undecided_with_a_reason():
+    many = linear_symmetries(QuadraticSystem.from_text([*"abcdefg"], [f"{v}^2" for v in "abcdefg"]))
+    assert (many.order, many.complete) == (None, False)
+    assert "not all were tried" in many.undecided[0]
+    names = [f"x{i}" for i in range(17)]
+    large = linear_symmetries(QuadraticSystem.from_text(names, [f"{v}^2" for v in names]))
+    assert [text.split(" are ")[0] for text in large.undecided] == ["infinitesimal symmetries", "signed permutations"]
+    assert large.symmetries == []
+
+
+def test_no_time():
+    assert not linear_symmetries(load("three_wave", {}).system, seconds=1e-9).complete
+
+
+def test_the_json_has_the_documented_shape():
+    found = linear_symmetries(load("lorenz", {}).system).to_json()
+    assert found["status"] == "complete"
+    assert found["group"]["generators"] == [
+        {
+            "kind": "symmetry",
+            "S": [["-1", "0", "0"], ["0", "-1", "0"], ["0", "0", "1"]],
+            "r": ["0", "0", "0"],
+            "text": "(x, y, z) -> (-x, -y, z)",
+            "obvious": False,
+            "verdict": "proved",
+        }
+    ]
+
+
+@pytest.mark.parametrize("seconds", [0, -1, float("nan")])
+def test_wrong_use(seconds):
+    with pytest.raises(InputError, match="expected a positive number"):
+        linear_symmetries(system("x", "x^2"), seconds=seconds)

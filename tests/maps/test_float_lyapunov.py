@@ -1,0 +1,121 @@
+"""Lyapunov exponents: linear maps in closed form, the sum against the volume, symplectic pairs, and the Lorenz map."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from kahanmaps.errors import InputError
+from kahanmaps.maps.float_ensemble import starts_in_box
+from kahanmaps.maps.float_lyapunov import lyapunov_exponents
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def system_of(*rhs: str) -> QuadraticSystem:
+    return QuadraticSystem.from_text(["x", "y", "z"][: len(rhs)], list(rhs))
+
+
+def exponent(eps: float, eigenvalue: float) -> float:
+    """That of the linear map (1 + eps a)/(1 - eps a), per unit of time."""
+    return math.log(abs((1 + eps * eigenvalue) / (1 - eps * eigenvalue))) / (2 * eps)
+
+
+@pytest.mark.parametrize("eps", ["1/10", "-1/10", "1/3"])
+def test_linear_systems_have_the_logarithms_of_their_eigenvalues(eps):
+    """Triangular, so that the frame turns into the flag of eigenvectors at a geometric rate."""
+    found = lyapunov_exponents(system_of("x/2 + y", "-y", "-2*z + x"), eps, [[1.0, 0.5, 0.2]], 400, transient=200)
+    value = float(eps.split("/")[0]) / float(eps.split("/")[1])
+    expected = sorted((exponent(value, a) for a in (0.5, -1.0, -2.0)), reverse=True)
+    assert found.mean == pytest.approx(expected, abs=1e-9)
+    assert found.per_step[0] == pytest.approx(np.array(expected) * 2 * value, abs=1e-9)
+    assert found.change == pytest.approx([0, 0, 0], abs=1e-9)
+
+
+def test_the_oscillator_has_none():
+    found = lyapunov_exponents(load("harmonic").system, "1/10", starts_in_box(5, 2, 1.0, 0), 1000)
+    assert np.abs(found.exponents).max() < 1e-12
+    assert found.residual < 1e-12
+
+
+def test_a_stable_fixed_point_of_a_moebius_map():
+    """x' = x^2 + x - 1 goes to (-1 - sqrt 5)/2, where f' = -sqrt 5."""
+    found = lyapunov_exponents(load("riccati").system, "1/10", [[0.1], [-3.0]], 500, transient=200)
+    assert found.mean == pytest.approx([exponent(0.1, -math.sqrt(5))], abs=1e-9)
+
+
+def test_the_sum_is_the_mean_growth_of_volume():
+    for name in ("lorenz", "euler_top", "henon_heiles"):
+        system = load(name).system
+        found = lyapunov_exponents(system, "1/50", starts_in_box(6, system.dim, 0.3, 1), 200)
+        assert found.residual < 1e-10
+
+
+def test_the_sum_telescopes_along_an_exact_orbit():
+    """det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)) along three exact steps, multiplied up over Q."""
+    kahan = KahanMap(load("lorenz").system, "1/50")
+    x = kahan.point(["1/2", "1/3", "1/4"])
+    product = 1.0
+    for _ in range(3):
+        product *= float(str(kahan.jacobian(x).det().p)) / float(str(kahan.jacobian(x).det().q))
+        x = kahan.step(x)
+    found = lyapunov_exponents(load("lorenz").system, "1/50", [[1 / 2, 1 / 3, 1 / 4]], 3)
+    assert found.log_volume[0] * 3 / 25 == pytest.approx(math.log(abs(product)), abs=1e-10)
+
+
+def test_symplectic_exponents_come_in_pairs_and_integrable_ones_are_small():
+    system = load("henon_heiles").system
+    found = lyapunov_exponents(system, "1/10", starts_in_box(4, 4, 0.2, 0), 3000)
+    assert found.mean + found.mean[::-1] == pytest.approx([0, 0, 0, 0], abs=1e-3)
+    top = lyapunov_exponents(load("euler_top").system, "1/10", starts_in_box(8, 3, 1.0, 0), 4000)
+    assert np.abs(top.mean).max() < 0.01
+
+
+@pytest.mark.slow
+def test_the_lorenz_map_at_a_small_step():
+    """About 0.906 for the flow (s = 10, r = 28, b = 8/3), and the divergence -41/3 for the sum."""
+    found = lyapunov_exponents(load("lorenz").system, "1/400", starts_in_box(32, 3, 5.0, 0), 20_000, transient=4_000)
+    assert found.ended == 0
+    assert found.mean[0] == pytest.approx(0.906, abs=0.06)
+    assert abs(found.mean[1]) < 0.05
+    assert found.mean.sum() == pytest.approx(-41 / 3, abs=0.05)
+
+
+def test_chaos_is_told_from_order():
+    found = lyapunov_exponents(load("lorenz").system, "1/200", starts_in_box(16, 3, 5.0, 0), 2000, transient=1000)
+    assert found.mean[0] > 0.6
+
+
+def test_orbits_that_leave_are_counted_and_left_out():
+    """x = 10 is the pole of x' = x^2 at eps = 1/20; y = 1e300 overflows."""
+    system = system_of("x^2", "y^2")
+    found = lyapunov_exponents(system, "1/20", [[10.0, -1.0], [-1.0, 1e300], [-1.0, -2.0]], 10)
+    assert (found.orbits, found.ended, len(found.exponents)) == (3, 2, 1)
+    nobody = lyapunov_exponents(system, "1/20", [[10.0, -1.0]], 10)
+    assert nobody.ended == 1
+    assert np.isnan(nobody.mean).all()
+    assert not nobody.stopped
+
+
+def test_the_clock_stops_it():
+    found = lyapunov_exponents(load("lorenz").system, "1/100", [[1.0, 1.0, 1.0]], 1000, seconds=0.0)
+    assert found.stopped
+    assert found.steps == 0
+
+
+@pytest.mark.parametrize(
+    ("starts", "steps", "eps", "words"),
+    [
+        ([[1.0]], 10, "1/10", "expected rows of 2 finite numbers"),
+        ([[1.0, math.inf]], 10, "1/10", "finite"),
+        (np.empty((0, 2)), 10, "1/10", "at least one"),
+        ([[1.0, 1.0]], 1, "1/10", "at least 2"),
+        ([[1.0, 1.0]], 10, "0", "eps = 0"),
+    ],
+)
+def test_wrong_use_is_refused(starts, steps, eps, words):
+    with pytest.raises(InputError, match=words):
+        lyapunov_exponents(load("harmonic").system, eps, starts, steps)
