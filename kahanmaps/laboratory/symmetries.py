@@ -17,7 +17,7 @@ from typing import Any
 from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
+from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import solve_system
 from kahanmaps.algebra.text import format_number, format_polynomial
@@ -202,12 +202,8 @@ def _add_infinitesimal(found: Symmetries) -> None:
             for monomial, value in p.terms():
                 rows.setdefault((k, tuple(monomial)), [fmpq(0)] * len(columns))[place] = value
     table = list(rows.values()) or [[fmpq(0)] * len(columns)]
-    linear = [(*v, *[fmpq(0)] * n) for v in nullspace(QQ, fmpq_mat([row[: n * n] for row in table]))]
-    affine = nullspace(QQ, fmpq_mat([row[:-1] for row in table]))
-    basis = list(linear)
-    for vector in affine:
-        if rank(QQ, fmpq_mat([*basis, vector])) > len(basis):
-            basis.append(vector)
+    # In echelon form from the right, with s last, the linear fields come first and are a basis of their own.
+    basis = nullspace(QQ, fmpq_mat([row[:-1] for row in table]))
     found.infinitesimal = [_infinitesimal(f, [fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
     scalings = [v for v in nullspace(QQ, fmpq_mat(table)) if v[-1] != 0]
     if f.is_homogeneous:  # S = I, rather than another one

@@ -160,6 +160,10 @@ def test_translations_and_linear_fields_are_told_apart():
     assert [(x.rhs, x.is_linear, x.weight) for x in found.infinitesimal] == [(["0", "1"], False, 0)]
     # What could be a family of matrices is searched all the same: there is no linear field.
     assert any("rational matrices" in text for text in found.searched)
+    # (x, 1) and (y, 1) are symmetries of (1, 1) as well, but linear fields come first and are a basis of their own.
+    both = linear_symmetries(system("x y", "1", "1")).infinitesimal
+    assert [x.is_linear for x in both] == [True, True, False, False]
+    assert [x.rhs for x in both[:2]] == [["x - y", "0"], ["0", "x - y"]]
     rotations = linear_symmetries(system("x y", "y", "-x"))
     assert [x.rhs for x in rotations.infinitesimal] == [["y", "-x"], ["x", "y"]]
     assert any("not searched" in text for text in rotations.searched)

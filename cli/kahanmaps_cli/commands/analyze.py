@@ -1,0 +1,100 @@
+"""kahanmaps analyze."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.render import on_terminal, print_json, shorten
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.analysis import Analysis
+
+_COLOURS = {"proved": "green", "supported": "cyan", "measured": "blue", "undecided": "yellow", "note": "bright_black"}
+
+
+@click.command("analyze")
+@system_options
+@eps_options
+@click.option("--seconds", type=click.FloatRange(min=1), help="Time for everything (default: 16 to 150 by dimension).")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@click.option("--markdown", is_flag=True, help="The report in Markdown.")
+@output_options
+def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **options: Any) -> int:
+    """What the Kahan map of SYSTEM preserves, and how it grows: one report, and a verdict in words.
+
+    Integrals and densities in closed form with their proofs, Hirota-Kimura relations, degrees of the iterates and
+    their recurrence, heights, symmetries, commuting systems, singularity confinement, and whether the system belongs
+    to the commuting family. Claims in the file are not read. Without --eps everything is for every eps.
+
+    \b
+      kahanmaps analyze euler_top
+      kahanmaps analyze henon_heiles -p c=-6 --seconds 30
+      kahanmaps analyze my-system.toml --markdown > report.md
+      kahanmaps analyze --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
+
+    proved, supported: formulas, as identities in x and eps. measured: modulo
+    primes and along orbits, which is evidence. The number of integrals and
+    the growth are separate findings.
+
+    Exit status: 0 there is a verdict, 2 wrong use, 3 undecided.
+    """
+    from kahanmaps.laboratory.analysis import analyze
+
+    if markdown and as_json:
+        raise click.UsageError("give --markdown or --json, one of the two")
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    with Progress(quiet) as progress:
+        found = analyze(file, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress)
+    if as_json:
+        print_json(found.to_json())
+    elif markdown:
+        _print_markdown(found)
+    else:
+        _print(found)
+    return 3 if found.conclusion.kind == "undecided" else 0
+
+
+def _title(found: Analysis) -> str:
+    if found.eps is None:
+        step = "every eps (the time step is 2 eps)"
+    else:
+        step = f"eps = {found.eps} (time step 2 eps = {2 * found.eps})"
+    values = "".join(f", {name} = {value}" for name, value in found.file.parameters.items())
+    return f"{found.file.name}, dimension {found.dim}{values}, {step}"
+
+
+def _print(found: Analysis) -> None:
+    terminal = on_terminal()
+    click.echo(f"analyze: {_title(found)}")
+    for name, lines in found.sections:
+        click.echo(click.style(f"\n{name}", bold=True) if terminal else f"\n{name}")
+        for line in lines:
+            if terminal:
+                status = click.style(f"{line.status:<10}", fg=_COLOURS[line.status])
+                click.echo(f"  {status}{shorten(line.text, 400)}")
+            else:
+                click.echo(f"{line.status}\t{line.text}")
+    final = found.conclusion
+    click.echo(f"\n{click.style('verdict', bold=True)}" if terminal else "\nverdict")
+    click.echo(f"  {final.sentence}" if terminal else f"{final.kind}\t{final.sentence}")
+
+
+def _print_markdown(found: Analysis) -> None:
+    from kahanmaps.algebra.text import format_polynomial
+
+    click.echo(f"# {_title(found)}\n")
+    click.echo("```")
+    for name, polynomial in zip(found.file.variables, found.file.system.rhs, strict=True):
+        click.echo(f"{name}' = {format_polynomial(polynomial)}")
+    click.echo("```\n")
+    click.echo(f"**{found.conclusion.sentence}**\n")
+    for name, lines in found.sections:
+        click.echo(f"## {name}\n")
+        for line in lines:
+            click.echo(f"* *{line.status}*: `{line.text}`" if "=" in line.text else f"* *{line.status}*: {line.text}")
+        click.echo("")
