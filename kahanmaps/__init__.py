@@ -22,6 +22,8 @@ from kahanmaps.version import __version__
 
 if TYPE_CHECKING:
     from kahanmaps.algebra.fields import CC, GF, QQ, RR
+    from kahanmaps.algebra.interpolation import reconstruct
+    from kahanmaps.algebra.latex import latex_polynomial, latex_rational_function
     from kahanmaps.algebra.text import parse_point, parse_polynomial, parse_rational_function
     from kahanmaps.checks.claims import Finding, Report, Verdict
     from kahanmaps.checks.commute import check_commute
@@ -40,8 +42,22 @@ if TYPE_CHECKING:
     from kahanmaps.family.planar import NormalForm, normal_form
     from kahanmaps.family.structure import Structure, structure_of
     from kahanmaps.invariants.heights import HeightGrowth, height, height_growth
+    from kahanmaps.laboratory.affine_functions import affine_darboux, affine_integrals
+    from kahanmaps.laboratory.analysis import Analysis, analyze
+    from kahanmaps.laboratory.commuting import CommutingSystems, commuting_systems
+    from kahanmaps.laboratory.cycles import Census, cycle_census
+    from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
+    from kahanmaps.laboratory.densities import DensitySearch, find_densities
+    from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, constant_structures
+    from kahanmaps.laboratory.height_survey import HeightSurvey, height_survey
+    from kahanmaps.laboratory.hirota_kimura import hirota_kimura_basis, orbit_profile
+    from kahanmaps.laboratory.integrals import IntegralSearch, Laboratory, find_integrals
+    from kahanmaps.laboratory.recurrences import Recurrence, find_recurrence
+    from kahanmaps.laboratory.singularities import SingularityRun, singularities
+    from kahanmaps.laboratory.symmetries import Symmetries, linear_symmetries
     from kahanmaps.maps.fast import FloatOrbit, to_floats
     from kahanmaps.maps.float_ensemble import FloatEnsemble
+    from kahanmaps.maps.float_lyapunov import Lyapunov, lyapunov_exponents
     from kahanmaps.maps.jump import Jump
     from kahanmaps.maps.kahan import KahanMap
     from kahanmaps.maps.modular import ModularEnsemble
@@ -58,6 +74,8 @@ if TYPE_CHECKING:
 _HOME = {
     "algebra.fields": ("CC", "GF", "QQ", "RR"),
     "algebra.text": ("parse_point", "parse_polynomial", "parse_rational_function"),
+    "algebra.interpolation": ("reconstruct",),
+    "algebra.latex": ("latex_polynomial", "latex_rational_function"),
     "systems.quadratic": ("QuadraticSystem",),
     "systems.hamiltonian": ("CubicHamiltonian", "standard_structure"),
     "systems.files": ("SystemFile", "parse_system", "read_system"),
@@ -75,6 +93,7 @@ _HOME = {
     "maps.periods": ("orbit_period", "period_over_rationals"),
     "maps.fast": ("FloatOrbit", "to_floats"),
     "maps.float_ensemble": ("FloatEnsemble",),
+    "maps.float_lyapunov": ("Lyapunov", "lyapunov_exponents"),
     "maps.modular": ("ModularEnsemble",),
     "invariants.heights": ("HeightGrowth", "height", "height_growth"),
     "checks.claims": ("Finding", "Report", "Verdict"),
@@ -82,6 +101,19 @@ _HOME = {
     "checks.commute": ("check_commute",),
     "checks.conserve": ("check_integrals",),
     "checks.preserve": ("check_measure", "check_poisson"),
+    "laboratory.analysis": ("Analysis", "analyze"),
+    "laboratory.integrals": ("IntegralSearch", "Laboratory", "find_integrals"),
+    "laboratory.hirota_kimura": ("hirota_kimura_basis", "orbit_profile"),
+    "laboratory.densities": ("DensitySearch", "find_densities"),
+    "laboratory.degrees": ("DegreeGrowth", "degree_growth"),
+    "laboratory.recurrences": ("Recurrence", "find_recurrence"),
+    "laboratory.height_survey": ("HeightSurvey", "height_survey"),
+    "laboratory.singularities": ("SingularityRun", "singularities"),
+    "laboratory.cycles": ("Census", "cycle_census"),
+    "laboratory.symmetries": ("Symmetries", "linear_symmetries"),
+    "laboratory.commuting": ("CommutingSystems", "commuting_systems"),
+    "laboratory.hamiltonian_structure": ("ConstantStructures", "constant_structures"),
+    "laboratory.affine_functions": ("affine_darboux", "affine_integrals"),
     "paper.examiner": ("VerifyOptions",),
     "paper.verify": ("verify", "verify_universal"),
     "experiments.records": ("Record", "Task"),
@@ -100,6 +132,9 @@ __all__ = [
     "parse_point",
     "parse_polynomial",
     "parse_rational_function",
+    "reconstruct",
+    "latex_polynomial",
+    "latex_rational_function",
     "QuadraticSystem",
     "CubicHamiltonian",
     "standard_structure",
@@ -130,6 +165,8 @@ __all__ = [
     "period_over_rationals",
     "FloatOrbit",
     "FloatEnsemble",
+    "Lyapunov",
+    "lyapunov_exponents",
     "ModularEnsemble",
     "to_floats",
     "HeightGrowth",
@@ -143,6 +180,33 @@ __all__ = [
     "check_integrals",
     "check_measure",
     "check_poisson",
+    "Analysis",
+    "analyze",
+    "IntegralSearch",
+    "Laboratory",
+    "find_integrals",
+    "hirota_kimura_basis",
+    "orbit_profile",
+    "DensitySearch",
+    "find_densities",
+    "DegreeGrowth",
+    "degree_growth",
+    "Recurrence",
+    "find_recurrence",
+    "HeightSurvey",
+    "height_survey",
+    "SingularityRun",
+    "singularities",
+    "Census",
+    "cycle_census",
+    "Symmetries",
+    "linear_symmetries",
+    "CommutingSystems",
+    "commuting_systems",
+    "ConstantStructures",
+    "constant_structures",
+    "affine_darboux",
+    "affine_integrals",
     "verify",
     "verify_universal",
     "VerifyOptions",

@@ -94,8 +94,8 @@ SOURCES: dict[str, str] = {
         "J. V. Pereira. Vector fields, invariant varieties and linear systems. Ann. Inst. Fourier 51 (2001), 1385-1405"
     ),
     "celledoni-2019": (
-        "E. Celledoni, C. Evripidou, D. I. McLaren, B. Owren, G. R. W. Quispel, B. K. Tapley, P. H. van der Kamp. Using "
-        "discrete Darboux polynomials to detect and determine preserved measures and integrals of rational maps. "
+        "E. Celledoni, C. Evripidou, D. I. McLaren, B. Owren, G. R. W. Quispel, B. K. Tapley, P. H. van der Kamp. "
+        "Using discrete Darboux polynomials to detect and determine preserved measures and integrals of rational maps. "
         "J. Phys. A 52 (2019), 31LT01. arXiv:1902.04715"
     ),
 }

@@ -21,6 +21,7 @@ from kahanmaps.family.draw import MAX_M, parse_chi
 
 _LARGEST = 2**63 - 1
 _PRIME_BITS = 192
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 _ARITHMETIC = re.compile(r"exact|float|(mod|ball):[1-9][0-9]{0,1999}")
 
 
@@ -134,6 +135,18 @@ def _read_prime(value: Any) -> str:
     return format_number(number)  # not an integer: JSON and databases may hold no long ones
 
 
+def _read_names(value: Any) -> str:
+    if not isinstance(value, str):
+        raise InputError(f'found {show(value)}, expected names of parameters in one text, e.g. "a1,a2"')
+    names = sorted({name.strip() for name in value.split(",")})
+    for name in names:
+        if name == "eps":
+            raise InputError("found eps, expected names of parameters: without a value of eps it is in all formulas")
+        if not _NAME.fullmatch(name):
+            raise InputError(f'found the name {show(name)}, expected names of parameters in one text, e.g. "a1,a2"')
+    return ",".join(names)
+
+
 def _read_chi(value: Any) -> str:
     if not isinstance(value, str):
         raise InputError(f'found {show(value)}, expected a polynomial in t, as text, e.g. "t^2 - 2"')
@@ -211,6 +224,13 @@ VOCABULARY = {
         flag("controls", "run every claim on input that breaks one hypothesis"),
         flag("report", "keep the whole report, as --json prints it"),
         whole("m", "half the dimension", 1, 16),
+        whole("seconds", "time after which an analysis stops, and says what is open", 1, 10**6),
+        whole("terms", "measure so many degrees (default: until a recurrence is certain)", 1, 10_000),
+        whole("max_degree", "the largest degree that is tried", most=10**6),
+        Option("symbolic", "parameters that formulas contain, e.g. a1,a2", _read_names, lambda text: text.split(",")),
+        choice("shape", "linear: g = B f with a constant B; quadratic: any g", ("linear", "quadratic")),
+        whole("samples", "follow so many random points instead of all", 1, 100_000),
+        whole("transient", "steps before those that count (default: a tenth)", most=10**9),
     )
 }
 

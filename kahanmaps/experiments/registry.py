@@ -24,6 +24,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.experiments.options import OTHER, VOCABULARY, Option, suggestion
 
 ENVIRONMENT = "KAHANMAPS_TASKS"
+LIBRARY = tuple(f"kahanmaps.experiments.{name}" for name in ("tasks", "laboratory_tasks", "dynamics_tasks"))
 Result = dict[str, Any]
 
 # What a task needs its system to be.
@@ -82,7 +83,8 @@ def task(name: str, needs: str = SYSTEM) -> Callable[[Callable[..., Result]], Ca
 
 def task_kinds() -> Mapping[str, TaskKind]:
     """All kinds of tasks by name, those of KAHANMAPS_TASKS among them."""
-    import_module("kahanmaps.experiments.tasks")
+    for ours in LIBRARY:
+        import_module(ours)
     for module in filter(None, map(str.strip, os.environ.get(ENVIRONMENT, "").split(","))):
         try:
             import_module(module)

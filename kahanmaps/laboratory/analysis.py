@@ -8,7 +8,7 @@ The number of integrals and the growth are two separate findings: a map may have
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,6 +38,7 @@ PROVED, SUPPORTED, MEASURED, UNDECIDED, NOTE = "proved", "supported", "measured"
 # Seconds for everything, by dimension; about half of it is used where nothing is hard.
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
 _MOST_SECONDS = 150.0
+_MAX_DEGREE = 200_000
 _SHOWN_DEGREES = 12
 
 
@@ -51,7 +52,8 @@ class Statement:
 
 @dataclass(frozen=True)
 class Conclusion:
-    """The verdict in words; `kind` is "linear", "linearisable", "integrable", "not integrable" or "undecided".
+    """The verdict in words; `kind` is "linear", "linearisable", "integrable", "not integrable", "singular" (nowhere
+    defined) or "undecided".
 
     `integrals` is the number of independent integrals known or shown by orbits, `growth` the kind of degree growth.
     """
@@ -152,6 +154,7 @@ class Analysis:
 def analyze(
     file: SystemFile,
     *,
+    symbols: Sequence[str] = (),
     eps: Any = None,
     seconds: float | None = None,
     seed: int = 0,
@@ -161,6 +164,7 @@ def analyze(
 
     Args:
         file: the system; its claims and facts are not looked at.
+        symbols: names of parameters that formulas are to contain; all else is for the values of the file.
         eps: an exact number, to analyse the map at that eps only (time step 2 eps); None for every eps.
         seconds: time for everything, about; by default 16 for planar systems, up to 150 from dimension 6 on.
         seed: of everything random.
@@ -170,14 +174,16 @@ def analyze(
         An `Analysis`. Parts that there was no time for are named in `skipped`.
 
     Raises:
-        InputError: for eps = 0.
+        InputError: for eps = 0 and unknown symbols.
 
     >>> from kahanmaps.systems.catalog import load
     >>> found = analyze(load("nahm_tetrahedral"))
     >>> found.conclusion.kind, found.conclusion.integrals, found.conclusion.growth
     ('integrable', 1, 'quadratic')
     """
-    bare = SystemFile.from_system(file.system, file.name)
+    Laboratory(file, symbols, eps, seed)  # refuses what is wrong before any work is done
+    # Without its claims, so that none can be read; with symbols the file itself is needed, and its claims are not read.
+    bare = file if symbols else SystemFile.from_system(file.system, file.name)
     total = seconds if seconds is not None else _SECONDS.get(file.system.dim, _MOST_SECONDS)
     found = Analysis(file, None if eps is None else rational(eps), total, seed)
     began = time.monotonic()
@@ -194,7 +200,7 @@ def analyze(
 
     def integrals() -> None:
         found.integrals = find_integrals(
-            bare, eps=found.eps, seconds=share(0.45), seed=seed, progress=told("integrals")
+            bare, symbols=symbols, eps=found.eps, seconds=share(0.45), seed=seed, progress=told("integrals")
         )
         profile = found.integrals.profile
         if profile.first_degree is not None and profile.period is None:
@@ -211,11 +217,18 @@ def analyze(
         found.structure = structure_of(system)
 
     def degrees() -> None:
-        found.degrees = degree_growth(system, found.eps, seconds=share(0.2), seed=seed, progress=told("degrees"))
+        found.degrees = degree_growth(
+            system,
+            found.eps,
+            seconds=share(0.25),
+            max_degree=_MAX_DEGREE,
+            seed=seed,
+            progress=told("degrees"),
+        )
 
     def densities() -> None:
         found.densities = find_densities(
-            bare, eps=found.eps, seconds=share(0.25), seed=seed, progress=told("densities")
+            bare, symbols=symbols, eps=found.eps, seconds=share(0.25), seed=seed, progress=told("densities")
         )
 
     def heights() -> None:
@@ -278,6 +291,8 @@ def _conclude(found: Analysis) -> Conclusion:
     def conclude(kind: str, sentence: str) -> Conclusion:
         return Conclusion(kind, count, str(growth), sentence + suffix)
 
+    if found.degrees is not None and found.degrees.ended == "singular" and len(found.degrees.degrees) == 1:
+        return conclude("singular", f"The map is nowhere defined: {found.degrees.message}.")
     if _is_affine(found):
         return conclude("linear", f"The system is linear, and so is its Kahan map; {integrals}.")
     if period is not None:
@@ -290,10 +305,12 @@ def _conclude(found: Analysis) -> Conclusion:
             f"The degrees of the iterates are bounded (measured): the map is linearisable in the sense of "
             f"complexity; {integrals}.",
         )
-    if growth is GrowthClass.EXPONENTIAL:
+    if growth is GrowthClass.EXPONENTIAL or (found.degrees is not None and found.degrees.looks_exponential):
+        measured = " (measured)" if growth is GrowthClass.EXPONENTIAL else ""  # the phrase says that it is estimated
+        growth = GrowthClass.EXPONENTIAL
         return conclude(
             "not integrable",
-            f"Not integrable in the sense of complexity: {phrase} (measured)"
+            f"Not integrable in the sense of complexity: {phrase}{measured}"
             + (f", although there {'is' if count == 1 else 'are'} {integrals}." if count else f"; {integrals}."),
         )
     if growth in (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL):
@@ -369,8 +386,8 @@ def _growth_lines(found: Analysis) -> list[Statement]:
         shown = ", ".join(map(str, found.degrees.degrees[1 : _SHOWN_DEGREES + 1]))
         more = ", ..." if len(found.degrees.degrees) > _SHOWN_DEGREES + 1 else ""
         lines.append(Statement(MEASURED, f"degrees of the iterates: {shown}{more}"))
-        status = UNDECIDED if found.degrees.growth is GrowthClass.UNKNOWN else MEASURED
-        lines.append(Statement(status, found.degrees.growth_text))
+        unknown = found.degrees.growth is GrowthClass.UNKNOWN and not found.degrees.looks_exponential
+        lines.append(Statement(UNDECIDED if unknown else MEASURED, found.degrees.growth_text))
         recurrence = found.degrees.recurrence
         if recurrence is not None:
             lines.append(Statement(MEASURED, f"recurrence: {recurrence.text}"))

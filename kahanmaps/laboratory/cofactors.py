@@ -19,7 +19,7 @@ from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
-from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.modular_points import (
@@ -98,8 +98,6 @@ def determinant_factors(system: ParametricSystem) -> tuple[Cofactor, ...]:
 
 def cofactor_of_affine(function: fmpq_mpoly, system: ParametricSystem) -> Cofactor:
     """The cofactor of an affine Darboux function, given in the variables of the system."""
-    from kahanmaps.algebra.polynomials import ring
-
     context = ring((*system.variables, *system.symbols, "eps"))
     images = context.gens()[: system.dim]
     return Cofactor(format_polynomial(function), 1, function.compose(*images, ctx=context))

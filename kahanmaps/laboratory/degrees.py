@@ -33,6 +33,7 @@ DEFAULT_SECONDS = 10.0
 DEFAULT_MAX_DEGREE = 20_000
 _MOST_TERMS = 10_000
 _LINES = 2
+_ENOUGH_QUOTIENTS = 5
 _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
 
 
@@ -80,14 +81,31 @@ class DegreeGrowth:
         return f"{self.degrees[-1] / self.degrees[-2]:.6g}"
 
     @property
+    def looks_exponential(self) -> bool:
+        """Whether the last quotients d_n/d_{n-1} change by far less than those of a sequence of polynomial growth.
+
+        There a quotient 1 + r falls by about r/n from one step to the next; here by less than a quarter of that, over
+        two steps. An estimate, for sequences that end before a recurrence could be checked.
+        """
+        d = self.degrees
+        n = len(d) - 1
+        if n < _ENOUGH_QUOTIENTS or d[n - 3] == 0:
+            return False
+        a, b, c = (d[k] / d[k - 1] for k in (n - 2, n - 1, n))
+        return c > 1.2 and all(abs(later / earlier - 1) < (c - 1) / (4 * n) for earlier, later in ((a, b), (b, c)))
+
+    @property
     def growth_text(self) -> str:
         """The kind of growth with its power or rate: one phrase."""
         found, rate = self.recurrence, self.dynamical_degree
         if self.growth is GrowthClass.ZERO:
             return "zero from some iterate on: that iterate is a constant map"
         if found is None:
+            terms = counted(len(self.degrees), "term")
+            if self.looks_exponential:
+                return f"exponential growth by a factor of about {self.estimate} (estimated: no recurrence in {terms})"
             estimate = f"; d_n/d_(n-1) is {self.estimate} at the end, an estimate only" if self.estimate else ""
-            return f"no recurrence found in {counted(len(self.degrees), 'term')}{estimate}"
+            return f"no recurrence found in {terms}{estimate}"
         if found.growth is GrowthClass.EXPONENTIAL:
             return "exponential growth" + (f", dynamical degree {rate.text}" if rate is not None else "")
         power = f" of degree {found.power}" if found.growth is GrowthClass.POLYNOMIAL else ""
@@ -120,6 +138,7 @@ class DegreeGrowth:
             "growth_text": self.growth_text,
             "dynamical_degree": None if rate is None else rate_json(rate),
             "estimate": self.estimate,
+            "looks_exponential": self.looks_exponential,
             "recurrence": None if self.recurrence is None else self.recurrence.to_json(),
             "notes": list(self.notes),
         }

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from math import comb
 from typing import Any
 
-from flint import fmpq, fmpz
+from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.latex import latex_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, primitive_part
-from kahanmaps.algebra.polynomials import degree as degree_of
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.errors import InputError
 from kahanmaps.laboratory.closed_forms import closed_forms
 from kahanmaps.laboratory.cofactors import (
     DETERMINANT,
@@ -29,14 +29,15 @@ from kahanmaps.laboratory.cofactors import (
     points_needed,
 )
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.hamiltonian_structure import constant_structures
+from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.identities import density_verdict
-from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.integrals import Laboratory, closing_note, toml_comment
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.systems.files import SystemFile
 
 _MAX_UNKNOWNS = 1000
 _MAX_DEGREE = 12
+_CLOSES_WITHIN = 64  # points of an orbit
 _ONCE = CofactorProduct((1,), 1)
 
 
@@ -67,8 +68,9 @@ class FoundDensity:
 class DensitySearch:
     """What `find_densities` found.
 
-    `densities` are all phi of the least degree that has some; `degree` is the largest that was tried, and `reason`
-    says why the search ended without a density. `eps` is None for every eps.
+    `densities` span all phi of the least degree that has some, or are det(I - eps f') of a Hamiltonian system, which
+    need not be of least degree; `degree` is the largest that was tried, and `reason` says why the search ended without
+    a density. `eps` is None for every eps; `period` is the number of points of orbits that close.
     """
 
     file: SystemFile
@@ -79,19 +81,32 @@ class DensitySearch:
     reason: str
     primes: tuple[int, ...]
     seed: int
+    period: int | None = None
+
+    @property
+    def note(self) -> str:
+        """That orbits close, and for which eps; empty where they do not."""
+        return closing_note(self.period, self.eps)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
             "densities": [one.to_json() for one in self.densities],
             "degree_tried": self.degree,
+            "period": self.period,
+            "note": self.note,
             "reason": self.reason,
             "primes": [str(prime) for prime in self.primes],
         }
 
     def toml_section(self) -> str:
-        """The first density as a section [density] of a system file, which `check-measure` accepts."""
-        return f'[density]\nphi = "{self.densities[0].text}"\n' if self.densities else ""
+        """The first density as a section [density] of a system file, which `check-measure` accepts.
+
+        Empty where there is none; for a given eps a comment says that it holds there only.
+        """
+        if not self.densities:
+            return ""
+        return "\n".join([*toml_comment(self.eps), "[density]", f'phi = "{self.densities[0].text}"', ""])
 
 
 def find_densities(
@@ -119,7 +134,7 @@ def find_densities(
         A `DensitySearch`; formulas are exact, proved or supported. Finding none up to a degree is measured.
 
     Raises:
-        InputError: for unknown symbols and eps = 0.
+        InputError: for unknown symbols, symbols in a [family] file, eps = 0, less than no time or degree.
 
     Source: celledoni-2019.
 
@@ -128,6 +143,10 @@ def find_densities(
     >>> [(one.text, str(one.verdict)) for one in found.densities]
     [('x*y', 'proved')]
     """
+    if not seconds > 0:
+        raise InputError(f"found {seconds} seconds, expected a time above 0")
+    if max_degree is not None and max_degree < 0:
+        raise InputError(f"found the largest degree {max_degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed)
     deadline = time.monotonic() + seconds
     dim = file.system.dim
@@ -145,12 +164,20 @@ def find_densities(
             "" if densities else reason,
             laboratory.primes,
             seed,
+            period,
         )
 
+    period: int | None = None
+    if laboratory.defect:
+        reason = laboratory.defect
+        return result([])
+    period = _period(laboratory)
     theorem = _theorem(laboratory)
     if theorem is not None:
-        tried = degree_of(theorem.function.numerator)
-        return result([theorem])
+        of_theorem = _degree_in(theorem.function.numerator, dim)
+        if max_degree is None or of_theorem <= max_degree:
+            tried = of_theorem
+            return result([theorem])
     try:
         for degree in range(top + 1):
             if time.monotonic() > deadline:
@@ -173,7 +200,9 @@ def find_densities(
 
 def _theorem(laboratory: Laboratory) -> FoundDensity | None:
     """det(I - eps f') of a Hamiltonian system with numbers for parameters, made primitive; None for others."""
-    if laboratory.symbols or constant_structures(laboratory.file.system).hamiltonian is None:
+    if laboratory.symbols or laboratory.system.dim > MAX_DIMENSION:
+        return None
+    if constant_structures(laboratory.file.system).hamiltonian is None:
         return None
     D = determinant_polynomial(laboratory.system)
     if D is None:
@@ -183,11 +212,39 @@ def _theorem(laboratory: Laboratory) -> FoundDensity | None:
         D = D.subs(at)
     if D.is_zero():
         return None
-    _, phi = primitive_part(D)
+    _, phi = primitive_part(D / _content(D, laboratory.system.dim))
     evidence = Evidence(
         "theorem", "f = J grad H with a constant skew matrix J: dx/det(I - eps f'(x)) is invariant (cmoq-2013)"
     )
     return FoundDensity(RationalFunction(phi, phi.context().constant(1)), Verdict.PROVED, evidence)
+
+
+def _degree_in(polynomial: fmpq_mpoly, n: int) -> int:
+    """The degree in the first n variables."""
+    return max((sum(int(e) for e in monomial[:n]) for monomial in polynomial.monoms()), default=0)
+
+
+def _content(polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
+    """The greatest common divisor of the coefficients of monomials in the first n variables."""
+    coefficients: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}
+    for monomial, value in polynomial.terms():
+        exponents = tuple(int(e) for e in monomial)
+        coefficients.setdefault(exponents[:n], {})[((0,) * n + exponents[n:])] = value
+    context = polynomial.context()
+    common = context.constant(0)
+    for terms in coefficients.values():
+        common = common.gcd(context.from_dict(terms))
+    return common
+
+
+def _period(laboratory: Laboratory) -> int | None:
+    """The number of points of orbits that close soon, on all maps; None where they do not."""
+    try:
+        periods = {len(map_.orbit(_CLOSES_WITHIN)) for map_ in laboratory.maps}
+    except NoPoint:
+        return None
+    period = periods.pop()
+    return None if periods or period == _CLOSES_WITHIN else period
 
 
 def _space(map_: ModularMap, degree: int, inverse: bool) -> DarbouxSpace:
@@ -225,6 +282,6 @@ def _formulas(
         one = P.context().constant(1)
         phi = RationalFunction(one, P) if inverse else RationalFunction(P, one)
         verdict, evidence = density_verdict(laboratory.system, phi, laboratory.eps, laboratory.seed)
-        if verdict is not Verdict.REFUTED:
+        if verdict.holds:
             found.append(FoundDensity(phi, verdict, evidence))
-    return found, ""
+    return found, f"a density of degree {degree} that was found modulo primes did not pass as an identity"

@@ -58,8 +58,9 @@ class OrbitRelations:
 class Profile:
     """The dimensions of the spaces of polynomials of degree 1, 2, ... that vanish along a generic orbit.
 
-    `codimension` is that of the orbit's variety as far as these polynomials show it; `relations` holds, for the two
-    maps that were compared, those of the last degree.
+    `codimension` is that of the orbit's variety as far as these polynomials show it. `period` is the number of points
+    of orbits that close, else None; `agree` tells whether all maps gave the same numbers, `complete` whether all
+    degrees that were asked for were tried.
     """
 
     dim: int
@@ -131,7 +132,26 @@ def orbit_profile(
 ) -> Profile:
     """Dimensions and codimensions for degree 1, 2, ..., on one orbit of each of the maps, which are to agree.
 
-    Ends where the codimension leaves curves (dim - 1) or points, at `max_degree`, or when the time is over.
+    Args:
+        maps: the maps, with different primes and, where eps is not given, different eps.
+        max_degree: the last degree; by default one that takes seconds.
+        seconds: the time that may be taken, about.
+        progress: is told what is being tried.
+
+    Returns:
+        The `Profile`, measured. It ends where the codimension leaves curves (dim - 1; points, dim, where orbits
+        close), at `max_degree`, or, not complete, when the time is over or there are too many monomials.
+
+    Raises:
+        NoPoint: where orbits meet the singular set.
+
+    Source: petrera-pfadler-suris-2009.
+
+    >>> from kahanmaps.laboratory.integrals import Laboratory
+    >>> from kahanmaps.systems.catalog import load
+    >>> profile = orbit_profile(Laboratory(load("euler_top")).maps)
+    >>> profile.nullities, profile.codimension
+    ((0, 2), 2)
     """
     dim = maps[0].dim
     deadline = time.monotonic() + seconds
@@ -139,6 +159,8 @@ def orbit_profile(
     codimensions: list[int] = []
     agree, period, took, complete = True, None, 0.0, True
     top = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
+    if max_degree is None:
+        top = max((d for d in range(1, top + 1) if comb(dim + d, d) <= MAX_UNKNOWNS), default=1)
     for degree in range(1, top + 1):
         unknowns = comb(dim + degree, degree)
         growth = (unknowns / comb(dim + degree - 1, degree - 1)) ** 3
@@ -153,8 +175,10 @@ def orbit_profile(
         # A special orbit has more relations, never fewer.
         nullities.append(min(len(one.vectors) for one in found))
         codimensions.append(min(one.codimension for one in found))
-        period = period or max((one.period or 0 for one in found), default=0) or None
-        if codimensions[-1] >= dim - 1:
+        if period is None and len({one.period for one in found}) == 1:
+            period = found[0].period
+        # Orbits that close are points, whatever curves of lower degree go through them.
+        if codimensions[-1] >= (dim - 1 if period is None else dim):
             break
     return Profile(dim, tuple(nullities), tuple(codimensions), period, agree, complete)
 
@@ -163,14 +187,16 @@ def orbit_profile(
 class Basis:
     """A Hirota-Kimura basis: the set, and the null space of a generic orbit.
 
-    `vectors` is the reduced echelon basis for one orbit modulo `prime`, `constant` tells for each of its entries
-    whether it is the same number for all orbits; the others are integrals.
+    `constant` tells for each entry of the reduced echelon basis whether it is the same number for all orbits; the
+    others are integrals. `agree` tells whether all orbits gave the same dimension, `period` is the number of points
+    of orbits that close, else None.
     """
 
     functions: tuple[str, ...]
     dimension: int
     constant: tuple[tuple[bool, ...], ...]
     agree: bool
+    period: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -179,23 +205,46 @@ class Basis:
             "dimension": self.dimension,
             "integrals": [[not same for same in row] for row in self.constant],
             "orbits_agree": self.agree,
+            "period": self.period,
         }
 
 
 def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpoly], names: Sequence[str]) -> Basis:
     """The null space of the given polynomials along orbits, on two orbits of each of the maps.
 
-    `functions` are polynomials in the variables of the system, `names` what to call them.
+    Args:
+        maps: maps of one system, with different primes.
+        functions: exact polynomials in the variables of the system, at least one.
+        names: what to call them.
+
+    Returns:
+        The `Basis`, measured: its dimension is the smallest of all orbits.
+
+    Raises:
+        NoPoint: where orbits meet the singular set.
+
+    Source: petrera-pfadler-suris-2009.
+
+    >>> from kahanmaps.laboratory.integrals import Laboratory
+    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.systems.structured_facts import relation_functions
+    >>> top, squares = load("euler_top"), ["x1^2", "x2^2", "x3^2", "1"]
+    >>> hirota_kimura_basis(Laboratory(top).maps, relation_functions(squares, top.variables), squares).dimension
+    2
     """
     bases: list[list[list[int]]] = []
+    periods: set[int | None] = set()
+    count = len(functions) + _SPARE
     constant: list[list[bool]] | None = None
     for map_ in maps:
         field = GF(map_.prime)
         pair: list[list[list[int]]] = []
         for _ in range(2):
+            points = map_.orbit(count)
+            periods.add(len(points) if len(points) < count else None)
             rows = [
                 [int(evaluate(function, field, [field.convert(c) for c in x])) for function in functions]
-                for x in map_.orbit(len(functions) + _SPARE)
+                for x in points
             ]
             pair.append(null_space(rows, len(functions), map_.prime))
         bases += pair
@@ -205,7 +254,11 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
     dimension = min(len(basis) for basis in bases)
     rows_of = constant if constant is not None and len(constant) == dimension else []
     return Basis(
-        tuple(names), dimension, tuple(tuple(row) for row in rows_of), len({len(basis) for basis in bases}) == 1
+        tuple(names),
+        dimension,
+        tuple(tuple(row) for row in rows_of),
+        len({len(basis) for basis in bases}) == 1,
+        periods.pop() if len(periods) == 1 else None,
     )
 
 

@@ -38,7 +38,25 @@ def integral_verdict(
 ) -> tuple[Verdict, Evidence]:
     """Whether I(x~) = I(x), for every value of the symbols of the system and, if `eps` is None, every eps.
 
-    `integral` is a function of (variables, symbols, eps). Proved by expansion, or supported, or refuted.
+    Args:
+        system: the system, some of its parameters symbols.
+        integral: an exact function of (variables, symbols, eps).
+        eps: the paper's epsilon, an exact number (the time step is 2 eps), or None for every eps.
+        seed: of the random points.
+
+    Returns:
+        The verdict with its evidence: proved by expansion, supported or refuted at random points modulo primes, or
+        undecided where the two sides have no values, as for a map that is singular everywhere.
+
+    Source: celledoni-2019.
+
+    >>> from kahanmaps.algebra.text import parse_rational_function
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> rotation = ParametricSystem.of_system(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]))
+    >>> for text in ("x^2 + y^2", "x^2 - y^2"):
+    ...     print(integral_verdict(rotation, parse_rational_function(text, ["x", "y", "eps"]), None)[0])
+    proved
+    refuted
     """
     return _verdict(system, integral, eps, seed, False)
 
@@ -46,7 +64,25 @@ def integral_verdict(
 def density_verdict(
     system: ParametricSystem, density: RationalFunction, eps: fmpq | None, seed: int = 0
 ) -> tuple[Verdict, Evidence]:
-    """Whether phi(x~) det(I - eps f'(x)) = phi(x) det(I + eps f'(x~)), that is, whether dx/phi is invariant."""
+    """Whether phi(x~) det(I - eps f'(x)) = phi(x) det(I + eps f'(x~)), that is, whether dx/phi is invariant.
+
+    Args:
+        system: the system, some of its parameters symbols.
+        density: phi, an exact function of (variables, symbols, eps).
+        eps: the paper's epsilon, an exact number (the time step is 2 eps), or None for every eps.
+        seed: of the random points.
+
+    Returns:
+        The verdict with its evidence, as `integral_verdict`; undecided as well where the map is not invertible.
+
+    Source: celledoni-2019.
+
+    >>> from kahanmaps.algebra.text import parse_rational_function
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> system = ParametricSystem.of_system(QuadraticSystem.from_text(["x"], ["x^2"]))
+    >>> str(density_verdict(system, parse_rational_function("x^2", ["x", "eps"]), None)[0])
+    'proved'
+    """
     return _verdict(system, density, eps, seed, True)
 
 
@@ -54,7 +90,10 @@ def _verdict(
     system: ParametricSystem, function: RationalFunction, eps: fmpq | None, seed: int, is_density: bool
 ) -> tuple[Verdict, Evidence]:
     scope = _scope(system, eps)
-    if not _holds_at_points(system, function, eps, seed, is_density):
+    holds = _holds_at_points(system, function, eps, seed, is_density)
+    if holds is None:
+        return Verdict.UNDECIDED, Evidence("random points over GF(p)", f"has no value at random points, {scope}")
+    if not holds:
         return Verdict.REFUTED, Evidence("random points over GF(p)", f"does not hold at a random point, {scope}")
     if system.dim <= _MAX_DIMENSION:
         field = FunctionField((*system.variables, *system.symbols, "eps"), _BUDGET)
@@ -103,22 +142,28 @@ def _sides(
     eps: Any,
     is_density: bool,
 ) -> tuple[Any, Any]:
-    """Both sides at a point over a field."""
+    """Both sides at a point over a field. Raises ZeroDivisionError where the products are 0 = 0 and say nothing."""
     map_ = KahanMapOver(system.over(field, values), eps)
     image = map_.step(point)
-    P, Q = function.numerator, function.denominator
     here, there = (*point, *values, eps), (*image, *values, eps)
-    left = evaluate(P, field, there) * evaluate(Q, field, here)
-    right = evaluate(P, field, here) * evaluate(Q, field, there)
+    P, Q = (evaluate(part, field, here) for part in (function.numerator, function.denominator))
+    P_there, Q_there = (evaluate(part, field, there) for part in (function.numerator, function.denominator))
+    # Where a map is not invertible, P and Q may both vanish on its image: then I has no value there.
+    if any(field.is_zero(p) and field.is_zero(q) for p, q in ((P, Q), (P_there, Q_there))):
+        raise ZeroDivisionError("0/0")
+    left, right = P_there * Q, P * Q_there
     if is_density:
-        left = left * map_.determinant(point)
-        right = right * map_.inverse.determinant(image)
+        above, below = map_.inverse.determinant(image), map_.determinant(point)
+        if field.is_zero(above):
+            raise ZeroDivisionError("the map is not invertible at this point")
+        left, right = left * below, right * above
     return left, right
 
 
 def _holds_at_points(
     system: ParametricSystem, function: RationalFunction, eps: fmpq | None, seed: int, is_density: bool
-) -> bool:
+) -> bool | None:
+    """Whether the sides agree at random points modulo primes, None where they had no value at any of many."""
     rng = random.Random(f"identity {seed}")
     good = 0
     for _ in range(10 * _POINTS):
@@ -135,4 +180,4 @@ def _holds_at_points(
         good += 1
         if good == _POINTS:
             return True
-    return False
+    return None

@@ -20,7 +20,7 @@ from flint import fmpq, fmpq_mpoly, fmpz
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.latex import latex_rational_function
-from kahanmaps.algebra.polynomials import RationalFunction, degree
+from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
@@ -29,7 +29,7 @@ from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.closed_forms import closed_forms
 from kahanmaps.laboratory.cofactors import Cofactor, cofactor_of_affine, determinant_factors
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.hamiltonian_structure import constant_structures
+from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.identities import integral_verdict
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, rank
@@ -86,6 +86,11 @@ class IntegralSearch:
     seed: int
 
     @property
+    def note(self) -> str:
+        """What is special about the orbits: that they close; empty where they do not."""
+        return closing_note(self.profile.period, self.eps)
+
+    @property
     def codimension(self) -> int:
         """How many independent integrals the orbits show, not fewer than were found."""
         return max(self.profile.codimension, len(self.integrals))
@@ -102,20 +107,51 @@ class IntegralSearch:
             "found": len(self.integrals),
             "codimension": self.codimension,
             "relations": self.profile.to_json(),
+            "note": self.note,
             "reason": self.reason,
             "primes": [str(prime) for prime in self.primes],
         }
 
     def toml_section(self) -> str:
-        """The integrals as a section [integrals] of a system file, which `check-integrals` accepts."""
+        """The integrals as a section [integrals] of a system file, which `check-integrals` accepts.
+
+        Empty where there are none; for a given eps a comment says that they hold there only.
+        """
+        if not self.integrals:
+            return ""
         lines = ["[integrals]", *(f'{one.name} = "{one.text}"' for one in self.integrals)]
-        return "\n".join(lines) + "\n"
+        return "\n".join([*toml_comment(self.eps), *lines]) + "\n"
+
+
+def closing_note(period: int | None, eps: fmpq | None) -> str:
+    """What orbits that close after `period` steps mean at this eps (None: at every one); empty where they do not.
+
+    >>> closing_note(4, fmpq(1))
+    'orbits close after 4 steps: at eps = 1 the map is periodic (measured); nothing follows for other eps'
+    """
+    if period is None:
+        return ""
+    closes = f"orbits close after {period} step{'s' * (period != 1)}"
+    if eps is None:
+        return f"{closes} at every eps that was tried: the map is periodic (measured)"
+    return f"{closes}: at eps = {eps} the map is periodic (measured); nothing follows for other eps"
+
+
+def toml_comment(eps: fmpq | None) -> list[str]:
+    """The line of a system file that says that formulas hold at one eps only; none where eps is in them."""
+    return [] if eps is None else [f"# for eps = {eps} only (time step 2 eps = {2 * eps}): check with --eps {eps}"]
 
 
 class Laboratory:
     """The maps on which a system is examined: two primes, each with its own eps and its own values of the symbols.
 
-    With `eps` (exact; the time step is 2 eps) all maps are at that eps.
+    With `eps` (exact; the time step is 2 eps) all maps are at that eps. Raises InputError for eps = 0, for eps both a
+    number and a symbol, and for symbols that `ParametricSystem.of` refuses.
+
+    >>> from kahanmaps.systems.catalog import load
+    >>> laboratory = Laboratory(load("euler_top"), ["a1"])
+    >>> len(laboratory.maps), laboratory.eps_enters, laboratory.defect
+    (2, 'by weight', '')
     """
 
     def __init__(self, file: SystemFile, symbols: Sequence[str] = (), eps: Any = None, seed: int = 0) -> None:
@@ -154,6 +190,19 @@ class Laboratory:
         n = self.system.dim
         terms = [monomial for polynomial in self.system.rhs for monomial in polynomial.monoms()]
         return "by weight" if all(sum(int(e) for e in m[:n]) == 2 for m in terms) else "symbol"
+
+    @property
+    def defect(self) -> str:
+        """Why the maps at the given eps are no birational maps, measured at random points; empty where they are."""
+        if self.eps is None:
+            return ""  # det(I - eps f'(x)) is 1 at eps = 0
+        try:
+            pairs = [(map_, image) for map_ in self.maps for _, image in map_.pairs(2)]
+        except NoPoint:
+            return f"at eps = {self.eps} the map has no value anywhere: det(I - eps f'(x)) is identically 0"
+        if not any(map_.determinant(image, -1) for map_, image in pairs):
+            return f"at eps = {self.eps} the map is not invertible: det(I + eps f'(x)) is 0 at all images"
+        return ""
 
     @property
     def primes(self) -> tuple[int, ...]:
@@ -208,7 +257,7 @@ def find_integrals(
         that orbits show is measured modulo two primes.
 
     Raises:
-        InputError: for unknown symbols and eps = 0.
+        InputError: for unknown symbols, symbols in a [family] file, eps = 0 and less than no time.
 
     Source: petrera-pfadler-suris-2009, celledoni-2019, cmoq-2013.
 
@@ -217,6 +266,10 @@ def find_integrals(
     >>> [(one.text, str(one.verdict)) for one in found.integrals], found.codimension
     ([('(-3*x^2*y + y^3)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
     """
+    if not seconds > 0:
+        raise InputError(f"found {seconds} seconds, expected a time above 0")
+    if max_degree is not None and max_degree < 1:
+        raise InputError(f"found the largest degree {max_degree}, expected at least 1")
     laboratory = Laboratory(file, symbols, eps, seed)
     deadline = time.monotonic() + seconds
     primes = laboratory.primes
@@ -225,10 +278,12 @@ def find_integrals(
         return IntegralSearch(file, laboratory.symbols, laboratory.eps, tuple(integrals), profile, reason, primes, seed)
 
     empty = Profile(file.system.dim, (), (), None, True, False)
+    if laboratory.defect:
+        return result([], empty, laboratory.defect)
     try:
         profile = orbit_profile(laboratory.maps, max_degree=max_degree, seconds=seconds / 3, progress=progress)
         if profile.codimension == 0:
-            return result(_theorem(laboratory, [], 1), profile, "")
+            return result(_theorem(laboratory, [], 1), profile, _unfinished(profile))
         cofactors = laboratory.cofactors()
         found = search(laboratory.maps[0], profile, cofactors, (deadline - time.monotonic()) / 2, progress)
         formulas, reason = _formulas(laboratory, found, cofactors, deadline, progress)
@@ -241,7 +296,14 @@ def find_integrals(
             f"{profile.codimension - len(integrals)} of the {profile.codimension} integrals that orbits show have no "
             "closed form P/Q of the degrees that were tried: coefficients of Hirota-Kimura bases are such integrals"
         )
-    return result(integrals, profile, reason)
+    return result(integrals, profile, "; ".join(text for text in (reason, _unfinished(profile)) if text))
+
+
+def _unfinished(profile: Profile) -> str:
+    """What the profile leaves open; empty where it left nothing."""
+    if not profile.complete:
+        return f"relations of degree {profile.degree + 1} and more were not tried: too many unknowns or too little time"
+    return "" if profile.agree else "the orbits that were compared do not agree: try another --seed"
 
 
 def _formulas(
@@ -307,7 +369,7 @@ def _independent(
             continue
         progress("verifying an integral")
         verdict, evidence = integral_verdict(laboratory.system, function, laboratory.eps, laboratory.seed)
-        if verdict is not Verdict.REFUTED:
+        if verdict.holds:
             rows.append(row)
             found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, verdict, evidence))
     return found
@@ -315,8 +377,6 @@ def _independent(
 
 def _gradient(map_: ModularMap, function: RationalFunction, point: Sequence[int]) -> list[int]:
     """A multiple of the gradient of P/Q with respect to the variables, modulo the prime."""
-    from kahanmaps.algebra.polynomials import evaluate
-
     field = GF(map_.prime)
     at = [field.convert(c) for c in (*point, *map_.values, map_.eps)]
     P, Q = evaluate(function.numerator, field, at), evaluate(function.denominator, field, at)
@@ -331,7 +391,7 @@ def _gradient(map_: ModularMap, function: RationalFunction, point: Sequence[int]
 
 def _theorem(laboratory: Laboratory, known: Sequence[FoundIntegral], wanted: int) -> list[FoundIntegral]:
     """The modified Hamiltonian, where the system has one with numbers for parameters and it is a new integral."""
-    if laboratory.symbols or len(known) >= wanted:
+    if laboratory.symbols or len(known) >= wanted or laboratory.system.dim > MAX_DIMENSION:
         return []
     structures = constant_structures(laboratory.file.system)
     integral = structures.integral

@@ -74,6 +74,7 @@ class ModularMap:
 
         An orbit that meets the singular set is given up for another. Raises NoPoint where all do.
         """
+        longest = 0
         for _ in range(_TRIES):
             x = self.random_point() if start is None else start
             found, first = [x], x
@@ -87,8 +88,11 @@ class ModularMap:
                 return found
             if image is not None:
                 return found
+            longest = max(longest, len(found))
             if start is not None:
                 break
+        if longest == 1:
+            raise NoPoint("the map has no value at random points modulo a prime")
         raise NoPoint("orbits modulo a prime meet the singular set")
 
 

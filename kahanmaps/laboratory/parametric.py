@@ -31,10 +31,23 @@ class ParametricSystem:
     def of(cls, file: SystemFile, symbols: Sequence[str] = ()) -> ParametricSystem:
         """The system of a file, the parameters named in `symbols` without values, the others with theirs.
 
-        Raises InputError for a name that is no parameter, and for a member of the family, whose A and H must fit
-        together at every value.
+        Args:
+            file: the system.
+            symbols: names of its parameters; eps is a symbol anyway and is not to be named.
+
+        Returns:
+            The system, its right-hand sides exact.
+
+        Raises:
+            InputError: for a name that is no parameter, for right-hand sides that with the symbols free have a degree
+                above 2 or are no polynomials, and for a member of the family, whose A and H must fit together at
+                every value.
+
+        >>> from kahanmaps.systems.catalog import load
+        >>> ParametricSystem.of(load("euler_top"), ["a1"]).rhs
+        (x2*x3*a1, -2*x1*x3, x1*x2)
         """
-        symbols = tuple(symbols)
+        symbols = tuple(dict.fromkeys(symbols))
         for name in symbols:
             if name not in file.parameters:
                 known = ", ".join(file.parameters) or "none"
@@ -45,9 +58,8 @@ class ParametricSystem:
         constants = {name: value for name, value in file.parameters.items() if name not in symbols}
         section = file.document[file.kind]
         if file.kind == "system":
-            return cls(
-                file.variables, symbols, tuple(parse_polynomial(str(t), names, constants) for t in section["rhs"])
-            )
+            rhs = tuple(parse_polynomial(str(text), names, constants) for text in section["rhs"])
+            return cls(file.variables, symbols, rhs)._checked()
         if file.kind == "family":
             raise InputError(
                 f"found the symbols {', '.join(symbols)} in a [family] file, expected numbers: "
@@ -62,16 +74,22 @@ class ParametricSystem:
         else:
             J = [[parse_polynomial(str(entry), names, constants) for entry in row] for row in section["J"]]
         zero = ring(names).constant(0)
-        return cls(
-            file.variables,
-            symbols,
-            tuple(sum((a * g for a, g in zip(row, gradient, strict=True)), zero) for row in J),
-        )
+        rhs = tuple(sum((a * g for a, g in zip(row, gradient, strict=True)), zero) for row in J)
+        return cls(file.variables, symbols, rhs)._checked()
 
     @classmethod
     def of_system(cls, system: QuadraticSystem) -> ParametricSystem:
         """A system without symbols."""
         return cls(system.variables, (), system.rhs)
+
+    def _checked(self) -> ParametricSystem:
+        """Itself. Raises InputError where a term of higher degree is 0 only at the values that the file gives."""
+        if self.degree > 2:
+            raise InputError(
+                f"found right-hand sides of degree {self.degree} in the variables with {', '.join(self.symbols)} as "
+                "symbols, expected at most 2: leave the parameter that makes them cubic a number"
+            )
+        return self
 
     @property
     def dim(self) -> int:

@@ -20,7 +20,7 @@ from typing import Any
 import flint
 from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz_mod_ctx, fmpz_mod_poly_ctx, fmpz_poly
 
-from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.text import format_number, format_univariate
 from kahanmaps.errors import InputError
 
 _PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
@@ -58,7 +58,7 @@ class GrowthRate:
         """The number, exactly where it is an integer, else rounded with its minimal polynomial."""
         if self.minimal_polynomial.degree() == 1:
             return str(-self.minimal_polynomial[0])
-        return f"{self.digits}, root of {self.minimal_polynomial}"
+        return f"{self.digits}, root of {format_univariate(fmpq_poly(self.minimal_polynomial))}"
 
 
 @dataclass(frozen=True)

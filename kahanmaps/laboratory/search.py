@@ -28,7 +28,7 @@ from kahanmaps.laboratory.hirota_kimura import Profile
 from kahanmaps.laboratory.modular_points import ModularMap, null_space
 
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
-_COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 5, 5: 4, 6: 3}
+_COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 5, 6: 4}
 _FEW = 20  # with more relations than these, cofactors come first
 
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.commands.find_integrals import symbols_and_eps
+from kahanmaps_cli.options import eps_options, load_system, output_options, system_options
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import on_terminal, print_json, shorten
 
@@ -19,6 +20,7 @@ _COLOURS = {"proved": "green", "supported": "cyan", "measured": "blue", "undecid
 @click.command("analyze")
 @system_options
 @eps_options
+@click.option("--symbolic", metavar="NAMES", help="Parameters that formulas are to contain, e.g. a1,a2 (eps is one).")
 @click.option("--seconds", type=click.FloatRange(min=1), help="Time for everything (default: 16 to 150 by dimension).")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
 @click.option("--markdown", is_flag=True, help="The report in Markdown.")
@@ -31,7 +33,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     to the commuting family. Claims in the file are not read. Without --eps everything is for every eps.
 
     \b
-      kahanmaps analyze euler_top
+      kahanmaps analyze euler_top --symbolic a1,a2,a3
       kahanmaps analyze henon_heiles -p c=-6 --seconds 30
       kahanmaps analyze my-system.toml --markdown > report.md
       kahanmaps analyze --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
@@ -46,10 +48,12 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
 
     if markdown and as_json:
         raise click.UsageError("give --markdown or --json, one of the two")
-    eps = the_eps(options["eps"], options["time_step"], required=False)
+    symbols, eps = symbols_and_eps(options)
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     with Progress(quiet) as progress:
-        found = analyze(file, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress)
+        found = analyze(
+            file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress
+        )
     if as_json:
         print_json(found.to_json())
     elif markdown:

@@ -60,6 +60,6 @@ def command(system: str | None, **options: Any) -> int:
         for one in found.densities:
             formula = shorten(one.text, 400) if on_terminal() else one.text
             click.echo(f"phi\t{one.verdict}\t{formula}\n\t{one.evidence.summary}")
-        if found.reason:
-            click.echo(f"note\t{found.reason}")
+        for text in filter(None, (found.note, found.reason)):
+            click.echo(f"note\t{text}")
     return 0 if found.densities else 3

@@ -41,7 +41,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
     Exit status: 0 every integral that orbits show has a formula, 2 wrong use,
-    3 some have none.
+    3 some have none, orbits were not measured, or the time was too short.
     """
     from kahanmaps.laboratory.integrals import find_integrals
 
@@ -76,9 +76,9 @@ def command(system: str | None, **options: Any) -> int:
             formula = shorten(one.text, 400) if on_terminal() else one.text
             click.echo(f"{one.name}\t{one.verdict}\t{formula}\n\t{one.origin}: {one.evidence.summary}")
         click.echo(_count(found))
-        if found.reason:
-            click.echo(f"note\t{found.reason}")
-    return 0 if found.is_complete and not _was_not_measured(found) else 3
+        for text in filter(None, (found.note, found.reason)):
+            click.echo(f"note\t{text}")
+    return 0 if found.is_complete and found.profile.complete else 3
 
 
 def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
@@ -123,54 +123,60 @@ def _was_not_measured(found: Any) -> bool:
 
 
 def _count(found: Any) -> str:
-    profile = found.profile
     if _was_not_measured(found):
         return "orbits\tnot measured"
-    if profile.period is not None:
-        orbits = f"orbits close after {profile.period} steps at every eps that was tried"
-    else:
-        orbits = f"orbits show {found.codimension} independent (measured, relations of degree up to {profile.degree})"
-    return f"found\t{len(found.integrals)} functionally independent; {orbits}"
+    measured = f"measured, relations of degree up to {found.profile.degree}"
+    return (
+        f"found\t{len(found.integrals)} functionally independent; orbits show {found.codimension} independent "
+        f"({measured})"
+    )
 
 
 def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
     from kahanmaps.algebra.text import parse_polynomial
     from kahanmaps.errors import InputError
-    from kahanmaps.laboratory.hirota_kimura import hirota_kimura_basis
-    from kahanmaps.laboratory.integrals import Laboratory
+    from kahanmaps.laboratory.hirota_kimura import Basis, hirota_kimura_basis
+    from kahanmaps.laboratory.integrals import Laboratory, closing_note
     from kahanmaps.laboratory.modular_points import NoPoint
 
     if options["symbolic"]:
         raise click.UsageError("--monomials goes without --symbolic: the null space is measured at random eps")
     laboratory = Laboratory(file, (), eps, options["seed"])
-    rows = []
+    rows: list[Basis] = []
+    reason = laboratory.defect
     for text in options["sets"]:
         parts = [part.strip() for part in text.split(",")]
         if not all(parts):
             raise InputError(f"found the set {text!r}, expected polynomials with commas between them: 'x^2,y^2,1'")
         functions = [parse_polynomial(part, file.variables, file.parameters) for part in parts]
         try:
-            rows.append(hirota_kimura_basis(laboratory.maps, functions, parts))
+            if not reason:
+                rows.append(hirota_kimura_basis(laboratory.maps, functions, parts))
         except NoPoint as error:
-            raise InputError(f"found no orbit to measure: {error}") from error
+            reason = str(error)
+    note = closing_note(next((row.period for row in rows if row.period), None), laboratory.eps)
     if options["as_json"]:
-        step = "generic" if laboratory.eps is None else str(laboratory.eps)
         print_json(
             {
-                "search": "hirota-kimura",
-                "system": file.name,
-                "eps": step,
-                "seed": options["seed"],
+                **heading("hirota-kimura", laboratory),
+                "arithmetic": "residues modulo primes, eps random where none is given",
                 "primes": [str(prime) for prime in laboratory.primes],
                 "bases": [row.to_json() for row in rows],
+                "note": note,
+                "reason": reason,
                 "document": dict(file.document),
             }
         )
-        return 0
-    click.echo(f"Hirota-Kimura bases: {file.name}, measured on two orbits modulo each of two primes")
+        return 3 if reason else 0
+    step = "generic eps" if laboratory.eps is None else scope(laboratory)
+    click.echo(f"Hirota-Kimura bases: {file.name}, {step}, measured on two orbits modulo each of two primes")
     for row in rows:
         click.echo(f"dimension {row.dimension}\t{', '.join(row.functions)}")
         for vector in row.constant:
             names = [name for name, same in zip(row.functions, vector, strict=True) if not same]
             click.echo(f"\tcoefficients that are integrals: {', '.join(names) or 'none'}")
-    return 0
+        if not row.agree:
+            click.echo("\tthe orbits that were compared do not agree: try another --seed")
+    for text in filter(None, (note, reason)):
+        click.echo(f"note\t{text}")
+    return 3 if reason else 0

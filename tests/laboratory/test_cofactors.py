@@ -1,0 +1,115 @@
+"""Cofactors, their products, and the polynomials that have them."""
+
+from __future__ import annotations
+
+import pytest
+from search_helpers import random_system, system
+
+from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.laboratory import cofactors as module
+from kahanmaps.laboratory.affine_functions import affine_darboux
+from kahanmaps.laboratory.cofactors import (
+    DETERMINANT,
+    Cofactor,
+    CofactorProduct,
+    Sample,
+    cofactor_of_affine,
+    cofactor_space,
+    determinant_factors,
+    determinant_polynomial,
+    points_needed,
+    products,
+    search_cofactors,
+)
+from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.parametric import ParametricSystem
+from kahanmaps.systems.catalog import load, names
+
+SMALL_ONES = [name for name in names() if load(name).system.dim <= 4]
+ONE = CofactorProduct((), 0)
+
+
+@pytest.mark.parametrize("name", SMALL_ONES)
+def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
+    """det(I - eps f') is a product of the factors and of numbers that depend on eps alone, even in eps or not."""
+    laboratory = Laboratory(load(name))
+    map_ = laboratory.maps[0]
+    D = determinant_polynomial(laboratory.system)
+    whole = Cofactor("D", 1, D)
+    for x, image in map_.pairs(3):
+        assert whole.sides(map_, x, image) == DETERMINANT.sides(map_, x, image)
+    context = D.context()
+    rest = D
+    for one in determinant_factors(laboratory.system):
+        assert one.polynomial.subs({"eps": 0}) == context.constant(1)
+        while not (rest % one.polynomial):
+            rest = rest // one.polynomial
+    assert all(not any(monomial[: map_.dim]) for monomial in rest.monoms())
+
+
+def test_symbols_stay_in_the_factors():
+    system_ = ParametricSystem.of(load("weierstrass"), ["g2"])
+    assert [one.name for one in determinant_factors(system_)] == ["12*x*eps^2 - 1"]
+    euler = ParametricSystem.of(load("euler_top"), ["a1", "a2"])
+    assert "a1" in determinant_factors(euler)[0].name
+
+
+def test_a_determinant_too_large_to_expand_is_one_cofactor(monkeypatch):
+    monkeypatch.setattr(module, "_DETERMINANT_BUDGET", 5)
+    system_ = ParametricSystem.of(load("euler_top"))
+    assert determinant_polynomial(system_) is None
+    [one] = determinant_factors(system_)
+    assert (one.weight, one.polynomial) == (3, None)
+
+
+def test_affine_darboux_functions_have_their_cofactors():
+    file = load("lotka_volterra")
+    laboratory = Laboratory(file)
+    map_ = laboratory.maps[0]
+    found = [cofactor_of_affine(one.function, laboratory.system) for one in affine_darboux(file.system).functions]
+    assert {one.name for one in found} == set(file.variables)
+    for x, image in map_.pairs(2):
+        assert {one.name: one.sides(map_, x, image) for one in found} == {
+            name: (image[k], x[k]) for k, name in enumerate(file.variables)
+        }
+
+
+def test_products_come_by_weight():
+    x, q = Cofactor("x", 1, None), Cofactor("q", 2, None)
+    found = products([x, q], 3)
+    assert [one.powers for one in found] == [(0, 0), (1, 0), (2, 0), (0, 1), (3, 0), (1, 1)]
+    assert [one.weight for one in found] == [0, 1, 2, 2, 3, 3]
+    assert [one.text([x, q]) for one in found][::2] == ["1", "C[x]^2", "C[x]^3"]
+    assert products([], 4) == [ONE]
+
+
+def test_polynomials_with_a_given_cofactor():
+    map_ = Laboratory(load("lotka_volterra")).maps[0]
+    sample = Sample.of(map_, [DETERMINANT], points_needed(2, 3))
+    # x y has the cofactor det dPhi, constants have 1
+    assert cofactor_space(sample, CofactorProduct((1,), 1), 2).basis == [[0, 0, 0, 0, 1, 0]]
+    assert cofactor_space(sample, CofactorProduct((0,), 0), 2).basis == [[1, 0, 0, 0, 0, 0]]
+    assert cofactor_space(sample, CofactorProduct((2,), 2), 3).basis == []
+
+
+def test_random_systems_have_nothing_but_constants():
+    map_ = Laboratory(random_system(3, 2)).maps[0]
+    sample = Sample.of(map_, [DETERMINANT], points_needed(3, 3))
+    assert cofactor_space(sample, CofactorProduct((1,), 1), 3).basis == []
+    assert len(cofactor_space(sample, CofactorProduct((0,), 0), 3).basis) == 1
+
+
+def test_the_search_ends_when_enough_is_found_or_the_time_is_over():
+    laboratory = Laboratory(system("x y", "x", "y"))
+    map_, known = laboratory.maps[0], laboratory.cofactors()
+    [(product, space)] = search_cofactors(map_, known, [], 1, 3, 10.0)
+    assert (product.text(known), space.basis) == ("C[x]", [[0, 1, 0], [0, 0, 1]])
+    assert list(search_cofactors(map_, known, [space], 1, 3, 10.0)) == []
+    assert list(search_cofactors(map_, known, [], 1, 3, -1.0)) == []
+    assert list(search_cofactors(map_, known, [], 0, 3, 10.0)) == []
+
+
+def test_a_cofactor_that_none_has_finds_nothing():
+    laboratory = Laboratory(load("lotka_volterra"))
+    wrong = Cofactor("x + 1", 1, parse_polynomial("x + 1", ["x", "y", "eps"]))
+    assert list(search_cofactors(laboratory.maps[0], [wrong], [], 1, 3, 10.0)) == []

@@ -1,0 +1,159 @@
+"""Relations along orbits: the dimensions of the literature, none for systems without integrals, points where orbits
+close."""
+
+from __future__ import annotations
+
+import pytest
+from search_helpers import random_system, system
+
+from kahanmaps.laboratory.hirota_kimura import (
+    hirota_kimura_basis,
+    orbit_profile,
+    relations_on_orbit,
+    span_of_relations,
+)
+from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, monomial_values
+from kahanmaps.laboratory.parametric import ParametricSystem
+from kahanmaps.systems.catalog import load, names
+from kahanmaps.systems.structured_facts import relation_functions, relations
+
+RELATIONS = [
+    (name, k) for name in names() for k, _ in enumerate(relations(load(name).catalog, load(name).system.variables))
+]
+# The degree in which all integrals show, in six dimensions, where all degrees would take long.
+SHOWS = {"clebsch_first_flow": 2, "kirchhoff_case": 2, "lagrange_top": 2, "so4_euler_manakov": 2, "three_wave": 3}
+SHOWS |= {"paper_m3": 3, "paper_m3_irreducible": 3, "kirchhoff_generic": 3, "volterra_periodic_5": 3}
+
+
+def maps(file, eps=None, seed=0):
+    return Laboratory(file, (), eps, seed).maps
+
+
+@pytest.mark.parametrize(("name", "k"), RELATIONS)
+def test_bases_have_the_dimensions_of_the_literature(name, k):
+    file = load(name)
+    known = relations(file.catalog, file.variables)[k]
+    labels = [str(one) for one in known.functions]
+    if len(labels) > 300:
+        pytest.skip("measured by the tests of the catalogue")
+    found = hirota_kimura_basis(maps(file), known.functions, labels)
+    assert (found.dimension, found.agree, found.period) == (known.dimension, True, None)
+    if known.text.startswith("degree <= "):
+        degree = int(known.text.removeprefix("degree <= "))
+        assert len(relations_on_orbit(maps(file)[0], degree).vectors) == known.dimension
+
+
+@pytest.mark.parametrize("name", names())
+def test_codimensions_are_those_of_the_catalogue(name):
+    file = load(name)
+    found = orbit_profile(maps(file), max_degree=SHOWS.get(name))
+    assert found.codimension == file.catalog["codimension"]
+    assert (found.agree, found.complete, found.period) == (True, True, None)
+    assert list(found.codimensions) == sorted(found.codimensions)
+
+
+@pytest.mark.parametrize("dim", [2, 3, 4])
+def test_random_systems_have_no_relations(dim):
+    found = orbit_profile(maps(random_system(dim, dim)), max_degree=5)
+    assert found.nullities == (0,) * 5
+    assert (found.codimension, found.first_degree, found.degree) == (0, None, 5)
+
+
+def test_a_perturbed_system_loses_its_relations():
+    assert orbit_profile(maps(system("x y", "y", "-x + x^2"))).nullities == (0, 0, 1)
+    assert orbit_profile(maps(system("x y", "y + x^2/100", "-x + x^2")), max_degree=4).nullities == (0,) * 4
+
+
+def test_relations_vanish_along_the_orbit_and_not_along_another():
+    map_ = maps(load("euler_top"))[0]
+    found = relations_on_orbit(map_, 2, (1, 2, 3))
+    support = exponents_up_to(3, 2)
+
+    def vanish(start):
+        return all(
+            sum(c * m for c, m in zip(vector, monomial_values(support, x, map_.prime), strict=True)) % map_.prime == 0
+            for vector in found.vectors
+            for x in map_.orbit(20, start)
+        )
+
+    assert (len(found.vectors), found.codimension, found.start) == (2, 2, (1, 2, 3))
+    assert vanish((1, 2, 3)) and not vanish((1, 2, 4))
+
+
+def test_the_relations_of_all_orbits_span_a_space():
+    # 1 - eps^2 a2 a3 x1^2 and its cyclic images; two relations for each orbit
+    found, each = span_of_relations(maps(load("euler_top"))[0], 2)
+    assert (len(found), each) == (3, 2)
+    assert span_of_relations(maps(load("lorenz"))[0], 3) == ([], 0)
+
+
+def test_which_coefficients_are_integrals():
+    file = load("volterra_periodic_3")
+    texts = ["x1 + x2 + x3", "x1 + x2", "x3", "1"]
+    found = hirota_kimura_basis(maps(file), relation_functions(texts, file.variables), texts)
+    # the first is the sum of the next two on every orbit, and equal to a number that depends on the orbit
+    assert found.dimension == 2
+    assert sum(row.count(False) for row in found.constant) > 0
+    independent = hirota_kimura_basis(maps(file), relation_functions(texts[1:3], file.variables), texts[1:3])
+    assert (independent.dimension, independent.constant) == (0, ())
+    assert found.to_json()["integrals"] == [[not same for same in row] for row in found.constant]
+
+
+@pytest.mark.parametrize(
+    ("file", "eps", "period"),
+    [
+        (system("x y", "y", "-x + x^2"), 1, 4),
+        (load("henon_heiles"), 1, 4),
+        (load("henon_heiles", {"c": 5}), -1, 4),
+        (system("x", "1 + x^2"), "1/2", 4),  # x = tan of an angle, each step an eighth of a turn
+        (system("x y", "y", "-3*x"), "1/3", 6),  # a sixth of a turn: conics go through the points
+        (system("x y", "y", "-3*x"), 1, 3),
+        (system("x y z", "0", "0", "0"), None, 1),
+    ],
+)
+def test_orbits_that_close_are_points(file, eps, period):
+    found = orbit_profile(maps(file, eps))
+    assert (found.period, found.codimension, found.agree) == (period, file.system.dim, True)
+    variables = relation_functions("degree <= 1", file.variables)
+    assert hirota_kimura_basis(maps(file, eps), variables, ["f"] * len(variables)).period in (period, None)
+
+
+def test_the_time_and_the_number_of_unknowns_are_limited():
+    top = load("lagrange_top")
+    assert not orbit_profile(maps(top), seconds=0.0).complete
+    assert orbit_profile(maps(top), seconds=0.0).nullities == ()
+    assert orbit_profile(maps(top), max_degree=1).complete
+    wide = " ".join(f"x{k}" for k in range(60))
+    chain = system(wide, *(f"x{k}*(x{(k + 1) % 60} - x{k - 1 if k else 59})" for k in range(60)))
+    asked = orbit_profile(maps(chain), max_degree=2)
+    assert (asked.nullities, asked.complete) == ((1,), False)  # 1891 monomials of degree 2
+    assert orbit_profile(maps(chain)).complete  # nothing more was asked for than the dimension allows
+
+
+def test_progress_is_told():
+    said = []
+    orbit_profile(maps(load("euler_top")), progress=said.append)
+    assert said == ["relations of degree 1 along orbits", "relations of degree 2 along orbits"]
+
+
+def test_a_map_without_values_has_no_profile():
+    with pytest.raises(NoPoint):
+        orbit_profile(maps(system("x y", "x", "3*y"), 1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in names() if load(name).system.dim >= 5])
+def test_higher_degrees_show_no_more(name):
+    """The relations of degree d that are multiples of those of degree d - 1 add nothing to the codimension."""
+    file = load(name)
+    found = orbit_profile(maps(file, seed=3), max_degree=5, seconds=100)
+    assert (found.codimension, found.degree) == (file.catalog["codimension"], 5)
+
+
+@pytest.mark.slow
+def test_small_primes_agree_where_orbits_are_long_enough():
+    file = load("euler_top")
+    for prime in (10007, 20011, 30011):
+        map_ = ModularMap(ParametricSystem.of(file), prime, 5)
+        assert len(relations_on_orbit(map_, 2).vectors) == 2

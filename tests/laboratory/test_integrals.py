@@ -1,0 +1,299 @@
+"""Integrals found from the right-hand sides alone: those of the literature, conserved to the last digit; no others."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpq
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from search_helpers import PRIME, random_system, ranks, specialised, system, values_on_orbits
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.identities import integral_verdict
+from kahanmaps.laboratory.integrals import Laboratory, closing_note, find_integrals
+from kahanmaps.laboratory.parametric import ParametricSystem
+from kahanmaps.systems.catalog import load, names
+
+PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
+EPS = ["1/10", "-2/7", "3"]
+# All known integrals of these files are found, in closed form.
+FOUND = {name: load(name).catalog["codimension"] for name in PLANE_AND_SPACE}
+SYMBOLS = [
+    ("euler_top", ["a1", "a2", "a3"]),
+    ("dressing_chain_3", ["b1", "b2", "b3"]),
+    ("weierstrass", ["g2"]),
+]
+
+
+def independent(functions, file, others=(), symbols=()):
+    return ranks(list(functions), list(others), Laboratory(file, symbols).maps[0])
+
+
+@pytest.mark.parametrize("name", PLANE_AND_SPACE)
+def test_the_integrals_of_the_literature_are_found(name):
+    file = load(name)
+    found = find_integrals(file)
+    functions = [one.function for one in found.integrals]
+    assert len(functions) == found.codimension == FOUND[name]
+    assert all(one.verdict is Verdict.PROVED for one in found.integrals)
+    assert (found.is_complete, found.reason, found.note) == (True, "", "")
+    known = list(file.integrals.values())
+    number, of_known, of_all = independent(functions, file, known)
+    assert number == of_all == len(functions)  # the known ones are functions of those found
+    assert of_known == len(known)
+
+
+@pytest.mark.parametrize(
+    "name", ["euler_top", "dressing_chain_3", "nahm_octahedral", "weierstrass", "volterra_periodic_4"]
+)
+def test_formulas_are_constant_along_exact_orbits(name):
+    file = load(name)
+    for one in find_integrals(file).integrals:
+        values = values_on_orbits(file, one.text, EPS)
+        assert [len(each) for each in values] == [1] * 9
+        assert len(set().union(*values)) >= 3  # and not constants
+
+
+def test_the_exact_orbits_tell_a_wrong_formula():
+    assert max(len(each) for each in values_on_orbits(load("euler_top"), "x1^2 + x2^2", EPS)) > 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PLANE_AND_SPACE)
+def test_all_formulas_are_constant_along_exact_orbits(name):
+    file = load(name)
+    for one in find_integrals(file, seed=4).integrals:
+        assert {len(each) for each in values_on_orbits(file, one.text, EPS, steps=3)} == {1}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "number"), [("clebsch_first_flow", 1), ("so4_euler_manakov", 1), ("three_wave", 3), ("paper_m3", 3)]
+)
+def test_six_dimensions(name, number):
+    file = load(name)
+    found = find_integrals(file)
+    assert (len(found.integrals), found.codimension) == (number, file.catalog["codimension"])
+    assert all(one.verdict.holds for one in found.integrals)
+    assert found.is_complete == (number == found.codimension)
+    assert bool(found.reason) == (not found.is_complete or not found.profile.complete)
+    for one in found.integrals:
+        assert {len(each) for each in values_on_orbits(file, one.text, ["1/10"], steps=2)} == {1}
+
+
+@pytest.mark.parametrize(("name", "symbols"), SYMBOLS)
+def test_formulas_with_symbols_are_those_with_numbers(name, symbols):
+    general = find_integrals(load(name), symbols=symbols)
+    assert (len(general.integrals), general.symbols) == (load(name).catalog["codimension"], tuple(symbols))
+    assert all(one.verdict is Verdict.PROVED for one in general.integrals)
+    rng = random.Random(name)
+    chosen = {symbol: fmpq(rng.randint(1, 9), rng.randint(1, 9)) for symbol in symbols}
+    file = load(name, chosen)
+    special = find_integrals(file)
+    # as functions of each other: the gradients span the same space
+    texts = [parse_rational_function(one.text, (*file.variables, "eps"), chosen) for one in general.integrals]
+    assert independent(texts, file, [one.function for one in special.integrals]) == (len(texts),) * 3
+    for one in general.integrals:
+        assert {len(each) for each in values_on_orbits(file, one.text, EPS, starts=1, **chosen)} == {1}
+
+
+def test_the_formulas_themselves_specialise():
+    general = find_integrals(load("weierstrass"), symbols=["g2"]).integrals[0].function
+    special = find_integrals(load("weierstrass", {"g2": 7})).integrals[0].function
+    field, rng = GF(PRIME), random.Random(2)
+    points = [[field.random(rng) for _ in range(3)] for _ in range(4)]
+    eps = field.random(rng)
+    values = [
+        (specialised(general, {"g2": 7}, field, [*p[:2], eps]), special.value(field, [*p[:2], eps])) for p in points
+    ]
+    # equal up to an affine function of one variable, as members of one pencil with one denominator
+    (a, b), (c, d), (e, f), (g, h) = values
+    assert (a - c) * (f - h) == (b - d) * (e - g)
+
+
+def test_a_number_for_eps():
+    found = find_integrals(load("euler_top"), symbols=["a1"], eps="1/3")
+    assert [one.text for one in found.integrals] == ["(x2^2*a1 - 9)/(2*x1^2 + 9)", "(2*x3^2*a1 + 9)/(2*x1^2 + 9)"]
+    assert found.toml_section().startswith("# for eps = 1/3 only (time step 2 eps = 2/3): check with --eps 1/3\n[integ")
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("dim", [2, 3])
+def test_random_systems_have_none(dim, seed):
+    found = find_integrals(random_system(dim, seed), max_degree=4)
+    assert (found.integrals, found.codimension, found.reason, found.toml_section()) == ((), 0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("names_", "rhs"),
+    [
+        ("x y", ["y + x^2/100", "-x + x^2"]),
+        ("x1 x2 x3", ["x2*x3", "-2*x3*x1 + x1/7", "x1*x2 + x2^2"]),
+    ],
+)
+def test_a_perturbed_system_loses_its_integral(names_, rhs):
+    assert find_integrals(system(names_, *rhs), max_degree=5).integrals == ()
+
+
+EULER = ParametricSystem.of(load("euler_top"))
+
+
+@pytest.mark.parametrize(
+    ("text", "verdict"),
+    [
+        ("(1 + 2*eps^2*x3^2)/(1 - eps^2*x2^2)", "proved"),
+        ("(1 + 3*eps^2*x3^2)/(1 - eps^2*x2^2)", "refuted"),
+        ("(1 + 2*eps^2*x3^2)/(1 - eps^2*x2^2 + eps^9*x1)", "refuted"),
+        ("x1", "refuted"),
+        ("7", "proved"),
+    ],
+)
+def test_identities_of_the_euler_top(text, verdict):
+    function = parse_rational_function(text, ["x1", "x2", "x3", "eps"])
+    assert str(integral_verdict(EULER, function, None)[0]) == verdict
+    assert str(integral_verdict(EULER, function, fmpq(2, 5))[0]) == verdict
+
+
+def test_identities_with_symbols():
+    general = ParametricSystem.of(load("euler_top"), ["a1", "a2", "a3"])
+    ring = ["x1", "x2", "x3", "a1", "a2", "a3", "eps"]
+    right = parse_rational_function("(1 - eps^2*a3*a1*x2^2)/(1 - eps^2*a1*a2*x3^2)", ring)
+    # right for the numbers of the file, a1 = a3, but for no others
+    wrong = parse_rational_function("(1 - eps^2*a3^2*x2^2)/(1 - eps^2*a1*a2*x3^2)", ring)
+    assert integral_verdict(general, right, None)[0] is Verdict.PROVED
+    assert integral_verdict(general, wrong, None)[0] is Verdict.REFUTED
+
+
+def test_what_holds_at_one_eps_is_not_claimed_for_others():
+    oscillator = ParametricSystem.of(system("x y", "y", "-x + x^2"))
+    function = parse_rational_function("x^2*y^2/(x - 1)^2", ["x", "y", "eps"])
+    assert integral_verdict(oscillator, function, fmpq(1))[0] is Verdict.PROVED
+    assert integral_verdict(oscillator, function, fmpq(1, 2))[0] is Verdict.REFUTED
+    assert integral_verdict(oscillator, function, None)[0] is Verdict.REFUTED
+
+
+@pytest.mark.parametrize(
+    ("rhs", "eps", "text"),
+    [
+        (["x", "3*y"], 1, "y/x"),  # the map has no value anywhere
+        (["-x", "-y"], 1, "y/x"),  # all images are the origin, where y/x has none
+    ],
+)
+def test_identities_without_values_are_undecided(rhs, eps, text):
+    verdict, evidence = integral_verdict(
+        ParametricSystem.of(system("x y", *rhs)), parse_rational_function(text, ["x", "y", "eps"]), fmpq(eps)
+    )
+    assert (verdict, "has no value" in evidence.summary) == (Verdict.UNDECIDED, True)
+
+
+@pytest.mark.parametrize(
+    ("file", "texts", "period"),
+    [
+        (system("x y", "0", "0"), ["x", "y"], 1),
+        (system("x", "0"), ["x"], 1),
+        (system("x y", "x", "2*y"), [], None),
+        (system("x y", "x", "y"), ["y/x"], None),
+        (system("x y", "x", "-y"), ["x*y"], None),
+        (system("x y", "1", "2"), ["2*x - y"], None),
+        (system("x", "1"), [], None),
+        (system("x", "x"), [], None),
+        (system("x", "1 + x^2"), [], None),
+        (system("x y", "y", "-x"), ["x^2 + y^2"], None),
+        (system("x y z", "y", "-x", "1"), ["x^2 + y^2"], None),
+    ],
+)
+def test_simple_systems(file, texts, period):
+    found = find_integrals(file)
+    assert ([one.text for one in found.integrals], found.profile.period) == (texts, period)
+    assert found.is_complete and found.profile.complete
+
+
+@pytest.mark.parametrize(
+    ("file", "eps", "period"),
+    [
+        (system("x y", "y", "-x + x^2"), 1, 4),
+        (system("x", "1 + x^2"), "1/2", 4),
+        (system("x y", "y", "-3*x"), "1/3", 6),
+        pytest.param(load("henon_heiles"), 1, 4, marks=pytest.mark.slow),
+    ],
+)
+def test_maps_that_are_periodic_at_an_eps(file, eps, period):
+    found = find_integrals(file, eps=eps)
+    assert (found.profile.period, len(found.integrals)) == (period, file.system.dim)
+    assert found.note == closing_note(period, found.eps)
+    assert "nothing follows for other eps" in found.to_json()["note"]
+    for one in found.integrals:
+        assert one.evidence.summary.endswith(f"for eps = {eps}")
+        # constant at this eps; at another one they are not all
+        assert {len(each) for each in values_on_orbits(file, one.text, [eps])} == {1}
+    others = [len(each) for one in found.integrals for each in values_on_orbits(file, one.text, ["1/7"])]
+    assert max(others) > 1
+
+
+@pytest.mark.parametrize(
+    ("rhs", "eps", "words"),
+    [
+        (["x", "3*y"], 1, "no value anywhere"),
+        (["x", "3*y"], "1/3", "no value anywhere"),
+        (["-x", "-3*y"], 1, "not invertible"),
+        (["-x", "x*y + y^2"], 1, "not invertible"),
+    ],
+)
+def test_maps_that_are_none_are_told(rhs, eps, words):
+    found = find_integrals(system("x y", *rhs), eps=eps)
+    assert (found.integrals, found.profile.nullities, found.profile.complete) == ((), (), False)
+    assert words in found.reason and f"eps = {eps}" in found.reason
+
+
+def test_nothing_is_concluded_at_a_neighbour_of_such_an_eps():
+    assert [one.text for one in find_integrals(system("x y", "-x", "-y"), eps="1/2").integrals] == ["y/x"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"eps": 0}, "found eps = 0"),
+        ({"eps": 0.5}, "0.5"),
+        ({"eps": 1, "symbols": ["eps"]}, "found eps both as a number and as a symbol"),
+        ({"symbols": ["a9"]}, "found the symbol 'a9'"),
+        ({"seconds": 0}, "found 0 seconds"),
+        ({"seconds": float("nan")}, "found nan seconds"),
+        ({"max_degree": 0}, "found the largest degree 0"),
+    ],
+)
+def test_wrong_use(options, words):
+    with pytest.raises(InputError) as caught:
+        find_integrals(load("euler_top"), **options)
+    assert words in str(caught.value)
+
+
+def test_too_little_time_is_told():
+    found = find_integrals(load("lagrange_top"), seconds=1e-9)
+    assert (found.integrals, found.profile.complete) == ((), False)
+    assert "relations of degree 1 and more were not tried" in found.reason
+
+
+def test_the_same_seed_gives_the_same():
+    documents = [find_integrals(load("dressing_chain_3"), seed=seed).to_json() for seed in (3, 3, 4)]
+    assert documents[0] == documents[1]
+    assert documents[0]["primes"] != documents[2]["primes"]
+    assert documents[0]["integrals"][0]["integral"] == documents[2]["integrals"][0]["integral"]
+
+
+@settings(max_examples=8)
+@given(st.tuples(*[st.integers(-3, 3)] * 10))
+def test_hamiltonian_planes_always_have_one(coefficients):
+    """H any cubic in the plane: the integral of cmoq-2013 is found, or H is so simple that there is more."""
+    monomials = ["x^3", "x^2*y", "x*y^2", "y^3", "x^2", "x*y", "y^2", "x", "y", "1"]
+    H = "+".join(f"({c})*{m}" for c, m in zip(coefficients, monomials, strict=True))
+    polynomial = parse_rational_function(H, ["x", "y"]).numerator
+    file = system("x y", str(polynomial.derivative(1)), str(-polynomial.derivative(0)))
+    found = find_integrals(file)
+    assert len(found.integrals) >= 1 and found.is_complete
+    for one in found.integrals:
+        assert {len(each) for each in values_on_orbits(file, one.text, ["1/9"], starts=1, steps=2)} == {1}

@@ -1,0 +1,129 @@
+"""Points and monomials modulo a prime, against exact orbits, FLINT's derivatives and linear algebra by definition."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpq
+from hypothesis import given
+from hypothesis import strategies as st
+from search_helpers import PRIME, system
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.polynomials import evaluate, ring
+from kahanmaps.laboratory.modular_points import (
+    ModularMap,
+    NoPoint,
+    combine,
+    echelon,
+    exponents_up_to,
+    gradient_values,
+    monomial_values,
+    null_space,
+    rank,
+)
+from kahanmaps.laboratory.parametric import ParametricSystem
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.catalog import load
+
+SMALL = 101
+residues = st.integers(0, SMALL - 1)
+
+
+def modular(file, eps=7, prime=PRIME, seed=0):
+    return ModularMap(ParametricSystem.of(file), prime, eps, seed=seed)
+
+
+@given(st.lists(residues, min_size=3, max_size=3), st.integers(0, 4))
+def test_monomials_and_gradients_are_those_of_polynomials(point, degree):
+    support, field, context = exponents_up_to(3, degree), GF(SMALL), ring(["x", "y", "z"])
+    assert monomial_values(support, tuple(point), SMALL) == [
+        point[0] ** a * point[1] ** b * point[2] ** c % SMALL for a, b, c in support
+    ]
+    vector = [random.Random(k).randrange(SMALL) for k in range(len(support))]
+    polynomial = context.from_dict(dict(zip(support, vector, strict=True)))
+    at = [field.convert(c) for c in point]
+    expected = [int(evaluate(polynomial.derivative(k), field, at)) for k in range(3)]
+    assert gradient_values(vector, support, tuple(point), SMALL) == (int(evaluate(polynomial, field, at)), expected)
+
+
+def test_there_are_as_many_monomials_as_there_should_be():
+    assert [len(exponents_up_to(3, d)) for d in range(5)] == [1, 4, 10, 20, 35]
+    assert exponents_up_to(2, 2)[0] == (0, 0)
+    # of a monomial that stands alone, too
+    assert monomial_values(((0, 3),), (2, 5), SMALL) == [125 % SMALL]
+
+
+matrices = st.integers(1, 5).flatmap(
+    lambda n: st.lists(st.lists(residues, min_size=n, max_size=n), min_size=1, max_size=6)
+)
+
+
+@given(matrices)
+def test_null_spaces_by_definition(rows):
+    columns = len(rows[0])
+    basis = null_space(rows, columns, SMALL)
+    assert len(basis) == columns - rank(rows, SMALL) == rank(basis, SMALL)
+    assert all(sum(a * b for a, b in zip(row, v, strict=True)) % SMALL == 0 for row in rows for v in basis)
+    assert basis == echelon(basis, SMALL)
+
+
+@given(matrices, st.randoms(use_true_random=False))
+def test_the_echelon_form_depends_on_the_span_alone(rows, rng):
+    weights = [[rng.randrange(SMALL) for _ in rows] for _ in range(len(rows) + 3)]
+    mixed = combine(weights, rows, SMALL)
+    if rank(weights, SMALL) == len(rows):
+        assert echelon(mixed, SMALL) == echelon(rows, SMALL)
+    assert len(echelon(mixed, SMALL)) <= rank(rows, SMALL)
+
+
+def test_nothing_gives_nothing():
+    assert null_space([], 2, SMALL) == [[1, 0], [0, 1]]
+    assert echelon([], SMALL) == combine([], [[1]], SMALL) == combine([[1]], [], SMALL) == []
+    assert rank([], SMALL) == rank([[]], SMALL) == 0
+
+
+def test_orbits_are_exact_orbits_modulo_the_prime():
+    kahan, map_ = KahanMap(load("lorenz").system, fmpq(7)), modular(load("lorenz"))
+    x = (fmpq(1), fmpq(2), fmpq(-3))
+    field, found = GF(PRIME), map_.orbit(4, (1, 2, PRIME - 3))
+    for point in found:
+        assert point == tuple(int(field.convert(c)) for c in x)
+        x = kahan.step(x)
+
+
+def test_the_determinants_are_those_of_the_derivative():
+    map_, x = modular(load("lorenz")), (3, 1, 4)
+    image = map_.step(x)
+    field = GF(PRIME)
+    kahan = KahanMap(load("lorenz").system, 7, field)
+    derivative = kahan.jacobian([field.convert(c) for c in x])
+    assert field.convert(map_.determinant(image, -1)) == derivative.det() * field.convert(map_.determinant(x))
+
+
+def test_an_orbit_that_closes_has_each_of_its_points_once():
+    # a quarter of a turn
+    found = modular(system("x y", "y", "-x"), eps=1).orbit(20, (1, 2))
+    assert found == [(1, 2), (2, PRIME - 1), (PRIME - 1, PRIME - 2), (PRIME - 2, 1)]
+    assert len(modular(system("x y", "0", "0")).orbit(20)) == 1
+    assert len(modular(load("lorenz")).orbit(20)) == 20
+
+
+def test_a_map_without_values_is_told():
+    singular = modular(system("x y", "x", "3*y"), eps=1)
+    for look in (lambda: list(singular.pairs(1)), lambda: singular.orbit(3), lambda: singular.orbit(3, (1, 1))):
+        with pytest.raises(NoPoint, match="no value at random points"):
+            look()
+    assert singular.step((1, 1)) is None
+
+
+def test_orbits_that_meet_the_singular_set_are_given_up():
+    # x -> x/(1 - 2 x) modulo 11: every orbit comes to a pole
+    with pytest.raises(NoPoint, match="meet the singular set"):
+        modular(system("x", "x^2"), eps=1, prime=11).orbit(30, (1,))
+
+
+def test_everything_depends_on_the_seed_alone():
+    draws = [list(modular(load("lorenz"), seed=seed).pairs(3)) for seed in (0, 0, 1)]
+    assert draws[0] == draws[1] != draws[2]

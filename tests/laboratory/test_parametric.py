@@ -1,0 +1,105 @@
+"""Systems with symbols are the systems with numbers, wherever the symbols get these numbers."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpq
+from helpers import systems
+from hypothesis import given
+from search_helpers import PRIME, system
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.laboratory.parametric import ParametricSystem
+from kahanmaps.systems.catalog import load, names
+from kahanmaps.systems.files import parse_system
+
+FIELD = GF(PRIME)
+WITH_PARAMETERS = [name for name in names() if load(name).parameters and load(name).kind != "family"]
+
+
+def same_maps(one, other, seed=0):
+    rng = random.Random(seed)
+    for _ in range(3):
+        x = [FIELD.random(rng) for _ in range(other.dim)]
+        assert list(one.polarised(x, x)) == list(other.value(x))
+        assert one.jacobian(x) == other.jacobian(x)
+
+
+@pytest.mark.parametrize("name", WITH_PARAMETERS)
+def test_symbols_at_the_numbers_of_the_file_give_its_system(name):
+    changed = {parameter: fmpq(2 * k + 3, k + 2) for k, parameter in enumerate(load(name).parameters)}
+    file = load(name, changed)
+    symbols = tuple(file.parameters)
+    over = ParametricSystem.of(load(name), symbols).over(FIELD, [FIELD.convert(file.parameters[s]) for s in symbols])
+    same_maps(over, file.system.over(FIELD))
+
+
+@given(systems())
+def test_without_symbols_nothing_changes(drawn):
+    same_maps(ParametricSystem.of_system(drawn).over(FIELD), drawn.over(FIELD))
+
+
+def test_a_poisson_matrix_may_contain_symbols():
+    text = (
+        'variables = ["x", "y"]\n[parameters]\na = "2"\n[hamiltonian]\nH = "a*x^3 + y^2"\nJ = [["0", "a"], ["-a", "0"]]'
+    )
+    file = parse_system(text)
+    found = ParametricSystem.of(file, ["a"])
+    assert [str(one) for one in found.rhs] == ["2*y*a", "-3*x^2*a^2"]
+    same_maps(found.over(FIELD, [FIELD.convert(2)]), file.system.over(FIELD))
+
+
+def test_the_jacobian_in_polynomials_is_that_over_a_field():
+    found = ParametricSystem.of(load("dressing_chain_3"), ["b1", "b2"])
+    rng = random.Random(1)
+    x, b = [FIELD.random(rng) for _ in range(3)], [FIELD.random(rng) for _ in range(2)]
+    rows = found.jacobian([*found.variables, "b1", "b2", "eps"])
+    numbers = [[evaluate(entry, FIELD, [*x, *b, FIELD.one]) for entry in row] for row in rows]
+    assert numbers == found.over(FIELD, b).jacobian(x).tolist()
+
+
+def test_a_symbol_given_twice_counts_once():
+    assert ParametricSystem.of(load("euler_top"), ["a1", "a1"]).symbols == ("a1",)
+
+
+@pytest.mark.parametrize(
+    ("file", "symbols", "words"),
+    [
+        (load("euler_top"), ["a4"], "found the symbol 'a4', expected eps or a parameter of the system: a1, a2, a3"),
+        (load("lorenz"), ["x"], "found the symbol 'x'"),
+        (system("x y", "x*y", "1"), ["a"], "a parameter of the system: none"),
+        # a term that is not there only because the file says a = 0
+        (system("x y", "a*x^3 + y", "x", a=0), ["a"], "of degree 3 in the variables with a as symbols"),
+        (system("x", "x^2/a", a=2), ["a"], "a division by something with variables in it"),
+    ],
+)
+def test_what_cannot_be_a_symbol_is_refused(file, symbols, words):
+    with pytest.raises(InputError) as caught:
+        ParametricSystem.of(file, symbols)
+    assert words in str(caught.value)
+
+
+def test_a_hamiltonian_that_is_cubic_only_at_a_number_is_refused():
+    text = 'variables = ["x", "y"]\n[parameters]\na = "0"\n[hamiltonian]\nH = "a*x^4 + y^2"\nJ = "standard"'
+    with pytest.raises(InputError, match="of degree 3 in the variables"):
+        ParametricSystem.of(parse_system(text), ["a"])
+
+
+def test_members_of_the_family_have_numbers():
+    text = load("paper_m2").to_toml().replace("[family]", '[parameters]\nt = "1"\n[family]')
+    with pytest.raises(InputError, match=r"found the symbols t in a \[family\] file"):
+        ParametricSystem.of(parse_system(text), ["t"])
+
+
+def test_a_prime_in_a_denominator_is_bad():
+    with pytest.raises(BadPrime):
+        ParametricSystem.of(system("x", "x^2/7")).over(GF(7))
+
+
+def test_the_degree_is_that_in_the_variables():
+    assert ParametricSystem.of(system("x", "a^5*x", a=1), ["a"]).degree == 1
+    assert ParametricSystem.of(system("x y", "0", "0")).degree == 0

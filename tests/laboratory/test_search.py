@@ -1,0 +1,134 @@
+"""A search recorded and repeated on other maps, and closed forms from spaces that are known modulo primes only."""
+
+from __future__ import annotations
+
+import pytest
+from flint import nmod
+from search_helpers import random_system, system
+
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.laboratory.closed_forms import closed_forms
+from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
+from kahanmaps.laboratory.hirota_kimura import orbit_profile
+from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
+from kahanmaps.laboratory.search import affine_space, repeat, search
+from kahanmaps.systems.catalog import load
+
+
+def searched(file, eps=None, seconds=30.0):
+    laboratory = Laboratory(file, (), eps)
+    known = laboratory.cofactors()
+    return laboratory, known, search(laboratory.maps[0], orbit_profile(laboratory.maps), known, seconds)
+
+
+@pytest.mark.parametrize(
+    ("file", "dimension"),
+    [
+        (load("dressing_chain_3"), 2),
+        (load("volterra_periodic_4"), 2),
+        (system("x y z", "0", "0", "0"), 4),
+        (system("x y", "1", "2"), 2),
+        (load("lorenz"), None),
+        (system("x", "x"), None),
+    ],
+)
+def test_affine_integrals(file, dimension):
+    found = affine_space(Laboratory(file).maps[0])
+    assert (found and len(found.basis)) == dimension
+
+
+@pytest.mark.parametrize(
+    ("name", "kinds", "independent"),
+    [
+        ("euler_top", ["relations"], 2),
+        ("volterra_periodic_4", ["affine", "cofactor", "cofactor"], 3),
+        ("weierstrass", ["relations"], 1),
+        ("lorenz", [], 0),
+    ],
+)
+def test_searches_can_be_repeated_on_another_map(name, kinds, independent):
+    laboratory, known, found = searched(load(name))
+    assert ([step.kind for step in found.steps], found.independent) == (kinds, independent)
+    reference, second = laboratory.primes[0], laboratory.maps[1]
+    again = repeat(found, second, known, reference)
+    assert again is not None
+    assert [[len(space.basis) for space in group] for group in again.spaces] == [
+        [len(space.basis) for space in group] for group in found.spaces
+    ]
+    assert gradient_rank(second, again.all_spaces) == independent
+
+
+def test_another_system_does_not_repeat_a_search():
+    _, known, found = searched(load("euler_top"))
+    stranger = Laboratory(system("x1 x2 x3", "x2*x3 + x1", "-2*x3*x1", "x1*x2"))
+    assert repeat(found, stranger.maps[0], known, stranger.primes[0]) is None
+
+
+def test_random_systems_and_no_time_give_nothing():
+    assert searched(random_system(3, 3))[2].steps == []
+    found = searched(load("euler_top"), seconds=0.0)[2]
+    assert (found.steps, found.independent) == ([], 0)
+
+
+def test_progress_is_told():
+    laboratory = Laboratory(load("dressing_chain_3"))
+    said = []
+    search(laboratory.maps[0], orbit_profile(laboratory.maps), laboratory.cofactors(), 30.0, said.append)
+    assert any("known cofactors" in text for text in said)
+
+
+# The pencil of 1 + a^2 x/(3 eps - 1) and y^2, as if it had been found at each value of a and eps.
+def pencil_at(prime, values):
+    a, eps = values
+    below = nmod(3 * eps - 1, prime)
+    if below == 0:
+        return None
+    entries = {(0, 0): nmod(1, prime), (1, 0): nmod(a * a, prime) / below}
+    support = exponents_up_to(2, 2)
+    vectors = [[int(entries.get(m, 0)) for m in support], [int(m == (0, 2)) for m in support]]
+    return [DarbouxSpace.spanned_by(2, 2, vectors, prime)]
+
+
+MODEL = pencil_at(2**61 - 1, (12345, 67890))
+
+
+def test_coefficients_are_interpolated():
+    found = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol")
+    assert [format_polynomial(P) for P in found.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]
+    assert (found.reason, found.samples > 10) == ("", True)
+
+
+def test_special_values_are_passed_over():
+    def now_and_then(prime, values):
+        if values[0] % 3 == 0:
+            raise NoPoint("not here")
+        return None if values[1] % 3 == 0 else pencil_at(prime, values)
+
+    found = closed_forms(MODEL, now_and_then, ["x", "y"], ["a"], "symbol")
+    assert format_polynomial(found.bases[0][0]) == "x*a^2 + 3*eps - 1"
+
+
+def test_no_value_anywhere_and_no_time_are_told():
+    nowhere = closed_forms(MODEL, lambda prime, values: None, ["x", "y"], ["a"], "symbol", seconds=5)
+    assert (nowhere.bases, bool(nowhere.reason)) == (None, True)
+    late = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol", seconds=-1.0)
+    assert (late.bases, bool(late.reason)) == (None, True)
+
+
+def test_eps_by_weight_and_numbers():
+    support = exponents_up_to(1, 2)
+
+    def at(prime, _):
+        half = (prime + 1) // 2
+        return [DarbouxSpace(1, 2, [[{(0,): half, (2,): 1}.get(m, 0) for m in support]])]
+
+    model = at(2**61 - 1, ())
+    assert format_polynomial(closed_forms(model, at, ["x"], [], "by weight").bases[0][0]) == "2*x^2*eps^2 + 1"
+    assert format_polynomial(closed_forms(model, at, ["x"], [], "not").bases[0][0]) == "2*x^2 + 1"
+
+
+def test_without_coefficients_nothing_has_to_be_sampled():
+    model = [DarbouxSpace(1, 1, [[1, 0], [0, 1]])]
+    found = closed_forms(model, lambda prime, values: None, ["x"], ["a"], "symbol")
+    assert ([str(P) for P in found.bases[0]], found.samples) == (["1", "x"], 0)

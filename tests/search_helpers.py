@@ -1,0 +1,103 @@
+"""What the tests of the searches for integrals and densities share: systems in a line, exact orbits, functions modulo p.
+
+Formulas are read here by Python with fractions, not by the library that wrote them.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from itertools import islice
+from typing import Any
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate
+from kahanmaps.checks.settings import random_starts
+from kahanmaps.errors import SingularStep
+from kahanmaps.laboratory.modular_points import ModularMap, rank
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.files import SystemFile, parse_system
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+PRIME = 2**61 - 1
+
+
+def system(names: str, *rhs: str, **parameters: Any) -> SystemFile:
+    """A system file: the names of the variables with spaces between them, the right-hand sides, the parameters."""
+    lines = [f"variables = {list(names.split())}", "[system]", f"rhs = {list(rhs)}", "[parameters]"]
+    lines += [f"{name} = '{value}'" for name, value in parameters.items()]
+    return parse_system("\n".join(lines))
+
+
+def random_system(dim: int, seed: int) -> SystemFile:
+    """All coefficients random: nothing is conserved."""
+    rng = random.Random(seed)
+    names = [f"x{k}" for k in range(dim)]
+    terms = ["1", *names, *(f"{a}*{b}" for i, a in enumerate(names) for b in names[i:])]
+    rhs = ["+".join(f"({rng.randint(-9, 9)})*{term}" for term in terms) for _ in names]
+    return SystemFile.from_system(QuadraticSystem.from_text(names, rhs))
+
+
+def value_of(formula: str, names: Sequence[str], point: Sequence[Any], eps: Any, **more: Any) -> Fraction:
+    """The value of a formula at a rational point."""
+    numbers = {name: Fraction(str(value)) for name, value in zip(names, point, strict=True)}
+    numbers |= {name: Fraction(str(value)) for name, value in (more | {"eps": eps}).items()}
+    words = formula.replace("^", "**")
+    return Fraction(eval(words, {"__builtins__": {}}, numbers))
+
+
+def values_on_orbits(
+    file: SystemFile, formula: str, eps: Sequence[Any], *, starts: int = 3, steps: int = 4, **more: Any
+) -> list[set[Fraction]]:
+    """The values of a formula along exact orbits over Q, one set for each eps and start; `more` are for its symbols.
+
+    An orbit ends at a pole of the map; where it starts at a pole of the formula, another takes its place.
+    """
+    found = []
+    for step in eps:
+        kahan = KahanMap(file.system, step)
+        wanted = len(found) + starts
+        for x in islice(random_starts(file.system.dim, 5), 10 * starts):
+            values = set()
+            try:
+                for _ in range(steps + 1):
+                    values.add(value_of(formula, file.variables, x, step, **more))
+                    x = kahan.step(x)
+            except (SingularStep, ZeroDivisionError):
+                pass
+            if values and len(found) < wanted:
+                found.append(values)
+    return found
+
+
+def gradient(function: RationalFunction, map_: ModularMap, point: Sequence[int]) -> list[int]:
+    """Q grad P - P grad Q modulo the prime of the map; the function is one of the variables, then symbols and eps."""
+    field = GF(map_.prime)
+    values = map_.values if len(function.names) > map_.dim + 1 else ()
+    at = [field.convert(c) for c in (*point, *values, map_.eps)]
+    P, Q = function.numerator, function.denominator
+    p, q = evaluate(P, field, at), evaluate(Q, field, at)
+    return [
+        int(evaluate(P.derivative(k), field, at) * q - evaluate(Q.derivative(k), field, at) * p)
+        for k in range(map_.dim)
+    ]
+
+
+def ranks(found: Sequence[RationalFunction], known: Sequence[RationalFunction], map_: ModularMap) -> tuple[int, ...]:
+    """The numbers of independent functions among those found, those known, and all of them."""
+    point = map_.random_point()
+    rows = [[gradient(one, map_, point) for one in functions] for functions in (found, known)]
+    return rank(rows[0], map_.prime), rank(rows[1], map_.prime), rank([*rows[0], *rows[1]], map_.prime)
+
+
+def at_residues(function: RationalFunction, map_: ModularMap, point: Sequence[int]) -> int:
+    """The value of a function of the variables and eps modulo the prime of the map."""
+    field = GF(map_.prime)
+    return int(function.value(field, [field.convert(c) for c in (*point, map_.eps)]))
+
+
+def specialised(function: RationalFunction, values: Mapping[str, Any], field: Any, point: Sequence[Any]) -> Any:
+    """The value of a function of (variables, symbols, eps) with numbers for the symbols; eps comes last in `point`."""
+    symbols = [field.convert(values[name]) for name in function.names[len(point) - 1 : -1]]
+    return function.value(field, [*point[:-1], *symbols, point[-1]])
