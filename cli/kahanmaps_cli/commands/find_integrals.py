@@ -22,6 +22,12 @@ from kahanmaps_cli.render import on_terminal, print_json, shorten
     multiple=True,
     help="A Hirota-Kimura basis of these polynomials instead, e.g. 'x^2,y^2,1'.",
 )
+@click.option(
+    "--darboux",
+    type=click.IntRange(1, 12),
+    metavar="DEGREE",
+    help="Instead: all discrete Darboux polynomials up to it.",
+)
 @click.option("--max-degree", type=click.IntRange(1, 20), help="Largest degree of relations along orbits.")
 @click.option("--seconds", type=click.FloatRange(min=1), default=60, show_default=True, help="Time for the search.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
@@ -38,6 +44,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals euler_top --symbolic a1,a2,a3
       kahanmaps find-integrals volterra_periodic_4 --toml
       kahanmaps find-integrals lagrange_top --monomials 'm1^2+m2^2,p3^2,p3,1'
+      kahanmaps find-integrals volterra_periodic_4 --darboux 2
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
     Exit status: 0 every integral that orbits show has a formula, 2 wrong use,
@@ -54,6 +61,10 @@ def command(system: str | None, **options: Any) -> int:
             if options["as_toml"] or options["as_latex"]:
                 raise click.UsageError("--monomials goes with --json, not with --toml and --latex")
             return _bases(file, eps, options)
+        if options["darboux"] is not None:
+            if options["as_toml"] or options["as_latex"]:
+                raise click.UsageError("--darboux goes with --json, not with --toml and --latex")
+            return _darboux(file, symbols, eps, options, progress)
         found = find_integrals(
             file,
             symbols=symbols,
@@ -132,6 +143,34 @@ def _count(found: Any) -> str:
     )
 
 
+def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, Any], progress: Progress) -> int:
+    from kahanmaps.algebra.text import format_polynomial
+    from kahanmaps.laboratory.darboux import darboux_polynomials
+
+    found = darboux_polynomials(
+        file,
+        options["darboux"],
+        symbols=symbols,
+        eps=eps,
+        seconds=options["seconds"],
+        seed=options["seed"],
+        progress=progress,
+    )
+    if options["as_json"]:
+        print_json({**heading("darboux-polynomials", found), **found.to_json(), "document": dict(file.document)})
+    else:
+        click.echo(f"Darboux polynomials: {file.name}, {scope(found)}")
+        click.echo("P(x~) = C P(x), C a product of C[g] = g(x~, -eps)/g(x, eps); products of P listed are not listed")
+        for space in found.spaces:
+            click.echo(f"C = {space.cofactor}")
+            for P in space.polynomials:
+                text = format_polynomial(P)
+                click.echo(f"\t{space.verdict}\t{shorten(text, 400) if on_terminal() else text}")
+        if found.reason:
+            click.echo(f"note\t{found.reason}")
+    return 3 if found.reason else 0
+
+
 def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
     from kahanmaps.algebra.text import parse_polynomial
     from kahanmaps.errors import InputError
@@ -149,6 +188,13 @@ def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
         if not all(parts):
             raise InputError(f"found the set {text!r}, expected polynomials with commas between them: 'x^2,y^2,1'")
         functions = [parse_polynomial(part, file.variables, file.parameters) for part in parts]
+        for k, function in enumerate(functions):
+            if function.is_zero():
+                raise InputError(
+                    f"found 0 as function {k + 1} of the set {text!r}, expected polynomials that are not 0"
+                )
+            if function in functions[:k]:
+                raise InputError(f"found function {k + 1} twice in the set {text!r}, expected different ones")
         try:
             if not reason:
                 rows.append(hirota_kimura_basis(laboratory.maps, functions, parts))

@@ -1,0 +1,252 @@
+"""The discrete Darboux polynomials of a Kahan map: all P of bounded degree with P(x~) = C(x) P(x), for many C.
+
+C runs through the products of the cofactors in cofactors.py. A space of such P is listed unless products of elements of
+spaces listed before span it. Source: celledoni-2019.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.latex import latex_polynomial
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.errors import SingularMatrix, SingularStep
+from kahanmaps.laboratory.closed_forms import closed_forms
+from kahanmaps.laboratory.cofactors import (
+    Cofactor,
+    CofactorProduct,
+    Sample,
+    cofactor_space,
+    points_needed,
+    products,
+)
+from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.modular_points import NoPoint, echelon, exponents_up_to
+from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.systems.files import SystemFile
+
+_BUDGET = 20_000_000
+_MOST_PRODUCTS = 2000
+
+
+@dataclass(frozen=True)
+class DarbouxPolynomials:
+    """A basis of all P with P(x~) = C(x) P(x); `cofactor` is C as text, where C[g] = g(x~, -eps)/g(x, eps).
+
+    The verdict is on the identity, for all of them: proved by expansion or supported at random points.
+    """
+
+    cofactor: str
+    polynomials: tuple[fmpq_mpoly, ...]
+    verdict: Verdict
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "cofactor": self.cofactor,
+            "polynomials": [format_polynomial(P) for P in self.polynomials],
+            "latex": [latex_polynomial(P) for P in self.polynomials],
+            "verdict": str(self.verdict),
+        }
+
+
+@dataclass
+class DarbouxSearch:
+    """What `darboux_polynomials` found: spaces by the weight of their cofactor; `reason` if the search ended early."""
+
+    file: SystemFile
+    symbols: tuple[str, ...]
+    eps: fmpq | None
+    degree: int
+    seed: int
+    primes: tuple[int, ...]
+    cofactors: tuple[str, ...] = ()
+    spaces: list[DarbouxPolynomials] = field(default_factory=list)
+    reason: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "degree": self.degree,
+            "cofactors": list(self.cofactors),
+            "spaces": [space.to_json() for space in self.spaces],
+            "reason": self.reason,
+            "primes": [str(prime) for prime in self.primes],
+        }
+
+
+def darboux_polynomials(
+    file: SystemFile,
+    degree: int,
+    *,
+    symbols: Sequence[str] = (),
+    eps: Any = None,
+    seconds: float = 60.0,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> DarbouxSearch:
+    """All discrete Darboux polynomials of degree at most `degree` whose cofactor is a product of the usual ones.
+
+    Args:
+        file: the system.
+        degree: the largest degree of the polynomials, and of the products of cofactors.
+        symbols: names of parameters that formulas are to contain; the others have the values of the file.
+        eps: an exact number, or None for formulas that contain eps (the time step is 2 eps).
+        seconds: the time that the search may take, about.
+        seed: of everything random.
+        progress: is told what is being tried.
+
+    Returns:
+        A `DarbouxSearch`. With C = 1 the polynomials are integrals (the constant 1 is left out). Products of what is
+        listed are not listed again.
+
+    Raises:
+        InputError: for unknown symbols and eps = 0.
+
+    Source: celledoni-2019.
+
+    >>> from kahanmaps.systems.catalog import load
+    >>> for space in darboux_polynomials(load("lotka_volterra"), 2).spaces:
+    ...     print(space.cofactor, *space.polynomials, space.verdict)
+    C[x] x proved
+    C[y] y proved
+    """
+    laboratory = Laboratory(file, symbols, eps, seed)
+    found = DarbouxSearch(file, laboratory.symbols, laboratory.eps, degree, seed, laboratory.primes)
+    deadline = time.monotonic() + seconds
+    cofactors = laboratory.cofactors()
+    found.cofactors = tuple(one.name for one in cofactors)
+    candidates = products(cofactors, degree)
+    if len(candidates) > _MOST_PRODUCTS:
+        found.reason = f"{len(candidates)} products of cofactors, of which the first {_MOST_PRODUCTS} were tried"
+        candidates = candidates[:_MOST_PRODUCTS]
+    map_ = laboratory.maps[0]
+    try:
+        sample = Sample.of(map_, cofactors, points_needed(map_.dim, degree))
+    except NoPoint as error:
+        found.reason = str(error)
+        return found
+    known: dict[CofactorProduct, DarbouxSpace] = {}
+    for product in candidates:
+        if time.monotonic() > deadline:
+            found.reason = "the time was over before all products of cofactors were tried"
+            break
+        progress(f"cofactor {product.text(cofactors)}")
+        space = _without_constants(cofactor_space(sample, product, degree), product)
+        if space.basis:
+            known[product] = space
+    # Different products of cofactors may be the same function, and one of them may show that products span the space.
+    listed = [space for product, space in known.items() if _is_spanned_by_products(known, product, map_.prime)]
+    for product, space in known.items():
+        if space not in listed:
+            listed.append(space)
+            _list(found, laboratory, cofactors, product, space, deadline)
+    return found
+
+
+def _without_constants(space: DarbouxSpace, product: CofactorProduct) -> DarbouxSpace:
+    """For C = 1 the constants solve the equation: they are left out."""
+    if any(product.powers):
+        return space
+    return DarbouxSpace(space.dim, space.degree, [vector for vector in space.basis if any(vector[1:])])
+
+
+def _is_spanned_by_products(known: dict[CofactorProduct, DarbouxSpace], product: CofactorProduct, prime: int) -> bool:
+    """Whether products P Q of elements of other spaces, whose cofactors multiply to the given one, span its space."""
+    space = known[product]
+    by_powers = {one.powers: other for one, other in known.items() if one != product}
+    exponents = exponents_up_to(space.dim, space.degree)
+    places = {exponent: k for k, exponent in enumerate(exponents)}
+    rows = []
+    for powers, left in by_powers.items():
+        rest = tuple(a - b for a, b in zip(product.powers, powers, strict=True))
+        right = by_powers.get(rest)
+        if right is not None and powers <= rest:
+            rows += [_times(P, Q, exponents, places, prime) for P in left.basis for Q in right.basis]
+    return len(echelon([row for row in rows if row is not None], prime)) == len(space.basis)
+
+
+def _times(
+    P: list[int],
+    Q: list[int],
+    exponents: Sequence[tuple[int, ...]],
+    places: dict[tuple[int, ...], int],
+    prime: int,
+) -> list[int] | None:
+    row = [0] * len(places)
+    for a, p in zip(exponents, P, strict=True):
+        if p:
+            for b, q in zip(exponents, Q, strict=True):
+                if q:
+                    place = places.get(tuple(i + j for i, j in zip(a, b, strict=True)))
+                    if place is None:
+                        return None  # of too high a degree
+                    row[place] = (row[place] + p * q) % prime
+    return row
+
+
+def _list(
+    found: DarbouxSearch,
+    laboratory: Laboratory,
+    cofactors: Sequence[Cofactor],
+    product: CofactorProduct,
+    model: DarbouxSpace,
+    deadline: float,
+) -> None:
+    count = len(laboratory.symbols)
+
+    def spaces_at(prime: int, values: tuple[int, ...]) -> list[DarbouxSpace] | None:
+        eps = values[count] if len(values) > count else 1
+        if eps % prime == 0:
+            return None
+        map_ = laboratory.map_at(prime, values[:count], eps)
+        sample = Sample.of(map_, cofactors, points_needed(map_.dim, model.degree))
+        return [_without_constants(cofactor_space(sample, product, model.degree), product)]
+
+    forms = closed_forms(
+        [model],
+        spaces_at,
+        laboratory.system.variables,
+        laboratory.symbols,
+        laboratory.eps_enters,
+        seed=laboratory.seed,
+        seconds=max(1.0, deadline - time.monotonic()),
+    )
+    if forms.bases is None:
+        found.reason = f"no closed form for the cofactor {product.text(cofactors)}: {forms.reason}"
+        return
+    polynomials = tuple(forms.bases[0])
+    proved = all(_is_proved(laboratory, cofactors, product, P) for P in polynomials)
+    verdict = Verdict.PROVED if proved else Verdict.SUPPORTED
+    found.spaces.append(DarbouxPolynomials(product.text(cofactors), polynomials, verdict))
+
+
+def _is_proved(laboratory: Laboratory, cofactors: Sequence[Cofactor], product: CofactorProduct, P: fmpq_mpoly) -> bool:
+    """Whether P(x~) prod g(x, eps)^k = prod g(x~, -eps)^k P(x), expanded; False where that is too large."""
+    system = laboratory.system
+    K = FunctionField((*system.variables, *system.symbols, "eps"), _BUDGET)
+    point, values = K.variables[: system.dim], K.variables[system.dim : -1]
+    eps = K.variables[-1] if laboratory.eps is None else K.convert(laboratory.eps)
+    try:
+        map_ = KahanMapOver(system.over(K, values), eps)
+        image = map_.step(point)
+        left, right = evaluate(P, K, (*image, *values, eps)), evaluate(P, K, (*point, *values, eps))
+        for one, power in zip(cofactors, product.powers, strict=True):
+            for _ in range(power):
+                if one.polynomial is None:
+                    left, right = left * map_.determinant(point), right * map_.inverse.determinant(image)
+                else:
+                    left = left * evaluate(one.polynomial, K, (*point, *values, eps))
+                    right = right * evaluate(one.polynomial, K, (*image, *values, -eps))
+        return K.equal(left, right)
+    except (BudgetExceeded, SingularMatrix, SingularStep, ZeroDivisionError):
+        return False

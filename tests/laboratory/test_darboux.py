@@ -1,0 +1,88 @@
+"""All discrete Darboux polynomials of a degree: known ones, their identities on exact points, and what is not one."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.darboux import darboux_polynomials
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def listed(name: str, degree: int, **options: object) -> dict[str, list[str]]:
+    """Cofactors and polynomials as text."""
+    found = darboux_polynomials(load(name), degree, **options)  # type: ignore[arg-type]
+    assert not found.reason
+    return {space.cofactor: [format_polynomial(P) for P in space.polynomials] for space in found.spaces}
+
+
+def test_the_coordinates_of_lotka_volterra_and_nothing_else() -> None:
+    """Origin: x' = x(...), y' = y(...), and the map has no integral; products are not listed."""
+    assert listed("lotka_volterra", 4) == {"C[x]": ["x"], "C[y]": ["y"]}
+
+
+def test_the_pencils_of_the_periodic_volterra_lattice() -> None:
+    """Origin: petrera-pfadler-suris-2011, integrals x1 x3/(1 - eps^2 (x2 - x4)^2) and its shift."""
+    found = listed("volterra_periodic_4", 2)
+    assert found["C[x1]*C[x3]"] == ["x1*x3", "x2^2*eps^2 - 2*x2*x4*eps^2 + x4^2*eps^2 - 1"]
+    assert found["1"][0] == "x1 + x2 + x3 + x4"
+
+
+def test_symbols_and_a_given_eps() -> None:
+    with_symbols = darboux_polynomials(load("euler_top"), 4, symbols=("a1", "a2", "a3"))
+    (space,) = with_symbols.spaces
+    assert len(space.polynomials) == 6
+    assert space.verdict is Verdict.PROVED
+    at_eps = darboux_polynomials(load("weierstrass"), 3, eps="1/3")
+    assert all("eps" not in format_polynomial(P) for space in at_eps.spaces for P in space.polynomials)
+    assert at_eps.spaces
+
+
+@pytest.mark.parametrize("name", ["nahm_octahedral", "zhukovski_volterra_1", "dressing_chain_3", "henon_heiles"])
+def test_ratios_of_one_space_are_conserved_along_exact_orbits(name: str) -> None:
+    file = load(name)
+    rng = random.Random(name)
+    seen = 0
+    for space in darboux_polynomials(file, 4).spaces:
+        for eps in (fmpq(1, 7), fmpq(-2, 5)):
+            x = tuple(fmpq(rng.randint(-9, 9), rng.randint(1, 9)) for _ in file.variables)
+            image = KahanMap(file.system, eps).step(x)
+            before = [evaluate(P, QQ, (*x, eps)) for P in space.polynomials]
+            after = [evaluate(P, QQ, (*image, eps)) for P in space.polynomials]
+            for k in range(1, len(before)):
+                assert after[k] * before[0] == before[k] * after[0]
+                seen += 1
+            assert all(value != 0 for value in before), "a random point should lie on no Darboux curve"
+    assert seen > 0
+
+
+def test_a_perturbed_system_loses_them() -> None:
+    kept = QuadraticSystem.from_text(["x", "y"], ["x^2 - y^2", "-2*x*y"])
+    lost = QuadraticSystem.from_text(["x", "y"], ["x^2 - y^2 + 1", "-2*x*y + x + 1"])
+    assert any(len(s.polynomials) > 1 for s in darboux_polynomials(SystemFile.from_system(kept), 3).spaces)
+    found = darboux_polynomials(SystemFile.from_system(lost), 1)
+    assert found.spaces == []
+    assert not found.reason
+
+
+def test_degenerate_systems_and_wrong_use() -> None:
+    linear = SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], ["x", "3*y"]))
+    nowhere = darboux_polynomials(linear, 2, eps=1)
+    assert nowhere.spaces == []
+    assert nowhere.reason
+    zero = darboux_polynomials(SystemFile.from_system(QuadraticSystem.from_text(["x"], ["0"])), 2)
+    assert [space.cofactor for space in zero.spaces] == ["1"]
+    with pytest.raises(InputError):
+        darboux_polynomials(load("weierstrass"), 2, eps=0)
+    short = darboux_polynomials(load("volterra_periodic_5"), 4, seconds=0.0)
+    assert "time was over" in short.reason
