@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The main job in one minute: a member of the family, an orbit, integrals, commutativity and its control.
+# The main job in one minute: a member of the family, an orbit, integrals, commutativity and its control, an analysis.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mkdir -p .demo
@@ -45,5 +45,8 @@ axes = { m = "2..3", seed = "0..9" }
 END
 run batch run .demo/first.toml --db .demo/first.db -q
 run batch summary --db .demo/first.db -e heights --by m,growth --value constant --stable
+
+echo; echo "== a system of another kind: what does the map of the Euler top preserve, and is it integrable?"
+run analyze euler_top | cut -c 1-160
 
 echo; echo "The files are in .demo; start your own with: .venv/bin/kahanmaps --help"

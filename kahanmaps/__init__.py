@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis, analyze
     from kahanmaps.laboratory.commuting import CommutingSystems, commuting_systems
     from kahanmaps.laboratory.cycles import Census, cycle_census
+    from kahanmaps.laboratory.darboux import DarbouxSearch, darboux_polynomials
     from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
     from kahanmaps.laboratory.densities import DensitySearch, find_densities
     from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, constant_structures
@@ -104,6 +105,7 @@ _HOME = {
     "laboratory.analysis": ("Analysis", "analyze"),
     "laboratory.integrals": ("IntegralSearch", "Laboratory", "find_integrals"),
     "laboratory.hirota_kimura": ("hirota_kimura_basis", "orbit_profile"),
+    "laboratory.darboux": ("DarbouxSearch", "darboux_polynomials"),
     "laboratory.densities": ("DensitySearch", "find_densities"),
     "laboratory.degrees": ("DegreeGrowth", "degree_growth"),
     "laboratory.recurrences": ("Recurrence", "find_recurrence"),
@@ -187,6 +189,8 @@ __all__ = [
     "find_integrals",
     "hirota_kimura_basis",
     "orbit_profile",
+    "DarbouxSearch",
+    "darboux_polynomials",
     "DensitySearch",
     "find_densities",
     "DegreeGrowth",

@@ -1,4 +1,4 @@
-"""What the tests of the searches for integrals and densities share: systems in a line, exact orbits, functions modulo p.
+"""What the tests of the searches for integrals and densities share: short systems, exact orbits, residues of functions.
 
 Formulas are read here by Python with fractions, not by the library that wrote them.
 """
@@ -6,6 +6,7 @@ Formulas are read here by Python with fractions, not by the library that wrote t
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import islice
@@ -43,8 +44,11 @@ def value_of(formula: str, names: Sequence[str], point: Sequence[Any], eps: Any,
     """The value of a formula at a rational point."""
     numbers = {name: Fraction(str(value)) for name, value in zip(names, point, strict=True)}
     numbers |= {name: Fraction(str(value)) for name, value in (more | {"eps": eps}).items()}
-    words = formula.replace("^", "**")
-    return Fraction(eval(words, {"__builtins__": {}}, numbers))
+    # 4/3 alone would be a float to Python
+    words = re.sub(r"\b([0-9]+)\b", r"Fraction(\1)", formula.replace("^", "**"))
+    found = eval(words, {"__builtins__": {}, "Fraction": Fraction}, numbers)
+    assert isinstance(found, Fraction)
+    return found
 
 
 def values_on_orbits(
@@ -54,7 +58,7 @@ def values_on_orbits(
 
     An orbit ends at a pole of the map; where it starts at a pole of the formula, another takes its place.
     """
-    found = []
+    found: list[set[Fraction]] = []
     for step in eps:
         kahan = KahanMap(file.system, step)
         wanted = len(found) + starts

@@ -156,20 +156,26 @@ def commuting(
 
 @task("analyze")
 def analysis(
-    system: SystemFile, eps: Any = None, seconds: int | None = None, seed: int = 0, report: bool = False
+    system: SystemFile,
+    eps: Any = None,
+    symbolic: list[str] | None = None,
+    seconds: int | None = None,
+    seed: int = 0,
+    report: bool = False,
 ) -> Result:
     """All analyses at once: integrability in a word, integrals, growth, densities, symmetries, commuting systems."""
     from kahanmaps.family.structure import Structure
     from kahanmaps.laboratory.analysis import analyze
 
-    found = analyze(system, eps=eps, seconds=seconds, seed=seed)
+    found = analyze(system, symbols=symbolic or (), eps=eps, seconds=seconds, seed=seed)
     final, confined = found.conclusion, {run.verdict for run in found.singularities}
     unfinished = _unfinished(found)
     result: Result = {
         "status": "partial" if found.skipped or unfinished else "complete",
         "integrability": final.kind,
         "integrals": final.integrals,
-        **(_growth(found.degrees) if found.degrees is not None else {"growth": final.growth}),
+        **(_growth(found.degrees) if found.degrees is not None else {}),
+        "growth": final.growth,
         "densities": None if found.densities is None else len(found.densities.densities),
         "group_order": None if found.symmetries is None else found.symmetries.order,
         "commuting": None if found.commuting is None else len(found.commuting.nontrivial),
@@ -187,12 +193,11 @@ def _with_report(result: Result, found: Any, whole: bool) -> Result:
 
 
 def _state_of_integrals(found: IntegralSearch) -> str:
-    profile = found.profile
-    if not profile.nullities:
+    if not found.profile.nullities:
         return "not measured"
     if not found.is_complete:
         return "formulas missing"
-    return "complete" if profile.complete and profile.agree else "unfinished"
+    return "unfinished" if found.reason else "complete"
 
 
 def _state_of_densities(found: DensitySearch) -> str:
@@ -226,6 +231,7 @@ def _growth(found: DegreeGrowth) -> Result:
     recurrence, rate = found.recurrence, found.dynamical_degree
     return {
         "growth": str(found.growth),
+        "looks_exponential": found.looks_exponential,  # an estimate, where there is no recurrence
         "dynamical_degree": None if rate is None else rate.digits,
         "minimal_polynomial": None if rate is None else format_univariate(fmpq_poly(rate.minimal_polynomial)),
         "power": None if recurrence is None else recurrence.power,

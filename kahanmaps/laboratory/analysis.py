@@ -7,6 +7,7 @@ The number of integrals and the growth are two separate findings: a map may have
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -14,9 +15,8 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number, format_polynomial
-from kahanmaps.errors import KahanmapsError
+from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.commuting import CommutingSystems, commuting_systems
@@ -31,6 +31,7 @@ from kahanmaps.laboratory.singularities import MAX_DIMENSION as MAX_SINGULAR_DIM
 from kahanmaps.laboratory.singularities import SingularityRun, default_eps, singularities
 from kahanmaps.laboratory.sparse_relations import SparseRelation, sparse_relations
 from kahanmaps.laboratory.symmetries import Symmetries, linear_symmetries
+from kahanmaps.maps.orbits import counted
 from kahanmaps.systems.files import SystemFile
 
 PROVED, SUPPORTED, MEASURED, UNDECIDED, NOTE = "proved", "supported", "measured", "undecided", "note"
@@ -72,6 +73,7 @@ class Analysis:
     eps: fmpq | None
     seconds: float
     seed: int
+    symbols: tuple[str, ...] = ()
     integrals: IntegralSearch | None = None
     relations: tuple[SparseRelation, ...] = ()
     densities: DensitySearch | None = None
@@ -98,6 +100,12 @@ class Analysis:
         return max(measured, family)
 
     @property
+    def integrals_were_counted(self) -> bool:
+        """Whether `integral_count` says anything: it is 0 as well where the orbits were not reached or not defined."""
+        measured = self.integrals is not None and bool(self.integrals.profile.nullities or self.integrals.integrals)
+        return measured or isinstance(self.structure, Structure)
+
+    @property
     def conclusion(self) -> Conclusion:
         """The verdict; integrability and the number of integrals are told apart."""
         return _conclude(self)
@@ -121,14 +129,16 @@ class Analysis:
             "analysis": self.file.name,
             "version": __version__,
             "parameters": {name: format_number(value) for name, value in self.file.parameters.items()},
+            "symbols": list(self.symbols),
             "eps": "every" if self.eps is None else format_number(self.eps),
+            "time_step": "every" if self.eps is None else format_number(2 * self.eps),
             "convention": CONVENTION,
             "seed": self.seed,
             "seconds": self.seconds,
             "dim": self.dim,
             "verdict": {
                 "integrability": final.kind,
-                "integrals": final.integrals,
+                "integrals": final.integrals if self.integrals_were_counted else None,
                 "growth": final.growth,
                 "sentence": final.sentence,
             },
@@ -174,18 +184,20 @@ def analyze(
         An `Analysis`. Parts that there was no time for are named in `skipped`.
 
     Raises:
-        InputError: for eps = 0 and unknown symbols.
+        InputError: for eps = 0, unknown symbols, and a time that is not positive.
 
     >>> from kahanmaps.systems.catalog import load
     >>> found = analyze(load("nahm_tetrahedral"))
     >>> found.conclusion.kind, found.conclusion.integrals, found.conclusion.growth
     ('integrable', 1, 'quadratic')
     """
-    Laboratory(file, symbols, eps, seed)  # refuses what is wrong before any work is done
+    if seconds is not None and not (seconds > 0 and math.isfinite(seconds)):
+        raise InputError(f"found {seconds} seconds, expected a positive number")
+    laboratory = Laboratory(file, symbols, eps, seed)  # refuses what is wrong before any work is done
     # Without its claims, so that none can be read; with symbols the file itself is needed, and its claims are not read.
     bare = file if symbols else SystemFile.from_system(file.system, file.name)
     total = seconds if seconds is not None else _SECONDS.get(file.system.dim, _MOST_SECONDS)
-    found = Analysis(file, None if eps is None else rational(eps), total, seed)
+    found = Analysis(file, laboratory.eps, total, seed, laboratory.symbols)
     began = time.monotonic()
     system = bare.system
 
@@ -207,7 +219,8 @@ def analyze(
             maps = Laboratory(bare, (), found.eps, seed).maps
             top = profile.degree if profile.dim - profile.codimension <= 1 else profile.first_degree + 1
             for degree in range(profile.first_degree, min(top, 4) + 1):
-                found.relations += sparse_relations(maps, degree, system.variables) or ()
+                known = sum(len(relation.integrals) for relation in found.relations)
+                found.relations += sparse_relations(maps, degree, system.variables, first=known + 1) or ()
 
     def hamiltonian() -> None:
         if system.dim <= MAX_HAMILTONIAN_DIMENSION:
@@ -283,8 +296,11 @@ def _conclude(found: Analysis) -> Conclusion:
     n, count = found.dim, found.integral_count
     growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
     phrase = found.degrees.growth_text if found.degrees is not None else "degrees not measured"
-    integrals = "no integral" if count == 0 else f"{count} independent integral{'s' * (count > 1)}"
-    integrals += f" in dimension {n}"
+    if found.integrals_were_counted:
+        integrals = "no integral" if count == 0 else counted(count, "independent integral")
+        integrals += f" in dimension {n}"
+    else:
+        integrals = "the integrals were not counted"
     period = found.integrals.profile.period if found.integrals is not None else None
     suffix = "" if found.eps is None else f" All this at eps = {found.eps} only: other eps may differ."
 
@@ -294,12 +310,14 @@ def _conclude(found: Analysis) -> Conclusion:
     if found.degrees is not None and found.degrees.ended == "singular" and len(found.degrees.degrees) == 1:
         return conclude("singular", f"The map is nowhere defined: {found.degrees.message}.")
     if _is_affine(found):
-        return conclude("linear", f"The system is linear, and so is its Kahan map; {integrals}.")
+        closes = "" if period is None else f"; orbits close after {counted(period, 'step')} (measured)"
+        return conclude("linear", f"The system is linear, and so is its Kahan map; {integrals}{closes}.")
     if period is not None:
-        return conclude(
-            "linearisable", f"Orbits close after {period} steps (measured): the map is periodic there; {phrase}."
-        )
-    if growth in (GrowthClass.BOUNDED, GrowthClass.ZERO):
+        closes = f"Orbits close after {counted(period, 'step')} (measured)"
+        return conclude("linearisable", f"{closes}: the map is periodic there; {phrase}.")
+    if growth is GrowthClass.ZERO:
+        return conclude("linearisable", "An iterate of the map is a constant map (measured): orbits end in one point.")
+    if growth is GrowthClass.BOUNDED:
         return conclude(
             "linearisable",
             f"The degrees of the iterates are bounded (measured): the map is linearisable in the sense of "
@@ -347,7 +365,7 @@ def _integral_lines(found: Analysis) -> list[Statement]:
     if not profile.nullities:
         lines.append(Statement(UNDECIDED, f"how many integrals there are was not measured: {search.reason}"))
     elif profile.period is not None:
-        lines.append(Statement(MEASURED, f"all orbits tried close after {profile.period} steps"))
+        lines.append(Statement(MEASURED, f"all orbits tried close after {counted(profile.period, 'step')}"))
     else:
         nullities = ", ".join(map(str, profile.nullities))
         lines.append(

@@ -36,6 +36,7 @@ from kahanmaps.laboratory.modular_points import (
 
 _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
 MAX_UNKNOWNS = 1800
+_SETTLED = 4  # degrees
 _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 
 
@@ -74,6 +75,11 @@ class Profile:
     def codimension(self) -> int:
         """The number of independent integrals that the relations show."""
         return max(self.codimensions, default=0)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether several degrees were tried and the last one showed no more than the one before."""
+        return self.degree >= _SETTLED and self.codimensions[-1] == self.codimensions[-2]
 
     @property
     def first_degree(self) -> int | None:

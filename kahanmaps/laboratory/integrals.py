@@ -73,7 +73,8 @@ class IntegralSearch:
     """What `find_integrals` found.
 
     `integrals` are functionally independent; `codimension` is how many independent integrals the orbits show
-    (measured), `profile` how they show it. `reason` says what is missing and why. `eps` is None for every eps.
+    (measured), `profile` how they show it. `reason` says what is missing and why, empty where nothing is. `eps` is None
+    for every eps.
     """
 
     file: SystemFile
@@ -264,7 +265,7 @@ def find_integrals(
     >>> from kahanmaps.systems.catalog import load
     >>> found = find_integrals(load("nahm_tetrahedral"))
     >>> [(one.text, str(one.verdict)) for one in found.integrals], found.codimension
-    ([('(-3*x^2*y + y^3)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
+    ([('(3*x^2*y - y^3)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
     """
     if not seconds > 0:
         raise InputError(f"found {seconds} seconds, expected a time above 0")
@@ -283,7 +284,7 @@ def find_integrals(
     try:
         profile = orbit_profile(laboratory.maps, max_degree=max_degree, seconds=seconds / 3, progress=progress)
         if profile.codimension == 0:
-            return result(_theorem(laboratory, [], 1), profile, _unfinished(profile))
+            return result(_theorem(laboratory, [], 1), profile, _unfinished(profile, max_degree))
         cofactors = laboratory.cofactors()
         found = search(laboratory.maps[0], profile, cofactors, (deadline - time.monotonic()) / 2, progress)
         formulas, reason = _formulas(laboratory, found, cofactors, deadline, progress)
@@ -291,17 +292,19 @@ def find_integrals(
         return result([], empty, str(error))
     integrals = _independent(laboratory, formulas, progress)
     integrals += _theorem(laboratory, integrals, profile.codimension)
-    if len(integrals) < profile.codimension and not reason:
+    if len(integrals) >= profile.codimension:
+        reason = ""
+    elif not reason:
         reason = (
             f"{profile.codimension - len(integrals)} of the {profile.codimension} integrals that orbits show have no "
             "closed form P/Q of the degrees that were tried: coefficients of Hirota-Kimura bases are such integrals"
         )
-    return result(integrals, profile, "; ".join(text for text in (reason, _unfinished(profile)) if text))
+    return result(integrals, profile, "; ".join(filter(None, (reason, _unfinished(profile, max_degree)))))
 
 
-def _unfinished(profile: Profile) -> str:
-    """What the profile leaves open; empty where it left nothing."""
-    if not profile.complete:
+def _unfinished(profile: Profile, max_degree: int | None) -> str:
+    """What the profile leaves open; empty where it left nothing that was asked for or is likely to show more."""
+    if not profile.complete and (max_degree is not None or not profile.is_settled):
         return f"relations of degree {profile.degree + 1} and more were not tried: too many unknowns or too little time"
     return "" if profile.agree else "the orbits that were compared do not agree: try another --seed"
 

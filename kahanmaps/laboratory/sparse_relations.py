@@ -50,12 +50,21 @@ class SparseRelation:
 
 
 def sparse_relations(
-    maps: Sequence[ModularMap], degree: int, variables: Sequence[str], most_terms: int = 12
+    maps: Sequence[ModularMap], degree: int, variables: Sequence[str], most_terms: int = 12, first: int = 1
 ) -> tuple[SparseRelation, ...] | None:
     """The relations of degree `degree` that those of lower degree do not imply; None where orbits disagree.
 
-    A relation with more than `most_terms` terms is left out. Names c1, c2, ... go through all relations; integrals
-    that are equal have one name.
+    `maps` are two or more maps of one system, with different primes. A relation with more than `most_terms` terms is
+    left out. The names of integrals go through all relations of the degree, from c1 or the given `first` on; those
+    that are equal have one name. Raises NoPoint where orbits meet the singular set.
+
+    Source: petrera-pfadler-suris-2009.
+
+    >>> from kahanmaps.laboratory.integrals import Laboratory
+    >>> from kahanmaps.systems.catalog import load
+    >>> top = load("euler_top")
+    >>> [one.text for one in sparse_relations(Laboratory(top).maps, 2, top.variables)]
+    ['x1^2 + c1*x3^2 + c2 = 0', 'x2^2 + c3*x3^2 + c4 = 0']
     """
     dim = maps[0].dim
     support = sorted(exponents_up_to(dim, degree), key=lambda e: -sum(e))
@@ -71,16 +80,16 @@ def sparse_relations(
     lower = _implied(maps[0], degree, support)
     found = []
     names: dict[tuple[int, int, int], str] = {}
-    for first, again, other in zip(*tables, strict=True):
-        lead = next(k for k, entry in enumerate(first) if entry)
-        used = [k for k, entry in enumerate(first) if entry]
+    for one, again, other in zip(*tables, strict=True):
+        used = [k for k, entry in enumerate(one) if entry]
+        lead = used[0]
         if support[lead] in lower or len(used) > most_terms:
             continue
         terms = []
         for k in used:
-            number = _number(first[k], again[k], other[k], maps[0].prime, maps[1].prime)
+            number = _number(one[k], again[k], other[k], maps[0].prime, maps[1].prime)
             if number is None:
-                text = names.setdefault((first[k], again[k], other[k]), f"c{len(names) + 1}")
+                text = names.setdefault((one[k], again[k], other[k]), f"c{first + len(names)}")
             else:
                 text = format_number(number)
             terms.append((_monomial(support[k], variables), text))

@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.errors import InputError
+from kahanmaps.experiments import registry
 from kahanmaps.experiments.options import FAMILY, VOCABULARY, Option, show, suggestion
 from kahanmaps.experiments.registry import task_kinds
 
@@ -44,6 +45,13 @@ SAME = [
     ("eigenvalues", ["1,0.5", "1, 1/2"], "1,1/2"),
     ("signs", ["1,-1", "+1, -1"], "1,-1"),
     ("signs", ["-1,1"], "-1,1"),
+    ("symbolic", ["a1,a2", "a2, a1", " a1 ,a2,a1"], "a1,a2"),
+    ("seconds", [60, "60", "60.0", "120/2"], 60),
+    ("terms", [8, "8"], 8),
+    ("max_degree", [0, "0"], 0),
+    ("samples", [100, "1e2"], 100),
+    ("transient", [0, "0"], 0),
+    ("shape", ["quadratic"], "quadratic"),
 ]
 
 
@@ -87,6 +95,8 @@ def test_a_canonical_value_is_what_json_gives_back(name, written, canonical):
         ("method", "jump", "jump"),
         ("chi", "t^2 - 2", fmpq_poly([-2, 0, 1])),
         ("eigenvalues", "1,1/2", (fmpq(1), fmpq(1, 2))),
+        ("symbolic", "a1,a2", ["a1", "a2"]),
+        ("seconds", 60, 60),
     ],
 )
 def test_an_option_makes_what_the_library_wants(name, canonical, made):
@@ -157,6 +167,15 @@ def test_a_point_gives_its_numbers_back(point):
         ("chi", 2, "found 2, expected a polynomial in t, as text"),
         ("eigenvalues", ",".join(["1"] * 17), "found 17 numbers, expected at most 16"),
         ("draw", "genric", "did you mean generic?"),
+        ("symbolic", "a,eps", "found eps, expected names of parameters: without a value of eps it is in all formulas"),
+        ("symbolic", "a,,b", "found the name '', expected names of parameters in one text"),
+        ("symbolic", "a b", "found the name 'a b', expected names"),
+        ("symbolic", 1, "found 1, expected names of parameters in one text"),
+        ("seconds", 0, "found 0, expected a whole number from 1 to 1000000"),
+        ("seconds", "1/2", "found 1/2, expected a whole number from 1"),
+        ("terms", 0, "found 0, expected a whole number from 1 to 10000"),
+        ("samples", 0, "found 0, expected a whole number from 1 to 100000"),
+        ("shape", "linaer", "did you mean linear?"),
     ],
 )
 def test_what_is_no_value_is_told_in_a_sentence(name, value, words):
@@ -227,5 +246,5 @@ def test_every_option_has_a_name_and_a_help(option: Option):
 
 @pytest.mark.parametrize("name", VOCABULARY)
 def test_every_option_of_the_vocabulary_is_used_by_a_task_of_the_library(name):
-    ours = [kind for kind in task_kinds().values() if kind.function.__module__ == "kahanmaps.experiments.tasks"]
+    ours = [kind for kind in task_kinds().values() if kind.function.__module__ in registry.LIBRARY]
     assert any(name in kind.options for kind in ours)

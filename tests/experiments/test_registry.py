@@ -19,8 +19,10 @@ from kahanmaps.experiments.registry import ENVIRONMENT, MEMBER, SYSTEM, task, ta
 
 LIBRARY = (
     "check-commute", "check-integrals", "check-measure", "check-poisson", "verify", "verify-universal", "family-space",
-    "orbit", "heights", "period",
+    "orbit", "ensemble", "heights", "period", "degrees", "find-integrals", "find-density", "find-symmetry",
+    "find-commuting", "analyze", "singularities", "cycles", "lyapunov",
 )  # fmt: skip
+DOCUMENTATION = Path(__file__).parents[2] / "docs" / "batch.md"
 
 
 @pytest.fixture(autouse=True)
@@ -58,6 +60,7 @@ def f(seed: int = 0):
 @pytest.mark.parametrize("name", LIBRARY)
 def test_the_library_has_the_tasks_that_are_documented(name):
     assert task_kind(name).name == name
+    assert f"`{name}`" in DOCUMENTATION.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", LIBRARY)

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from flint import fmpq
+from task_helpers import made, member, perform
 
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
 from kahanmaps.checks.claims import Report, Verdict
@@ -19,9 +20,7 @@ from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.recipes import recipe_of, system_from
 from kahanmaps.experiments.records import canonical
-from kahanmaps.experiments.registry import task_kind
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.structure import structure_of
 from kahanmaps.invariants.heights import height_growth
@@ -46,28 +45,9 @@ phi = "x + y"
 """
 
 
-def made(file: SystemFile) -> SystemFile:
-    """The system as a child has it: from the recipe of the file."""
-    documents: dict[str, str] = {}
-    return system_from(recipe_of(file, documents), documents.__getitem__)
-
-
-def member(m: int = 2, seed: int = 1, **recipe: Any) -> SystemFile:
-    return system_from({"family": {"draw": "eigenvalues", "m": m, "seed": seed, **recipe}}, {}.__getitem__)
-
-
 MEMBER, LORENZ, TOP, RIVALS, WRONG = member(), *map(made, map(load, ["lorenz", "euler_top", "lotka_volterra"])), made(
     parse_system(FALSE)
 )  # fmt: skip
-
-
-def perform(name: str, system: SystemFile | None, **asked: Any) -> dict[str, Any]:
-    """What a task gives, with the defaults of its kind for what is not asked; it has to be plain data."""
-    kind = task_kind(name)
-    given = {key: value if key == "other" else kind.options[key].read(value) for key, value in asked.items()}
-    result = kind.perform(system, {**kind.defaults, **given})
-    assert json.loads(canonical(result)) == result
-    return result
 
 
 def start_of(system: SystemFile, seed: int = 0) -> Any:

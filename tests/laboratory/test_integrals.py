@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from functools import cache
 
 import pytest
 from flint import fmpq
@@ -20,6 +21,7 @@ from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.systems.catalog import load, names
 
 PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
+LONG = ("henon_heiles", "paper_m2")
 EPS = ["1/10", "-2/7", "3"]
 # All known integrals of these files are found, in closed form.
 FOUND = {name: load(name).catalog["codimension"] for name in PLANE_AND_SPACE}
@@ -30,14 +32,19 @@ SYMBOLS = [
 ]
 
 
+@cache
+def searched(name):
+    return find_integrals(load(name))
+
+
 def independent(functions, file, others=(), symbols=()):
     return ranks(list(functions), list(others), Laboratory(file, symbols).maps[0])
 
 
-@pytest.mark.parametrize("name", PLANE_AND_SPACE)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in PLANE_AND_SPACE])
 def test_the_integrals_of_the_literature_are_found(name):
     file = load(name)
-    found = find_integrals(file)
+    found = searched(name)
     functions = [one.function for one in found.integrals]
     assert len(functions) == found.codimension == FOUND[name]
     assert all(one.verdict is Verdict.PROVED for one in found.integrals)
@@ -53,7 +60,7 @@ def test_the_integrals_of_the_literature_are_found(name):
 )
 def test_formulas_are_constant_along_exact_orbits(name):
     file = load(name)
-    for one in find_integrals(file).integrals:
+    for one in searched(name).integrals:
         values = values_on_orbits(file, one.text, EPS)
         assert [len(each) for each in values] == [1] * 9
         assert len(set().union(*values)) >= 3  # and not constants
@@ -81,7 +88,7 @@ def test_six_dimensions(name, number):
     assert (len(found.integrals), found.codimension) == (number, file.catalog["codimension"])
     assert all(one.verdict.holds for one in found.integrals)
     assert found.is_complete == (number == found.codimension)
-    assert bool(found.reason) == (not found.is_complete or not found.profile.complete)
+    assert bool(found.reason) == (not found.is_complete)
     for one in found.integrals:
         assert {len(each) for each in values_on_orbits(file, one.text, ["1/10"], steps=2)} == {1}
 
@@ -204,13 +211,14 @@ def test_identities_without_values_are_undecided(rhs, eps, text):
         (system("x", "x"), [], None),
         (system("x", "1 + x^2"), [], None),
         (system("x y", "y", "-x"), ["x^2 + y^2"], None),
-        (system("x y z", "y", "-x", "1"), ["x^2 + y^2"], None),
+        pytest.param(system("x y z", "y", "-x", "1"), ["x^2 + y^2"], None, marks=pytest.mark.slow),
     ],
 )
 def test_simple_systems(file, texts, period):
     found = find_integrals(file)
     assert ([one.text for one in found.integrals], found.profile.period) == (texts, period)
-    assert found.is_complete and found.profile.complete
+    assert found.is_complete
+    assert found.profile.complete
 
 
 @pytest.mark.parametrize(
@@ -247,7 +255,8 @@ def test_maps_that_are_periodic_at_an_eps(file, eps, period):
 def test_maps_that_are_none_are_told(rhs, eps, words):
     found = find_integrals(system("x y", *rhs), eps=eps)
     assert (found.integrals, found.profile.nullities, found.profile.complete) == ((), (), False)
-    assert words in found.reason and f"eps = {eps}" in found.reason
+    assert words in found.reason
+    assert f"eps = {eps}" in found.reason
 
 
 def test_nothing_is_concluded_at_a_neighbour_of_such_an_eps():
@@ -279,7 +288,7 @@ def test_too_little_time_is_told():
 
 
 def test_the_same_seed_gives_the_same():
-    documents = [find_integrals(load("dressing_chain_3"), seed=seed).to_json() for seed in (3, 3, 4)]
+    documents = [find_integrals(load("zander_111"), seed=seed).to_json() for seed in (3, 3, 4)]
     assert documents[0] == documents[1]
     assert documents[0]["primes"] != documents[2]["primes"]
     assert documents[0]["integrals"][0]["integral"] == documents[2]["integrals"][0]["integral"]
@@ -294,6 +303,7 @@ def test_hamiltonian_planes_always_have_one(coefficients):
     polynomial = parse_rational_function(H, ["x", "y"]).numerator
     file = system("x y", str(polynomial.derivative(1)), str(-polynomial.derivative(0)))
     found = find_integrals(file)
-    assert len(found.integrals) >= 1 and found.is_complete
+    assert len(found.integrals) >= 1
+    assert found.is_complete
     for one in found.integrals:
         assert {len(each) for each in values_on_orbits(file, one.text, ["1/9"], starts=1, steps=2)} == {1}

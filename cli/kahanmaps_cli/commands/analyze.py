@@ -69,7 +69,8 @@ def _title(found: Analysis) -> str:
     else:
         step = f"eps = {found.eps} (time step 2 eps = {2 * found.eps})"
     values = "".join(f", {name} = {value}" for name, value in found.file.parameters.items())
-    return f"{found.file.name}, dimension {found.dim}{values}, {step}"
+    formulas = f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
+    return f"{found.file.name}, dimension {found.dim}{values}, {step}{formulas}"
 
 
 def _print(found: Analysis) -> None:

@@ -89,7 +89,7 @@ def command(system: str | None, **options: Any) -> int:
         click.echo(_count(found))
         for text in filter(None, (found.note, found.reason)):
             click.echo(f"note\t{text}")
-    return 0 if found.is_complete and found.profile.complete else 3
+    return 3 if found.reason else 0
 
 
 def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:

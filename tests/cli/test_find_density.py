@@ -1,0 +1,134 @@
+"""kahanmaps find-density: densities that check-measure accepts, honest words where there are none, no traceback."""
+
+from __future__ import annotations
+
+import pytest
+
+from kahanmaps.systems.catalog import load
+from kahanmaps.version import __version__
+
+RAMP = "--vars x,y --rhs x --rhs 3*y"
+
+
+def without_density(name):
+    return load(name).to_toml().split("[density]")[0]
+
+
+def test_densities_and_verdicts(kahanmaps):
+    outcome = kahanmaps("find-density lotka_volterra")
+    assert outcome.status == 0
+    assert outcome.out.splitlines() == [
+        "find-density: lotka_volterra, every eps (the time step is 2 eps)",
+        "phi\tproved\tx*y",
+        "\tboth sides are the same rational function, for every eps",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "check"),
+    [
+        ("euler_top", "", ""),
+        ("euler_top", "--symbolic a1,a2,a3", "-p a1=3/2 -p a2=5"),
+        ("euler_top", "--eps 1/3", "--eps 1/3"),
+        ("dressing_chain_3", "--symbolic b1,b2,b3", "-p b1=7"),
+        ("weierstrass", "--symbolic g2", "-p g2=-3/5"),
+        ("henon_heiles", "", "--steps 3"),
+        pytest.param("volterra_periodic_4", "", "", marks=pytest.mark.slow),
+        ("lotka_volterra", "", ""),
+    ],
+)
+def test_the_section_is_accepted_by_check_measure(kahanmaps, tmp_path, name, options, check):
+    section = kahanmaps(f"find-density {name} --toml", options)
+    assert (section.status, section.out.count("[density]\nphi = ")) == (0, 1)
+    path = tmp_path / "system.toml"
+    path.write_text(without_density(name) + section.out)
+    report = kahanmaps("check-measure", path, "--json", check)
+    assert report.status == 0
+    assert {finding["verdict"] for finding in report.json["claims"]} <= {"proved", "supported"}
+
+
+def test_a_density_for_one_eps_is_refuted_at_another(kahanmaps, tmp_path):
+    section = kahanmaps("find-density euler_top --eps 1/3 --toml").out
+    assert section.startswith("# for eps = 1/3 only (time step 2 eps = 2/3): check with --eps 1/3\n")
+    path = tmp_path / "system.toml"
+    path.write_text(without_density("euler_top") + section)
+    assert kahanmaps("check-measure", path, "--eps 1/4").status == 1
+
+
+def test_json_is_one_object_with_all_that_is_needed_to_redo_it(kahanmaps):
+    outcome = kahanmaps("find-density lotka_volterra --eps 1/7 --seed 2 --json -q")
+    found = outcome.json
+    assert (outcome.status, outcome.err) == (0, "")
+    keys = ("search", "version", "system", "symbols", "eps", "time_step", "seed", "degree_tried", "period", "reason")
+    assert [found[key] for key in keys] == [
+        "find-density",
+        __version__,
+        "lotka_volterra",
+        [],
+        "1/7",
+        "2/7",
+        2,
+        2,
+        None,
+        "",
+    ]
+    assert [one["phi"] for one in found["densities"]] == ["x*y"]
+    assert len(found["primes"]) == 2
+    assert "document" in found
+    assert "convention" in found
+    assert kahanmaps("find-density lotka_volterra --eps 1/7 --seed 2 --json -q").json == found
+
+
+def test_latex(kahanmaps):
+    assert kahanmaps("find-density lotka_volterra --latex").out.startswith("phi = ")
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("lorenz --max-degree 3", "no polynomial of degree at most 3, and no reciprocal of one, is a density"),
+        (f"{RAMP} --eps 1", "at eps = 1 the map has no value anywhere"),
+        ("--vars x,y --rhs=-x --rhs=-y --eps 1", "at eps = 1 the map is not invertible"),
+    ],
+)
+def test_none_gives_3(kahanmaps, command, words):
+    outcome = kahanmaps(f"find-density {command}")
+    assert (outcome.status, words in outcome.out, "phi\t" in outcome.out) == (3, True, False)
+    toml = kahanmaps(f"find-density {command} --toml")
+    assert (toml.status, toml.out) == (3, "")
+
+
+def test_a_map_that_is_periodic_at_this_eps_is_told(kahanmaps):
+    outcome = kahanmaps("find-density henon_heiles --eps 1")
+    assert outcome.status == 0
+    assert outcome.out.splitlines()[-1] == (
+        "note\torbits close after 4 steps: at eps = 1 the map is periodic (measured); nothing follows for other eps"
+    )
+    assert "every eps" not in outcome.out
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("euler_top --symbolic zz", "found the symbol 'zz'"),
+        ("euler_top --symbolic eps --eps 1", "give --eps as a number, or eps among --symbolic"),
+        ("euler_top --eps 0", "found eps = 0"),
+        ("euler_top --seconds 0.5", "0.5"),
+        ("euler_top --max-degree -1", "-1 is not in the range"),
+        ("euler_top --toml --latex", "give one of --toml, --latex and --json"),
+        ("--vars x,y --rhs x/a --rhs x -p a=1 --symbolic a", "a division by something with variables in it"),
+        ("", "missing SYSTEM"),
+    ],
+)
+def test_wrong_use_gives_2(kahanmaps, options, words):
+    outcome = kahanmaps(f"find-density {options}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err
+    assert "Traceback" not in outcome.err
+
+
+def test_the_help_fits_a_terminal(kahanmaps):
+    outcome = kahanmaps("find-density --help")
+    assert outcome.status == 0
+    assert max(map(len, outcome.out.splitlines())) <= 80
+    assert outcome.out.count("kahanmaps find-density") >= 3

@@ -1,0 +1,479 @@
+"""The tasks of the laboratory: each gives what a direct call gives, in words and numbers that can be grouped by.
+
+Known answers, with their origin, are those of the catalogue: the degrees 2 n^2 + 1 of the Euler top, the dynamical
+degrees 2 and 3 of maps without cancellation, the integrals and densities of the literature that the files name.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from task_helpers import made, member, perform
+
+import kahanmaps as km
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.export import write_csv, write_jsonl
+from kahanmaps.experiments.registry import task_kind
+from kahanmaps.experiments.store import Store
+from kahanmaps.experiments.summary import summarise
+from kahanmaps.laboratory import densities, integrals
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.commuting import commuting_systems
+from kahanmaps.laboratory.cycle_laws import compare
+from kahanmaps.laboratory.cycles import cycle_census
+from kahanmaps.laboratory.degrees import degree_growth
+from kahanmaps.laboratory.reversors import find_reversor
+from kahanmaps.laboratory.singularities import singularities
+from kahanmaps.laboratory.symmetries import linear_symmetries
+from kahanmaps.maps.float_ensemble import starts_in_box
+from kahanmaps.maps.float_lyapunov import lyapunov_exponents
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.files import SystemFile, parse_system
+
+TASKS = (
+    "degrees", "find-integrals", "find-density", "find-symmetry", "find-commuting", "analyze", "singularities",
+    "cycles", "lyapunov",
+)  # fmt: skip
+NEEDED: dict[str, dict[str, Any]] = {"cycles": {"prime": 31}, "lyapunov": {"eps": "1/10", "steps": 40}}
+SURVEY = Path(__file__).parents[2] / "examples" / "growth_survey.toml"
+
+
+def of_catalogue(name: str) -> SystemFile:
+    return made(load(name))
+
+
+def of_rhs(*rhs: str) -> SystemFile:
+    variables = ["x", "y", "z"][: len(rhs)]
+    return made(parse_system(f"variables = {json.dumps(variables)}\n[system]\nrhs = {json.dumps(list(rhs))}"))
+
+
+TOP, LORENZ, RIVALS, WEIERSTRASS, NAHM = map(
+    of_catalogue, ["euler_top", "lorenz", "lotka_volterra", "weierstrass", "nahm_tetrahedral"]
+)
+ZERO, LINE, OSCILLATOR = of_rhs("0", "0"), of_rhs("x^2"), of_rhs("y", "-x")
+
+
+# All of them
+
+
+@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("system", [ZERO, LINE, OSCILLATOR], ids=["zero", "line", "oscillator"])
+def test_degenerate_systems_have_results_too(name, system):
+    result = perform(name, system, **NEEDED.get(name, {}))
+    assert result["status"]
+    assert result.get("verdict", "proved") in (None, "proved", "supported", "undecided")
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_the_same_task_has_the_same_result(name):
+    asked = NEEDED.get(name, {})
+    assert perform(name, NAHM, **asked) == perform(name, NAHM, **asked)
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_no_entry_of_a_result_has_the_name_of_an_option(name):
+    # Otherwise its column would be called result.x.
+    result = perform(name, NAHM, **NEEDED.get(name, {}))
+    assert not set(result) & set(task_kind(name).options)
+
+
+@pytest.mark.parametrize("name", [name for name in TASKS if "eps" in task_kind(name).options])
+def test_eps_0_is_refused(name):
+    with pytest.raises(InputError, match="at eps = 0 the Kahan map is the identity"):
+        perform(name, NAHM, **{**NEEDED.get(name, {}), "eps": 0})
+
+
+@pytest.mark.parametrize("name", [name for name in TASKS if name not in ("cycles", "singularities", "lyapunov")])
+def test_the_whole_report_is_kept_if_asked_for(name):
+    calls = {
+        "degrees": lambda: degree_growth(RIVALS.system),
+        "find-integrals": lambda: integrals.find_integrals(RIVALS),
+        "find-density": lambda: densities.find_densities(RIVALS),
+        "find-symmetry": lambda: linear_symmetries(RIVALS.system),
+        "find-commuting": lambda: commuting_systems(RIVALS.system),
+        "analyze": lambda: analyze(RIVALS),
+    }
+    short, long = perform(name, RIVALS), perform(name, RIVALS, report=True)
+    assert "report" not in short
+    seconds = {"seconds": long["report"].get("seconds")} if name == "analyze" else {}
+    assert long == {**short, "report": {**json.loads(json.dumps(calls[name]().to_json())), **seconds}}
+
+
+# Degrees
+
+
+@pytest.mark.parametrize(
+    ("system", "growth", "rate", "power"),
+    [
+        (TOP, "quadratic", "1", 2),
+        (RIVALS, "exponential", "2", 0),
+        (OSCILLATOR, "bounded", "1", 0),
+        (LINE, "bounded", "1", 0),
+        (member(1), "quadratic", "1", 2),
+    ],
+)
+def test_the_growth_of_degrees_is_known(system, growth, rate, power):
+    found = perform("degrees", system)
+    assert (found["growth"], found["dynamical_degree"], found["power"]) == (growth, rate, power)
+    assert found["status"] == "recurrence"
+    assert found["degrees"] == list(degree_growth(system.system).degrees)
+    assert found["reached"] == len(found["degrees"]) - 1
+
+
+def test_the_degrees_of_the_top_have_their_closed_form():
+    found = perform("degrees", TOP)
+    assert (found["closed_form"], found["minimal_polynomial"]) == ("2*n^2 + 1", "t - 1")
+
+
+@pytest.mark.parametrize(
+    ("asked", "status", "degrees"),
+    [
+        ({"terms": 3}, "terms", [1, 3, 9, 27]),
+        ({"terms": 2, "eps": "1/7"}, "terms", [1, 3, 9]),
+        ({"max_degree": 10}, "degree", [1, 3, 9]),
+    ],
+)
+def test_degrees_end_where_they_are_told_to(asked, status, degrees):
+    found = perform("degrees", LORENZ, **asked)
+    assert (found["status"], found["degrees"]) == (status, degrees)
+
+
+def test_a_result_that_the_time_cut_short_says_so():
+    # Degrees of 10^6 take minutes.
+    found = perform("degrees", of_catalogue("henon_heiles"), seconds=1, max_degree=10**6)
+    assert (found["status"], found["growth"]) == ("time", "unknown")
+
+
+def test_growth_without_a_recurrence_is_estimated_and_not_more():
+    found = perform("degrees", of_catalogue("henon_heiles"), max_degree=1000)
+    assert (found["growth"], found["looks_exponential"], found["status"]) == ("unknown", True, "degree")
+    assert not perform("degrees", TOP)["looks_exponential"]
+
+
+def test_a_growth_that_is_not_known_is_called_so():
+    found = perform("degrees", LORENZ, terms=1)
+    assert (found["growth"], found["dynamical_degree"], found["recurrence"]) == ("unknown", None, None)
+
+
+def test_one_eps_may_be_special():
+    # (x, y)' = (y, -x) at eps = 1 turns by a right angle; for other eps orbits do not close.
+    assert perform("find-integrals", OSCILLATOR, eps=1)["period"] == 4
+    assert perform("find-integrals", OSCILLATOR)["period"] is None
+
+
+# Formulas
+
+
+@pytest.mark.parametrize(
+    ("system", "count", "verdict"), [(TOP, 2, "proved"), (NAHM, 1, "proved"), (RIVALS, 0, None), (LORENZ, 0, None)]
+)
+def test_integrals_are_counted_and_given(system, count, verdict):
+    found = perform("find-integrals", system)
+    assert (found["integrals"], found["codimension"], found["verdict"]) == (count, count, verdict)
+    assert len(found["formulas"]) == count
+    assert (found["status"], found["reason"]) == ("complete", "")
+
+
+def test_formulas_contain_the_parameters_that_are_asked_for():
+    found = perform("find-integrals", TOP, symbolic="a1, a2")
+    assert all("a2" in text for text in found["formulas"])
+    assert not any("a3" in text for text in found["formulas"])
+
+
+def test_formulas_for_one_eps_do_not_contain_it():
+    found = perform("find-integrals", NAHM, eps="1/10")
+    assert found["verdict"] == "proved"
+    assert "eps" not in found["formulas"][0]
+
+
+def test_what_is_missing_has_a_reason():
+    # Four integrals by petrera-pfadler-suris-2009, not all of them quotients of small degree.
+    found = perform("find-integrals", of_catalogue("clebsch_first_flow"), seconds=30, max_degree=2)
+    assert (found["status"], found["codimension"] > found["integrals"] > 0) == ("formulas missing", True)
+    assert "no closed form" in found["reason"]
+
+
+def test_a_search_of_low_degree_only_says_how_far_it_went():
+    found = perform("find-integrals", TOP, max_degree=1)
+    assert (found["integrals"], found["nullities"]) == (0, [0])
+
+
+def test_a_map_without_values_has_no_orbits_to_measure():
+    # x' = x: det(I - eps f') = 1 - eps vanishes identically at eps = 1.
+    found = perform("find-integrals", of_rhs("x"), eps=1)
+    assert (found["status"], found["codimension"], found["verdict"]) == ("not measured", None, None)
+    assert "det(I - eps f'(x)) is identically 0" in found["reason"]
+    assert perform("find-density", of_rhs("x"), eps=1)["status"] == "open"
+
+
+def test_densities_are_those_of_the_literature():
+    # x y for Lotka and Volterra's equations: sanz-serna-1994.
+    found = perform("find-density", RIVALS)
+    assert (found["status"], found["verdict"], found["degree_tried"]) == ("found", "proved", 2)
+    assert found["formulas"] == ["x*y"]
+
+
+def test_no_density_up_to_a_degree_is_measured_and_has_no_verdict():
+    found = perform("find-density", LORENZ, max_degree=2)
+    assert (found["status"], found["verdict"], found["densities"], found["degree_tried"]) == ("none", None, 0, 2)
+
+
+def test_a_hamiltonian_system_has_a_density():
+    found = perform("find-density", WEIERSTRASS)
+    assert (found["status"], found["verdict"]) == ("found", "proved")
+
+
+# Symmetries and commuting systems
+
+
+def test_symmetries_are_those_of_the_library():
+    found, direct = perform("find-symmetry", TOP), linear_symmetries(TOP.system)
+    assert (found["group_order"], found["generators"]) == (direct.order, [one.text for one in direct.generators])
+    assert found["symmetries"] == found["reversing"] == 8
+    assert (found["verdict"], found["status"], found["scaling"]) == ("proved", "complete", True)
+
+
+def test_a_member_commutes_with_its_associated_maps_and_others_with_nothing():
+    # m = 2, two factors: g = B f with B^2 = I up to sign has four solutions, two of them f and -f (petrera-suris-2016).
+    found = perform("find-commuting", member(2))
+    direct = commuting_systems(member(2).system)
+    assert found["commuting"] == len(direct.nontrivial) > 0
+    assert found["systems"] == [one.rhs for one in direct.nontrivial]
+    alone = perform("find-commuting", RIVALS)
+    assert (alone["commuting"], alone["status"], alone["verdict"]) == (0, "complete", "proved")
+
+
+def test_the_shape_of_commuting_systems_may_be_chosen():
+    found = perform("find-commuting", ZERO, shape="quadratic")
+    assert found["every_g_commutes"]
+
+
+# Singularities, cycles, exponents
+
+
+@pytest.mark.parametrize(("system", "word"), [(TOP, "confined"), (WEIERSTRASS, "confined"), (RIVALS, "not confined")])
+def test_confinement_is_known(system, word):
+    found = perform("singularities", system)
+    assert (found["confinement"], found["status"]) == (word, "complete")
+    assert len(found["tried"]) == len(set(found["tried"])) == 2
+
+
+def test_singularities_at_one_eps_are_those_of_the_library():
+    found = perform("singularities", RIVALS, eps="1/10", steps=5, report=True)
+    run = singularities(RIVALS.system, "1/10", steps=5)
+    assert found["tried"] == ["1/10"]
+    assert found["report"][0]["polynomials"] == [h.polynomial for h in run.hypersurfaces]
+    assert [h["ranks"] for h in found["hypersurfaces"]] == [[s.rank for s in h.steps] for h in run.hypersurfaces]
+    assert all(len(h["ranks"]) == 5 for h in found["hypersurfaces"])
+
+
+def test_the_cycles_of_an_integrable_map_are_short_and_those_of_others_are_not():
+    integrable, other = (perform("cycles", system, prime=101) for system in (WEIERSTRASS, RIVALS))
+    assert (integrable["integrable_bound"], other["integrable_bound"]) == ("compatible", "not compatible")
+    assert integrable["least_share_within_bound"] == 1
+    assert integrable["longest"] <= integrable["bound"] == 101 + 1 + 20
+    assert [run["eps"] for run in other["runs"]] == ["1/7", "2/11"]  # 1/10 is a fourth root of 1 modulo 101
+
+
+def test_a_census_is_that_of_the_library():
+    found = perform("cycles", WEIERSTRASS, prime=31, eps="1/10", report=True)
+    census = cycle_census(WEIERSTRASS.system, "1/10", 31, reversor=find_reversor(WEIERSTRASS.system))
+    (run,) = found["runs"]
+    assert run["lengths"] == [list(pair) for pair in census.lengths.items()]
+    assert (run["lost"], run["falling"], run["periodic"], found["points"]) == (3, 613, 377, "993")
+    assert run["reasons"] == dict(compare(census).reasons)
+    assert "lengths" not in perform("cycles", WEIERSTRASS, prime=31, eps="1/10")["runs"][0]
+
+
+def test_points_may_be_sampled():
+    found = perform("cycles", WEIERSTRASS, prime=10007, eps="1/10", samples=20, steps=50)
+    assert found["status"] == "sampled"
+    assert found["random_permutation"] == "not tried"
+    assert found["runs"][0]["looked_at"] == 20
+
+
+def test_exponents_are_those_of_the_library():
+    found = perform("lyapunov", LORENZ, eps="1/400", orbits=4, box="5", steps=50, transient=10, seed=3)
+    direct = lyapunov_exponents(LORENZ.system, "1/400", starts_in_box(4, 3, 5.0, 3), 50, transient=10)
+    assert found["exponents"] == direct.mean.tolist()
+    assert (found["largest"], found["smallest"]) == (found["exponents"][0], found["exponents"][2])
+    assert (found["status"], found["counted"], found["ended"]) == ("completed", 50, 0)
+    # The divergence of the Lorenz equations is -10 - 1 - 8/3, and the sum has to be near it.
+    assert found["sum"] == pytest.approx(-41 / 3, abs=0.05)
+
+
+def test_an_ensemble_none_of_which_went_through_has_no_exponents():
+    found = perform("lyapunov", of_rhs("x^2"), eps=1, box=0, orbits=2, steps=10)
+    assert found["exponents"] == [0.0]
+    pole = perform("lyapunov", of_rhs("x"), eps=1, orbits=2, steps=10)  # 1 - eps = 0
+    assert (pole["status"], pole["ended"], pole["largest"], pole["sum"]) == ("no orbit left", 2, None, None)
+
+
+# All at once
+
+
+def test_an_analysis_says_all_in_words():
+    found = perform("analyze", NAHM)
+    assert (found["integrability"], found["growth"], found["integrals"]) == ("integrable", "quadratic", 1)
+    assert (found["confinement"], found["status"], found["unfinished"]) == ("confined", "complete", [])
+    found = perform("analyze", RIVALS)
+    assert (found["integrability"], found["dynamical_degree"]) == ("not integrable", "2")
+    assert (found["densities"], found["in_family"]) == (1, False)
+    assert perform("analyze", of_rhs("x"), eps=1)["integrability"] == "singular"
+
+
+def test_an_analysis_that_could_not_finish_says_what():
+    # In dimension 6 relations of all degrees cannot be tried.
+    found = perform("analyze", of_catalogue("clebsch_first_flow"), seconds=1)
+    assert found["status"] == "partial"
+    assert "integrals" in found["unfinished"] or any("integrals" in text for text in found["skipped"])
+
+
+# What cannot be done
+
+
+@pytest.mark.parametrize(
+    ("name", "system", "asked", "words"),
+    [
+        ("find-integrals", TOP, {"symbolic": "b"}, "b"),
+        ("find-integrals", TOP, {"max_degree": 0}, "found the largest degree 0, expected at least 1"),
+        ("find-integrals", member(), {"symbolic": "a"}, "found"),
+        ("degrees", TOP, {"max_degree": 0}, "found the largest degree 0, expected at least 1"),
+        ("singularities", member(4), {}, "found a system of dimension 8, expected at most 6"),
+        ("singularities", TOP, {"steps": 0}, "found 0 steps, expected 1 to 200"),
+        ("cycles", TOP, {"prime": 2}, "found the prime 2"),
+        ("cycles", TOP, {"prime": 2**61 - 1}, "found the prime 2305843009213693951, expected one from 3 to"),
+        ("cycles", TOP, {"prime": 31, "steps": 5}, "found steps = 5 without samples"),
+        ("cycles", TOP, {"prime": 7, "eps": "1/7"}, "the prime 7 divides 1/7"),
+        ("lyapunov", TOP, {"eps": 1, "steps": 1}, "found 1 steps after 0, expected at least 2"),
+    ],
+)
+def test_what_cannot_be_done_is_told_in_a_sentence(name, system, asked, words):
+    with pytest.raises(InputError, match=words):
+        perform(name, system, **asked)
+
+
+# Batches
+
+
+SMALL = """
+[experiments.degrees]
+task = "degrees"
+system = ["euler_top", "lorenz", "lotka_volterra", "harmonic"]
+options = { max_degree = 300, seconds = 20 }
+[experiments.members]
+task = "degrees"
+system = "family"
+axes = { m = [1, 2], seed = [1, 2] }
+[experiments.integrals]
+task = "find-integrals"
+system = ["euler_top", "nahm_tetrahedral", "lotka_volterra"]
+[experiments.scaled]
+task = "find-density"
+system = "euler_top"
+axes = { "parameters.a1" = [2, 3] }
+[experiments.cycles]
+task = "cycles"
+system = ["weierstrass", "lotka_volterra"]
+axes = { prime = [101, 103], eps = ["1/7"] }
+[experiments.wrong]
+task = "cycles"
+system = "weierstrass"
+axes = { prime = [2] }
+"""
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    db = tmp_path_factory.mktemp("laboratory") / "small.db"
+    assert len(list(km.run(SMALL, db, jobs=2))) == 4 + 4 + 3 + 2 + 4 + 1
+    return db
+
+
+def test_a_batch_has_the_results_of_the_tasks(small):
+    with Store.open(small, readonly=True) as store:
+        rows = list(store.rows())
+    assert Counter(str(row.record.outcome) for row in rows) == {"ok": 17, "failed": 1}
+    assert next(row.record.message for row in rows if not row.record.is_ok).startswith("found the prime 2")
+    growth = [row.record.result["growth"] for row in rows if row.experiment == "degrees"]
+    assert growth == ["quadratic", "exponential", "exponential", "bounded"]
+    assert all(row.record.verdict == "proved" for row in rows if row.experiment == "scaled")
+
+
+def test_batches_are_grouped_by_what_was_found(small):
+    with Store.open(small, readonly=True) as store:
+        by_growth = summarise(store.rows(), ("task", "growth"))
+        by_count = summarise(store.rows(), ("integrals",))
+        by_law = summarise(store.rows(), ("name", "integrable_bound"))
+    assert {group.values: group.tasks for group in by_growth.groups if group.values[0] == "degrees"} == {
+        ("degrees", "bounded"): 1,
+        ("degrees", "exponential"): 2,
+        ("degrees", "quadratic"): 5,
+    }
+    assert [group.values[0] for group in by_count.groups] == [0, 1, 2, None]
+    assert {("weierstrass", "compatible"), ("lotka_volterra", "not compatible")} <= {g.values for g in by_law.groups}
+
+
+def test_the_budget_is_another_column_than_the_time_a_task_took(small):
+    stream = io.StringIO()
+    with Store.open(small, readonly=True) as store:
+        write_csv(store.rows, stream)
+    header, *rows = csv.reader(io.StringIO(stream.getvalue()))
+    assert {"seconds", "option.seconds", "growth", "dynamical_degree", "integrals", "codimension"} <= set(header)
+    assert not any(name.startswith("result.") for name in header)
+    assert rows[0][header.index("option.seconds")] == "20"
+
+
+def test_a_batch_in_one_process_is_the_same_batch(small, tmp_path):
+    def exported(db: Path) -> str:
+        stream = io.StringIO()
+        with Store.open(db, readonly=True) as store:
+            write_jsonl(store.rows(), stream, stable=True)
+        return stream.getvalue()
+
+    list(km.run(SMALL, tmp_path / "again.db", jobs=1))
+    assert exported(tmp_path / "again.db") == exported(small)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("{ second = 5 }", "degrees has no such option"),
+        ("{ seconds = 0 }", "found 0, expected a whole number from 1"),
+        ('{ symbolic = "a1" }', "degrees has no such option"),
+        ("{ prime = 7 }", "degrees has no such option"),
+    ],
+)
+def test_an_option_that_a_task_has_not_is_refused(options, words):
+    with pytest.raises(InputError, match=words):
+        list(km.run(f'[experiments.a]\ntask = "degrees"\nsystem = "lorenz"\noptions = {options}'))
+
+
+def test_the_survey_of_the_catalogue_is_a_spec():
+    spec = km.read_spec(SURVEY)
+    assert spec.size == 27 + 17 + 7 + 10 + 30
+
+
+@pytest.mark.slow
+def test_the_survey_of_the_catalogue_finds_what_the_catalogue_knows():
+    found: dict[str, list[Any]] = {}
+    spec = km.read_spec(SURVEY)
+    tasks = {task.key: (experiment.name, task) for experiment in spec.experiments for task in experiment.tasks()}
+    for record in km.run(spec, jobs=2):
+        experiment, task = tasks[record.key]
+        assert record.is_ok
+        found.setdefault(experiment, []).append((task, record))
+    assert {record.result["growth"] for _, record in found["members"]} == {"quadratic"}
+    counts = {task.system["name"]: record.result["codimension"] for task, record in found["integrals"]}
+    assert {name: counts[name] for name in ("euler_top", "lorenz", "clebsch_first_flow", "paper_m3")} == {
+        "euler_top": 2,
+        "lorenz": 0,
+        "clebsch_first_flow": 4,
+        "paper_m3": 3,
+    }

@@ -1,0 +1,271 @@
+"""Systems beyond the catalogue, analysed blind and compared with answers that were found without this library.
+
+further_systems/ has the right-hand sides, answers.json what is known of their Kahan maps for generic eps. Integrals and
+densities of the answers are tried here on exact orbits first, by the arithmetic of the tests; then `analyze` has to
+give the same. The systems in degenerate/ are linear, constant, one-dimensional, or special at some eps.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from itertools import islice
+from pathlib import Path
+
+import pytest
+from analysis_helpers import Answer, differences, residues_of, verdict_of
+from check_helpers import (
+    combined_rows,
+    determinant,
+    function_value,
+    kahan_jacobian,
+    kahan_step,
+    modified_value,
+    slope,
+    unit,
+)
+from helpers import fraction
+from search_helpers import ranks
+
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.conserve import check_integrals
+from kahanmaps.checks.preserve import check_measure
+from kahanmaps.checks.settings import random_starts
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.densities import find_densities
+from kahanmaps.laboratory.integrals import Laboratory, find_integrals
+from kahanmaps.systems.files import parse_system, read_system
+
+FOLDER = Path(__file__).parent / "further_systems"
+FURTHER = json.loads((FOLDER / "answers.json").read_text(encoding="utf-8"))
+DEGENERATE = json.loads((FOLDER / "degenerate" / "answers.json").read_text(encoding="utf-8"))
+KNOWN = FURTHER | DEGENERATE
+MODIFIED, DETERMINANT = "modified Hamiltonian", "determinant"  # of theorems, for which no formula is written out
+
+# Analysed in less than half a second; of the others those with too many dimensions for it are given a time.
+FAST = ("nahm_icosahedral", "suslov_pencil", "riccati_pair", "gauss_skew", "painleve_1", "ishii", "volterra_open_3")
+FAST = (*FAST, "zander_11m1_lines", "zander_112_affine")
+SECONDS = {"bogoyavlensky_5": 40, "coupled_euler_tops": 20, "volterra_open_5": 20, "volterra_periodic_6": 30}
+BOUNDED = ("hamiltonian_6_generic",)  # has a test of its own
+EPS = ("1/10", "-2/7")
+
+
+@cache
+def file_of(name):
+    folder = FOLDER / "degenerate" if name in DEGENERATE else FOLDER
+    return read_system(folder / f"{name}.toml")
+
+
+@cache
+def parsed(name, text):
+    return function(file_of(name), text)
+
+
+def function(file, text):
+    return parse_rational_function(text, (*file.variables, "eps"), file.parameters)
+
+
+def formulas(name):
+    """The integrals of the answer that are written out, as functions of the variables and eps."""
+    file = file_of(name)
+    return tuple(function(file, text) for text in KNOWN[name]["integrals"] if text != MODIFIED)
+
+
+def answer_for(name):
+    known, file = KNOWN[name], file_of(name)
+    density = known["density"]
+    if density == DETERMINANT:
+        value = lambda map_, x: map_.determinant(x)  # noqa: E731
+    else:
+        value = None if density is None else residues_of(function(file, density))
+    return Answer(
+        known["independent_integrals"],
+        known["growth"],
+        tuple(known["degrees"]),
+        known["dynamical_degree"],
+        formulas(name),
+        value,
+        density is None,
+        verdict_of(known["growth"]),
+    )
+
+
+def value_at(text, name, x, eps):
+    """The value of an integral or a density of the answers at a rational point, None at a pole."""
+    if text == MODIFIED:
+        return modified_value(file_of(name).hamiltonian, eps, x)
+    if text == DETERMINANT:
+        return determinant(combined_rows(unit(len(x)), -eps, slope(file_of(name).system, x)))
+    return function_value(parsed(name, text), x, eps)
+
+
+def orbits(file, starts=4, steps=2):
+    """(eps, points of an orbit), exact, with orbits that end at a pole left out."""
+    for text in EPS:
+        eps, found = Fraction(text), 0
+        for start in islice(random_starts(file.system.dim, 8), 10 * starts):
+            points = [tuple(fraction(entry) for entry in start)]
+            while len(points) <= steps and points[-1] is not None:
+                points.append(kahan_step(file.system, eps, points[-1]))
+            if points[-1] is not None and found < starts:
+                found += 1
+                yield eps, points
+
+
+def slow_unless(names, fast):
+    return [name if name in fast else pytest.param(name, marks=pytest.mark.slow) for name in names]
+
+
+# The answers themselves
+
+
+def test_every_system_has_an_answer_and_the_other_way_round():
+    for folder, answers in ((FOLDER, FURTHER), (FOLDER / "degenerate", DEGENERATE)):
+        assert {path.stem for path in folder.glob("*.toml")} == set(answers)
+    assert all(file_of(name).system.dim == known["dim"] for name, known in KNOWN.items())
+
+
+@pytest.mark.parametrize("name", slow_unless(KNOWN, [name for name in KNOWN if KNOWN[name]["dim"] <= 4]))
+def test_the_integrals_and_densities_of_the_answers_hold_on_exact_orbits(name):
+    file, known = file_of(name), KNOWN[name]
+    compared, seen = 0, [set() for _ in known["integrals"]]
+    for eps, points in orbits(file):
+        rows = [[value_at(text, name, x, eps) for x in points] for text in known["integrals"]]
+        x, image = points[:2]
+        before, after = (
+            (1, 1) if known["density"] is None else (value_at(known["density"], name, y, eps) for y in (x, image))
+        )
+        if before == 0 or any(None in row for row in rows):
+            continue  # a point on an invariant line, or a pole of an integral
+        for values, row in zip(seen, rows, strict=True):
+            assert len(set(row)) == 1
+            values |= set(row)
+        assert known["density"] is None or after == determinant(kahan_jacobian(file.system, eps, x)) * before
+        compared += 1
+    assert compared >= 4
+    assert all(len(values) > 1 for values in seen)  # no constants
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_the_answers_count_their_independent_integrals(name):
+    known = KNOWN[name]
+    _, rank, _ = ranks([], formulas(name), Laboratory(file_of(name)).maps[0])
+    assert rank + (MODIFIED in known["integrals"]) == known["independent_integrals"] <= known["dim"]
+
+
+def test_the_checks_of_the_library_say_the_same():
+    for name in ("volterra_open_3", "suslov", "ishii", "zander_112_lines", "gyrostat_two", "radial"):
+        file, known = file_of(name), KNOWN[name]
+        claims = {f"I{k}": function(file, text) for k, text in enumerate(known["integrals"])}
+        assert [f.verdict for f in check_integrals(file, None, claims).findings] == [Verdict.PROVED] * len(claims)
+        report = check_measure(file, None, function(file, known["density"]))
+        assert Verdict.PROVED in [f.verdict for f in report.findings]
+        assert Verdict.REFUTED not in [f.verdict for f in report.findings]
+
+
+# Blind
+
+
+@pytest.mark.parametrize("name", slow_unless([name for name in FURTHER if name not in BOUNDED], FAST))
+def test_the_analysis_gives_the_answer(name):
+    found = analyze(file_of(name), seconds=SECONDS.get(name))
+    assert differences(found, answer_for(name)) == set()
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_the_analysis_of_degenerate_systems_gives_the_answer(name):
+    found = analyze(file_of(name))
+    assert differences(found, replace(answer_for(name), verdict=None), 4) == set()
+    affine = all(int(p.total_degree()) <= 1 for p in found.file.system.rhs)
+    growth = KNOWN[name]["growth"]
+    assert found.conclusion.kind == ("linear" if affine else verdict_of(growth))
+    assert found.skipped == []
+
+
+@pytest.mark.slow
+def test_six_dimensions_with_a_modified_hamiltonian_only():
+    # Along orbits the integral shows in degree 7 only, which is 1716 monomials: the theorem gives it.
+    file = file_of("hamiltonian_6_generic")
+    found = find_integrals(file, max_degree=3)
+    assert [(one.origin, one.verdict) for one in found.integrals] == [
+        ("modified Hamiltonian (cmoq-2013)", Verdict.PROVED)
+    ]
+    assert found.profile.nullities == (0, 0, 0)
+
+
+# What holds at one eps only
+
+
+SPECIAL = [(name, eps) for name, known in DEGENERATE.items() for eps in known["at_special_eps"]]
+
+
+@pytest.mark.parametrize(("name", "eps"), SPECIAL)
+def test_special_eps(name, eps):
+    file, special = file_of(name), DEGENERATE[name]["at_special_eps"][eps]
+    found = analyze(file, eps=eps)
+    assert f"at eps = {eps} only: other eps may differ" in found.conclusion.sentence
+    if "period" in special:
+        assert found.integrals.profile.period == special["period"]
+        assert (
+            f"close after {special['period']} steps" in found.conclusion.sentence or found.conclusion.kind == "linear"
+        )
+        assert found.conclusion.integrals == file.system.dim
+        return
+    assert found.integrals.integrals == found.densities.densities == ()
+    defect = {"no value": "has no value anywhere", "not invertible": "is not invertible"}[special["defect"]]
+    assert defect in found.integrals.reason
+    if special["defect"] == "no value":
+        assert found.conclusion.kind == "singular"
+
+
+@pytest.mark.parametrize(("name", "eps"), SPECIAL)
+def test_no_special_eps_is_special_for_its_neighbours(name, eps):
+    found = analyze(file_of(name), eps=f"{Fraction(eps) + Fraction(1, 7)}")
+    assert found.integrals.profile.period is None
+    assert found.conclusion.integrals == DEGENERATE[name]["independent_integrals"]
+
+
+# Wrong answers are seen to be wrong
+
+
+@pytest.mark.parametrize("name", ["ishii", "volterra_open_3", "painleve_1", "zander_112_affine"])
+def test_a_wrong_answer_is_seen_to_be_different(name):
+    found, answer = analyze(file_of(name)), answer_for(name)
+    n = found.dim
+    one, last = function(found.file, "1"), function(found.file, found.file.variables[-1])
+    assert differences(found, answer) == set()
+    assert "count" in differences(found, replace(answer, integrals=answer.integrals + 1))
+    assert "count" in differences(found, replace(answer, integrals=answer.integrals - 1))
+    assert differences(found, replace(answer, degrees=(*answer.degrees[:4], answer.degrees[4] + 1))) == {"degrees"}
+    assert differences(found, replace(answer, growth="cubic")) == {"growth"}
+    assert differences(found, replace(answer, verdict="undecided")) == {"verdict"}
+    assert differences(found, replace(answer, dynamical_degree="x^2 - x - 1")) == {"dynamical degree"}
+    wrong = one if name != "ishii" else last  # where 1 is a density
+    assert differences(found, replace(answer, density=residues_of(wrong))) == {"density"}
+    assert differences(found, replace(answer, without_density=True)) == {"density"}
+    foreign = function(found.file, "+".join(f"{k + 2}*{v}^3" for k, v in enumerate(found.file.variables)))
+    assert differences(found, replace(answer, formulas=(*answer.formulas, foreign))) == {"formulas"} or n == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("ishii", '"12*x*y"', '"12*x*y + x"'),
+        ("volterra_open_3", '"-x2*x3"', '"-x2*x3 + x1/50"'),
+        ("suslov_pencil", "(a*x + b*y + c)*(y)", "(a*x + b*y + c)*(y) + x^2/9"),
+    ],
+)
+def test_a_perturbed_system_no_longer_has_the_answer(name, old, new):
+    text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+    assert old in text
+    found = analyze(parse_system(text.replace(old, new)))
+    assert {"count", "growth"} <= differences(found, answer_for(name))
+
+
+def test_of_the_perturbed_systems_the_densities_go_too():
+    text = (FOLDER / "suslov_pencil.toml").read_text(encoding="utf-8")
+    perturbed = parse_system(text.replace("(a*x + b*y + c)*(y)", "(a*x + b*y + c)*(y) + x^2/9"))
+    assert find_densities(perturbed, seconds=5).densities == ()

@@ -1,0 +1,30 @@
+"""Tasks as a child does them: systems from their recipes, options from their canonical texts, results of plain data."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from kahanmaps.experiments.recipes import recipe_of, system_from
+from kahanmaps.experiments.records import canonical
+from kahanmaps.experiments.registry import task_kind
+from kahanmaps.systems.files import SystemFile
+
+
+def made(file: SystemFile) -> SystemFile:
+    """The system as a child has it: from the recipe of the file."""
+    documents: dict[str, str] = {}
+    return system_from(recipe_of(file, documents), documents.__getitem__)
+
+
+def member(m: int = 2, seed: int = 1, **recipe: Any) -> SystemFile:
+    return system_from({"family": {"draw": "eigenvalues", "m": m, "seed": seed, **recipe}}, {}.__getitem__)
+
+
+def perform(name: str, system: SystemFile | None, **asked: Any) -> dict[str, Any]:
+    """What a task gives, with the defaults of its kind for what is not asked; it has to be plain data."""
+    kind = task_kind(name)
+    given = {key: value if key == "other" else kind.options[key].read(value) for key, value in asked.items()}
+    result = kind.perform(system, {**kind.defaults, **given})
+    assert json.loads(canonical(result)) == result
+    return result
