@@ -336,10 +336,11 @@ class PrimeField(Field):
         return self._element(rng.randrange(self.prime))
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
-        elements = [self.convert(entry) for entry in entries]
         if self._large is not None:
-            return fmpz_mod_mat(rows, columns, elements, self._large)
-        return nmod_mat(rows, columns, elements, self.prime)
+            return fmpz_mod_mat(rows, columns, [self.convert(entry) for entry in entries], self._large)
+        p, convert = self.prime, self.convert  # a loop in which large systems spend much of their time
+        elements = [e if type(e) is nmod and e.modulus() == p else convert(e) for e in entries]
+        return nmod_mat(rows, columns, elements, p)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, PrimeField) and other.prime == self.prime

@@ -38,6 +38,8 @@ def density_identity(system: QuadraticSystem, density: PhaseFunction, eps: fmpq 
         if after is None or before is None:
             return None
         above, below = jacobian_determinant_sides(kahan, point, image)
+        if field.is_zero(above) or field.is_zero(below):
+            return None  # where the map has no inverse both sides may vanish, and say nothing of a measure
         return [after * below], [before * above]
 
     size = eps_size(eps)

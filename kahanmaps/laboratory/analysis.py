@@ -218,9 +218,9 @@ def analyze(
         if profile.first_degree is not None and profile.period is None:
             maps = Laboratory(bare, (), found.eps, seed).maps
             top = profile.degree if profile.dim - profile.codimension <= 1 else profile.first_degree + 1
-            for degree in range(profile.first_degree, min(top, 4) + 1):
-                known = sum(len(relation.integrals) for relation in found.relations)
-                found.relations += sparse_relations(maps, degree, system.variables, first=known + 1) or ()
+            for degree in range(profile.first_degree, min(top, profile.degree, 4) + 1):
+                first = 1 + len({name for relation in found.relations for name in relation.names})
+                found.relations += sparse_relations(maps, degree, system.variables, first=first) or ()
 
     def hamiltonian() -> None:
         if system.dim <= MAX_HAMILTONIAN_DIMENSION:
@@ -380,6 +380,8 @@ def _integral_lines(found: Analysis) -> list[Statement]:
     lines += [Statement(MEASURED, f"along orbits {relation.text}") for relation in found.relations]
     if found.relations and any(relation.integrals for relation in found.relations):
         lines.append(Statement(NOTE, "the c are integrals: numbers that depend on the orbit only"))
+    if any(set(relation.names) - set(relation.integrals) for relation in found.relations):
+        lines.append(Statement(NOTE, "the e are numbers that depend on eps only"))
     if search.reason and profile.nullities:
         lines.append(Statement(NOTE, search.reason))
     if isinstance(found.structure, Structure):

@@ -33,6 +33,7 @@ from kahanmaps.laboratory.parametric import ParametricSystem
 
 _SPARE = 8
 _DETERMINANT_BUDGET = 20_000_000
+_MAX_DIMENSION = 16  # beyond it the determinant is not expanded: even a sparse one costs more than it tells
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +64,8 @@ DETERMINANT = Cofactor("det dPhi", 1, None)
 
 def determinant_polynomial(system: ParametricSystem) -> fmpq_mpoly | None:
     """det(I - eps f'(x)) in (variables, symbols, eps); None where it is too large to be expanded."""
+    if system.dim > _MAX_DIMENSION:
+        return None
     names = (*system.variables, *system.symbols, "eps")
     field = FunctionField(names, _DETERMINANT_BUDGET)
     jacobian = system.jacobian(names)

@@ -33,7 +33,7 @@ DEFAULT_SECONDS = 10.0
 DEFAULT_MAX_DEGREE = 20_000
 _MOST_TERMS = 10_000
 _LINES = 2
-_ENOUGH_QUOTIENTS = 5
+_ENOUGH_QUOTIENTS = 6
 _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
 
 

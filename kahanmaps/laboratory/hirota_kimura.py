@@ -167,8 +167,12 @@ def orbit_profile(
     top = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
     if max_degree is None:
         top = max((d for d in range(1, top + 1) if comb(dim + d, d) <= MAX_UNKNOWNS), default=1)
+    began = time.monotonic()
+    maps[0].step(maps[0].random_point())
+    step = time.monotonic() - began
     for degree in range(1, top + 1):
         unknowns = comb(dim + degree, degree)
+        took = max(took, step * unknowns * len(maps) / 8)
         growth = (unknowns / comb(dim + degree - 1, degree - 1)) ** 3
         if unknowns > MAX_UNKNOWNS or time.monotonic() + took * min(growth, 8) > deadline:
             complete = False

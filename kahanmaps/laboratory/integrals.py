@@ -371,11 +371,27 @@ def _independent(
         if rank([*rows, row], map_.prime) == len(rows):
             continue
         progress("verifying an integral")
-        verdict, evidence = integral_verdict(laboratory.system, function, laboratory.eps, laboratory.seed)
+        if _is_affine_integral(laboratory.system, function):
+            verdict, evidence = Verdict.PROVED, Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
+        else:
+            verdict, evidence = integral_verdict(laboratory.system, function, laboratory.eps, laboratory.seed)
         if verdict.holds:
             rows.append(row)
             found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, verdict, evidence))
     return found
+
+
+def _is_affine_integral(system: ParametricSystem, function: RationalFunction) -> bool:
+    """Whether the function is v.x with v.f = 0; v may contain the symbols."""
+    if not function.is_polynomial:
+        return False
+    n = system.dim
+    context = function.numerator.context()
+    rhs = [polynomial.compose(*context.gens()[: n + len(system.symbols)], ctx=context) for polynomial in system.rhs]
+    slopes = [function.numerator.derivative(k) for k in range(n)]
+    if any(int(e) for slope in slopes for m in slope.monoms() for e in (*m[:n], m[-1])):
+        return False  # not affine in x, or with eps
+    return bool(sum((v * f for v, f in zip(slopes, rhs, strict=True)), context.constant(0)).is_zero())
 
 
 def _gradient(map_: ModularMap, function: RationalFunction, point: Sequence[int]) -> list[int]:

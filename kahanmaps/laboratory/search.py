@@ -29,6 +29,7 @@ from kahanmaps.laboratory.modular_points import ModularMap, null_space
 
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 5, 6: 4}
+_MOST_TERMS = 1000
 _FEW = 20  # with more relations than these, cofactors come first
 
 
@@ -108,6 +109,8 @@ def search(
         unresolved += _take_relations(map_, degree, steps, spaces, deadline)
     if not done():
         top = _COFACTOR_DEGREE.get(map_.dim, 2)
+        while comb(map_.dim + top, top) > _MOST_TERMS:
+            top -= 1
         progress(f"polynomials of degree up to {top} with {comb(map_.dim + top, top)} terms and known cofactors")
         for product, space in search_cofactors(map_, cofactors, known(), wanted, top, deadline - time.monotonic()):
             steps.append(Step("cofactor", space.degree, product, f"common cofactor {product.text(cofactors)}"))

@@ -1,8 +1,9 @@
 """The relations of one degree along orbits, written out: which monomials, which numbers, which integrals.
 
 Of the null space of an orbit the reduced echelon basis is taken for the monomials of the highest degree first, and what
-lower degrees imply is left out. A coefficient that is the same for two orbits and both maps is a number; the others are
-integrals, named c1, c2, ... Measured, as everything in hirota_kimura.py.
+lower degrees imply is left out. A coefficient that differs for two orbits is an integral; these are named c1, c2, ...
+One that does not is a number, times a power of eps where the maps differ in eps, or, where no such number is found,
+some function of eps named e1, e2, ... Measured, as everything in hirota_kimura.py.
 """
 
 from __future__ import annotations
@@ -19,13 +20,15 @@ from kahanmaps.laboratory.hirota_kimura import relations_on_orbit
 from kahanmaps.laboratory.modular_points import ModularMap, echelon, exponents_up_to
 
 _SIMPLE = 10**6  # a number that both maps share and that is no simpler is taken for an accident
+_POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # of eps
 
 
 @dataclass(frozen=True)
 class SparseRelation:
     """A polynomial that vanishes along every orbit, with coefficients that are integrals.
 
-    `terms` are pairs of a monomial and its coefficient: text of a number, or a name such as "c3" for an integral.
+    `terms` are pairs of a monomial and its coefficient: text of a number, perhaps with a power of eps, or a name, such
+    as "c3" for an integral and "e1" for a function of eps.
     """
 
     terms: tuple[tuple[str, str], ...]
@@ -44,9 +47,14 @@ class SparseRelation:
         return " + ".join(parts).replace("+ -", "- ") + " = 0"
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """The coefficients that are names."""
+        return tuple(text for _, text in self.terms if text[0] in "ce" and text[1:].isdigit())
+
+    @property
     def integrals(self) -> tuple[str, ...]:
         """The names of the coefficients that are integrals."""
-        return tuple(coefficient for _, coefficient in self.terms if coefficient.startswith("c"))
+        return tuple(name for name in self.names if name.startswith("c"))
 
 
 def sparse_relations(
@@ -80,6 +88,7 @@ def sparse_relations(
     lower = _implied(maps[0], degree, support)
     found = []
     names: dict[tuple[int, int, int], str] = {}
+    functions: dict[tuple[int, int], str] = {}  # of eps
     for one, again, other in zip(*tables, strict=True):
         used = [k for k, entry in enumerate(one) if entry]
         lead = used[0]
@@ -87,11 +96,11 @@ def sparse_relations(
             continue
         terms = []
         for k in used:
-            number = _number(one[k], again[k], other[k], maps[0].prime, maps[1].prime)
-            if number is None:
+            if one[k] != again[k]:
                 text = names.setdefault((one[k], again[k], other[k]), f"c{first + len(names)}")
             else:
-                text = format_number(number)
+                number = _number_text(one[k], other[k], maps[0], maps[1])
+                text = number or functions.setdefault((one[k], other[k]), f"e{first + len(functions)}")
             terms.append((_monomial(support[k], variables), text))
         found.append(SparseRelation(tuple(terms)))
     return tuple(found)
@@ -113,14 +122,27 @@ def _implied(map_: ModularMap, degree: int, support: Sequence[tuple[int, ...]]) 
     }
 
 
-def _number(first: int, again: int, other: int, prime: int, other_prime: int) -> fmpq | None:
-    """The rational number that a coefficient is for all orbits, None for an integral."""
-    if first != again:
-        return None
-    value = rational_reconstruction(first, prime)
-    if value is None or value != rational_reconstruction(other, other_prime):
-        return None
-    return value if abs(value.p) < _SIMPLE and value.q < _SIMPLE else None
+def _number_text(one: int, other: int, map_: ModularMap, other_map: ModularMap) -> str | None:
+    """The coefficient as a simple number times a power of eps, which both maps share; None where it is none."""
+    for power in _POWERS:
+        value = rational_reconstruction(one * pow(map_.eps, -power, map_.prime) % map_.prime, map_.prime)
+        again = other * pow(other_map.eps, -power, other_map.prime) % other_map.prime
+        if value is None or value != rational_reconstruction(again, other_map.prime):
+            continue
+        if abs(value.p) < _SIMPLE and value.q < _SIMPLE:
+            return _times_power(value, power)
+    return None
+
+
+def _times_power(value: fmpq, power: int) -> str:
+    """E.g. -1/6*eps^2, or 3/eps."""
+    number = format_number(value)
+    if power == 0:
+        return number
+    eps = "eps" if abs(power) == 1 else f"eps^{abs(power)}"
+    if power > 0:
+        return f"{number}*{eps}".replace("1*", "", 1) if abs(value) == 1 else f"{number}*{eps}"
+    return f"{value.p}/{eps}" if value.q == 1 else f"{value.p}/({value.q}*{eps})"
 
 
 def _monomial(exponent: tuple[int, ...], variables: Sequence[str]) -> str:

@@ -72,7 +72,12 @@ class KahanMapOver:
         """The matrix I - eps f'(x)."""
         x = self.point(point)
         with self.field.working():
-            return self.field.identity(self.dim) - self._local.jacobian(x) * self.eps
+            return self._identity - self._local.jacobian(x) * self.eps
+
+    @cached_property
+    def _identity(self) -> Any:
+        with self.field.working():
+            return self.field.identity(self.dim)
 
     def determinant(self, point: Sequence[Any]) -> Any:
         """det(I - eps f'(x)), the denominator of the map."""

@@ -14,7 +14,7 @@ from flint import fmpz_poly, nmod_poly
 from kahanmaps.algebra.fields import GF
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import curves
-from kahanmaps.laboratory.degrees import degree_growth
+from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.recurrences import GrowthClass
 from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -165,8 +165,29 @@ def test_one_plus_the_root_of_two():
 def test_without_a_recurrence_there_is_an_estimate_that_says_so():
     found = degree_growth(load("henon_heiles").system, max_terms=6)
     assert (found.recurrence, found.growth, found.dynamical_degree) == (None, GrowthClass.UNKNOWN, None)
-    assert found.growth_text.startswith("no recurrence found in 7 terms; d_n/d_(n-1) is 2.31")
-    assert found.growth_text.endswith("an estimate only")
+    assert found.looks_exponential
+    assert found.growth_text == "exponential growth by a factor of about 2.31183 (estimated: no recurrence in 7 terms)"
+    shorter = degree_growth(load("henon_heiles").system, max_terms=5)
+    assert not shorter.looks_exponential
+    assert shorter.growth_text.startswith("no recurrence found in 6 terms; d_n/d_(n-1) is 2.38")
+    assert shorter.growth_text.endswith("an estimate only")
+
+
+def with_degrees(*degrees):
+    return DegreeGrowth(degrees, None, "terms", "", 0, (), ())
+
+
+@pytest.mark.parametrize("n", [6, 8, 12, 30])
+@pytest.mark.parametrize("power", [1, 2, 3, 5, 9])
+def test_polynomial_growth_does_not_look_exponential(power, n):
+    assert not with_degrees(*(1 + k**power for k in range(n + 1))).looks_exponential
+    assert not with_degrees(*(1 + -(-(k**power) * 3 // 4) for k in range(n + 1))).looks_exponential
+
+
+@pytest.mark.parametrize("n", [6, 8, 12, 30])
+@pytest.mark.parametrize("rate", [1.5, 1.84, 2, 4, 6])
+def test_exponential_growth_does(rate, n):
+    assert with_degrees(*(1 + round(10 * rate**k) for k in range(n + 1))).looks_exponential
 
 
 @pytest.mark.slow

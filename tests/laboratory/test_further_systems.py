@@ -37,6 +37,7 @@ from kahanmaps.checks.settings import random_starts
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.densities import find_densities
 from kahanmaps.laboratory.integrals import Laboratory, find_integrals
+from kahanmaps.laboratory.modular_points import ModularMap
 from kahanmaps.systems.files import parse_system, read_system
 
 FOLDER = Path(__file__).parent / "further_systems"
@@ -45,10 +46,11 @@ DEGENERATE = json.loads((FOLDER / "degenerate" / "answers.json").read_text(encod
 KNOWN = FURTHER | DEGENERATE
 MODIFIED, DETERMINANT = "modified Hamiltonian", "determinant"  # of theorems, for which no formula is written out
 
-# Analysed in less than half a second; of the others those with too many dimensions for it are given a time.
-FAST = ("nahm_icosahedral", "suslov_pencil", "riccati_pair", "gauss_skew", "painleve_1", "ishii", "volterra_open_3")
-FAST = (*FAST, "zander_11m1_lines", "zander_112_affine")
-SECONDS = {"bogoyavlensky_5": 40, "coupled_euler_tops": 20, "volterra_open_5": 20, "volterra_periodic_6": 30}
+# Analysed in less than half a second. Those that would take long by default are given a time.
+FAST = ("nahm_icosahedral", "suslov_pencil", "riccati_pair", "gauss_skew", "volterra_open_3")
+FAST = (*FAST, "rabinovich_conservative", "zander_11m1_lines", "zander_112_affine")
+SECONDS = {"bogoyavlensky_5": 40, "coupled_euler_tops": 20, "volterra_open_5": 20, "volterra_periodic_6": 24}
+SECONDS |= {"weierstrass_times_lv": 10, "hamiltonian_4_generic": 12, "volterra_open_4": 10, "gyrostat_two": 8}
 BOUNDED = ("hamiltonian_6_generic",)  # has a test of its own
 EPS = ("1/10", "-2/7")
 
@@ -70,17 +72,16 @@ def function(file, text):
 
 def formulas(name):
     """The integrals of the answer that are written out, as functions of the variables and eps."""
-    file = file_of(name)
-    return tuple(function(file, text) for text in KNOWN[name]["integrals"] if text != MODIFIED)
+    return tuple(parsed(name, text) for text in KNOWN[name]["integrals"] if text != MODIFIED)
 
 
 def answer_for(name):
-    known, file = KNOWN[name], file_of(name)
+    known = KNOWN[name]
     density = known["density"]
     if density == DETERMINANT:
-        value = lambda map_, x: map_.determinant(x)  # noqa: E731
+        value = ModularMap.determinant
     else:
-        value = None if density is None else residues_of(function(file, density))
+        value = None if density is None else residues_of(parsed(name, density))
     return Answer(
         known["independent_integrals"],
         known["growth"],
@@ -128,7 +129,7 @@ def test_every_system_has_an_answer_and_the_other_way_round():
     assert all(file_of(name).system.dim == known["dim"] for name, known in KNOWN.items())
 
 
-@pytest.mark.parametrize("name", slow_unless(KNOWN, [name for name in KNOWN if KNOWN[name]["dim"] <= 4]))
+@pytest.mark.parametrize("name", slow_unless(KNOWN, [name for name in KNOWN if KNOWN[name]["dim"] <= 2]))
 def test_the_integrals_and_densities_of_the_answers_hold_on_exact_orbits(name):
     file, known = file_of(name), KNOWN[name]
     compared, seen = 0, [set() for _ in known["integrals"]]
@@ -185,7 +186,6 @@ def test_the_analysis_of_degenerate_systems_gives_the_answer(name):
     assert found.skipped == []
 
 
-@pytest.mark.slow
 def test_six_dimensions_with_a_modified_hamiltonian_only():
     # Along orbits the integral shows in degree 7 only, which is 1716 monomials: the theorem gives it.
     file = file_of("hamiltonian_6_generic")
@@ -221,20 +221,18 @@ def test_special_eps(name, eps):
         assert found.conclusion.kind == "singular"
 
 
-@pytest.mark.parametrize(("name", "eps"), SPECIAL)
+@pytest.mark.parametrize(("name", "eps"), [each for each in SPECIAL if not each[1].startswith("-")])
 def test_no_special_eps_is_special_for_its_neighbours(name, eps):
-    found = analyze(file_of(name), eps=f"{Fraction(eps) + Fraction(1, 7)}")
-    assert found.integrals.profile.period is None
-    assert found.conclusion.integrals == DEGENERATE[name]["independent_integrals"]
+    found = find_integrals(file_of(name), eps=f"{Fraction(eps) + Fraction(1, 7)}")
+    assert (found.profile.period, found.codimension) == (None, DEGENERATE[name]["independent_integrals"])
 
 
 # Wrong answers are seen to be wrong
 
 
-@pytest.mark.parametrize("name", ["ishii", "volterra_open_3", "painleve_1", "zander_112_affine"])
+@pytest.mark.parametrize("name", ["ishii", "volterra_open_3", "zander_112_affine"])
 def test_a_wrong_answer_is_seen_to_be_different(name):
     found, answer = analyze(file_of(name)), answer_for(name)
-    n = found.dim
     one, last = function(found.file, "1"), function(found.file, found.file.variables[-1])
     assert differences(found, answer) == set()
     assert "count" in differences(found, replace(answer, integrals=answer.integrals + 1))
@@ -247,21 +245,21 @@ def test_a_wrong_answer_is_seen_to_be_different(name):
     assert differences(found, replace(answer, density=residues_of(wrong))) == {"density"}
     assert differences(found, replace(answer, without_density=True)) == {"density"}
     foreign = function(found.file, "+".join(f"{k + 2}*{v}^3" for k, v in enumerate(found.file.variables)))
-    assert differences(found, replace(answer, formulas=(*answer.formulas, foreign))) == {"formulas"} or n == 0
+    assert differences(found, replace(answer, formulas=(*answer.formulas, foreign))) == {"formulas"}
 
 
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
-        ("ishii", '"12*x*y"', '"12*x*y + x"'),
-        ("volterra_open_3", '"-x2*x3"', '"-x2*x3 + x1/50"'),
+        pytest.param("ishii", '"12*x*y"', '"12*x*y + x"', marks=pytest.mark.slow),
+        pytest.param("volterra_open_3", '"-x2*x3"', '"-x2*x3 + x1/50"', marks=pytest.mark.slow),
         ("suslov_pencil", "(a*x + b*y + c)*(y)", "(a*x + b*y + c)*(y) + x^2/9"),
     ],
 )
 def test_a_perturbed_system_no_longer_has_the_answer(name, old, new):
     text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
     assert old in text
-    found = analyze(parse_system(text.replace(old, new)))
+    found = analyze(parse_system(text.replace(old, new)), seconds=4)
     assert {"count", "growth"} <= differences(found, answer_for(name))
 
 

@@ -1,0 +1,229 @@
+"""kahanmaps analyze: the report in three forms, what it says of one eps, how it ends, and exit statuses."""
+
+from __future__ import annotations
+
+import os
+import pty
+import signal
+import subprocess
+import time
+
+import pytest
+from cli_helpers import COMMAND, shell, terminal
+
+from kahanmaps.version import __version__
+
+TOP = "analyze euler_top"
+FOUR = "analyze --vars x,y --rhs y --rhs='-x+x^2'"  # periodic at eps = 1
+STATUSES = {"proved", "supported", "measured", "undecided", "note"}
+
+
+def report(out):
+    """The title, (section, status, text) of every line, and the verdict."""
+    blocks = [block.splitlines() for block in out.strip().split("\n\n")]
+    assert blocks[-1][0] == "verdict"
+    lines = [(block[0], *line.split("\t")) for block in blocks[1:-1] for line in block[1:]]
+    return blocks[0][0], lines, tuple(blocks[-1][1].split("\t"))
+
+
+def test_the_report_as_text(kahanmaps):
+    outcome = kahanmaps(TOP)
+    title, lines, verdict = report(outcome.out)
+    assert (outcome.status, outcome.err) == (0, "")
+    assert title == "analyze: euler_top, dimension 3, a1 = 1, a2 = -2, a3 = 1, every eps (the time step is 2 eps)"
+    assert {status for _, status, _ in lines} <= STATUSES
+    assert (
+        "integrals",
+        "proved",
+        "I1 = (x2^2*eps^2 - 1)/(2*x1^2*eps^2 + 1)  [relations of degree 2 along orbits]",
+    ) in (lines)
+    assert ("integrals", "measured", "along orbits x1^2 + c1*x3^2 + c2 = 0") in lines
+    assert ("growth", "measured", "d_n = 2*n^2 + 1") in lines
+    assert list(dict.fromkeys(section for section, _, _ in lines)) == [
+        "integrals",
+        "measure",
+        "growth",
+        "singularities",
+        "symmetry",
+        "structure",
+        "commuting systems",
+    ]
+    assert verdict == (
+        "integrable",
+        "Integrable in the sense of complexity: quadratic growth, dynamical degree 1 (measured); "
+        "2 independent integrals in dimension 3.",
+    )
+
+
+def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
+    found = kahanmaps(f"{TOP} --json --seed 5 --symbolic a2,eps --seconds 20").json
+    parts = ("integrals", "densities", "degrees", "heights", "symmetries", "commuting")
+    for part in parts:
+        assert isinstance(found.pop(part), dict)
+    assert found.pop("document")["name"] == "euler_top"
+    statements = found.pop("statements")
+    assert {line["status"] for line in statements} <= STATUSES
+    assert {"section": "growth", "status": "measured", "text": "d_n = 2*n^2 + 1"} in statements
+    assert [run["verdict"] for run in found.pop("singularities")] == ["confined", "confined"]
+    assert found == {
+        "analysis": "euler_top",
+        "version": __version__,
+        "parameters": {"a1": "1", "a2": "-2", "a3": "1"},
+        "symbols": ["a2"],
+        "eps": "every",
+        "time_step": "every",
+        "convention": "eps is the paper's epsilon, the time step is 2 eps",
+        "seed": 5,
+        "seconds": 20.0,
+        "dim": 3,
+        "verdict": {
+            "integrability": "integrable",
+            "integrals": 2,
+            "growth": "quadratic",
+            "sentence": "Integrable in the sense of complexity: quadratic growth, dynamical degree 1 (measured); "
+            "2 independent integrals in dimension 3.",
+        },
+        "hirota_kimura": ["x1^2 + c1*x3^2 + c2 = 0", "x2^2 + c3*x3^2 + c4 = 0"],
+        "family": None,
+        "skipped": [],
+    }
+
+
+def test_the_report_as_markdown(kahanmaps):
+    out = kahanmaps("analyze nahm_tetrahedral --markdown").out
+    assert out.startswith(
+        "# nahm_tetrahedral, dimension 2, every eps (the time step is 2 eps)\n\n```\nx' = x^2 - y^2\n"
+    )
+    assert "\ny' = -2*x*y\n```\n\n**Integrable in the sense of complexity: " in out
+    assert "\n## growth\n\n* *measured*: degrees of the iterates: 2, 4, 8, 13, " in out
+    # formulas are code, or their stars would be taken for emphasis
+    assert "* *measured*: `along orbits x^2*y - 1/3*y^3 + c1*x^2 + c1*y^2 + c2 = 0`\n" in out
+    assert all("`" in line for line in out.splitlines() if line.startswith("* ") and "=" in line)
+
+
+def test_text_json_and_markdown_say_the_same(kahanmaps):
+    _, lines, verdict = report(kahanmaps("analyze nahm_tetrahedral").out)
+    found = kahanmaps("analyze nahm_tetrahedral --json").json
+    markdown = kahanmaps("analyze nahm_tetrahedral --markdown").out
+    assert [(line["section"], line["status"], line["text"]) for line in found["statements"]] == lines
+    assert (found["verdict"]["integrability"], found["verdict"]["sentence"]) == verdict
+    assert all(text in markdown for _, _, text in lines)
+
+
+def test_symbolic_parameters_stay_in_the_formulas(kahanmaps):
+    out = kahanmaps("analyze weierstrass --symbolic g2").out
+    assert out.splitlines()[0].endswith("g2 = 4, every eps (the time step is 2 eps); formulas for every g2")
+    assert "proved\tdx/phi is invariant, phi = 12*x*eps^2 - 1\n" in out
+    assert "*g2" in out.partition("I1 = ")[2].partition("\n")[0]
+
+
+def test_parameters_are_set(kahanmaps):
+    out = kahanmaps("analyze weierstrass -p g2=12").out
+    assert "g2 = 12" in out.splitlines()[0]
+    assert "along orbits x^3 - eps^2*x*y^2 + 12*eps^2*x^2 - 1/4*y^2 + c1*x + c2 = 0\n" in out
+
+
+@pytest.mark.parametrize("step", ["--eps 1", "--time-step 2"])
+def test_one_eps_is_told_to_be_one(kahanmaps, step):
+    title, _, verdict = report(kahanmaps(f"{FOUR} {step}").out)
+    assert title == "analyze: inline, dimension 2, eps = 1 (time step 2 eps = 2)"
+    assert verdict[0] == "linearisable"
+    assert verdict[1].endswith("All this at eps = 1 only: other eps may differ.")
+    assert report(kahanmaps(FOUR).out)[2][0] == "integrable"
+    found = kahanmaps(f"{FOUR} {step} --json").json
+    assert (found["eps"], found["time_step"], found["commuting"]) == ("1", "2", None)
+
+
+def test_a_system_on_standard_input(tmp_path):
+    file = 'variables = ["x"]\n[system]\nrhs = ["x^2"]\n[density]\nphi = "x + 5"\n'
+    outcome = shell("kahanmaps analyze -", tmp_path, file.encode())
+    assert outcome.status == 0
+    assert "phi = x^2\n" in outcome.out
+
+
+def test_on_a_terminal_statuses_have_colours():
+    outcome = terminal("analyze", "--vars", "x,y", "--rhs", "y", "--rhs=-x")
+    assert outcome.status == 0
+    assert "\x1b[32mproved    \x1b[0m" in outcome.out
+    assert "\n\x1b[1mverdict\x1b[0m\n  The system is linear" in outcome.out
+
+
+# Exit statuses
+
+
+def test_undecided_gives_3(kahanmaps, monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.analysis._SECONDS", {3: 1e-9})
+    outcome = kahanmaps(TOP)
+    _, lines, verdict = report(outcome.out)
+    assert (outcome.status, verdict[0]) == (3, "undecided")
+    assert ("not done", "note", "degrees: the time was over") in lines
+    assert kahanmaps(f"{TOP} --json").status == kahanmaps(f"{TOP} --markdown").status == 3
+
+
+@pytest.mark.parametrize("command", ["lotka_volterra", "--vars x --rhs x --eps 1", "--vars x,y --rhs 0 --rhs 0"])
+def test_a_verdict_gives_0_whatever_it_is(kahanmaps, command):
+    assert kahanmaps(f"analyze {command}").status == 0
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("", "missing SYSTEM"),
+        ("nosuch", "found the unknown system 'nosuch'"),
+        ("euler_top --eps 0", "found eps = 0"),
+        ("euler_top --eps 1/3 --time-step 2/3", "give --eps or --time-step, not both"),
+        ("euler_top --eps 1/0", "1/0"),
+        ("euler_top --markdown --json", "give --markdown or --json, one of the two"),
+        ("euler_top --symbolic zz", "found the symbol 'zz', expected eps or a parameter of the system: a1, a2, a3"),
+        ("euler_top --symbolic eps --eps 1/3", "not both"),
+        ("paper_m2 --symbolic a", "found the symbol 'a'"),
+        ("euler_top --seconds 0.5", "0.5 is not in the range x>=1"),
+        ("euler_top --seconds nan", "found nan seconds"),
+        ("euler_top --seconds inf", "found inf seconds"),
+        ("euler_top -p a9=1", "a9"),
+        ("--vars x --rhs x^3", "found a polynomial of degree 3"),
+        ("--vars x,y --rhs x", "rhs"),
+    ],
+)
+def test_wrong_use_gives_2(kahanmaps, command, words):
+    outcome = kahanmaps(f"analyze {command}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert words in outcome.err
+
+
+# Time, progress and interrupts
+
+
+def test_an_interrupt_in_any_part_ends_it(kahanmaps, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    for part in ("degree_growth", "linear_symmetries", "height_survey"):
+        with monkeypatch.context() as patch:
+            patch.setattr(f"kahanmaps.laboratory.analysis.{part}", interrupted)
+            outcome = kahanmaps(FOUR)
+        assert (outcome.status, outcome.out) == (130, "")
+        assert "interrupted" in outcome.err
+
+
+def test_progress_is_told_and_quiet_is_quiet(kahanmaps, slow_clock):
+    assert "degrees" in kahanmaps(f"{FOUR}").err
+    assert kahanmaps(f"{FOUR} -q").err == ""
+
+
+@pytest.mark.slow
+def test_an_interrupt_gives_130_and_is_prompt():
+    ours, theirs = pty.openpty()  # on a terminal progress is told from the first second on
+    words = ["analyze", "kirchhoff_generic", "--seconds", "100", "--json"]
+    process = subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=theirs)
+    os.close(theirs)
+    said = os.read(ours, 4096)  # work is under way
+    process.send_signal(signal.SIGINT)
+    began = time.monotonic()
+    out, _ = process.communicate(timeout=60)
+    assert time.monotonic() - began < 20  # one step in exact arithmetic, on a busy machine
+    while b"interrupted" not in said:
+        said += os.read(ours, 4096)
+    os.close(ours)
+    assert (process.returncode, out) == (130, b"")
+    assert b"Traceback" not in said

@@ -1,0 +1,325 @@
+"""One report of everything: it reads no claims, concludes nothing from one eps, and says what it did not do."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import pytest
+from search_helpers import random_system, system
+
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory import analysis as module
+from kahanmaps.laboratory.analysis import Analysis, analyze
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.files import SystemFile, parse_system, read_system
+
+FURTHER = Path(__file__).parent / "further_systems"
+PARTS = (
+    "hamiltonian structure",
+    "the commuting family",
+    "degrees",
+    "integrals",
+    "densities",
+    "symmetries",
+    "commuting systems",
+    "heights",
+    "singularities",
+)
+
+PLANE = """variables = ["x", "y"]
+[parameters]
+a = "3"
+b = "1/2"
+[system]
+rhs = ["a*y", "6*x^2 - b"]
+"""
+TRUTH = """[density]
+phi = "1 - 12*eps^2*a*x"
+[catalog]
+degrees = [2, 3, 5, 7]
+growth = "quadratic"
+verdict = "integrable"
+codimension = 1
+"""
+NONSENSE = """[integrals]
+lie = "x"
+other = "(x^5 + eps)/y"
+third = "y"
+[density]
+phi = "x^7 + 1"
+[catalog]
+degrees = [1, 2, 3, 4]
+growth = "exponential"
+dynamical_degree = "x - 5"
+verdict = "not integrable"
+codimension = 0
+relations = [{monomials = "degree <= 2", dimension = 0}]
+"""
+FOUR = ("x y", "y", "-x + x^2")  # q'' = -q + q^2: at eps = 1 the fourth iterate is the identity
+
+
+def text_of(found):
+    return "\n".join(line.text for _, lines in found.sections for line in lines)
+
+
+def results(found):
+    """Everything but the file itself."""
+    return {key: value for key, value in found.to_json().items() if key != "document"}
+
+
+# What a file claims is not read
+
+
+@pytest.mark.parametrize(("symbols", "eps"), [((), None), (("a", "b"), None), ((), "1/3"), (("b",), "1/3")])
+def test_the_claims_and_facts_of_a_file_are_not_read(symbols, eps):
+    found = [
+        results(analyze(parse_system(PLANE + claims, "same"), symbols=symbols, eps=eps))
+        for claims in ("", TRUTH, NONSENSE)
+    ]
+    assert found[0] == found[1] == found[2]
+    assert found[0]["verdict"]["integrals"] == 1
+
+
+def test_a_hamiltonian_and_a_member_of_the_family_are_not_read_either():
+    for name in ("weierstrass", "harmonic"):
+        file = load(name)
+        one, other = (results(analyze(each)) for each in (file, SystemFile.from_system(file.system, file.name)))
+        assert one.pop("parameters") == {key: str(value) for key, value in file.parameters.items()}
+        assert other.pop("parameters") == {}
+        assert one == other
+
+
+def test_another_system_under_the_same_claims_is_seen_to_be_another():
+    same = analyze(parse_system(PLANE + TRUTH))
+    assert (same.conclusion.integrals, same.conclusion.kind) == (1, "integrable")
+    found = analyze(parse_system((PLANE + TRUTH).replace("6*x^2 - b", "6*x^2 - b + y^2/9")))
+    assert (found.conclusion.integrals, found.conclusion.kind) == (0, "not integrable")
+
+
+# One eps says nothing of others
+
+
+def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
+    special, generic = analyze(system(*FOUR), eps=1), analyze(system(*FOUR))
+    assert (special.conclusion.kind, special.integrals.profile.period) == ("linearisable", 4)
+    assert special.conclusion.sentence == (
+        "Orbits close after 4 steps (measured): the map is periodic there; bounded growth, dynamical degree 1. "
+        "All this at eps = 1 only: other eps may differ."
+    )
+    assert (generic.conclusion.kind, generic.conclusion.integrals) == ("integrable", 1)
+    assert generic.conclusion.growth == "quadratic"
+    assert "only" not in generic.conclusion.sentence
+    assert generic.integrals.profile.period is None
+
+
+def test_henon_heiles_closes_after_four_steps_at_eps_1_only():
+    special = analyze(load("henon_heiles"), eps=1)
+    assert (special.conclusion.kind, special.conclusion.integrals) == ("linearisable", 4)
+    assert "at eps = 1 only" in special.conclusion.sentence
+    assert special.commuting is None  # which is a question for every eps
+
+
+@pytest.mark.slow
+def test_henon_heiles_is_not_integrable_at_other_eps():
+    generic = analyze(load("henon_heiles"), seconds=4)
+    assert (generic.conclusion.kind, generic.conclusion.integrals) == ("not integrable", 1)
+
+
+def test_a_linear_system_at_one_eps():
+    assert analyze(load("harmonic"), eps=1).conclusion.sentence == (
+        "The system is linear, and so is its Kahan map; 2 independent integrals in dimension 2; orbits close after 4 "
+        "steps (measured). All this at eps = 1 only: other eps may differ."
+    )
+    assert analyze(load("harmonic")).conclusion.integrals == 1
+
+
+# Integrals and growth are two findings
+
+
+@pytest.mark.parametrize("name", ["sir", pytest.param("zhukovski_volterra_2", marks=pytest.mark.slow)])
+def test_one_integral_and_exponential_growth(name):
+    found = analyze(read_system(FURTHER / "sir.toml") if name == "sir" else load(name), seconds=3)
+    assert (found.conclusion.kind, found.conclusion.integrals) == ("not integrable", 1)
+    assert found.conclusion.growth == "exponential"
+    assert "although there is 1 independent integral in dimension 3" in found.conclusion.sentence
+
+
+def test_quadratic_growth_without_integrals():
+    found = analyze(read_system(FURTHER / "painleve_1.toml"))
+    assert (found.conclusion.kind, found.conclusion.integrals, found.conclusion.growth) == (
+        "integrable",
+        0,
+        "quadratic",
+    )
+    assert found.conclusion.sentence.endswith("(measured); no integral in dimension 3.")
+
+
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
+def test_random_systems_have_nothing(seed):
+    found = analyze(random_system(2, seed))
+    assert (found.conclusion.kind, found.conclusion.integrals) == ("not integrable", 0)
+    assert found.relations == found.densities.densities == ()
+    assert "not Hamiltonian" in text_of(found)
+
+
+def test_a_system_of_the_commuting_family_is_recognised():
+    found = analyze(load("nahm_tetrahedral"))
+    assert "belongs to the commuting family" in text_of(found)
+    assert ("proved", "1 independent integrals, as a member of the commuting family") in [
+        (line.status, line.text) for line in dict(found.sections)["integrals"]
+    ]
+
+
+# What was not done
+
+
+def test_where_the_time_is_over_parts_are_skipped_and_told():
+    began = time.monotonic()
+    found = analyze(load("lagrange_top"), seconds=1e-9)
+    assert time.monotonic() - began < 5
+    assert found.skipped == [f"{part}: the time was over" for part in PARTS]
+    assert [line.text for line in dict(found.sections)["not done"]] == found.skipped
+    assert (found.conclusion.kind, found.conclusion.growth) == ("undecided", "unknown")
+    # none was found, which is not that there is none
+    assert found.conclusion.sentence == "The growth is undecided: degrees not measured; the integrals were not counted."
+    data = json.loads(json.dumps(found.to_json()))
+    assert (data["verdict"]["integrals"], data["integrals"], data["skipped"]) == (None, None, found.skipped)
+
+
+@pytest.mark.slow
+def test_in_twelve_dimensions_the_time_is_kept():
+    names = [f"x{k}" for k in range(12)]
+    rhs = [f"x{k}*(x{(k + 1) % 12} - x{(k - 1) % 12})" for k in range(12)]
+    began = time.process_time()
+    found = analyze(system(" ".join(names), *rhs), seconds=3)
+    assert time.process_time() - began < 15
+    assert found.conclusion.integrals == 1
+
+
+def test_a_part_that_gives_up_leaves_the_others(monkeypatch):
+    def refuses(*_, **__):
+        raise InputError("found 1, expected 2")
+
+    monkeypatch.setattr(module, "linear_symmetries", refuses)
+    found = analyze(load("nahm_tetrahedral"))
+    assert found.skipped == ["symmetries: found 1, expected 2"]
+    assert found.symmetries is None
+    assert found.commuting is not None
+    assert found.conclusion.kind == "integrable"
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_mistakes_and_interrupts_are_not_swallowed(monkeypatch, error):
+    def fails(*_, **__):
+        raise error
+
+    monkeypatch.setattr(module, "linear_symmetries", fails)
+    with pytest.raises(error):
+        analyze(load("nahm_tetrahedral"))
+
+
+def test_nothing_done_yet_is_undecided():
+    empty = Analysis(load("lorenz"), None, 1.0, 0)
+    assert empty.conclusion.kind == "undecided"
+    assert not empty.integrals_were_counted
+    assert json.dumps(empty.to_json())
+
+
+# Degenerate systems
+
+
+def test_where_the_map_has_no_value():
+    found = analyze(system("x", "x"), eps=1)
+    assert (found.conclusion.kind, found.to_json()["verdict"]["integrals"]) == ("singular", None)
+    assert found.conclusion.sentence.startswith("The map is nowhere defined")
+
+
+def test_where_an_iterate_is_constant():
+    found = analyze(system("x y", "x^2 - y^2 - 1", "2*x*y"), eps="1/2")
+    assert found.conclusion.sentence == (
+        "An iterate of the map is a constant map (measured): orbits end in one point. "
+        "All this at eps = 1/2 only: other eps may differ."
+    )
+    assert (found.conclusion.kind, found.conclusion.growth) == ("linearisable", "zero")
+    linear = analyze(system("x", "x"), eps=-1)
+    assert linear.conclusion.sentence.startswith(
+        "The system is linear, and so is its Kahan map; the integrals were not counted."
+    )
+
+
+def test_the_identity():
+    found = analyze(system("x y z", "0", "0", "0"))
+    assert (found.conclusion.kind, found.conclusion.integrals) == ("linear", 3)
+    assert found.conclusion.sentence == (
+        "The system is linear, and so is its Kahan map; 3 independent integrals in dimension 3; "
+        "orbits close after 1 step (measured)."
+    )
+    assert "all orbits tried close after 1 step\n" in text_of(found)
+
+
+# Form
+
+
+def test_relations_of_several_degrees_do_not_share_names():
+    found = analyze(read_system(FURTHER / "volterra_open_3.toml"))
+    assert [one.text for one in found.relations] == [
+        "x1 + x2 + x3 + c1 = 0",
+        "x2^2 + c2*x2*x3 + c2*x3^2 + c3*x3 - 1/eps^2 = 0",
+    ]
+    lines = text_of(found)
+    assert "the c are integrals: numbers that depend on the orbit only" in lines
+    assert "the e are" not in lines
+    assert "the e are numbers that depend on eps only" in text_of(analyze(load("planar_cubic_hamiltonian")))
+
+
+def test_symbols_enter_formulas_and_the_json_says_which():
+    found = analyze(parse_system(PLANE), symbols=("a", "eps", "b"))
+    assert found.symbols == ("a", "b")
+    assert found.to_json()["symbols"] == ["a", "b"]
+    assert {"a", "b", "eps"} <= set(found.integrals.integrals[0].function.names)
+
+
+def test_the_same_seed_gives_the_same_and_another_the_same_verdict():
+    one, again, other = (analyze(load("nahm_octahedral"), seed=seed).to_json() for seed in (3, 3, 4))
+    assert one == again
+    assert one["seed"] == 3
+    assert other["verdict"] == one["verdict"]
+    assert [each["integral"] for each in other["integrals"]["integrals"]] == [
+        each["integral"] for each in one["integrals"]["integrals"]
+    ]
+    assert other["integrals"]["primes"] != one["integrals"]["primes"]
+
+
+def test_statements_say_how_they_are_known():
+    found = analyze(load("weierstrass"))
+    known = {"proved", "supported", "measured", "undecided", "note"}
+    assert {line.status for _, lines in found.sections for line in lines} <= known
+    growth = dict(found.sections)["growth"]
+    assert {line.status for line in growth} == {"measured"}  # degrees are never proved
+    assert {line.status for line in dict(found.sections)["measure"]} == {"proved"}
+
+
+def test_progress_names_the_parts():
+    told = []
+    analyze(load("nahm_tetrahedral"), progress=told.append)
+    assert {part for part in told if ":" not in part} >= set(PARTS)
+    assert any(text.startswith("degrees: ") for text in told)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"eps": 0}, "found eps = 0"),
+        ({"symbols": ("zz",)}, "found the symbol 'zz'"),
+        ({"symbols": ("eps",), "eps": 1}, "both as a number and as a symbol"),
+        ({"seconds": 0}, "found 0 seconds"),
+        ({"seconds": -1}, "found -1 seconds"),
+        ({"seconds": float("nan")}, "found nan seconds"),
+        ({"seconds": float("inf")}, "found inf seconds"),
+    ],
+)
+def test_wrong_use(options, words):
+    with pytest.raises(InputError, match=words):
+        analyze(load("euler_top"), **options)

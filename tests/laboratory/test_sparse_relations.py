@@ -1,0 +1,181 @@
+"""Relations along orbits written out: they hold on exact orbits, and numbers, eps and integrals are told apart."""
+
+from __future__ import annotations
+
+import random
+from fractions import Fraction
+from itertools import islice
+from pathlib import Path
+
+import pytest
+from check_helpers import kahan_step, rank_by_elimination, solve_by_elimination
+from helpers import fraction
+from search_helpers import random_system, system, value_of
+
+from kahanmaps.checks.settings import random_starts
+from kahanmaps.laboratory import sparse_relations as module
+from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.modular_points import NoPoint
+from kahanmaps.laboratory.sparse_relations import SparseRelation, sparse_relations
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.files import read_system
+
+FURTHER = Path(__file__).parent / "further_systems"
+
+# Of the literature: the Euler top has (x1^2 - a x3^2) and (x2^2 - b x3^2) with integrals a, b; sums of open and closed
+# chains are constant; the Casimir functions of the tops in their Hirota-Kimura form.
+WRITTEN = [
+    ("euler_top", 2, ["x1^2 + c1*x3^2 + c2 = 0", "x2^2 + c3*x3^2 + c4 = 0"]),
+    ("harmonic", 2, ["x^2 + y^2 + c1 = 0"]),
+    ("volterra_periodic_3", 1, ["x1 + x2 + x3 + c1 = 0"]),
+    ("zhukovski_volterra_2", 2, ["x1^2 + 1/2*x2^2 + c1*x3^2 - x1 - 2*x2 + c2 = 0"]),
+    ("weierstrass", 3, ["x^3 - eps^2*x*y^2 + 4*eps^2*x^2 - 1/4*y^2 + c1*x + c2 = 0"]),
+    ("nahm_tetrahedral", 3, ["x^2*y - 1/3*y^3 + c1*x^2 + c1*y^2 + c2 = 0"]),
+    ("ishii", 2, ["x^2 - eps^2*y^2 - 1/6*z + c1 = 0", "x*z - 3/2*y^2 + 1/2*eps^2*z^2 + c2*x + c3 = 0"]),
+    ("volterra_open_3", 2, ["x2^2 + c1*x2*x3 + c1*x3^2 + c2*x3 - 1/eps^2 = 0"]),
+    ("lorenz", 3, []),
+]
+
+
+def file_of(name):
+    path = FURTHER / f"{name}.toml"
+    return read_system(path) if path.exists() else load(name)
+
+
+def relations(name, degree, eps=None, **more):
+    file = file_of(name) if isinstance(name, str) else name
+    return sparse_relations(Laboratory(file, (), eps).maps, degree, file.variables, **more)
+
+
+def exact_orbit(file, eps, length, seed=1):
+    """Points of an orbit over Q with no two equal, and none at a pole."""
+    for start in islice(random_starts(file.system.dim, seed), 50):
+        points = [tuple(fraction(entry) for entry in start)]
+        while len(points) < length and points[-1] is not None:
+            points.append(kahan_step(file.system, eps, points[-1]))
+        if points[-1] is not None and len(set(points)) == length:
+            return points
+    raise AssertionError("no orbit found")
+
+
+def unknowns_on(relation, file, eps, points):
+    """The values of the names that make the relation hold at the points, None where none do."""
+    names = sorted({text for _, text in relation.terms if text in relation.names})
+    rows = []
+    for x in points:
+        row = dict.fromkeys((*names, ""), Fraction(0))
+        for monomial, text in relation.terms:
+            value = value_of(monomial, file.variables, x, eps)
+            if text in relation.names:
+                row[text] += value
+            else:
+                row[""] += value * value_of(text, (), (), eps)
+        rows.append([row[name] for name in (*names, "")])
+    if rank_by_elimination(rows) != len(names):
+        return None
+    if not names:
+        return {}
+    chosen = []
+    for row in rows:
+        if rank_by_elimination([entry[:-1] for entry in [*chosen, row]]) > len(chosen):
+            chosen.append(row)
+    found = solve_by_elimination([row[:-1] for row in chosen], [-row[-1] for row in chosen])
+    return dict(zip(names, found, strict=True))
+
+
+@pytest.mark.parametrize(("name", "degree", "texts"), WRITTEN)
+def test_the_relations_of_the_literature(name, degree, texts):
+    assert [one.text for one in relations(name, degree)] == texts
+
+
+@pytest.mark.parametrize(("name", "degree"), [(name, degree) for name, degree, texts in WRITTEN if texts])
+def test_relations_hold_on_exact_orbits(name, degree):
+    file = file_of(name)
+    for relation in relations(name, degree):
+        for text in ("1/3", "-2/7"):
+            eps = Fraction(text)
+            values = [unknowns_on(relation, file, eps, exact_orbit(file, eps, 7, seed)) for seed in (1, 2, 3, 4)]
+            assert None not in values
+            for c in relation.integrals:  # they are no constants
+                assert len({each[c] for each in values}) > 1
+
+
+def test_a_wrong_relation_does_not_hold_on_exact_orbits():
+    file = load("euler_top")
+    points = exact_orbit(file, Fraction(1, 3), 7)
+    right = relations("euler_top", 2)[0]
+    for terms in ((("x1^2", "1"), ("x3", "c1"), ("1", "c2")), (("x1^2", "2"), ("x3^2", "-1"), ("1", "c1"))):
+        assert unknowns_on(SparseRelation(terms), file, Fraction(1, 3), points) is None
+    assert unknowns_on(right, file, Fraction(1, 3), points) is not None
+
+
+def test_what_depends_on_eps_alone_is_no_integral():
+    (found,) = relations("planar_cubic_hamiltonian", 3)
+    assert found.text.startswith("x^3 + e1*x^2*y + e2*x*y^2 + e3*y^3 + c1*x^2")
+    assert found.integrals == ("c1", "c2", "c3", "c4", "c5", "c6")
+    assert found.names == ("e1", "e2", "e3", *found.integrals)
+    file = load("planar_cubic_hamiltonian")
+    for eps in (Fraction(1, 3), Fraction(-2, 7)):
+        one, other = (unknowns_on(found, file, eps, exact_orbit(file, eps, 11, seed)) for seed in (1, 2))
+        assert [name for name in found.names if one[name] == other[name]] == ["e1", "e2", "e3"]
+
+
+def test_at_a_given_eps_they_are_numbers():
+    (found,) = relations("weierstrass", 3, eps="1/3")
+    assert found.text == "x^3 - 1/9*x*y^2 + 4/9*x^2 - 1/4*y^2 + c1*x + c2 = 0"
+
+
+@pytest.mark.parametrize(("name", "degree"), [("euler_top", 3), ("volterra_periodic_3", 2), ("harmonic", 4)])
+def test_what_lower_degrees_imply_is_left_out(name, degree):
+    assert relations(name, degree) == ()
+
+
+def test_long_relations_are_left_out():
+    assert relations("planar_cubic_hamiltonian", 3, most_terms=9) == ()
+    assert len(relations("planar_cubic_hamiltonian", 3, most_terms=10)) == 1
+
+
+def test_names_go_on_where_they_are_told_to():
+    found = relations("euler_top", 2, first=5)
+    assert [one.text for one in found] == ["x1^2 + c5*x3^2 + c6 = 0", "x2^2 + c7*x3^2 + c8 = 0"]
+
+
+def test_equal_integrals_have_one_name():
+    (found,) = relations("nahm_tetrahedral", 3)
+    assert found.integrals == ("c1", "c1", "c2")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_systems_have_no_relations(seed):
+    assert relations(random_system(random.Random(seed).choice((2, 3)), seed), 4) == ()
+
+
+def test_orbits_that_disagree_give_nothing():
+    one, other = (Laboratory(load(name)).maps for name in ("euler_top", "volterra_periodic_3"))
+    assert sparse_relations([one[0], other[1]], 2, ["x1", "x2", "x3"]) is None
+
+
+def test_a_common_number_that_is_not_simple_is_taken_for_an_accident(monkeypatch):
+    monkeypatch.setattr(module, "_SIMPLE", 2)
+    (found,) = relations("zhukovski_volterra_2", 2)
+    assert found.text == "x1^2 + e1*x2^2 + c1*x3^2 - x1 + e2*x2 + c2 = 0"
+
+
+def test_degenerate_systems():
+    assert [one.text for one in relations(system("x y", "0", "0"), 1)] == ["x + c1 = 0", "y + c2 = 0"]
+    assert [one.text for one in relations(system("x y", "1", "2"), 1)] == ["x - 1/2*y + c1 = 0"]
+    assert relations(system("x", "x"), 2) == ()
+    with pytest.raises(NoPoint):
+        relations(system("x", "x"), 2, eps=1)
+
+
+@pytest.mark.parametrize(
+    ("terms", "text"),
+    [
+        ((("x", "1"), ("y", "-1"), ("1", "c1")), "x - y + c1 = 0"),
+        ((("x", "-1"), ("y", "-2/3"), ("1", "-1")), "-x - 2/3*y - 1 = 0"),
+        ((("x", "1"), ("y", "-eps^2"), ("1", "-1/(4*eps^2)")), "x - eps^2*y - 1/(4*eps^2) = 0"),
+    ],
+)
+def test_signs_are_written_as_people_do(terms, text):
+    assert SparseRelation(terms).text == text
