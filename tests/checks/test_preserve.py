@@ -395,6 +395,16 @@ def test_a_wrong_tensor_is_refuted_where_no_theorem_applies(wrong, monkeypatch):
     assert check_poisson(SystemFile.from_member(member), QUICK).findings[0].verdict is REFUTED
 
 
+def test_a_map_without_an_inverse_has_no_measure_to_judge():
+    """x' = -x, y' = -y at eps = 1 sends everything to 0, where both sides of the law vanish for many phi."""
+    contraction = file_of(system_of("x y", "-x", "-y"))
+    phi = parse_rational_function("x", ["x", "y", "eps"])
+    assert check_measure(contraction, Settings(eps=fmpq(1)), phi).verdict is Verdict.UNDECIDED
+    right = parse_rational_function("x*y", ["x", "y", "eps"])
+    assert check_measure(contraction, Settings(eps=fmpq(1, 2)), right).verdict is PROVED
+    assert check_measure(contraction, Settings(eps=fmpq(1, 2)), phi).verdict is REFUTED
+
+
 def test_a_wrong_sign_of_eps_in_det_dphi_refutes_a_right_density(monkeypatch):
     own = file_of(LOTKA_VOLTERRA, phi="x*y")
     assert only(check_measure(own, QUICK)).verdict is SUPPORTED

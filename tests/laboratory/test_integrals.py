@@ -16,7 +16,7 @@ from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.identities import integral_verdict
-from kahanmaps.laboratory.integrals import Laboratory, closing_note, find_integrals
+from kahanmaps.laboratory.integrals import Laboratory, _is_affine_integral, closing_note, find_integrals
 from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.systems.catalog import load, names
 
@@ -307,3 +307,18 @@ def test_hamiltonian_planes_always_have_one(coefficients):
     assert found.is_complete
     for one in found.integrals:
         assert {len(each) for each in values_on_orbits(file, one.text, ["1/9"], starts=1, steps=2)} == {1}
+
+
+def test_affine_integrals_are_proved_in_any_dimension_and_nothing_else_passes_for_one():
+    """v.f = 0 is all there is to it; where it fails, or v.x is not what was given, the general way decides."""
+    n = 9
+    names_ = [f"x{i}" for i in range(n)]
+    sites = [f"{names_[i]}*({names_[(i + 1) % n]} - {names_[i - 1]})" for i in range(n)]
+    file = system(" ".join(names_), *sites)
+    found = find_integrals(file, max_degree=1)
+    assert [(one.verdict, one.evidence.method) for one in found.integrals] == [(Verdict.PROVED, "theorem")]
+    three = load("volterra_periodic_3")
+    laboratory = Laboratory(three)
+    for text, expected in (("x1 + x2 + x3", True), ("x1 + x2 - x3", False), ("eps*x1 + eps*x2 + eps*x3", False)):
+        function = parse_rational_function(text, [*three.variables, "eps"])
+        assert _is_affine_integral(laboratory.system, function) is expected
