@@ -173,7 +173,7 @@ def analysis(
     result: Result = {
         "status": "partial" if found.skipped or unfinished else "complete",
         "integrability": final.kind,
-        "integrals": final.integrals,
+        "integrals": final.integrals if found.integrals_were_counted else None,
         **(_growth(found.degrees) if found.degrees is not None else {}),
         "growth": final.growth,
         "densities": None if found.densities is None else len(found.densities.densities),

@@ -19,7 +19,7 @@ from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.laboratory.affine_functions import affine_darboux
-from kahanmaps.laboratory.commuting import CommutingSystems, commuting_systems
+from kahanmaps.laboratory.commuting import CommutingField, CommutingSystems, commuting_systems
 from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.densities import DensitySearch, find_densities
 from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
@@ -126,8 +126,9 @@ class Analysis:
             return None if result is None else result.to_json()
 
         return {
-            "analysis": self.file.name,
+            "command": "analyze",
             "version": __version__,
+            "system": self.file.name,
             "parameters": {name: format_number(value) for name, value in self.file.parameters.items()},
             "symbols": list(self.symbols),
             "eps": "every" if self.eps is None else format_number(self.eps),
@@ -386,7 +387,7 @@ def _integral_lines(found: Analysis) -> list[Statement]:
         lines.append(Statement(NOTE, search.reason))
     if isinstance(found.structure, Structure):
         m = found.structure.form.m
-        lines.append(Statement(PROVED, f"{m} independent integrals, as a member of the commuting family"))
+        lines.append(Statement(PROVED, f"{counted(m, 'independent integral')}, as a member of the commuting family"))
     return lines
 
 
@@ -479,8 +480,12 @@ def _commuting_lines(found: Analysis) -> list[Statement]:
     lines = []
     if search.every_g_commutes:
         lines.append(Statement(PROVED, "the map is the identity and commutes with every other"))
-    for one in search.nontrivial:
-        lines.append(Statement(str(one.finding.verdict), f"commutes with the Kahan map of g = ({', '.join(one.rhs)})"))
+    told: list[CommutingField] = []
+    for one in search.nontrivial:  # with g there is -g, whose map is the inverse
+        if not any(one.system == other.system.scaled(-1) for other in told):
+            told.append(one)
+            text = f"commutes with the Kahan maps of g and -g, g = ({', '.join(one.rhs)})"
+            lines.append(Statement(str(one.finding.verdict), text))
     for family in search.families:
         lines.append(
             Statement(

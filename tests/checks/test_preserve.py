@@ -401,7 +401,7 @@ def test_a_map_without_an_inverse_has_no_measure_to_judge():
     phi = parse_rational_function("x", ["x", "y", "eps"])
     assert check_measure(contraction, Settings(eps=fmpq(1)), phi).verdict is Verdict.UNDECIDED
     right = parse_rational_function("x*y", ["x", "y", "eps"])
-    assert check_measure(contraction, Settings(eps=fmpq(1, 2)), right).verdict is PROVED
+    assert check_measure(contraction, Settings(eps=fmpq(1, 2)), right).holds is True
     assert check_measure(contraction, Settings(eps=fmpq(1, 2)), phi).verdict is REFUTED
 
 

@@ -66,7 +66,8 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
     assert {"section": "growth", "status": "measured", "text": "d_n = 2*n^2 + 1"} in statements
     assert [run["verdict"] for run in found.pop("singularities")] == ["confined", "confined"]
     assert found == {
-        "analysis": "euler_top",
+        "command": "analyze",
+        "system": "euler_top",
         "version": __version__,
         "parameters": {"a1": "1", "a2": "-2", "a3": "1"},
         "symbols": ["a2"],

@@ -10,7 +10,7 @@ def test_text_and_json_agree(kahanmaps):
     assert text.status == 0
     assert "C = C[x - y]\n\tproved\tx - y\n" in text.out
     data = kahanmaps("find-integrals nahm_octahedral --darboux 3 --json").json
-    assert data["search"] == "darboux-polynomials"
+    assert data["command"] == "darboux-polynomials"
     assert ["x - y"] in [space["polynomials"] for space in data["spaces"]]
     assert data["eps"] == "every"
 

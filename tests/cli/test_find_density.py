@@ -59,7 +59,7 @@ def test_json_is_one_object_with_all_that_is_needed_to_redo_it(kahanmaps):
     outcome = kahanmaps("find-density lotka_volterra --eps 1/7 --seed 2 --json -q")
     found = outcome.json
     assert (outcome.status, outcome.err) == (0, "")
-    keys = ("search", "version", "system", "symbols", "eps", "time_step", "seed", "degree_tried", "period", "reason")
+    keys = ("command", "version", "system", "symbols", "eps", "time_step", "seed", "degree_tried", "period", "reason")
     assert [found[key] for key in keys] == [
         "find-density",
         __version__,

@@ -90,8 +90,8 @@ def test_json_is_one_object_with_all_that_is_needed_to_redo_it(kahanmaps):
     outcome = kahanmaps("find-integrals euler_top --symbolic a1 --seed 5 --json -q")
     found = outcome.json
     assert (outcome.status, outcome.err) == (0, "")
-    assert {key: found[key] for key in ("search", "version", "system", "symbols", "eps", "time_step", "seed")} == {
-        "search": "find-integrals",
+    assert {key: found[key] for key in ("command", "version", "system", "symbols", "eps", "time_step", "seed")} == {
+        "command": "find-integrals",
         "version": __version__,
         "system": "euler_top",
         "symbols": ["a1"],
@@ -194,7 +194,7 @@ def test_bases_of_given_polynomials(kahanmaps):
 
 def test_bases_in_json(kahanmaps):
     found = kahanmaps("find-integrals euler_top --monomials x1^2,x2^2,x3^2,1 --eps 1/3 --json").json
-    assert (found["search"], found["eps"], found["time_step"], found["version"]) == (
+    assert (found["command"], found["eps"], found["time_step"], found["version"]) == (
         "hirota-kimura",
         "1/3",
         "2/3",

@@ -116,7 +116,7 @@ def heading(name: str, found: Any) -> dict[str, Any]:
     from kahanmaps.version import __version__
 
     return {
-        "search": name,
+        "command": name,
         "version": __version__,
         "system": found.file.name,
         "parameters": {key: str(value) for key, value in found.file.parameters.items()},
