@@ -7,6 +7,7 @@ rules of `kahanmaps.invariants.heights`; here orbits are drawn and compared.
 
 from __future__ import annotations
 
+import random
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +17,6 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
-from kahanmaps.checks.settings import random_starts
 from kahanmaps.errors import InputError
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.heights import Growth, HeightGrowth, height_growth
@@ -29,6 +29,8 @@ DEFAULT_STARTS = 3
 DEFAULT_STEPS = 60
 DEFAULT_MAX_DIGITS = 20_000
 DEFAULT_SECONDS = 30.0
+_NUMERATORS = (13, 17, 19, 23, 29, 31, 37, 41, 43, 47)
+_DENOMINATORS = (7, 8, 9, 16, 25, 27)
 _MOST_STARTS = 1000
 _DRAWS = 20  # starts tried in place of one whose orbit meets a singular point
 
@@ -134,7 +136,7 @@ def height_survey(
     orbits: list[SurveyedOrbit] = []
     for value in DEFAULT_EPS if eps is None else (rational(eps),):
         kahan_map = KahanMap(system, value)
-        draws = random_starts(system.dim, seed)
+        draws = _generic_starts(system.dim, seed)
         given = [None] * starts if isinstance(starts, int) else [kahan_map.point(start) for start in starts]
         for k, start in enumerate(given):
             if orbits and time.monotonic() > deadline:
@@ -146,6 +148,16 @@ def height_survey(
                     break
             orbits.append(SurveyedOrbit(value, tuple(candidate), found))
     return HeightSurvey(tuple(orbits), True)
+
+
+def _generic_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
+    """Random points off the invariant curves of small equation that many maps have, such as eps^2 x^2 = 1.
+
+    Numerators are primes, so that a coordinate is no simple multiple of 1/eps.
+    """
+    rng = random.Random(f"heights {seed}")
+    while True:
+        yield tuple(fmpq(rng.choice((-1, 1)) * rng.choice(_NUMERATORS), rng.choice(_DENOMINATORS)) for _ in range(dim))
 
 
 def _candidates(draws: Iterator[tuple[fmpq, ...]]) -> Iterator[tuple[fmpq, ...]]:
