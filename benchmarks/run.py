@@ -1,6 +1,6 @@
 """All benchmarks (`make bench`): runs them, prints ratios, and writes results.json here and docs/benchmarks.md.
 
-    python benchmarks/run.py [--quick] [--only exact|iterate|float] [--page]
+    python benchmarks/run.py [--quick] [--only exact|iterate|float|degrees] [--page]
 
 --quick takes less than a minute, on shorter orbits, and writes nothing; --only runs one part, and leaves what is on
 record of the others as it is; --page runs nothing and writes the page anew from the record. Peers that are absent are
@@ -21,6 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import bench_degrees
 import bench_exact
 import bench_iterate
 import flint
@@ -29,7 +30,7 @@ from work import Absent, Row, format_ratio, gp_version, say, table
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE / "results.json"
 PAGE = HERE.parent / "docs" / "benchmarks.md"
-PARTS = ("exact", "iterate", "float")
+PARTS = ("exact", "iterate", "float", "degrees")
 PACKAGES = ("python-flint", "numpy", "cypari", "gmpy2", "sympy", "scipy", "numba", "heyoka")
 FLOAT = "Float orbits"
 
@@ -63,6 +64,8 @@ def measured(part: str, quick: bool) -> list[Row]:
         return bench_exact.measure(quick)
     if part == "iterate":
         return bench_iterate.measure(quick)
+    if part == "degrees":
+        return bench_degrees.measure(quick)
     if quick:
         say("  left out: there is no quick form of it")
         return []
@@ -191,6 +194,11 @@ GROUPS = {
     FLOAT: (
         "Speed relative to the first line of each block: **more is faster**. Integrators solve another problem,\n"
         "the flow, and are what one would use instead."
+    ),
+    bench_degrees.GROUP: (
+        "Time relative to kahanmaps, which walks two lines with different primes and compares them; the peers walk\n"
+        "one line modulo 2^61 - 1. Polynomials with gcds are what kahanmaps does itself up to dimension 5; in\n"
+        "dimension 6 it takes power series."
     ),
 }
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from kahanmaps import KahanMap
+from kahanmaps import KahanMap, load
 
 BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
 STEPS = 4
@@ -19,7 +19,7 @@ def _scripts(monkeypatch):
     """The scripts import each other by name, as they do when they are run."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     yield
-    for name in ("work", "run", "bench_exact", "bench_iterate"):
+    for name in ("work", "run", "bench_exact", "bench_iterate", "bench_degrees"):
         sys.modules.pop(name, None)
 
 
@@ -82,6 +82,20 @@ def test_the_jump_the_steps_and_nmod_mat_agree():
     assert bench_iterate.jump(work.work(), 30)[1] == bench_iterate.step(work.work(), 30)[1]
     assert bench_iterate.jump_modulo(work.work(), 50)[1] == bench_iterate.step_modulo(work.work(), 50)[1]
     assert bench_iterate.in_balls(work.work(), n=100, bits=200, check=8)
+
+
+def test_the_walkers_of_a_line_agree():
+    import bench_degrees
+    import work
+
+    for name, n in (("weierstrass", 6), ("euler_top", 3), ("kirchhoff_generic", 2)):
+        system = load(name).system
+        degrees = bench_degrees.ours(system, n)
+        for label, run in bench_degrees.PEERS:
+            try:
+                assert run(system, n)[1] == degrees, label
+            except work.Absent:
+                continue
 
 
 def test_the_page_is_what_the_record_says():

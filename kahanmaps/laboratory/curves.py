@@ -1,22 +1,30 @@
 """The curve t -> Phi^n(a + b t) that a Kahan map makes of a random line over GF(p), step after step, exactly.
 
-The curve is kept as dim + 1 polynomials without a common factor. A step solves (I - eps f'(x)) x~ = (I + eps B) x +
-2 eps c in power series in t, to as many terms as the next curve needs, and finds its polynomials from the shortest
-recurrence (massey-1969) of the series of a random quotient of two affine functions: its generating function has the
-common denominator of the coordinates. All terms to spare of all coordinates are tried.
+The curve is kept as dim + 1 polynomials without a common factor. The next one is the kernel of an n x (n + 1) matrix of
+linear forms in them (maps/projective.py), and there are two ways to it:
+
+    minors  up to dimension 5: the maximal minors, and the gcd of two random combinations of them divided out;
+    series  above it, where minors are many: (I - eps f'(x)) x~ = (I + eps B) x + 2 eps c in power series in t, to as
+            many terms as the next curve needs. Its polynomials follow from the shortest recurrence (massey-1969) of the
+            series of a random quotient of two affine functions, whose generating function has the common denominator
+            of the coordinates. All terms to spare of all coordinates are tried.
+
+In the plane minors are five to ten times as fast as series; in dimension 6 the two are even.
 """
 
 from __future__ import annotations
 
 import random
 import time
-from typing import Any
+from typing import Any, NoReturn
 
 from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
 
+from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.checks.decide import random_prime_field
 from kahanmaps.systems.quadratic import QuadraticSystem
 
+_MINORS = 5  # the largest dimension in which minors are taken
 _MARGIN = 8  # terms of a series beyond those that determine the curve: each is right by chance once in 2^62
 
 
@@ -61,20 +69,64 @@ class Line:
         self._X = [nmod_poly([1], p), *(nmod_poly([rng.randrange(p), rng.randrange(1, p)], p) for _ in range(n))]
 
     def step(self, guess: int) -> None:
-        """One step on. Raises ZeroDivisionError where the line starts at a point without image, Stopped at a limit."""
+        """One step on. Raises ZeroDivisionError where points of the line have no image, Stopped at a limit."""
+        curve = self._by_minors() if len(self._right) <= _MINORS else self._by_series(guess)
+        degree = max(0, *(int(entry.degree()) for entry in curve))
+        if degree > self._max_degree:
+            self._raise_degree()
+        self._X, self.degree = curve, degree
+        self.steps += 1
+
+    def _by_minors(self) -> list[nmod_poly]:
+        rows = [
+            [*(self._value(form) for form in forms), -self._value(right)]
+            for forms, right in zip(self._matrix, self._right, strict=True)
+        ]
+        *above, below = kernel_minors(rows, self._times)
+        if below.is_zero():
+            raise ZeroDivisionError("no point of the line has an image")
+        mixed = (self._mixture([below, *above]) for _ in range(2))
+        common = next(mixed).gcd(next(mixed))
+        self._require_time()
+        curve = []
+        for entry in (below, *above):
+            quotient, rest = divmod(entry, common)
+            if not rest.is_zero():  # two mixtures with a factor that is not in all: once in about p
+                return self._divided([below, *above])
+            curve.append(quotient)
+        return curve
+
+    def _divided(self, entries: list[nmod_poly]) -> list[nmod_poly]:
+        common = nmod_poly([0], self.prime)
+        for entry in entries:
+            common = common.gcd(entry)
+        return [entry // common for entry in entries]
+
+    def _times(self, left: nmod_poly, right: nmod_poly) -> nmod_poly:
+        self._require_time()
+        return left * right
+
+    def _mixture(self, entries: list[nmod_poly]) -> nmod_poly:
+        zero = nmod_poly([0], self.prime)
+        return sum((entry * nmod(self._rng.randrange(self.prime), self.prime) for entry in entries), zero)
+
+    def _value(self, form: list[tuple[int, nmod]]) -> nmod_poly:
+        return sum((self._X[k] * c for k, c in form), nmod_poly([0], self.prime))
+
+    def _raise_degree(self) -> NoReturn:
+        raise Stopped("degree", f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
+
+    def _by_series(self, guess: int) -> list[nmod_poly]:
         most = 2 * self._max_degree + _MARGIN + 1
         length = min(2 * guess + _MARGIN + 1, most)
         while True:
             self._require_time()
             curve = self._curve(self._image(length), length)
             if curve is not None:
-                break
+                return curve
             if length == most:
-                raise Stopped("degree", f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
+                self._raise_degree()
             length = min(2 * length, most)
-        self._X = curve
-        self.degree = max(0, *(int(entry.degree()) for entry in curve))
-        self.steps += 1
 
     def _require_time(self) -> None:
         if time.monotonic() > self._deadline:

@@ -16,7 +16,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory import curves
 from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.recurrences import GrowthClass
-from kahanmaps.systems.catalog import load
+from kahanmaps.systems.catalog import load, names
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 CATALOG = {
@@ -171,6 +171,26 @@ def test_without_a_recurrence_there_is_an_estimate_that_says_so():
     assert not shorter.looks_exponential
     assert shorter.growth_text.startswith("no recurrence found in 6 terms; d_n/d_(n-1) is 2.38")
     assert shorter.growth_text.endswith("an estimate only")
+
+
+@pytest.mark.parametrize("name", [name for name in names() if load(name).system.dim <= 5])
+def test_minors_and_power_series_walk_the_same_curves(name, monkeypatch):
+    """Two implementations of one step; the minors serve up to dimension 5, the series above."""
+    file = load(name)
+    terms = 4 if file.system.dim > 3 else 6
+    for eps in (None, "2/7"):
+        monkeypatch.setattr(curves, "_MINORS", 5)
+        by_minors = degree_growth(file.system, eps, max_terms=terms)
+        monkeypatch.setattr(curves, "_MINORS", 0)
+        assert degree_growth(file.system, eps, max_terms=terms).degrees == by_minors.degrees
+        assert len(by_minors.degrees) == terms + 1
+
+
+def test_minors_above_a_common_factor_that_two_mixtures_share_by_chance(monkeypatch):
+    """Mixtures that are all the same leave a quotient with a rest: then every entry is taken."""
+    expected = degree_growth(load("weierstrass").system, max_terms=5).degrees
+    monkeypatch.setattr(curves.Line, "_mixture", lambda self, entries: entries[-1])
+    assert degree_growth(load("weierstrass").system, max_terms=5).degrees == expected
 
 
 def with_degrees(*degrees):

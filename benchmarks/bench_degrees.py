@@ -1,0 +1,124 @@
+"""Degrees of the iterates on a random line modulo a prime: kahanmaps against plain polynomials and rational functions.
+
+    python benchmarks/bench_degrees.py [--quick]
+
+The peers walk one line modulo 2^61 - 1 at eps = 1/10 and remove common factors by gcds; kahanmaps walks two, each
+modulo a prime of its own, and compares them.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from flint import nmod_poly
+from work import Absent, Row, require_equal, row, run_gp, say, table, timed
+
+from kahanmaps import degree_growth, load
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.maps.projective import linear_forms
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+GROUP = "Degrees of the iterates"
+PRIME = 2**61 - 1
+EPS = "1/10"
+WORKS = [("planar_cubic_hamiltonian", 40), ("euler_top", 12), ("clebsch_first_flow", 8), ("lorenz", 7)]
+QUICK = [("planar_cubic_hamiltonian", 12), ("euler_top", 5)]
+OURS = "kahanmaps, two lines compared"
+POLYNOMIALS = "python-flint: minors of polynomial matrices, gcds, one line"
+PARI = "PARI/GP: matsolve over GF(p)(t), one line"
+
+
+def ours(system: QuadraticSystem, n: int) -> list[int]:
+    """The degrees from d_0 = 1 to d_n."""
+    return list(degree_growth(system, EPS, max_terms=n, seconds=600, max_degree=10**6).degrees)
+
+
+def _line(system: QuadraticSystem) -> list[list[int]]:
+    """A random affine line, as pairs of residues, and the homogenising coordinate."""
+    rng = random.Random(1)
+    return [*([rng.randrange(PRIME), rng.randrange(PRIME)] for _ in range(system.dim)), [1]]
+
+
+def polynomials(system: QuadraticSystem, n: int) -> tuple[float, list[int]]:
+    """The same by homogeneous coordinates that are polynomials in t: Cramer's rule, then the content."""
+    forms = linear_forms(system, EPS, GF(PRIME))
+
+    def run() -> list[int]:
+        x = [nmod_poly(pair, PRIME) for pair in _line(system)]
+        degrees = [1]
+        for _ in range(n):
+            rows = [[_combination(entry, x) for entry in line] for line in forms]
+            image = kernel_minors(rows)
+            common = nmod_poly([0], PRIME)
+            for entry in image:
+                common = common.gcd(entry)
+            x = [entry // common for entry in image]
+            degrees.append(max(int(entry.degree()) for entry in x))
+        return degrees
+
+    return timed(run, most=2)
+
+
+def _combination(coefficients: list[Any], x: list[nmod_poly]) -> nmod_poly:
+    total = nmod_poly([0], PRIME)
+    for coefficient, entry in zip(coefficients, x, strict=True):
+        total = total + entry * int(coefficient)
+    return total
+
+
+def pari(system: QuadraticSystem, n: int) -> tuple[float, list[int]]:
+    """The same by rational functions of t, which PARI reduces itself. Raises Absent."""
+    forms = linear_forms(system, EPS, GF(PRIME))
+    size = system.dim
+    entries = ", ".join(
+        "[" + ", ".join("[" + ", ".join(f"Mod({int(c)}, p)" for c in entry) + "]" for entry in line) + "]"
+        for line in forms
+    )
+    line = ", ".join(" + ".join(f"Mod({c}, p)*t^{k}" for k, c in enumerate(pair)) for pair in _line(system))
+    program = [
+        f"p = {PRIME}",
+        f"L = [{entries}]",
+        f"X = [{line}]",
+        f"e(i, j, X) = sum(k = 1, {size + 1}, L[i][j][k]*X[k])",
+        f"s(X) = matsolve(matrix({size}, {size}, i, j, e(i, j, X)), vector({size}, i, -e(i, {size + 1}, X))~)",
+        f"h(y) = my(d = 1); for(i = 1, {size}, d = lcm(d, denominator(y[i]))); concat(Vec(y*d), [d])",
+        f"gettime(); D = [1]; for(k = 1, {n}, X = h(s(X)); D = concat(D, [vecmax(apply(poldegree, X))]))",
+        "concat([gettime()], D)",
+    ]
+    answer = [int(entry) for entry in run_gp(program)]
+    return answer[0] / 1000, answer[1:]
+
+
+PEERS: list[tuple[str, Callable[[QuadraticSystem, int], tuple[float, list[int]]]]] = [
+    (POLYNOMIALS, polynomials),
+    (PARI, pari),
+]
+
+
+def measure(quick: bool = False) -> list[Row]:
+    """The rows of this part."""
+    rows: list[Row] = []
+    for name, n in QUICK if quick else WORKS:
+        system = load(name).system
+        seconds, degrees = timed(partial(ours, system, n), most=3)
+        what = f"{name}, n = {n}, d_n = {degrees[-1]}"
+        rows.append(row(GROUP, OURS, what, seconds, 1.0))
+        for label, run in PEERS:
+            try:
+                slow, found = run(system, n)
+            except Absent as reason:
+                say(f"  {label}: left out, {reason}")
+                continue
+            require_equal(label, found, degrees)
+            rows.append(row(GROUP, label, what, slow, slow / seconds))
+            say(f"  {what}: {label} {slow / seconds:.3g}")
+    return rows
+
+
+if __name__ == "__main__":
+    print(table(measure("--quick" in sys.argv)))
