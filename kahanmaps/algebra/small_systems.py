@@ -275,7 +275,7 @@ class _Solver:
         _, factors = matrix.charpoly().factor()
         for factor, _ in factors:
             if factor.degree() > 1:
-                self.found.irrational.append(f"a group of {factor.degree()} conjugate solutions")
+                self.found.irrational.append(f"groups of {factor.degree()} conjugate solutions")
             else:
                 self.solve([*basis, form + factor[0] / factor[1]], values)
 

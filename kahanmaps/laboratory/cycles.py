@@ -19,7 +19,7 @@ from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.reversors import require_reversor
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-MAX_POINTS = 2_000_000  # up to which the whole graph is made
+MAX_POINTS = 2_000_000  # up to which the whole graph is made, up to dimension 6
 DEFAULT_SAMPLES = 500
 MAX_SAMPLES = 100_000
 DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3", "5", "4", "6")
@@ -92,7 +92,8 @@ def cycle_census(
 ) -> Census:
     """The orbits of the Kahan map of a system on P^n over GF(p), all of them or those of random points.
 
-    `eps` is exact, half the time step; 2 < `prime` < 2^29. Up to 2,000,000 points the whole graph is made unless
+    `eps` is exact, half the time step; 2 < `prime` < 2^29. Up to 2,000,000 points (half as many with
+    each dimension above 6, where a step costs twice as much) the whole graph is made unless
     `samples` says how many random points to follow; each is followed for at most `steps` steps (default
     8 (p + 1 + 2 sqrt p)), all of them for about `seconds` seconds. `reversor` is a matrix R with R^2 = I and
     f(R x) = -R f(x). Exact: counts, no estimates. Raises InputError for a wrong prime, matrix or number of samples,
@@ -116,7 +117,7 @@ def cycle_census(
     chart = ProjectiveMap(system, exact_eps, prime)
     known = (prime, exact_eps, chart.dim, chart.count)
     form = (chart.factor, chart.degree, chart.is_undefined)
-    if samples is None and chart.count <= MAX_POINTS:
+    if samples is None and chart.count <= MAX_POINTS >> max(0, chart.dim - 6):
         progress(f"p = {prime}: the images of {chart.count} points")
         image = chart.table()
         graph = graph_of(image)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import comb
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly
@@ -35,6 +36,7 @@ from kahanmaps.maps.kahan import KahanMapOver
 from kahanmaps.systems.files import SystemFile
 
 _BUDGET = 20_000_000
+_MOST_TERMS = 2000  # of a polynomial: as many unknowns
 _MOST_PRODUCTS = 2000
 
 
@@ -125,6 +127,11 @@ def darboux_polynomials(
     deadline = time.monotonic() + seconds
     cofactors = laboratory.cofactors()
     found.cofactors = tuple(one.name for one in cofactors)
+    asked, dim = degree, laboratory.system.dim
+    while comb(dim + degree, dim) > _MOST_TERMS:
+        degree -= 1
+    if degree < asked:
+        found.reason = f"degrees above {degree} were not tried: polynomials in dimension {dim} have too many terms"
     candidates = products(cofactors, degree)
     if len(candidates) > _MOST_PRODUCTS:
         found.reason = f"{len(candidates)} products of cofactors, of which the first {_MOST_PRODUCTS} were tried"

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import random
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,10 +34,11 @@ from kahanmaps.laboratory.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.identities import integral_verdict
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, rank
 from kahanmaps.laboratory.parametric import ParametricSystem
-from kahanmaps.laboratory.search import Found, repeat, search
+from kahanmaps.laboratory.search import Found, may_be_conjugate, repeat, search
 from kahanmaps.systems.files import SystemFile
 
 _TRIES = 3
+_CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
 
 
 @dataclass(frozen=True)
@@ -183,6 +184,17 @@ class Laboratory:
                 raise BadPrime(f"the prime {prime} divides the numerator of eps", prime)
         return ModularMap(self.system, prime, eps, values, self.seed)
 
+    def other_maps(self, count: int) -> Iterator[ModularMap]:
+        """So many maps modulo further primes, each at other random residues of the symbols and eps."""
+        rng = random.Random(f"other maps {self.seed}")
+        while count > 0:
+            prime = random_prime(rng)
+            try:
+                yield self.map_at(prime, [rng.randrange(2, prime) for _ in self.symbols], rng.randrange(2, prime))
+            except BadPrime:
+                continue
+            count -= 1
+
     @property
     def eps_enters(self) -> str:
         """How eps enters formulas: "not", where it is a number, "by weight" for homogeneous f, else as a "symbol"."""
@@ -286,8 +298,8 @@ def find_integrals(
         if profile.codimension == 0:
             return result(_theorem(laboratory, [], 1), profile, _unfinished(profile, max_degree))
         cofactors = laboratory.cofactors()
-        found = search(laboratory.maps[0], profile, cofactors, (deadline - time.monotonic()) / 2, progress)
-        formulas, reason = _formulas(laboratory, found, cofactors, deadline, progress)
+        base, found = _search(laboratory, profile, cofactors, deadline, progress)
+        formulas, reason = _formulas(laboratory, base, found, cofactors, deadline, progress)
     except NoPoint as error:
         return result([], empty, str(error))
     integrals = _independent(laboratory, formulas, progress)
@@ -309,8 +321,26 @@ def _unfinished(profile: Profile, max_degree: int | None) -> str:
     return "" if profile.agree else "the orbits that were compared do not agree: try another --seed"
 
 
+def _search(
+    laboratory: Laboratory,
+    profile: Profile,
+    cofactors: Sequence[Cofactor],
+    deadline: float,
+    progress: Callable[[str], None],
+) -> tuple[ModularMap, Found]:
+    """What is found modulo a prime where spaces that are conjugate over an extension of Q do not occur, and the map."""
+    base = laboratory.maps[0]
+    found = search(base, profile, cofactors, (deadline - time.monotonic()) / 2, progress)
+    if may_be_conjugate(found):
+        for map_ in laboratory.other_maps(_CONJUGATE_PRIMES):
+            if time.monotonic() < deadline and repeat(found, map_, cofactors, base.prime) is None:
+                base, found = map_, search(map_, profile, cofactors, (deadline - time.monotonic()) / 2, progress)
+    return base, found
+
+
 def _formulas(
     laboratory: Laboratory,
+    base: ModularMap,
     found: Found,
     cofactors: Sequence[Cofactor],
     deadline: float,
@@ -319,7 +349,7 @@ def _formulas(
     """All ratios of the spaces in closed form, with how they were found, and a reason where that failed."""
     if not found.steps:
         return [], ""
-    reference = laboratory.maps[0].prime
+    reference = base.prime
     if repeat(found, laboratory.maps[1], cofactors, reference) is None:
         return [], "what was found at one eps was not found at another"
     progress("interpolating closed forms")

@@ -96,7 +96,7 @@ def search(
         spaces.append([affine])
     later: list[int] = []
     for degree, nullity in enumerate(profile.nullities, 1):
-        if degree == 1 or not nullity:
+        if not nullity:
             continue
         if nullity >= LARGEST_SPAN:
             break
@@ -160,6 +160,14 @@ def repeat(found: Found, map_: ModularMap, cofactors: Sequence[Cofactor], refere
     return Found(found.steps, spaces, found.independent, found.unresolved)
 
 
+def may_be_conjugate(found: Found) -> bool:
+    """Whether spaces of one degree have the same monomials, as spaces have that are conjugate over an extension of Q.
+
+    These exist only modulo primes where the extension splits, and have no formula over Q.
+    """
+    return any(len(set(map(_pattern, group))) < len(group) for group in found.spaces)
+
+
 def _pattern(space: DarbouxSpace) -> tuple[tuple[bool, ...], ...]:
     return tuple(tuple(bool(entry) for entry in vector) for vector in space.basis)
 
@@ -167,13 +175,16 @@ def _pattern(space: DarbouxSpace) -> tuple[tuple[bool, ...], ...]:
 def _in_order(
     group: list[DarbouxSpace], model: list[DarbouxSpace], prime: int, reference: int
 ) -> list[DarbouxSpace] | None:
-    """The spaces in the order of the model, by the places of their zeros and, where these agree, by their numbers."""
-    if sorted(map(_pattern, group)) != sorted(map(_pattern, model)):
-        return None
+    """The spaces in the order of the model, by the places of their zeros and, where these agree, by their numbers.
+
+    There may be more of them than in the model, see `may_be_conjugate`; None where there are fewer.
+    """
     waiting = list(group)
     ordered = []
     for space in model:
         alike = [one for one in waiting if _pattern(one) == _pattern(space)]
+        if not alike:
+            return None
         if len(alike) > 1:
             alike.sort(key=lambda one: -_equal_entries(one, space, prime, reference))
         waiting.remove(alike[0])

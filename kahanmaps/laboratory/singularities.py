@@ -20,17 +20,20 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.text import format_polynomial
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.laboratory.fates import NOT_CONTRACTED, UNDECIDED, Hypersurface, fate_of, unwritten
+from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 6
 MAX_STEPS = 200
 DEFAULT_STEPS = 12
+_POINTS = 3  # random ones, where det dPhi is looked at
 _MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
 
 
@@ -40,6 +43,8 @@ class SingularityRun:
 
     `denominator` is det(I - eps f'(x)) as text; `critical_degree` the degree of the Jacobian determinant of the
     homogeneous map (None where it was too large to expand: contracted hypersurfaces are then known by random points).
+    The map is not dominant where that determinant vanishes identically: its image lies in a hypersurface, and none is
+    followed.
     """
 
     eps: fmpq
@@ -49,12 +54,19 @@ class SingularityRun:
     hypersurfaces: tuple[Hypersurface, ...]
     stopped: bool
     is_undefined: bool
+    is_dominant: bool
 
     @property
     def verdict(self) -> str:
-        """ "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided"."""
+        """What all hypersurfaces together say.
+
+        "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided"; where that
+        has no meaning at this eps, "singular everywhere" or "not dominant".
+        """
         if self.is_undefined:
             return "singular everywhere"
+        if not self.is_dominant:
+            return "not dominant"
         states = {h.status for h in self.hypersurfaces if h.status != NOT_CONTRACTED}
         if self.stopped or UNDECIDED in states:
             return UNDECIDED
@@ -67,12 +79,11 @@ class SingularityRun:
     @property
     def shape(self) -> tuple[Any, ...]:
         """What does not depend on eps if eps is generic: degrees, kinds and patterns."""
-        return tuple(
-            sorted(
-                (h.degree, h.is_pole, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
-                for h in self.hypersurfaces
-            )
+        patterns = sorted(
+            (h.degree, h.is_pole, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
+            for h in self.hypersurfaces
         )
+        return (self.is_undefined, self.is_dominant, *patterns)
 
 
 def singularities(
@@ -103,14 +114,17 @@ def singularities(
     end = time.monotonic() + seconds
     forms, common = homogeneous_map(system, exact_eps, QQ)
     degree = max(int(form.total_degree()) for form in forms)
-    denominator = _affine(forms[-1] * common, system)
+    # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
+    denominator = _affine(forms[-1] * common * (-1) ** system.dim, system)
     is_undefined = bool(forms[-1].is_zero())  # det(I - eps f'(x)) = 0 for all x
+    if is_undefined or not _is_dominant(system, exact_eps):
+        return SingularityRun(exact_eps, denominator, degree, None, (), False, is_undefined, False)
     factors: dict[str, tuple[fmpq_mpoly, bool, int | None]] = {}
-    for factor, _ in [] if is_undefined else (forms[-1] * common).factor()[1]:
+    for factor, _ in (forms[-1] * common).factor()[1]:
         if not _is_infinity(factor):
             factors[str(factor)] = (factor, True, 0)
     critical_degree: int | None = 0
-    if not is_undefined and degree > 1:
+    if degree > 1:
         progress("the Jacobian determinant of the homogeneous map")
         critical = _critical(forms, degree)
         critical_degree = None if critical is None else int(critical.total_degree())
@@ -136,7 +150,7 @@ def singularities(
         progress("following critical points")
         found += unwritten(system, exact_eps, steps, rng, end)
         stopped = time.monotonic() > end
-    return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, is_undefined)
+    return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
 
 
 def symbolic_denominator(system: QuadraticSystem) -> list[tuple[str, int]] | None:
@@ -174,6 +188,18 @@ def default_eps(seed: int) -> tuple[fmpq, fmpq]:
     rng = random.Random(f"singularities eps {seed}")
     first = fmpq(rng.randint(2, 9), 11)
     return first, fmpq(rng.randint(2, 11), 13)
+
+
+def _is_dominant(system: QuadraticSystem, eps: fmpq) -> bool:
+    """Whether det dPhi is not 0 at one of a few points: proved where it is, and false otherwise as good as never."""
+    kahan_map, rng = KahanMap(system, eps), random.Random("dominant")
+    for _ in range(_POINTS):
+        try:
+            if det(kahan_map.jacobian([rng.randint(-(10**9), 10**9) for _ in range(system.dim)])) != 0:
+                return True
+        except SingularStep:
+            continue
+    return False
 
 
 def _critical(forms: Sequence[Any], degree: int) -> Any:

@@ -67,8 +67,13 @@ class Lyapunov:
 
     @property
     def residual(self) -> float:
-        """The largest distance of a sum of exponents from the mean of log |det dPhi|: rounding, if all is well."""
-        return float(np.abs(self.exponents.sum(axis=1) - self.log_volume).max(initial=0.0))
+        """The largest distance of a sum of exponents from the mean of log |det dPhi|: rounding, if all is well.
+
+        NaN where no orbit went through.
+        """
+        if len(self.exponents) == 0:
+            return float("nan")
+        return float(np.abs(self.exponents.sum(axis=1) - self.log_volume).max())
 
 
 def lyapunov_exponents(
@@ -111,10 +116,9 @@ def lyapunov_exponents(
     done = counted = half_at = 0
     half = walk.sums.copy()
     while done < transient + steps:
-        if done % 64 == 0:
-            progress(f"step {done} of {transient + steps}")
-            if time.monotonic() > end or len(walk.lanes) == 0:
-                break
+        progress(f"step {done} of {transient + steps}")
+        if time.monotonic() > end or len(walk.lanes) == 0:
+            break
         walk.step()
         done += 1
         if done == transient:

@@ -217,13 +217,14 @@ def walk_until_back(
 ) -> tuple[Integers, Integers]:
     """For starts in columns: the step at which each comes back, and that after which it has no image; -1 for neither.
 
-    At most `steps` steps are taken; `keep_on`, called now and then with the step, may stop earlier by returning False.
+    At most `steps` steps are taken; `keep_on`, called before each step with its number, may stop earlier by returning
+    False.
     """
     back = np.full(starts.shape[1], -1, dtype=np.int64)
     lost = back.copy()
     lanes, X, home = np.arange(starts.shape[1]), starts, starts
     for step in range(1, steps + 1):
-        if len(lanes) == 0 or (keep_on is not None and step % 64 == 0 and not keep_on(step)):
+        if len(lanes) == 0 or (keep_on is not None and not keep_on(step)):
             break
         X = chart.images(X)
         gone = ~X.any(axis=0)

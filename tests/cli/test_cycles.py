@@ -24,6 +24,7 @@ def test_counts_are_printed_for_two_eps_by_default(kahanmaps):
 def test_the_json_is_enough_to_redo_the_run(kahanmaps):
     found = kahanmaps("cycles lotka_volterra --prime 101 --prime 199 --eps 1/7 --eps 3/13 --json").json
     assert (found["command"], found["version"], found["primes"]) == ("cycles", __version__, [101, 199])
+    assert (found["samples"], found["steps_asked"], found["seconds"]) == (None, None, 60.0)
     assert [(run["prime"], run["eps"]) for run in found["runs"]] == [
         (101, "1/7"),
         (101, "3/13"),

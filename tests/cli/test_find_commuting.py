@@ -45,7 +45,7 @@ def test_families_are_printed_with_their_parameters(kahanmaps):
 def test_where_chi_does_not_split_the_note_says_so(kahanmaps):
     outcome = kahanmaps("find-commuting paper_m3_irreducible")
     assert outcome.status == 0
-    assert "note\tmore solutions, not rational: a group of 3 conjugate solutions" in outcome.out
+    assert "note\tmore solutions, not rational: groups of 3 conjugate solutions" in outcome.out
 
 
 def test_the_json_has_the_documented_shape(kahanmaps):

@@ -20,7 +20,10 @@ def test_products_are_left_out(kahanmaps):
     assert "x*y" not in kahanmaps("find-integrals lotka_volterra --darboux 3").out.split("listed\n")[1]
 
 
-@pytest.mark.parametrize("options", ["--darboux 2 --toml", "--darboux 2 --latex", "--darboux 0", "--darboux x"])
+@pytest.mark.parametrize(
+    "options",
+    ["--darboux 2 --toml", "--darboux 2 --latex", "--darboux 2 --monomials x,1", "--darboux 0", "--darboux x"],
+)
 def test_wrong_use(kahanmaps, options):
     outcome = kahanmaps(f"find-integrals weierstrass {options}")
     assert outcome.status == 2

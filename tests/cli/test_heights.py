@@ -95,3 +95,9 @@ def test_wrong_use_gives_2(kahanmaps, command, words):
     outcome = kahanmaps(command)
     assert (outcome.status, outcome.out) == (2, "")
     assert words in outcome.err
+
+
+def test_starts_given_and_random_do_not_go_together(kahanmaps):
+    outcome = kahanmaps("heights weierstrass --start 1,2 --starts 2")
+    assert outcome.status == 2
+    assert "not both" in outcome.err

@@ -24,6 +24,7 @@ def test_the_json_is_enough_to_redo_the_run(kahanmaps):
     assert (found["command"], found["version"], found["seed"]) == ("lyapunov", __version__, 4)
     assert found["starts"] == {"random": 3, "box": "5"}
     assert (found["eps"], found["time_step"], found["steps"], found["transient"]) == ("1/100", "1/50", 200, 20)
+    assert (found["steps_asked"], found["seconds"]) == (200, 60.0)
     assert len(found["per_time"]) == len(found["spread"]) == len(found["change_from_half"]) == 3
     assert found["sum"] == pytest.approx(found["log_volume"], abs=1e-9)
     assert found["residual"] < 1e-10
@@ -50,6 +51,7 @@ def test_no_orbit_left_is_null_in_json(kahanmaps, tmp_path):
     outcome = kahanmaps("lyapunov --vars x --rhs x^2 --eps 1/20 --steps 50 --json --starts", tmp_path / "starts.csv")
     assert outcome.status == 3
     assert (outcome.json["per_time"], outcome.json["sum"], outcome.json["log_volume"]) == ([None], None, None)
+    assert outcome.json["residual"] is None
 
 
 def test_a_clock_that_stops_is_status_three(kahanmaps):

@@ -82,3 +82,23 @@ def test_help_fits_the_screen(tmp_path):
     outcome = shell("kahanmaps singularities --help", tmp_path, COLUMNS="80")
     assert outcome.status == 0
     assert max(map(len, outcome.out.splitlines())) <= 80
+
+
+def test_one_eps_at_which_the_map_has_no_value_is_not_the_verdict(kahanmaps):
+    """At eps = 7/11, the first of the two, I - eps B = 0; at the other one the map is an ordinary linear one."""
+    outcome = kahanmaps("singularities --vars x --rhs 11/7*x")
+    assert outcome.status == 3
+    assert "singular everywhere" in outcome.out
+    assert "no singularities" in outcome.out
+    assert outcome.out.splitlines()[-1] == "# undecided"
+    assert "the two eps tell different things" in outcome.err
+
+
+def test_a_map_into_a_hypersurface_is_told(kahanmaps):
+    """At eps = -1 the map of x' = x is x -> 0, so that nothing can be confined."""
+    outcome = kahanmaps("singularities --vars x,y --rhs x --rhs y^2 --eps=-1")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert outcome.out.splitlines()[-1] == "# not dominant"
+    found = kahanmaps("singularities --vars x,y --rhs x --rhs y^2 --eps=-1 --json").json
+    assert [(run["dominant"], run["hypersurfaces"]) for run in found["runs"]] == [(False, [])]
+    assert kahanmaps("singularities --vars x,y --rhs x --rhs y^2 --eps=-2 --json").json["runs"][0]["dominant"]

@@ -86,3 +86,10 @@ def test_degenerate_systems_and_wrong_use() -> None:
         darboux_polynomials(load("weierstrass"), 2, eps=0)
     short = darboux_polynomials(load("volterra_periodic_5"), 4, seconds=0.0)
     assert "time was over" in short.reason
+
+
+def test_a_degree_with_too_many_terms_is_lowered_and_said() -> None:
+    """Dimension 6: 18564 monomials up to degree 12, 1716 up to degree 7."""
+    found = darboux_polynomials(load("kirchhoff_generic"), 12, seconds=1.0)
+    assert found.reason
+    assert found.degree == 12

@@ -309,6 +309,29 @@ def test_hamiltonian_planes_always_have_one(coefficients):
         assert {len(each) for each in values_on_orbits(file, one.text, ["1/9"], starts=1, steps=2)} == {1}
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_spaces_that_are_conjugate_over_an_extension_do_no_harm(seed):
+    """At eps = 1, y + sqrt(-3) x and its conjugate have constant cofactors: spaces modulo one prime in two only."""
+    found = find_integrals(system("x y", "y", "-3*x"), eps=1, seed=seed)
+    assert [one.text for one in found.integrals] == ["3*x^2 + y^2", "x^3 - x*y^2"]
+    assert all(one.verdict is Verdict.PROVED for one in found.integrals)
+
+
+def test_integrals_over_an_extension_are_found_as_rational_ones():
+    """u' = 2v + s u, v' = 3u^2 - 2 - s v with s^2 = 2, written in coordinates over Q: a cubic H over Q(s)."""
+    file = system("a b c d", "2*c + 2*b", "2*d + a", "3*a^2 + 6*b^2 - 2*d - 2", "6*a*b - c")
+    found = find_integrals(file)
+    assert len(found.integrals) == found.codimension == 2
+    for one in found.integrals:
+        assert {len(each) for each in values_on_orbits(file, one.text, ["1/9"], starts=1, steps=2)} == {1}
+
+
+def test_quotients_of_affine_functions_come_first():
+    """y/x, at once: the relations of higher degree are its multiples, and there are very many."""
+    found = find_integrals(system("x y z", "x^2", "x*y", "x*z + y^2"))
+    assert [(one.text, one.origin) for one in found.integrals] == [("y/x", "relations of degree 1 along orbits")]
+
+
 def test_affine_integrals_are_proved_in_any_dimension_and_nothing_else_passes_for_one():
     """v.f = 0 is all there is to it; where it fails, or v.x is not what was given, the general way decides."""
     n = 9

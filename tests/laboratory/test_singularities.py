@@ -8,6 +8,8 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.fates import CONFINED, NOT_CONFINED
 from kahanmaps.laboratory.jets import NotGeneric, PrecisionTooLow, follow
@@ -245,3 +247,13 @@ def test_series_too_short_say_so_and_special_points_too():
     assert [s.rank for s in follow(forms, [third, 5, 1], [1, 1, 0], [[0, 1, 0]], PRIME, 4, 16)] == [0, 0, 0, 1]
     with pytest.raises((PrecisionTooLow, NotGeneric)):
         follow(forms, [third, 5, 1], [0, 1, 0], [[1, 0, 0]], PRIME, 4, 16)
+
+
+@pytest.mark.parametrize(
+    "name", ["riccati", "weierstrass", "lorenz", "henon_heiles", "volterra_periodic_5", "lagrange_top"]
+)
+def test_the_denominator_is_that_determinant_in_every_dimension(name):
+    system = load(name).system
+    point = [fmpq(2 * k + 1, k + 2) for k in range(system.dim)]
+    denominator = parse_polynomial(singularities(system, "1/7", steps=1).denominator, system.variables)
+    assert evaluate(denominator, QQ, point) == KahanMap(system, "1/7").determinant(point)

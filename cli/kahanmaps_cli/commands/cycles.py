@@ -34,8 +34,8 @@ _LENGTHS_SHOWN = 12
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """The orbits of the Kahan map on projective space over a finite field, and how long its cycles are.
 
-    All points of P^n over GF(P), or random ones where they are more than two million. Without --eps two values are
-    tried for each prime: one alone may be special.
+    All points of P^n over GF(P), or random ones where they are more than two million (from dimension 7 on, half as many
+    with each dimension). Without --eps two values are tried for each prime: one alone may be special.
 
     \b
       kahanmaps cycles weierstrass --prime 101 --prime 499
@@ -176,6 +176,8 @@ def _record(
         "arithmetic": "exact modulo primes",
         "seed": options["seed"],
         "samples": options["samples"],
+        "steps_asked": options["steps"],
+        "seconds": options["seconds"],
         "reversor": _rows(reversor),
         "primes": list(dict.fromkeys(options["primes"])),
         "runs": [

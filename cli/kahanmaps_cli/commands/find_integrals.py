@@ -58,6 +58,8 @@ def command(system: str | None, **options: Any) -> int:
         file = load_system(system, options["variables"], options["rhs"], options["parameters"])
         symbols, eps = symbols_and_eps(options)
         if options["sets"]:
+            if options["darboux"] is not None:
+                raise click.UsageError("give --monomials or --darboux, not both")
             if options["as_toml"] or options["as_latex"]:
                 raise click.UsageError("--monomials goes with --json, not with --toml and --latex")
             return _bases(file, eps, options)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.command("heights")
 @system_options
 @eps_options
-@click.option("--starts", type=int, default=3, show_default=True, help="Number of random starts.")
+@click.option("--starts", type=int, help="Number of random starts (default 3).")
 @click.option("--start", "given", type=PointText(), multiple=True, metavar="X", help="A start; may be repeated.")
 @click.option("--steps", type=int, default=60, show_default=True, help="Steps of each orbit.")
 @click.option("--max-digits", type=int, default=20_000, show_default=True, help="Digit budget of each orbit.")
@@ -45,8 +45,10 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     from kahanmaps.errors import InputError
     from kahanmaps.family.structure import structure_of
     from kahanmaps.invariants.heights import Growth
-    from kahanmaps.laboratory.height_survey import height_survey
+    from kahanmaps.laboratory.height_survey import DEFAULT_STARTS, height_survey
 
+    if options["starts"] is not None and options["given"]:
+        raise click.UsageError("give --start X or --starts N, not both: --starts counts random starts")
     if options["max_digits"] < 1:
         raise InputError(f"found --max-digits {options['max_digits']}, expected at least 1")
     eps = the_eps(options["eps"], options["time_step"], required=False)
@@ -55,7 +57,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         found = height_survey(
             file.system,
             eps,
-            starts=options["given"] or options["starts"],
+            starts=options["given"] or (DEFAULT_STARTS if options["starts"] is None else options["starts"]),
             steps=options["steps"],
             max_digits=options["max_digits"],
             seconds=options["seconds"],

@@ -129,6 +129,8 @@ def _record(file: SystemFile, eps: Any, options: dict[str, Any], found: Lyapunov
         "seed": (options["seed"] or 0) if random else None,
         "orbits": found.orbits,
         "ended": found.ended,
+        "steps_asked": options["steps"],
+        "seconds": options["seconds"],
         "steps": found.steps,
         "transient": found.transient,
         "stopped": found.stopped,
@@ -138,6 +140,6 @@ def _record(file: SystemFile, eps: Any, options: dict[str, Any], found: Lyapunov
         "change_from_half": _numbers(found.change),
         "sum": _numbers([found.mean.sum()])[0],
         "log_volume": _numbers([found.log_volume.mean()])[0] if len(found.log_volume) else None,
-        "residual": found.residual,
+        "residual": _numbers([found.residual])[0],
         "document": dict(file.document),
     }

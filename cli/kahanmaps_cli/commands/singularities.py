@@ -36,9 +36,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps singularities --vars x,y --rhs 'y' --rhs '6*x^2 - 2' --json
 
     "ranks" are the dimensions of the images after 1, 2, ... steps, "poles" the orders of their poles. Z is the
-    hyperplane at infinity. Confined
-    singularities are evidence for, and no proof of integrability: those of henon_heiles are confined, and its degrees
-    grow exponentially. "not confined" means within so many steps.
+    hyperplane at infinity. Confined singularities are evidence for, and no proof of integrability: those of
+    henon_heiles are confined, and its degrees grow exponentially. "not confined" means within so many steps. Where the
+    map is not dominant, that is, where its image lies in a hypersurface, nothing is followed.
 
     Where the polynomials are too large, ? stands for all hypersurfaces that share their multiplicity and their fate,
     known by random points.
@@ -113,7 +113,7 @@ def _print(
     click.echo(f"# {file.name}, dimension {file.system.dim}, eps is half the time step")
     if symbolic is not None:
         factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
-        click.echo(f"det(I - eps f')\t{cut(factors) or 'constant'}")
+        click.echo(f"factors of det(I - eps f')\t{cut(factors) or 'none'}")
     for run in runs:
         click.echo(f"\n# eps = {format_number(run.eps)}: map of degree {run.map_degree}, {run.verdict}")
         click.echo(f"det(I - eps f')\t{cut(run.denominator)}")
@@ -145,6 +145,7 @@ def _record(
         "arithmetic": "exact; series modulo primes",
         "seed": options["seed"],
         "steps": options["steps"],
+        "seconds": options["seconds"],
         "verdict": verdict,
         "symbolic_denominator": symbolic,
         "runs": [
@@ -157,6 +158,7 @@ def _record(
                 "critical_degree": run.critical_degree,
                 "stopped": run.stopped,
                 "singular_everywhere": run.is_undefined,
+                "dominant": run.is_dominant,
                 "hypersurfaces": [
                     {
                         "polynomial": found.polynomial,
