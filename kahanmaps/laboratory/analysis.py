@@ -304,6 +304,8 @@ def _conclude(found: Analysis) -> Conclusion:
         integrals = "the integrals were not counted"
     period = found.integrals.profile.period if found.integrals is not None else None
     suffix = "" if found.eps is None else f" All this at eps = {found.eps} only: other eps may differ."
+    if found.symbols:
+        suffix += f" The integrals are for every {', '.join(found.symbols)}, all else for the values of the file."
 
     def conclude(kind: str, sentence: str) -> Conclusion:
         return Conclusion(kind, count, str(growth), sentence + suffix)
@@ -379,10 +381,13 @@ def _integral_lines(found: Analysis) -> list[Statement]:
         if not profile.agree:
             lines.append(Statement(NOTE, "the orbits that were compared do not agree"))
     lines += [Statement(MEASURED, f"along orbits {relation.text}") for relation in found.relations]
-    if found.relations and any(relation.integrals for relation in found.relations):
-        lines.append(Statement(NOTE, "the c are integrals: numbers that depend on the orbit only"))
-    if any(set(relation.names) - set(relation.integrals) for relation in found.relations):
-        lines.append(Statement(NOTE, "the e are numbers that depend on eps only"))
+    integrals = [name for relation in found.relations for name in relation.integrals]
+    if integrals:
+        letter = integrals[0].rstrip("0123456789")
+        lines.append(Statement(NOTE, f"the {letter} are integrals: numbers that depend on the orbit only"))
+    functions = [name for relation in found.relations for name in relation.functions_of_eps]
+    if functions:
+        lines.append(Statement(NOTE, f"the {functions[0].rstrip('0123456789')} are numbers that depend on eps only"))
     if search.reason and profile.nullities:
         lines.append(Statement(NOTE, search.reason))
     if isinstance(found.structure, Structure):

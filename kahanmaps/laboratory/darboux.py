@@ -108,8 +108,8 @@ def darboux_polynomials(
         progress: is told what is being tried.
 
     Returns:
-        A `DarbouxSearch`. With C = 1 the polynomials are integrals (the constant 1 is left out). Products of what is
-        listed are not listed again.
+        A `DarbouxSearch`. With C = 1 the polynomials are integrals (the constant 1 is left out). A space that
+        products of elements of others span is left out.
 
     Raises:
         InputError: for unknown symbols and eps = 0.

@@ -37,7 +37,6 @@ from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.laboratory.search import Found, may_be_conjugate, repeat, search
 from kahanmaps.systems.files import SystemFile
 
-_TRIES = 3
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
 
 

@@ -213,7 +213,7 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
     >>> find_recurrence([1, 6, 36, 216, 1296]).rate.text
     '6'
     >>> find_recurrence([1, 2, 3, 5, 8, 13, 21]).rate.text
-    '1.61803398874989484820, root of x^2 + (-1)*x + (-1)'
+    '1.61803398874989484820, root of t^2 - t - 1'
     >>> find_recurrence([2, 3, 5, 7, 11, 13, 17, 19]) is None
     True
     """

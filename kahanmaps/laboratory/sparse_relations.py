@@ -28,10 +28,12 @@ class SparseRelation:
     """A polynomial that vanishes along every orbit, with coefficients that are integrals.
 
     `terms` are pairs of a monomial and its coefficient: text of a number, perhaps with a power of eps, or a name, such
-    as "c3" for an integral and "e1" for a function of eps.
+    as "c3" for an integral and "e1" for a function of eps; `integrals` and `functions_of_eps` list these names.
     """
 
     terms: tuple[tuple[str, str], ...]
+    integrals: tuple[str, ...] = ()
+    functions_of_eps: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
@@ -49,12 +51,7 @@ class SparseRelation:
     @property
     def names(self) -> tuple[str, ...]:
         """The coefficients that are names."""
-        return tuple(text for _, text in self.terms if text[0] in "ce" and text[1:].isdigit())
-
-    @property
-    def integrals(self) -> tuple[str, ...]:
-        """The names of the coefficients that are integrals."""
-        return tuple(name for name in self.names if name.startswith("c"))
+        return tuple(text for _, text in self.terms if text in self.integrals or text in self.functions_of_eps)
 
 
 def sparse_relations(
@@ -87,6 +84,7 @@ def sparse_relations(
         return None
     lower = _implied(maps[0], degree, support)
     found = []
+    integral, function = (_letter(choice, variables) for choice in (("c", "k", "C", "K"), ("e", "s", "E", "S")))
     names: dict[tuple[int, int, int], str] = {}
     functions: dict[tuple[int, int], str] = {}  # of eps
     for one, again, other in zip(*tables, strict=True):
@@ -97,13 +95,25 @@ def sparse_relations(
         terms = []
         for k in used:
             if one[k] != again[k]:
-                text = names.setdefault((one[k], again[k], other[k]), f"c{first + len(names)}")
+                text = names.setdefault((one[k], again[k], other[k]), f"{integral}{first + len(names)}")
             else:
                 number = _number_text(one[k], other[k], maps[0], maps[1])
-                text = number or functions.setdefault((one[k], other[k]), f"e{first + len(functions)}")
+                text = number or functions.setdefault((one[k], other[k]), f"{function}{first + len(functions)}")
             terms.append((_monomial(support[k], variables), text))
-        found.append(SparseRelation(tuple(terms)))
+        found.append(
+            SparseRelation(
+                tuple(terms),
+                tuple(text for _, text in terms if text in names.values()),
+                tuple(text for _, text in terms if text in functions.values()),
+            )
+        )
     return tuple(found)
+
+
+def _letter(choice: Sequence[str], variables: Sequence[str]) -> str:
+    """The first letter that names like c1, c2, ... may begin with, none of them being a variable."""
+    taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
+    return next((letter for letter in choice if letter not in taken), f"{choice[0]}_")
 
 
 def _implied(map_: ModularMap, degree: int, support: Sequence[tuple[int, ...]]) -> set[tuple[int, ...]]:

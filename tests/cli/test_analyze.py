@@ -82,7 +82,8 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
             "integrals": 2,
             "growth": "quadratic",
             "sentence": "Integrable in the sense of complexity: quadratic growth, dynamical degree 1 (measured); "
-            "2 independent integrals in dimension 3.",
+            "2 independent integrals in dimension 3. The integrals are for every a2, all else for the values of the "
+            "file.",
         },
         "hirota_kimura": ["x1^2 + c1*x3^2 + c2 = 0", "x2^2 + c3*x3^2 + c4 = 0"],
         "family": None,

@@ -295,7 +295,7 @@ def test_a_check_whose_orbit_nobody_asked_for_may_cut_it_short(kahanmaps):
         ("systems nonsense", "found the unknown system"),
         ("systems --toml", "need the NAME of a system"),
         ("systems -p a=1", "need the NAME of a system"),
-        ("systems euler_top --toml --json", "one of the two"),
+        ("systems euler_top --toml --json", "one of the three"),
         ("systems euler_top lorenz", "unexpected extra argument"),
         # everything else
         ("nonsense", "There is no command 'nonsense'"),

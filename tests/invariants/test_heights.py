@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 from planar_helpers import SPLIT, over_members, side_by_side, structure_and_system
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.checks.settings import random_starts
 from kahanmaps.errors import InexactNumber, InputError
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.structure import structure_of
@@ -170,8 +171,20 @@ CATALOGUE = {
 }
 
 
-def test_the_table_has_the_whole_catalogue():
-    assert set(CATALOGUE) == set(names())
+# The others: their degrees, which the catalogue has, grow as the heights do.
+OTHERS = [name for name in names() if name not in CATALOGUE]
+
+
+def test_every_system_of_the_catalogue_is_tried():
+    assert set(CATALOGUE) <= set(names())
+    assert all(load(name).catalog["growth"] in ("quadratic", "exponential") for name in OTHERS)
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_heights_grow_as_the_degrees_of_the_catalogue(name):
+    file = load(name)
+    found = growth(file.system, next(random_starts(file.system.dim, 3)), 40, max_digits=6_000)
+    assert str(found.kind) == file.catalog["growth"]
 
 
 @pytest.mark.parametrize("name", CATALOGUE)

@@ -18,7 +18,8 @@ from kahanmaps.laboratory.integrals import Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint
 from kahanmaps.laboratory.sparse_relations import SparseRelation, sparse_relations
 from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import read_system
+from kahanmaps.systems.files import SystemFile, read_system
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 FURTHER = Path(__file__).parent / "further_systems"
 
@@ -105,7 +106,8 @@ def test_a_wrong_relation_does_not_hold_on_exact_orbits():
     points = exact_orbit(file, Fraction(1, 3), 7)
     right = relations("euler_top", 2)[0]
     for terms in ((("x1^2", "1"), ("x3", "c1"), ("1", "c2")), (("x1^2", "2"), ("x3^2", "-1"), ("1", "c1"))):
-        assert unknowns_on(SparseRelation(terms), file, Fraction(1, 3), points) is None
+        integrals = tuple(text for _, text in terms if text.startswith("c"))
+        assert unknowns_on(SparseRelation(terms, integrals), file, Fraction(1, 3), points) is None
     assert unknowns_on(right, file, Fraction(1, 3), points) is not None
 
 
@@ -179,3 +181,11 @@ def test_degenerate_systems():
 )
 def test_signs_are_written_as_people_do(terms, text):
     assert SparseRelation(terms).text == text
+
+
+def test_names_of_coefficients_are_not_those_of_variables():
+    """The Euler top in variables c1, c2, c3: c1 cannot be an integral as well."""
+    top = SystemFile.from_system(QuadraticSystem.from_text(["c1", "c2", "e1"], ["c2*e1", "-2*c1*e1", "c1*c2"]))
+    found = sparse_relations(Laboratory(top).maps, 2, top.variables)
+    assert [one.text for one in found] == ["c1^2 + k1*e1^2 + k2 = 0", "c2^2 + k3*e1^2 + k4 = 0"]
+    assert [one.integrals for one in found] == [("k1", "k2"), ("k3", "k4")]

@@ -162,7 +162,7 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
         print_json({**heading("darboux-polynomials", found), **found.to_json(), "document": dict(file.document)})
     else:
         click.echo(f"Darboux polynomials: {file.name}, {scope(found)}")
-        click.echo("P(x~) = C P(x), C a product of C[g] = g(x~, -eps)/g(x, eps); products of P listed are not listed")
+        click.echo("P(x~) = C P(x), C a product of C[g] = g(x~, -eps)/g(x, eps); spaces spanned by products left out")
         for space in found.spaces:
             click.echo(f"C = {space.cofactor}")
             for P in space.polynomials:
