@@ -89,6 +89,7 @@ def until_done(db: str, number: int, process: subprocess.Popen[str]) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_what_is_killed_on_a_cluster_changes_nothing(machines: Any, capsys: pytest.CaptureFixture[str]):
     assert main(["batch", "run", "study.toml", "--db", "home.db", "-q", "-j", "2"]) == 3  # some tasks fail, as meant
     first, _ = machines.worker(1), machines.worker(1)

@@ -88,6 +88,7 @@ def test_degenerate_systems_and_wrong_use() -> None:
     assert "time was over" in short.reason
 
 
+@pytest.mark.slow
 def test_a_degree_with_too_many_terms_is_lowered_and_said() -> None:
     """Dimension 6: 18564 monomials up to degree 12, 1716 up to degree 7."""
     found = darboux_polynomials(load("kirchhoff_generic"), 12, seconds=1.0)
