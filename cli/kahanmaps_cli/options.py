@@ -27,15 +27,23 @@ def _stack(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     return apply
 
 
-inline_options: Callable[[F], F] = _stack(
-    click.option("--vars", "variables", metavar="X,Y,...", help="Inline system: its variables."),
-    click.option("--rhs", multiple=True, metavar="EXPR", help="Inline system: one right-hand side a variable."),
-    click.option(
-        "-p", "--parameter", "parameters", type=NameValue(), multiple=True, help="Set a parameter of the system."
-    ),
-)
+def _inline_options(parameter: NameValue, help_text: str) -> Callable[[F], F]:
+    return _stack(
+        click.option("--vars", "variables", metavar="X,Y,...", help="Inline system: its variables."),
+        click.option("--rhs", multiple=True, metavar="EXPR", help="Inline system: one right-hand side a variable."),
+        click.option("-p", "--parameter", "parameters", type=parameter, multiple=True, help=help_text),
+    )
+
+
+inline_options: Callable[[F], F] = _inline_options(NameValue(), "Set a parameter of the system.")
 
 system_options: Callable[[F], F] = _stack(click.argument("system", required=False), inline_options)
+
+# For commands about one prime, where -p 101 is natural: values without a name come under the name "".
+system_or_prime_options: Callable[[F], F] = _stack(
+    click.argument("system", required=False),
+    _inline_options(NameValue(name_is_optional=True), "Set a parameter NAME=VALUE; a number alone is the prime."),
+)
 
 eps_options: Callable[[F], F] = _stack(
     click.option("--eps", type=ExactNumber(), help="The paper's epsilon, exact; the time step is 2 eps."),

@@ -71,7 +71,7 @@ def test_a_map_without_values_is_told(kahanmaps):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ("weierstrass", "Missing option '--prime'"),
+        ("weierstrass", "missing --prime P, or -p P"),
         ("weierstrass --prime 2", "modulo 2 every Kahan map is the identity"),
         ("weierstrass --prime 15", "15 is composite"),
         ("weierstrass --prime 7 --eps 1/7", "divides 1/7"),
@@ -96,3 +96,20 @@ def test_help_fits_the_screen(tmp_path):
     outcome = shell("kahanmaps cycles --help", tmp_path, COLUMNS="80")
     assert outcome.status == 0
     assert max(map(len, outcome.out.splitlines())) <= 80
+
+
+def test_a_prime_may_stand_behind_p_as_parameters_do(kahanmaps):
+    short = kahanmaps("cycles weierstrass -p 31 --json").json
+    long = kahanmaps("cycles weierstrass --prime 31 --json").json
+    assert short == long
+    both = kahanmaps("cycles euler_top -p a1=2 -p 11 --prime 13 --json").json
+    assert both["primes"] == [13, 11]
+    assert both["document"] == kahanmaps("cycles euler_top -p a1=2 --prime 13 --json").json["document"]
+
+
+@pytest.mark.parametrize("options", ["", "-p x", "-p 1.5", "-p ''", "-p 9", "-p a1="])
+def test_what_is_no_prime_and_no_parameter_is_refused(kahanmaps, options):
+    outcome = kahanmaps(f"cycles euler_top {options}")
+    assert outcome.status == 2
+    assert outcome.out == ""
+    assert "expected" in outcome.err or "missing --prime" in outcome.err

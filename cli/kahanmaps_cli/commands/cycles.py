@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import load_system, output_options, system_options
+from kahanmaps_cli.options import load_system, output_options, system_or_prime_options
 from kahanmaps_cli.params import ExactNumber
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
@@ -22,8 +22,8 @@ _LENGTHS_SHOWN = 12
 
 
 @click.command("cycles")
-@system_options
-@click.option("--prime", "primes", type=int, multiple=True, required=True, metavar="P", help="The prime; repeatable.")
+@system_or_prime_options
+@click.option("--prime", "primes", type=int, multiple=True, metavar="P", help="The prime; repeatable.")
 @click.option("--eps", type=ExactNumber(), multiple=True, help="The paper's epsilon, exact; repeatable.")
 @click.option("--samples", type=int, metavar="N", help="Follow N random points instead of making the whole graph.")
 @click.option("--steps", type=int, metavar="K", help="... for at most K steps (default 8 (p + 1 + 2 sqrt p)).")
@@ -38,7 +38,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     with each dimension). Without --eps two values are tried for each prime: one alone may be special.
 
     \b
-      kahanmaps cycles weierstrass --prime 101 --prime 499
+      kahanmaps cycles weierstrass -p 101
+      kahanmaps cycles euler_top -p a1=2 --prime 31 --prime 47
       kahanmaps cycles lotka_volterra --prime 997 --eps 1/10 --eps 1/7
       kahanmaps cycles weierstrass --prime 10007 --samples 200 --json
       kahanmaps cycles --vars x,y --rhs 'x*y' --rhs '-x^2' --prime 31
@@ -60,7 +61,11 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         raise click.UsageError("--steps K is for --samples N")
     if not options["seconds"] > 0:
         raise click.UsageError(f"found --seconds {options['seconds']}, expected more than 0")
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    options["primes"] = (*options["primes"], *map(_prime, (text for name, text in options["parameters"] if not name)))
+    if not options["primes"]:
+        raise click.UsageError("missing --prime P, or -p P")
+    parameters = [pair for pair in options["parameters"] if pair[0]]
+    file = load_system(system, options["variables"], options["rhs"], parameters)
     reversor = _matrix(options["reversor"]) if options["reversor"] is not None else find_reversor(file.system)
     runs: list[tuple[Census, Comparison]] = []
     with Progress(quiet) as progress:
@@ -88,6 +93,12 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if stopped and not quiet:
         say("stopped by the clock: give more --seconds, fewer --samples or a smaller prime")
     return 3 if stopped else 0
+
+
+def _prime(text: str) -> int:
+    if not text.isdecimal() or len(text) > 20:
+        raise click.UsageError(f"found -p {text[:40]!r}, expected NAME=VALUE for a parameter, or a prime")
+    return int(text)
 
 
 def _matrix(text: str) -> fmpq_mat:
