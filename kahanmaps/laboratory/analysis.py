@@ -411,7 +411,8 @@ def _growth_lines(found: Analysis) -> list[Statement]:
     if found.degrees is not None:
         shown = ", ".join(map(str, found.degrees.degrees[1 : _SHOWN_DEGREES + 1]))
         more = ", ..." if len(found.degrees.degrees) > _SHOWN_DEGREES + 1 else ""
-        lines.append(Statement(MEASURED, f"degrees of the iterates: {shown}{more}"))
+        if shown:
+            lines.append(Statement(MEASURED, f"degrees of the iterates: {shown}{more}"))
         unknown = found.degrees.growth is GrowthClass.UNKNOWN and not found.degrees.looks_exponential
         lines.append(Statement(UNDECIDED if unknown else MEASURED, found.degrees.growth_text))
         recurrence = found.degrees.recurrence

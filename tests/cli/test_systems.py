@@ -45,6 +45,7 @@ def test_a_system_is_shown_with_equations_facts_and_sources(kahanmaps, name):
 def test_a_system_is_shown_for_scripts(kahanmaps, name):
     shown = kahanmaps("systems", name, "--json").json
     assert set(shown) == {
+        "version",
         "name",
         "dim",
         "kind",

@@ -51,7 +51,15 @@ def command(
     elif as_latex:
         click.echo(_latex(file))
     elif as_json:
-        print_json({**_summary(file), **_equations(file), "known": _known(file), "document": file.document})
+        print_json(
+            {
+                "version": __version__,
+                **_summary(file),
+                **_equations(file),
+                "known": _known(file),
+                "document": file.document,
+            }
+        )
     else:
         _show(file)
 
