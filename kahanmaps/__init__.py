@@ -52,7 +52,8 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, constant_structures
     from kahanmaps.laboratory.height_survey import HeightSurvey, height_survey
     from kahanmaps.laboratory.hirota_kimura import hirota_kimura_basis, orbit_profile
-    from kahanmaps.laboratory.integrals import IntegralSearch, Laboratory, find_integrals
+    from kahanmaps.laboratory.integrals import IntegralSearch, find_integrals
+    from kahanmaps.laboratory.laboratory import Laboratory
     from kahanmaps.laboratory.recurrences import Recurrence, find_recurrence
     from kahanmaps.laboratory.singularities import SingularityRun, singularities
     from kahanmaps.laboratory.symmetries import Symmetries, linear_symmetries
@@ -103,7 +104,8 @@ _HOME = {
     "checks.conserve": ("check_integrals",),
     "checks.preserve": ("check_measure", "check_poisson"),
     "laboratory.analysis": ("Analysis", "analyze"),
-    "laboratory.integrals": ("IntegralSearch", "Laboratory", "find_integrals"),
+    "laboratory.integrals": ("IntegralSearch", "find_integrals"),
+    "laboratory.laboratory": ("Laboratory",),
     "laboratory.hirota_kimura": ("hirota_kimura_basis", "orbit_profile"),
     "laboratory.darboux": ("DarbouxSearch", "darboux_polynomials"),
     "laboratory.densities": ("DensitySearch", "find_densities"),

@@ -11,7 +11,7 @@ from search_helpers import at_residues, ranks
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.laboratory.analysis import Analysis
-from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap
 
 Value = Callable[[ModularMap, Sequence[int]], int]

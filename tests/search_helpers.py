@@ -5,8 +5,9 @@ Formulas are read here by Python with fractions, not by the library that wrote t
 
 from __future__ import annotations
 
+import ast
+import operator
 import random
-import re
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import islice
@@ -22,6 +23,7 @@ from kahanmaps.systems.files import SystemFile, parse_system
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PRIME = 2**61 - 1
+OPERATIONS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
 
 
 def system(names: str, *rhs: str, **parameters: Any) -> SystemFile:
@@ -44,11 +46,23 @@ def value_of(formula: str, names: Sequence[str], point: Sequence[Any], eps: Any,
     """The value of a formula at a rational point."""
     numbers = {name: Fraction(str(value)) for name, value in zip(names, point, strict=True)}
     numbers |= {name: Fraction(str(value)) for name, value in (more | {"eps": eps}).items()}
-    # 4/3 alone would be a float to Python
-    words = re.sub(r"\b([0-9]+)\b", r"Fraction(\1)", formula.replace("^", "**"))
-    found = eval(words, {"__builtins__": {}, "Fraction": Fraction}, numbers)
-    assert isinstance(found, Fraction)
-    return found
+    return _number(ast.parse(formula.replace("^", "**"), mode="eval").body, numbers)
+
+
+def _number(node: ast.AST, numbers: Mapping[str, Fraction]) -> Fraction:
+    match node:
+        case ast.Constant(int(value)):
+            return Fraction(value)
+        case ast.Name(name):
+            return numbers[name]
+        case ast.UnaryOp(sign, operand):
+            value = _number(operand, numbers)
+            return -value if isinstance(sign, ast.USub) else value
+        case ast.BinOp(left, ast.Pow(), ast.Constant(int(power))):
+            return _number(left, numbers) ** power
+        case ast.BinOp(left, operation, right):
+            return OPERATIONS[type(operation)](_number(left, numbers), _number(right, numbers))
+    raise AssertionError(f"found {ast.dump(node)} in a formula")
 
 
 def values_on_orbits(

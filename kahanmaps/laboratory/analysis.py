@@ -25,7 +25,8 @@ from kahanmaps.laboratory.densities import DensitySearch, find_densities
 from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
 from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, constant_structures
 from kahanmaps.laboratory.height_survey import HeightSurvey, height_survey
-from kahanmaps.laboratory.integrals import IntegralSearch, Laboratory, find_integrals
+from kahanmaps.laboratory.integrals import IntegralSearch, find_integrals
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.recurrences import GrowthClass
 from kahanmaps.laboratory.singularities import MAX_DIMENSION as MAX_SINGULAR_DIMENSION
 from kahanmaps.laboratory.singularities import SingularityRun, default_eps, singularities

@@ -20,7 +20,6 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import SingularMatrix, SingularStep
-from kahanmaps.laboratory.closed_forms import closed_forms
 from kahanmaps.laboratory.cofactors import (
     Cofactor,
     CofactorProduct,
@@ -30,8 +29,8 @@ from kahanmaps.laboratory.cofactors import (
     products,
 )
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.integrals import Laboratory
-from kahanmaps.laboratory.modular_points import NoPoint, echelon, exponents_up_to
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, exponents_up_to
 from kahanmaps.maps.kahan import KahanMapOver
 from kahanmaps.systems.files import SystemFile
 
@@ -209,25 +208,11 @@ def _list(
     model: DarbouxSpace,
     deadline: float,
 ) -> None:
-    count = len(laboratory.symbols)
-
-    def spaces_at(prime: int, values: tuple[int, ...]) -> list[DarbouxSpace] | None:
-        eps = values[count] if len(values) > count else 1
-        if eps % prime == 0:
-            return None
-        map_ = laboratory.map_at(prime, values[:count], eps)
+    def spaces_on(map_: ModularMap) -> list[DarbouxSpace]:
         sample = Sample.of(map_, cofactors, points_needed(map_.dim, model.degree))
         return [_without_constants(cofactor_space(sample, product, model.degree), product)]
 
-    forms = closed_forms(
-        [model],
-        spaces_at,
-        laboratory.system.variables,
-        laboratory.symbols,
-        laboratory.eps_enters,
-        seed=laboratory.seed,
-        seconds=max(1.0, deadline - time.monotonic()),
-    )
+    forms = laboratory.formulas([model], spaces_on, deadline)
     if forms.bases is None:
         found.reason = f"no closed form for the cofactor {product.text(cofactors)}: {forms.reason}"
         return

@@ -19,7 +19,6 @@ from kahanmaps.algebra.polynomials import RationalFunction, primitive_part
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.closed_forms import closed_forms
 from kahanmaps.laboratory.cofactors import (
     DETERMINANT,
     CofactorProduct,
@@ -31,7 +30,8 @@ from kahanmaps.laboratory.cofactors import (
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.identities import density_verdict
-from kahanmaps.laboratory.integrals import Laboratory, closing_note, toml_comment
+from kahanmaps.laboratory.integrals import closing_note, toml_comment
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.systems.files import SystemFile
 
@@ -258,23 +258,7 @@ def _space(map_: ModularMap, degree: int, inverse: bool) -> DarbouxSpace:
 def _formulas(
     laboratory: Laboratory, model: DarbouxSpace, degree: int, inverse: bool, deadline: float
 ) -> tuple[list[FoundDensity], str]:
-    count = len(laboratory.symbols)
-
-    def spaces_at(prime: int, values: tuple[int, ...]) -> list[DarbouxSpace] | None:
-        eps = values[count] if len(values) > count else 1
-        if eps % prime == 0:
-            return None
-        return [_space(laboratory.map_at(prime, values[:count], eps), degree, inverse)]
-
-    forms = closed_forms(
-        [model],
-        spaces_at,
-        laboratory.system.variables,
-        laboratory.symbols,
-        laboratory.eps_enters,
-        seed=laboratory.seed,
-        seconds=max(1.0, deadline - time.monotonic()),
-    )
+    forms = laboratory.formulas([model], lambda map_: [_space(map_, degree, inverse)], deadline)
     if forms.bases is None:
         return [], f"there is a density of degree {degree} modulo primes, but no closed form: {forms.reason}"
     found = []

@@ -9,29 +9,26 @@ in any case.
 
 from __future__ import annotations
 
-import random
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
 
-from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.latex import latex_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate
-from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
-from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.laboratory.affine_functions import affine_darboux
-from kahanmaps.laboratory.closed_forms import closed_forms
-from kahanmaps.laboratory.cofactors import Cofactor, cofactor_of_affine, determinant_factors
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.cofactors import Cofactor
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.identities import integral_verdict
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, rank
 from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.laboratory.search import Found, may_be_conjugate, repeat, search
@@ -143,106 +140,6 @@ def toml_comment(eps: fmpq | None) -> list[str]:
     return [] if eps is None else [f"# for eps = {eps} only (time step 2 eps = {2 * eps}): check with --eps {eps}"]
 
 
-class Laboratory:
-    """The maps on which a system is examined: two primes, each with its own eps and its own values of the symbols.
-
-    With `eps` (exact; the time step is 2 eps) all maps are at that eps. Raises InputError for eps = 0, for eps both a
-    number and a symbol, and for symbols that `ParametricSystem.of` refuses.
-
-    >>> from kahanmaps.systems.catalog import load
-    >>> laboratory = Laboratory(load("euler_top"), ["a1"])
-    >>> len(laboratory.maps), laboratory.eps_enters, laboratory.defect
-    (2, 'by weight', '')
-    """
-
-    def __init__(self, file: SystemFile, symbols: Sequence[str] = (), eps: Any = None, seed: int = 0) -> None:
-        self.file = file
-        self.symbols = tuple(name for name in dict.fromkeys(symbols) if name != "eps")
-        self.eps = None if eps is None else rational(eps)
-        if self.eps == 0:
-            raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
-        if self.eps is not None and "eps" in symbols:
-            raise InputError("found eps both as a number and as a symbol, expected one of the two")
-        self.seed = seed
-        self.system = ParametricSystem.of(file, self.symbols)
-        rng = random.Random(f"laboratory {seed}")
-        self.maps: list[ModularMap] = []
-        while len(self.maps) < 2:
-            prime = random_prime(rng)
-            values = [rng.randrange(2, prime) for _ in self.symbols]
-            try:
-                self.maps.append(self.map_at(prime, values, rng.randrange(2, prime)))
-            except BadPrime:
-                continue
-
-    def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:
-        """The map modulo a prime; the residue `eps` counts only where eps is no given number. Raises BadPrime."""
-        if self.eps is not None:
-            eps = int(GF(prime).convert(self.eps))
-            if eps == 0:
-                raise BadPrime(f"the prime {prime} divides the numerator of eps", prime)
-        return ModularMap(self.system, prime, eps, values, self.seed)
-
-    def other_maps(self, count: int) -> Iterator[ModularMap]:
-        """So many maps modulo further primes, each at other random residues of the symbols and eps."""
-        rng = random.Random(f"other maps {self.seed}")
-        while count > 0:
-            prime = random_prime(rng)
-            try:
-                yield self.map_at(prime, [rng.randrange(2, prime) for _ in self.symbols], rng.randrange(2, prime))
-            except BadPrime:
-                continue
-            count -= 1
-
-    @property
-    def eps_enters(self) -> str:
-        """How eps enters formulas: "not", where it is a number, "by weight" for homogeneous f, else as a "symbol"."""
-        if self.eps is not None:
-            return "not"
-        n = self.system.dim
-        terms = [monomial for polynomial in self.system.rhs for monomial in polynomial.monoms()]
-        return "by weight" if all(sum(int(e) for e in m[:n]) == 2 for m in terms) else "symbol"
-
-    @property
-    def defect(self) -> str:
-        """Why the maps at the given eps are no birational maps, measured at random points; empty where they are."""
-        if self.eps is None:
-            return ""  # det(I - eps f'(x)) is 1 at eps = 0
-        try:
-            pairs = [(map_, image) for map_ in self.maps for _, image in map_.pairs(2)]
-        except NoPoint:
-            return f"at eps = {self.eps} the map has no value anywhere: det(I - eps f'(x)) is identically 0"
-        if not any(map_.determinant(image, -1) for map_, image in pairs):
-            return f"at eps = {self.eps} the map is not invertible: det(I + eps f'(x)) is 0 at all images"
-        return ""
-
-    @property
-    def primes(self) -> tuple[int, ...]:
-        """The primes of the maps."""
-        return tuple(map_.prime for map_ in self.maps)
-
-    def cofactors(self) -> list[Cofactor]:
-        """The cofactors that polynomials are tried with."""
-        affine = [
-            cofactor_of_affine(one.function, self.system)
-            for one in affine_darboux(self.file.system).functions
-            if self._stays_darboux(one.function)
-        ]
-        return [*affine, *determinant_factors(self.system)]
-
-    def _stays_darboux(self, function: fmpq_mpoly) -> bool:
-        """Whether l divides l' with the symbols free, not only at the values that the file gives them."""
-        if not self.symbols:
-            return True
-        context = self.system.rhs[0].context()
-        gens = context.gens()[: self.system.dim]
-        l_ = function.compose(*gens, ctx=context)
-        slope = sum(
-            (l_.derivative(k) * polynomial for k, polynomial in enumerate(self.system.rhs)), context.constant(0)
-        )
-        return bool((slope % l_).is_zero())
-
-
 def find_integrals(
     file: SystemFile,
     *,
@@ -352,24 +249,12 @@ def _formulas(
     if repeat(found, laboratory.maps[1], cofactors, reference) is None:
         return [], "what was found at one eps was not found at another"
     progress("interpolating closed forms")
-    count = len(laboratory.symbols)
 
-    def spaces_at(prime: int, values: tuple[int, ...]) -> list[DarbouxSpace] | None:
-        eps = values[count] if len(values) > count else 1
-        if eps % prime == 0:
-            return None
-        again = repeat(found, laboratory.map_at(prime, values[:count], eps), cofactors, reference)
+    def spaces_on(map_: ModularMap) -> list[DarbouxSpace] | None:
+        again = repeat(found, map_, cofactors, reference)
         return None if again is None else again.all_spaces
 
-    forms = closed_forms(
-        found.all_spaces,
-        spaces_at,
-        laboratory.system.variables,
-        laboratory.symbols,
-        laboratory.eps_enters,
-        seed=laboratory.seed,
-        seconds=max(1.0, deadline - time.monotonic()),
-    )
+    forms = laboratory.formulas(found.all_spaces, spaces_on, deadline)
     if forms.bases is None:
         return [], f"integrals were found modulo primes, but no closed form: {forms.reason}"
     origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]

@@ -65,7 +65,7 @@ def sparse_relations(
 
     Source: petrera-pfadler-suris-2009.
 
-    >>> from kahanmaps.laboratory.integrals import Laboratory
+    >>> from kahanmaps.laboratory.laboratory import Laboratory
     >>> from kahanmaps.systems.catalog import load
     >>> top = load("euler_top")
     >>> [one.text for one in sparse_relations(Laboratory(top).maps, 2, top.variables)]

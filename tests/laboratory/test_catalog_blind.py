@@ -15,7 +15,7 @@ from search_helpers import ranks
 
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.hirota_kimura import hirota_kimura_basis, relations_on_orbit
-from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.systems.catalog import load, names
 from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.structured_facts import relations

@@ -21,7 +21,7 @@ from kahanmaps.laboratory.cofactors import (
     products,
     search_cofactors,
 )
-from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.systems.catalog import load, names
 

@@ -14,7 +14,7 @@ from kahanmaps.laboratory.darboux_spaces import (
     darboux_spaces,
     gradient_rank,
 )
-from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import combine, exponents_up_to, monomial_values
 from kahanmaps.systems.catalog import load
 

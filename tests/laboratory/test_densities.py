@@ -19,7 +19,7 @@ from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.laboratory import densities as module
 from kahanmaps.laboratory.densities import _space, find_densities
 from kahanmaps.laboratory.identities import density_verdict
-from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import rank
 from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.maps.kahan import KahanMap

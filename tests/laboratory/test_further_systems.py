@@ -36,7 +36,8 @@ from kahanmaps.checks.preserve import check_measure
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.densities import find_densities
-from kahanmaps.laboratory.integrals import Laboratory, find_integrals
+from kahanmaps.laboratory.integrals import find_integrals
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap
 from kahanmaps.systems.files import parse_system, read_system
 

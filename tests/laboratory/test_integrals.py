@@ -16,7 +16,8 @@ from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.identities import integral_verdict
-from kahanmaps.laboratory.integrals import Laboratory, _is_affine_integral, closing_note, find_integrals
+from kahanmaps.laboratory.integrals import _is_affine_integral, closing_note, find_integrals
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.systems.catalog import load, names
 

@@ -10,7 +10,7 @@ from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.laboratory.closed_forms import closed_forms
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.hirota_kimura import orbit_profile
-from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
 from kahanmaps.laboratory.search import affine_space, repeat, search
 from kahanmaps.systems.catalog import load

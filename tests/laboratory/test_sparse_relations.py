@@ -14,7 +14,7 @@ from search_helpers import random_system, system, value_of
 
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.laboratory import sparse_relations as module
-from kahanmaps.laboratory.integrals import Laboratory
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint
 from kahanmaps.laboratory.sparse_relations import SparseRelation, sparse_relations
 from kahanmaps.systems.catalog import load

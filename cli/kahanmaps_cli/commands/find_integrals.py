@@ -177,7 +177,8 @@ def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
     from kahanmaps.algebra.text import parse_polynomial
     from kahanmaps.errors import InputError
     from kahanmaps.laboratory.hirota_kimura import Basis, hirota_kimura_basis
-    from kahanmaps.laboratory.integrals import Laboratory, closing_note
+    from kahanmaps.laboratory.integrals import closing_note
+    from kahanmaps.laboratory.laboratory import Laboratory
     from kahanmaps.laboratory.modular_points import NoPoint
 
     if options["symbolic"]:

@@ -1,0 +1,141 @@
+"""The maps on which one system is examined, and the way from what is found on them to formulas."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.residues import random_prime
+from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.laboratory.affine_functions import affine_darboux
+from kahanmaps.laboratory.closed_forms import ClosedForms, Spaces, closed_forms
+from kahanmaps.laboratory.cofactors import Cofactor, cofactor_of_affine, determinant_factors
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
+from kahanmaps.laboratory.parametric import ParametricSystem
+from kahanmaps.systems.files import SystemFile
+
+
+class Laboratory:
+    """The maps on which a system is examined: two primes, each with its own eps and its own values of the symbols.
+
+    With `eps` (exact; the time step is 2 eps) all maps are at that eps. Raises InputError for eps = 0, for eps both a
+    number and a symbol, and for symbols that `ParametricSystem.of` refuses.
+
+    >>> from kahanmaps.systems.catalog import load
+    >>> laboratory = Laboratory(load("euler_top"), ["a1"])
+    >>> len(laboratory.maps), laboratory.eps_enters, laboratory.defect
+    (2, 'by weight', '')
+    """
+
+    def __init__(self, file: SystemFile, symbols: Sequence[str] = (), eps: Any = None, seed: int = 0) -> None:
+        self.file = file
+        self.symbols = tuple(name for name in dict.fromkeys(symbols) if name != "eps")
+        self.eps = None if eps is None else rational(eps)
+        if self.eps == 0:
+            raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+        if self.eps is not None and "eps" in symbols:
+            raise InputError("found eps both as a number and as a symbol, expected one of the two")
+        self.seed = seed
+        self.system = ParametricSystem.of(file, self.symbols)
+        rng = random.Random(f"laboratory {seed}")
+        self.maps: list[ModularMap] = []
+        while len(self.maps) < 2:
+            prime = random_prime(rng)
+            values = [rng.randrange(2, prime) for _ in self.symbols]
+            try:
+                self.maps.append(self.map_at(prime, values, rng.randrange(2, prime)))
+            except BadPrime:
+                continue
+
+    def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:
+        """The map modulo a prime; the residue `eps` counts only where eps is no given number. Raises BadPrime."""
+        if self.eps is not None:
+            eps = int(GF(prime).convert(self.eps))
+            if eps == 0:
+                raise BadPrime(f"the prime {prime} divides the numerator of eps", prime)
+        return ModularMap(self.system, prime, eps, values, self.seed)
+
+    def other_maps(self, count: int) -> Iterator[ModularMap]:
+        """So many maps modulo further primes, each at other random residues of the symbols and eps."""
+        rng = random.Random(f"other maps {self.seed}")
+        while count > 0:
+            prime = random_prime(rng)
+            try:
+                yield self.map_at(prime, [rng.randrange(2, prime) for _ in self.symbols], rng.randrange(2, prime))
+            except BadPrime:
+                continue
+            count -= 1
+
+    @property
+    def eps_enters(self) -> str:
+        """How eps enters formulas: "not", where it is a number, "by weight" for homogeneous f, else as a "symbol"."""
+        if self.eps is not None:
+            return "not"
+        n = self.system.dim
+        terms = [monomial for polynomial in self.system.rhs for monomial in polynomial.monoms()]
+        return "by weight" if all(sum(int(e) for e in m[:n]) == 2 for m in terms) else "symbol"
+
+    @property
+    def defect(self) -> str:
+        """Why the maps at the given eps are no birational maps, measured at random points; empty where they are."""
+        if self.eps is None:
+            return ""  # det(I - eps f'(x)) is 1 at eps = 0
+        try:
+            pairs = [(map_, image) for map_ in self.maps for _, image in map_.pairs(2)]
+        except NoPoint:
+            return f"at eps = {self.eps} the map has no value anywhere: det(I - eps f'(x)) is identically 0"
+        if not any(map_.determinant(image, -1) for map_, image in pairs):
+            return f"at eps = {self.eps} the map is not invertible: det(I + eps f'(x)) is 0 at all images"
+        return ""
+
+    @property
+    def primes(self) -> tuple[int, ...]:
+        """The primes of the maps."""
+        return tuple(map_.prime for map_ in self.maps)
+
+    def cofactors(self) -> list[Cofactor]:
+        """The cofactors that polynomials are tried with."""
+        affine = [
+            cofactor_of_affine(one.function, self.system)
+            for one in affine_darboux(self.file.system).functions
+            if self._stays_darboux(one.function)
+        ]
+        return [*affine, *determinant_factors(self.system)]
+
+    def _stays_darboux(self, function: fmpq_mpoly) -> bool:
+        """Whether l divides l' with the symbols free, not only at the values that the file gives them."""
+        if not self.symbols:
+            return True
+        context = self.system.rhs[0].context()
+        gens = context.gens()[: self.system.dim]
+        l_ = function.compose(*gens, ctx=context)
+        slope = sum(
+            (l_.derivative(k) * polynomial for k, polynomial in enumerate(self.system.rhs)), context.constant(0)
+        )
+        return bool((slope % l_).is_zero())
+
+    def formulas(self, model: Spaces, spaces_on: Callable[[ModularMap], Spaces | None], deadline: float) -> ClosedForms:
+        """The polynomials that span spaces known modulo primes: `model` on the first map, `spaces_on(map)` on others.
+
+        `spaces_on` returns None where the map is special. The search ends at `deadline`, a value of time.monotonic().
+        """
+        count = len(self.symbols)
+
+        def spaces_at(prime: int, values: tuple[int, ...]) -> Spaces | None:
+            eps = values[count] if len(values) > count else 1
+            return spaces_on(self.map_at(prime, values[:count], eps)) if eps % prime else None
+
+        return closed_forms(
+            model,
+            spaces_at,
+            self.system.variables,
+            self.symbols,
+            self.eps_enters,
+            seed=self.seed,
+            seconds=max(1.0, deadline - time.monotonic()),
+        )
