@@ -128,7 +128,7 @@ class Laboratory:
 
         def spaces_at(prime: int, values: tuple[int, ...]) -> Spaces | None:
             eps = values[count] if len(values) > count else 1
-            return spaces_on(self.map_at(prime, values[:count], eps)) if eps % prime else None
+            return spaces_on(self.map_at(prime, values[:count], eps))
 
         return closed_forms(
             model,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from typing import Any
 
 import pytest
 from flint import fmpq
@@ -19,9 +20,9 @@ from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
-def listed(name: str, degree: int, **options: object) -> dict[str, list[str]]:
+def listed(name: str, degree: int, **options: Any) -> dict[str, list[str]]:
     """Cofactors and polynomials as text."""
-    found = darboux_polynomials(load(name), degree, **options)  # type: ignore[arg-type]
+    found = darboux_polynomials(load(name), degree, **options)
     assert not found.reason
     return {space.cofactor: [format_polynomial(P) for P in space.polynomials] for space in found.spaces}
 
