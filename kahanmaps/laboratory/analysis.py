@@ -15,11 +15,10 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.algebra.text import format_number
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
-from kahanmaps.laboratory.affine_functions import affine_darboux
-from kahanmaps.laboratory.commuting import CommutingField, CommutingSystems, commuting_systems
+from kahanmaps.laboratory.commuting import CommutingSystems, commuting_systems
 from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.densities import DensitySearch, find_densities
 from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
@@ -27,43 +26,17 @@ from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, const
 from kahanmaps.laboratory.height_survey import HeightSurvey, height_survey
 from kahanmaps.laboratory.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.recurrences import GrowthClass
+from kahanmaps.laboratory.report import Conclusion, Statement, conclude, sections
 from kahanmaps.laboratory.singularities import MAX_DIMENSION as MAX_SINGULAR_DIMENSION
 from kahanmaps.laboratory.singularities import SingularityRun, default_eps, singularities
 from kahanmaps.laboratory.sparse_relations import SparseRelation, sparse_relations
 from kahanmaps.laboratory.symmetries import Symmetries, linear_symmetries
-from kahanmaps.maps.orbits import counted
 from kahanmaps.systems.files import SystemFile
-
-PROVED, SUPPORTED, MEASURED, UNDECIDED, NOTE = "proved", "supported", "measured", "undecided", "note"
 
 # Seconds for everything, by dimension; about half of it is used where nothing is hard.
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
 _MOST_SECONDS = 150.0
 _MAX_DEGREE = 200_000
-_SHOWN_DEGREES = 12
-
-
-@dataclass(frozen=True)
-class Statement:
-    """One line of the report and how it is known: proved, supported, measured, undecided; or a note."""
-
-    status: str
-    text: str
-
-
-@dataclass(frozen=True)
-class Conclusion:
-    """The verdict in words; `kind` is "linear", "linearisable", "integrable", "not integrable", "singular" (nowhere
-    defined) or "undecided".
-
-    `integrals` is the number of independent integrals known or shown by orbits, `growth` the kind of degree growth.
-    """
-
-    kind: str
-    integrals: int
-    growth: str
-    sentence: str
 
 
 @dataclass
@@ -109,12 +82,12 @@ class Analysis:
     @property
     def conclusion(self) -> Conclusion:
         """The verdict; integrability and the number of integrals are told apart."""
-        return _conclude(self)
+        return conclude(self)
 
     @property
     def sections(self) -> list[tuple[str, list[Statement]]]:
         """The report: titles and their statements."""
-        return [(title, lines) for title, lines in _sections(self) if lines]
+        return [(title, lines) for title, lines in sections(self) if lines]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: the verdict, the statements, and all results."""
@@ -289,218 +262,3 @@ def analyze(
             found.skipped.append(f"{name}: {error}")
     found.elapsed = time.monotonic() - began
     return found
-
-
-# -- the verdict ----------------------------------------------------------------------------------------------------
-
-
-def _conclude(found: Analysis) -> Conclusion:
-    n, count = found.dim, found.integral_count
-    growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
-    phrase = found.degrees.growth_text if found.degrees is not None else "degrees not measured"
-    if found.integrals_were_counted:
-        integrals = "no integral" if count == 0 else counted(count, "independent integral")
-        integrals += f" in dimension {n}"
-    else:
-        integrals = "the integrals were not counted"
-    period = found.integrals.profile.period if found.integrals is not None else None
-    suffix = "" if found.eps is None else f" All this at eps = {found.eps} only: other eps may differ."
-    if found.symbols:
-        suffix += f" The integrals are for every {', '.join(found.symbols)}, all else for the values of the file."
-
-    def conclude(kind: str, sentence: str) -> Conclusion:
-        return Conclusion(kind, count, str(growth), sentence + suffix)
-
-    if found.degrees is not None and found.degrees.ended == "singular" and len(found.degrees.degrees) == 1:
-        return conclude("singular", f"The map is nowhere defined: {found.degrees.message}.")
-    if _is_affine(found):
-        closes = "" if period is None else f"; orbits close after {counted(period, 'step')} (measured)"
-        return conclude("linear", f"The system is linear, and so is its Kahan map; {integrals}{closes}.")
-    if period is not None:
-        closes = f"Orbits close after {counted(period, 'step')} (measured)"
-        return conclude("linearisable", f"{closes}: the map is periodic there; {phrase}.")
-    if growth is GrowthClass.ZERO:
-        return conclude("linearisable", "An iterate of the map is a constant map (measured): orbits end in one point.")
-    if growth is GrowthClass.BOUNDED:
-        return conclude(
-            "linearisable",
-            f"The degrees of the iterates are bounded (measured): the map is linearisable in the sense of "
-            f"complexity; {integrals}.",
-        )
-    if growth is GrowthClass.EXPONENTIAL or (found.degrees is not None and found.degrees.looks_exponential):
-        measured = " (measured)" if growth is GrowthClass.EXPONENTIAL else ""  # the phrase says that it is estimated
-        growth = GrowthClass.EXPONENTIAL
-        return conclude(
-            "not integrable",
-            f"Not integrable in the sense of complexity: {phrase}{measured}"
-            + (f", although there {'is' if count == 1 else 'are'} {integrals}." if count else f"; {integrals}."),
-        )
-    if growth in (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL):
-        return conclude("integrable", f"Integrable in the sense of complexity: {phrase} (measured); {integrals}.")
-    return conclude("undecided", f"The growth is undecided: {phrase}; {integrals}.")
-
-
-def _is_affine(found: Analysis) -> bool:
-    return all(int(p.total_degree()) <= 1 for p in found.file.system.rhs)
-
-
-# -- the statements -------------------------------------------------------------------------------------------------
-
-
-def _sections(found: Analysis) -> list[tuple[str, list[Statement]]]:
-    return [
-        ("integrals", _integral_lines(found)),
-        ("measure", _measure_lines(found)),
-        ("growth", _growth_lines(found)),
-        ("singularities", _singularity_lines(found)),
-        ("symmetry", _symmetry_lines(found)),
-        ("structure", _structure_lines(found)),
-        ("commuting systems", _commuting_lines(found)),
-        ("not done", [Statement(NOTE, text) for text in found.skipped]),
-    ]
-
-
-def _integral_lines(found: Analysis) -> list[Statement]:
-    search = found.integrals
-    if search is None:
-        return []
-    lines = [Statement(str(one.verdict), f"{one.name} = {one.text}  [{one.origin}]") for one in search.integrals]
-    profile = search.profile
-    if not profile.nullities:
-        lines.append(Statement(UNDECIDED, f"how many integrals there are was not measured: {search.reason}"))
-    elif profile.period is not None:
-        lines.append(Statement(MEASURED, f"all orbits tried close after {counted(profile.period, 'step')}"))
-    else:
-        nullities = ", ".join(map(str, profile.nullities))
-        lines.append(
-            Statement(
-                MEASURED,
-                f"orbits have codimension {profile.codimension}: so many independent integrals; polynomials of degree "
-                f"at most 1, 2, ... that vanish along an orbit: {nullities} dimensions",
-            )
-        )
-        if not profile.agree:
-            lines.append(Statement(NOTE, "the orbits that were compared do not agree"))
-    lines += [Statement(MEASURED, f"along orbits {relation.text}") for relation in found.relations]
-    integrals = [name for relation in found.relations for name in relation.integrals]
-    if integrals:
-        letter = integrals[0].rstrip("0123456789")
-        lines.append(Statement(NOTE, f"the {letter} are integrals: numbers that depend on the orbit only"))
-    functions = [name for relation in found.relations for name in relation.functions_of_eps]
-    if functions:
-        lines.append(Statement(NOTE, f"the {functions[0].rstrip('0123456789')} are numbers that depend on eps only"))
-    if search.reason and profile.nullities:
-        lines.append(Statement(NOTE, search.reason))
-    if isinstance(found.structure, Structure):
-        m = found.structure.form.m
-        lines.append(Statement(PROVED, f"{counted(m, 'independent integral')}, as a member of the commuting family"))
-    return lines
-
-
-def _measure_lines(found: Analysis) -> list[Statement]:
-    search = found.densities
-    if search is None:
-        return []
-    lines = [Statement(str(one.verdict), f"dx/phi is invariant, phi = {one.text}") for one in search.densities]
-    if not search.densities:
-        lines.append(Statement(MEASURED if "no polynomial" in search.reason else UNDECIDED, search.reason))
-    return lines
-
-
-def _growth_lines(found: Analysis) -> list[Statement]:
-    lines = []
-    if found.degrees is not None:
-        shown = ", ".join(map(str, found.degrees.degrees[1 : _SHOWN_DEGREES + 1]))
-        more = ", ..." if len(found.degrees.degrees) > _SHOWN_DEGREES + 1 else ""
-        if shown:
-            lines.append(Statement(MEASURED, f"degrees of the iterates: {shown}{more}"))
-        unknown = found.degrees.growth is GrowthClass.UNKNOWN and not found.degrees.looks_exponential
-        lines.append(Statement(UNDECIDED if unknown else MEASURED, found.degrees.growth_text))
-        recurrence = found.degrees.recurrence
-        if recurrence is not None:
-            lines.append(Statement(MEASURED, f"recurrence: {recurrence.text}"))
-            if recurrence.closed_form:
-                lines.append(Statement(MEASURED, f"d_n = {recurrence.closed_form}"))
-    if found.heights is not None:
-        status = UNDECIDED if found.heights.text.startswith("undecided") else MEASURED
-        lines.append(Statement(status, f"heights of exact orbits: {found.heights.text}"))
-    return lines
-
-
-def _singularity_lines(found: Analysis) -> list[Statement]:
-    if not found.singularities:
-        return []
-    verdicts = {run.verdict for run in found.singularities}
-    values = ", ".join(format_number(run.eps) for run in found.singularities)
-    if len(verdicts) > 1:
-        return [Statement(UNDECIDED, f"the eps {values} disagree: {', '.join(sorted(verdicts))}")]
-    verdict = verdicts.pop()
-    return [Statement(UNDECIDED if verdict == "undecided" else MEASURED, f"{verdict} (eps = {values})")]
-
-
-def _symmetry_lines(found: Analysis) -> list[Statement]:
-    search = found.symmetries
-    if search is None:
-        return []
-    lines = []
-    linear = len(search.infinitesimal)
-    if linear:
-        lines.append(Statement(PROVED, f"a Lie algebra of affine symmetries, of dimension {linear}"))
-    if search.order is not None and search.order > 1:
-        generators = "; ".join(one.text for one in search.generators)
-        lines.append(Statement(PROVED, f"{search.order} signed permutations, generated by {generators}"))
-    lines += [Statement(PROVED, one.text) for one in search.others]
-    lines += [Statement(UNDECIDED, text) for text in search.undecided]
-    return lines or [Statement(NOTE, "no affine symmetry of the kinds searched, apart from the identity")]
-
-
-def _structure_lines(found: Analysis) -> list[Statement]:
-    lines = []
-    structures = found.hamiltonian
-    if structures is not None and structures.hamiltonian is not None:
-        H = format_polynomial(structures.hamiltonian.H)
-        kind = "the standard J" if structures.hamiltonian.is_standard else "a constant skew J"
-        lines.append(Statement(PROVED, f"Hamiltonian with {kind}, H = {H}"))
-    elif structures is not None and structures.proved:
-        lines.append(Statement(PROVED, f"not Hamiltonian with a constant J: {structures.reason}"))
-    darboux = affine_darboux(found.file.system)
-    if darboux.functions:
-        planes = ", ".join(format_polynomial(one.function) for one in darboux.functions)
-        lines.append(Statement(PROVED, f"invariant hyperplanes of flow and map: {planes} = 0"))
-    if isinstance(found.structure, Structure):
-        form = found.structure.form
-        lines.append(Statement(PROVED, f"belongs to the commuting family: {found.structure.text}"))
-        lines.append(
-            Statement(
-                PROVED,
-                f"normal form: the planar map of h(X, Y) = {form.h_text} over Q[t]/({form.chi_text}), "
-                "a block for each root t",
-            )
-        )
-    return lines
-
-
-def _commuting_lines(found: Analysis) -> list[Statement]:
-    search = found.commuting
-    if search is None:
-        return []
-    lines = []
-    if search.every_g_commutes:
-        lines.append(Statement(PROVED, "the map is the identity and commutes with every other"))
-    told: list[CommutingField] = []
-    for one in search.nontrivial:  # with g there is -g, whose map is the inverse
-        if not any(one.system == other.system.scaled(-1) for other in told):
-            told.append(one)
-            text = f"commutes with the Kahan maps of g and -g, g = ({', '.join(one.rhs)})"
-            lines.append(Statement(str(one.finding.verdict), text))
-    for family in search.families:
-        lines.append(
-            Statement(
-                str(family.finding.verdict), f"commutes with a linear family of {len(family.directions)} parameters"
-            )
-        )
-    lines += [Statement(NOTE, text) for text in search.irrational]
-    lines += [Statement(UNDECIDED, text) for text in search.undecided]
-    if not lines:
-        lines.append(Statement(PROVED, "no g = B f with a constant rational matrix B other than 0, f and -f commutes"))
-    return lines
