@@ -18,16 +18,19 @@ FLOORS = {
     "errors": 0,
     "sources": 0,
     "version": 0,
+    "markup": 0,
     "algebra": 1,
     "systems": 2,
     "family": 2,
     "maps": 3,
     "invariants": 4,
+    "languages": 4,
     "checks": 5,
     "paper": 5,
     "laboratory": 5,
     "experiments": 6,
     "plots": 7,
+    "reports": 7,
 }
 CLI_FLOOR = 8
 

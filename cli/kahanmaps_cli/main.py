@@ -40,8 +40,14 @@ COMMANDS = {
     "lyapunov": ("lyapunov", "Lyapunov exponents of float orbits, by the exact tangent map."),
     "verify": ("verify", "Every statement of the paper, for a random or given member, any m."),
     "family": ("family", "Make and look at members of the commuting family."),
+    "plot": ("plot", "Pictures: portraits, invariant curves, drift, growth, batches."),
+    "report": ("report", "A page about a system, a member or a batch: one HTML file, pictures inside."),
+    "convert": ("convert", "A system, its map or its integrals as LaTeX, SymPy, PARI/GP, Maple, ..."),
     "batch": ("batch", "Thousands of experiments from one file: run, resume, summarise."),
     "systems": ("systems", "The catalogue of named systems."),
+    "schema": ("schema", "JSON schemas of files and of what --json prints."),
+    "completion": ("completion", "Completion of commands, systems and options for your shell."),
+    "manual": ("manual", "The manual page, for man."),
     "version": ("version", "The versions of kahanmaps and of what it computes with."),
 }
 
