@@ -1,14 +1,25 @@
-"""To come."""
+"""kahanmaps plot portrait | invariant-curves | drift | heights | degrees | commute | batch | recipe."""
 
 from __future__ import annotations
 
 import click
 
+from kahanmaps_cli.pictures import batch, commute, degrees, drift, heights, invariant_curves, portrait, recipe
 
-@click.command(name="plot")
+
+@click.group("plot")
 def command() -> None:
-    """To come.
+    """Pictures as PDF, SVG or PNG for papers, or drawn in the terminal.
 
     \b
-      kahanmaps plot
+      kahanmaps plot portrait lotka_volterra --eps 1/20
+      kahanmaps plot portrait lotka_volterra --eps 1/20 -o portrait.pdf
+      kahanmaps plot degrees euler_top -o degrees.svg --size 8.6
+      kahanmaps plot recipe portrait.pdf
+
+    Pictures need matplotlib: pip install 'kahanmaps[plot]'. Each of them carries the command that makes it.
     """
+
+
+for _module in (portrait, invariant_curves, drift, heights, degrees, commute, batch, recipe):
+    command.add_command(_module.command)

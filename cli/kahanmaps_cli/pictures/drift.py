@@ -1,0 +1,16 @@
+"""kahanmaps plot drift."""
+
+from __future__ import annotations
+
+import click
+
+from kahanmaps_cli.pictures.output import PictureCommand
+
+
+@click.command("drift", cls=PictureCommand)
+def command() -> None:
+    """To come.
+
+    \b
+      kahanmaps plot drift
+    """

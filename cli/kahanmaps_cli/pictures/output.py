@@ -1,0 +1,166 @@
+"""What all commands below `kahanmaps plot` share: where the picture goes, how large it is, how it can be remade."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from kahanmaps_cli.options import _stack
+from kahanmaps_cli.params import OptionType
+from kahanmaps_cli.progress import say
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from kahanmaps.plots.style import Style
+    from kahanmaps.plots.terminal import Cell
+    from kahanmaps.systems.files import SystemFile
+
+F = TypeVar("F", bound=Callable[..., Any])
+_ARGUMENTS = "kahanmaps_cli.arguments"
+_MOST_ROWS = 60
+
+
+class Size(OptionType):
+    """WIDTH or WIDTHxHEIGHT in centimetres."""
+
+    name = "size"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value
+        match = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)(?:x([0-9]+(?:\.[0-9]+)?))?", value.strip(), re.ASCII)
+        if match is None:
+            self.fail(f"found {value[:60]!r}, expected WIDTH or WIDTHxHEIGHT in cm, as 12 or 12x9", param, ctx)
+        width, height = match.groups()
+        return float(width), None if height is None else float(height)
+
+
+class PictureCommand(click.Command):
+    """A command that remembers the words it was called with: they are the recipe of the picture."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        ctx.meta[_ARGUMENTS] = list(args)
+        return super().parse_args(ctx, args)
+
+
+picture_options: Callable[[F], F] = _stack(
+    click.option(
+        "-o",
+        "--output",
+        default="-",
+        show_default=True,
+        metavar="FILE",
+        help="FILE.pdf, .svg or .png; - draws in the terminal.",
+    ),
+    click.option(
+        "--format", "kind", type=click.Choice(["pdf", "svg", "png", "text"]), help="Instead of by the ending."
+    ),
+    click.option("--size", type=Size(), metavar="WxH", help="Width, or width x height, in cm (default 12 wide)."),
+    click.option("--font-size", type=float, metavar="PT", help="Size of the letters in points (default 9)."),
+    click.option("--dpi", type=int, metavar="N", help="Dots per inch of PNG and of clouds of points (default 300)."),
+    click.option("--title", help="A title above the picture (default: none)."),
+    click.option("-q", "--quiet", is_flag=True, help="No progress and no talk on standard error."),
+)
+
+
+def style_from(options: dict[str, Any]) -> Style:
+    """The style that the options ask for."""
+    from kahanmaps.plots.style import Style
+
+    given: dict[str, Any] = {}
+    if options["size"] is not None:
+        given["width"], given["height"] = options["size"]
+    for name in ("font_size", "dpi"):
+        if options[name] is not None:
+            given[name] = options[name]
+    return Style(**given)
+
+
+def require_output(options: dict[str, Any]) -> None:
+    """Refuse, before anything is computed, an output that cannot be written."""
+    from kahanmaps.errors import InputError
+    from kahanmaps.plots.figures import format_of, require_matplotlib
+
+    require_matplotlib()
+    style_from(options)
+    path = options["output"]
+    if path == "-":
+        return
+    if options["kind"] != "text":
+        format_of(path, options["kind"])
+    folder = Path(path).resolve().parent
+    if not folder.is_dir():
+        raise InputError(f"{path}: found no folder {folder}, expected an existing one")
+    if Path(path).is_dir():
+        raise InputError(f"{path}: found a folder, expected the name of a file")
+
+
+def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = None) -> None:
+    """Write the figure to its file, or draw it in the terminal; the options are those of `picture_options`."""
+    from kahanmaps.plots.figures import drawing, format_of, picture_bytes, plain, write_whole
+    from kahanmaps.plots.recipe import Recipe
+
+    style = style_from(options)
+    path, kind = options["output"], options["kind"]
+    if options["title"]:
+        with drawing(style):
+            figure.suptitle(plain(options["title"]), fontsize=style.font_size + 1)
+    if kind == "text" or (kind is None and path == "-"):
+        _draw_in_terminal(figure, style, path)
+        return
+    kind = format_of(path, kind)
+    content = picture_bytes(figure, kind, style, Recipe(_command(), "" if file is None else file.to_toml()))
+    if path == "-":
+        sys.stdout.buffer.write(content)
+        sys.stdout.buffer.flush()
+        return
+    write_whole(Path(path), content)
+    if not options["quiet"]:
+        width, height = figure.get_size_inches() * 2.54
+        say(f"{path}: {width:.1f} x {height:.1f} cm, {len(content)} bytes")
+
+
+def _command() -> str:
+    context = click.get_current_context()
+    words = context.command_path.split()[1:]  # the first one is the program, whatever it was called
+    return shlex.join(["kahanmaps", *words, *context.meta[_ARGUMENTS]])
+
+
+def _draw_in_terminal(figure: Figure, style: Style, path: str) -> None:
+    from kahanmaps.plots.figures import write_whole
+    from kahanmaps.plots.terminal import draw_in_characters
+
+    window = shutil.get_terminal_size()
+    columns = max(20, window.columns - 1)
+    width, height = figure.get_size_inches()
+    rows = max(8, min(window.lines - 2, round(columns / 2 * height / width), _MOST_ROWS))
+    cells = draw_in_characters(figure, columns, rows, style)
+    if path == "-" and sys.stdout.isatty():
+        _print_in_colour(cells)
+        return
+    text = "".join("".join(cell.character for cell in row).rstrip() + "\n" for row in cells)
+    if path == "-":
+        click.echo(text, nl=False)
+    else:
+        write_whole(Path(path), text.encode())
+
+
+def _print_in_colour(cells: list[list[Cell]]) -> None:
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(markup=False, emoji=False, highlight=False)
+    for row in cells:
+        line = Text(no_wrap=True, overflow="crop")
+        for cell in row:
+            line.append(cell.character, None if cell.colour is None else "#{:02x}{:02x}{:02x}".format(*cell.colour))
+        line.rstrip()
+        console.print(line)

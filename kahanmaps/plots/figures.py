@@ -1,0 +1,161 @@
+"""Figures of matplotlib without pyplot: no windows, no global state, the same bytes for the same picture.
+
+A drawing function is `draw_...(values, style) -> Figure`; it makes its figure by `new_figure` inside `drawing(style)`:
+
+    with drawing(style):
+        figure = new_figure(style, aspect=0.75)
+        axes = figure.subplots()
+        ...
+    return figure
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import escape
+
+from kahanmaps.algebra.latex import latex_name
+from kahanmaps.errors import InputError
+from kahanmaps.plots.recipe import Recipe
+from kahanmaps.plots.style import Style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FORMATS = ("pdf", "svg", "png")
+# More points than this are stored as an image of `dpi` dots per inch: as vectors, a million are 15 MB and ten seconds.
+RASTERISE_ABOVE = 20_000
+
+
+def require_matplotlib() -> None:
+    """Raise InputError with the remedy where matplotlib is missing."""
+    try:
+        import matplotlib.figure  # noqa: F401 (whether it is there)
+    except ImportError as error:
+        raise InputError(f"pictures need matplotlib ({error}): pip install 'kahanmaps[plot]'") from error
+
+
+@contextmanager
+def drawing(style: Style) -> Iterator[None]:
+    """Inside, matplotlib has its own defaults and those of the style; afterwards whatever it had before.
+
+    Raises InputError where matplotlib is missing.
+    """
+    require_matplotlib()
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(style.settings())
+        yield
+
+
+def new_figure(style: Style, aspect: float = 0.75) -> Figure:
+    """An empty figure in the size of the style; `aspect` is height over width where the style has no height."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=style.inches(aspect), layout="constrained")
+
+
+def label_of(name: str) -> str:
+    r"""A variable, parameter or other name as a label of a picture.
+
+    >>> label_of("x1"), label_of("eps"), label_of("p_a$")
+    ('$x_1$', '$\\varepsilon$', 'p_a\\$')
+    """
+    latex = latex_name(name)
+    if latex.startswith(r"\mathrm"):  # matplotlib reads less than TeX: such names stay text
+        return name.replace("$", r"\$")
+    return f"${latex}$"
+
+
+def plain(text: str) -> str:
+    """Text of a user in which no dollar sign starts a formula."""
+    return text.replace("$", r"\$")
+
+
+def points(axes: Axes, *coordinates: Any, **how: Any) -> Any:
+    """Points as dots, smaller where they are many and stored as an image above RASTERISE_ABOVE; `how` goes to plot."""
+    count = len(coordinates[0])
+    size = how.pop("markersize", 2.4 if count <= 500 else 1.4 if count <= 5_000 else 0.7 if count <= 50_000 else 0.35)
+    return axes.plot(
+        *coordinates,
+        **{"marker": "o", "linestyle": "none", "markeredgewidth": 0, **how},
+        markersize=size,
+        rasterized=count > RASTERISE_ABOVE,
+    )[0]
+
+
+def format_of(path: str, asked: str | None) -> str:
+    """pdf, svg or png: what is asked for, or by the ending of the path. Raises InputError for anything else."""
+    found = asked or Path(path).suffix.removeprefix(".").lower()
+    if found not in FORMATS:
+        what = f"the ending .{found}" if found else "no ending"
+        raise InputError(f"{path}: found {what}, expected .pdf, .svg or .png (or --format)")
+    return found
+
+
+def picture_bytes(figure: Figure, kind: str, style: Style, recipe: Recipe | None = None) -> bytes:
+    """The figure as a PDF, SVG or PNG file, with the recipe in its metadata.
+
+    The same figure gives the same bytes, with the same version of matplotlib: no dates, no random names.
+    """
+    held = io.BytesIO()
+    with drawing(style):
+        figure.savefig(held, format=kind, metadata=(recipe or Recipe()).metadata(kind))
+    return held.getvalue()
+
+
+def write_picture(figure: Figure, path: str, kind: str, style: Style, recipe: Recipe | None = None) -> None:
+    """Write the figure to a file, whole or not at all."""
+    write_whole(Path(path), picture_bytes(figure, kind, style, recipe))
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file beside its place and put it there when it is complete; what stood there stays until then."""
+    if path.exists() and not path.is_file():  # /dev/stdout and its relatives take bytes, but cannot be replaced
+        path.write_bytes(content)
+        return
+    target = path.resolve()
+    mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
+    with NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as part:
+        try:
+            part.write(content)
+            part.flush()
+            os.chmod(part.name, mode)
+            os.replace(part.name, target)
+        except BaseException:
+            with suppress(OSError):
+                os.unlink(part.name)
+            raise
+
+
+def _umask() -> int:
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask
+
+
+def svg_text(figure: Figure, name: str, style: Style, alt: str) -> str:
+    """The figure as an <svg> element for a page.
+
+    `name` makes its ids different from those of other pictures on the page, `alt` says in words what it shows. It is as
+    wide as there is room for, and no wider than the style says.
+    """
+    text = picture_bytes(figure, "svg", style).decode()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'(\bid=")([^"]+)"', rf'\1{name}-\2"', text)
+    text = re.sub(r'((?:xlink:)?href="#|url\(#)', rf"\1{name}-", text)
+    head, rest = text.split(">", 1)
+    head = re.sub(r'\s(width|height)="[^"]*"', "", head)
+    head += f' class="picture" role="img" style="width:100%;max-width:{style.width:g}cm;height:auto"'
+    return f"{head}>\n <title>{escape(alt)}</title>{rest}"

@@ -1,0 +1,163 @@
+"""A figure as characters: Braille dots, two across and four down in each cell, with the figure's texts in between.
+
+The figure itself is drawn, at one pixel a dot and without its texts; so every kind of picture can be seen in a
+terminal, though coarsely.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kahanmaps.errors import InputError
+from kahanmaps.plots.figures import drawing
+from kahanmaps.plots.style import Style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
+_INK = 48  # how far from white, in steps of 255, a dot has to be to be seen
+_FRAME = "#808080"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A character and its colour (red, green, blue), None for the terminal's own."""
+
+    character: str
+    colour: tuple[int, int, int] | None
+
+
+def draw_in_characters(figure: Figure, columns: int, rows: int, style: Style) -> list[list[Cell]]:
+    """The figure in `rows` rows of `columns` cells.
+
+    The figure is changed (size and line widths): draw what goes into a file before, or make it anew. Raises InputError
+    for fewer than 20 columns or 8 rows.
+    """
+    if columns < 20 or rows < 8:
+        raise InputError(f"found {columns} columns and {rows} rows, expected at least 20 and 8 for a picture")
+    with drawing(style):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.text import Text
+
+        # A cell is 2 by 4 pixels; a font of 4 pixels, one row high and about a cell wide, makes the layout leave room.
+        figure.set_dpi(72)
+        figure.set_size_inches(2 * columns / 72, 4 * rows / 72)
+        _coarsen(figure)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        texts = [_placed(text, columns, rows) for text in _visible(figure, Text)]
+        figure.set_layout_engine("none")
+        for text in figure.findobj(Text):
+            text.set_visible(False)
+        canvas.draw()
+        pixels = np.asarray(canvas.buffer_rgba())[: 4 * rows, : 2 * columns, :3].astype(int)
+    cells = _braille(pixels, columns, rows)
+    for row, column, content in texts:
+        for k, character in enumerate(content):
+            if 0 <= row < rows and 0 <= column + k < columns:
+                cells[row][column + k] = Cell(character, None)
+    return cells
+
+
+def _visible(figure: Figure, kind: Any) -> list[Any]:
+    hidden = _off_scale(figure)
+    found = []
+    for text in figure.findobj(kind):
+        if text.get_visible() and text.get_text().strip() and id(text) not in hidden:
+            box = text.get_window_extent()
+            if box.width and figure.bbox.overlaps(box):
+                found.append(text)
+    return found
+
+
+def _off_scale(figure: Figure) -> set[int]:
+    """The labels of ticks outside the limits of their axis, which matplotlib keeps but does not draw."""
+    off = set()
+    for axes in figure.axes:
+        if hasattr(axes, "zaxis"):
+            continue
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            slack = 1e-9 * (high - low)
+            for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
+                if not low - slack <= tick.get_loc() <= high + slack:
+                    off |= {id(tick.label1), id(tick.label2)}
+    return off
+
+
+def _placed(text: Any, columns: int, rows: int) -> tuple[int, int, str]:
+    box = text.get_window_extent()
+    content = " ".join(readable(text.get_text()).split())[:columns]
+    middle = (box.x0 + box.x1) / 4
+    anchor = {"left": box.x0 / 2, "right": box.x1 / 2 - len(content)}.get(
+        text.get_horizontalalignment(), middle - len(content) / 2
+    )
+    column = min(max(0, round(anchor)), columns - len(content))
+    row = rows - 1 - int((box.y0 + box.y1) / 8)
+    return min(max(0, row), rows - 1), column, content
+
+
+def readable(text: str) -> str:
+    r"""A label of matplotlib as plain text.
+
+    >>> readable(r"$x_{12}$"), readable(r"$\mathdefault{10^{-3}}$"), readable(r"$\varepsilon$ = 1/10")
+    ('x12', '10^-3', 'eps = 1/10')
+    """
+    text = re.sub(r"\\math\w+|\\left|\\right|\\operatorname", "", text.replace(r"\$", "\0"))
+    text = text.replace(r"\varepsilon", "eps").replace(r"\times", "*").replace(r"\cdot", "*").replace(r"\,", " ")
+    text = text.replace(r"\tilde", "~").replace(r"\leq", "<=").replace(r"\geq", ">=")
+    text = re.sub(r"_\{?", "", text)
+    return re.sub(r"[\\${}]", "", text).replace("\0", "$").replace("\N{MINUS SIGN}", "-")
+
+
+def _coarsen(figure: Figure) -> None:
+    """Lines one dot wide, marks of a dot, letters of one row: what can be seen at this size."""
+    from matplotlib.collections import LineCollection, PathCollection
+    from matplotlib.lines import Line2D
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        text.set_fontsize(4)
+        text.set_fontfamily("monospace")
+    for line in figure.findobj(Line2D):
+        line.set_antialiased(False)
+        line.set_linewidth(min(line.get_linewidth(), 0.8))
+        line.set_markersize(min(line.get_markersize(), 1.2))
+        line.set_markeredgewidth(0)
+    for collection in figure.findobj(LineCollection):
+        collection.set_antialiased(False)
+        collection.set_linewidth(0.8)
+    for cloud in figure.findobj(PathCollection):
+        cloud.set_sizes([1.2])
+        cloud.set_linewidth(0)
+    for axes in figure.axes:
+        axes.tick_params(which="both", length=0, pad=2)
+        for spine in axes.spines.values():
+            spine.set_color(_FRAME)
+            spine.set_linewidth(0.5)
+
+
+def _braille(pixels: Any, columns: int, rows: int) -> list[list[Cell]]:
+    """Cells of 4 by 2 pixels; the colour of a cell is that of its darkest or most coloured dot."""
+    ink = 255 - pixels.min(axis=2) > _INK
+    blocks = ink.reshape(rows, 4, columns, 2).transpose(0, 2, 1, 3)
+    codes = (blocks * _DOTS).sum(axis=(2, 3))
+    values = pixels.reshape(rows, 4, columns, 2, 3).transpose(0, 2, 1, 3, 4).reshape(rows, columns, 8, 3)
+    strongest = values.min(axis=3).argmin(axis=2)
+    cells = []
+    for i in range(rows):
+        row = []
+        for j in range(columns):
+            if codes[i, j] == 0:
+                row.append(Cell(" ", None))
+                continue
+            red, green, blue = (int(c) for c in values[i, j, strongest[i, j]])
+            grey = max(red, green, blue) - min(red, green, blue) < 24  # black on white is white on black elsewhere
+            row.append(Cell(chr(0x2800 + int(codes[i, j])), None if grey else (red, green, blue)))
+        cells.append(row)
+    return cells

@@ -1,0 +1,175 @@
+"""Figures: the size asked for, the same bytes every time, whole files or none, matplotlib's settings left alone."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import xml.etree.ElementTree as ElementTree
+from itertools import pairwise
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from kahanmaps.errors import InputError
+from kahanmaps.plots import figures
+from kahanmaps.plots.figures import (
+    FORMATS,
+    RASTERISE_ABOVE,
+    drawing,
+    format_of,
+    label_of,
+    new_figure,
+    picture_bytes,
+    points,
+    svg_text,
+    write_whole,
+)
+from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
+
+STYLE = Style(width=6)
+
+
+def a_figure(count=10, style=STYLE):
+    with drawing(style):
+        figure = new_figure(style)
+        axes = figure.subplots()
+        points(axes, np.linspace(0, 1, count), np.linspace(0, 1, count))
+        axes.set_xlabel(label_of("x1"))
+    return figure
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_the_same_picture_is_the_same_bytes(kind):
+    assert picture_bytes(a_figure(), kind, STYLE) == picture_bytes(a_figure(), kind, STYLE)
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_another_picture_is_other_bytes(kind):
+    assert picture_bytes(a_figure(10), kind, STYLE) != picture_bytes(a_figure(11), kind, STYLE)
+
+
+def test_the_size_is_in_centimetres():
+    content = picture_bytes(a_figure(style=Style(width=8.6, height=5)), "svg", Style(width=8.6, height=5)).decode()
+    width, height = (float(x) for x in re.search(r'width="([\d.]+)pt" height="([\d.]+)pt"', content).groups())
+    assert (round(width / 72 * 2.54, 3), round(height / 72 * 2.54, 3)) == (8.6, 5)
+
+
+def test_many_points_are_an_image_inside_the_picture():
+    few = picture_bytes(a_figure(RASTERISE_ABOVE), "svg", STYLE)
+    many = picture_bytes(a_figure(RASTERISE_ABOVE + 1), "svg", STYLE)
+    assert b"<image" not in few
+    assert b"<image" in many
+    assert len(many) < len(few) / 10
+
+
+def test_settings_of_matplotlib_are_left_as_they_were():
+    mpl.rcParams["lines.linewidth"] = 7.0
+    try:
+        a_figure()
+        assert mpl.rcParams["lines.linewidth"] == 7.0
+    finally:
+        mpl.rcdefaults()
+
+
+def test_settings_of_a_user_do_not_get_into_a_picture():
+    expected = picture_bytes(a_figure(), "png", STYLE)
+    mpl.rcParams["font.size"] = 30
+    try:
+        assert picture_bytes(a_figure(), "png", STYLE) == expected
+    finally:
+        mpl.rcdefaults()
+
+
+@pytest.mark.parametrize(
+    ("path", "asked", "found"),
+    [
+        ("a.pdf", None, "pdf"),
+        ("a.PNG", None, "png"),
+        ("a.b.svg", None, "svg"),
+        ("a.pdf", "png", "png"),
+        ("a", "svg", "svg"),
+    ],
+)
+def test_the_format_is_that_of_the_ending_or_the_one_asked_for(path, asked, found):
+    assert format_of(path, asked) == found
+
+
+@pytest.mark.parametrize("path", ["a", "a.jpg", "a.pdf.gz", ".svg"])
+def test_other_endings_are_refused(path):
+    with pytest.raises(InputError, match=r"expected \.pdf, \.svg or \.png"):
+        format_of(path, None)
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    target = tmp_path / "x.svg"
+    target.write_bytes(b"before")
+    monkeypatch.setattr(figures.os, "replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        write_whole(target, b"after")
+    assert target.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_new_file_has_the_permissions_of_the_user(tmp_path):
+    before = os.umask(0o027)
+    try:
+        write_whole(tmp_path / "x", b"")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "x").stat().st_mode) == 0o640
+
+
+def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path):
+    (tmp_path / "x").write_bytes(b"")
+    (tmp_path / "x").chmod(0o600)
+    write_whole(tmp_path / "x", b"new")
+    assert stat.S_IMODE((tmp_path / "x").stat().st_mode) == 0o600
+
+
+def test_a_link_stays_a_link(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "target")
+    write_whole(tmp_path / "link", b"new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "target").read_bytes() == b"new"
+
+
+def test_pictures_on_one_page_have_different_ids_and_every_reference_is_met():
+    first, second = (svg_text(a_figure(), name, STYLE, "a < b") for name in ("one", "two"))
+    ids = [set(re.findall(r'\bid="([^"]+)"', text)) for text in (first, second)]
+    assert ids[0] & ids[1] == set()
+    for text, own in zip((first, second), ids, strict=True):
+        assert set(re.findall(r"(?:url\(|href=\")#([^)\"]+)", text)) <= own
+        assert next(ElementTree.fromstring(text).iter("{http://www.w3.org/2000/svg}title")).text == "a < b"
+
+
+def test_names_of_users_are_labels_and_no_formulas():
+    with drawing(STYLE):
+        figure = new_figure(STYLE)
+        figure.subplots().set_xlabel(label_of(r"a$\frac$_b"))
+    assert picture_bytes(figure, "svg", STYLE)
+
+
+def lightness(colour):
+    """CIE L* of an sRGB colour, by the definition."""
+    channels = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    y = sum(w * c for w, c in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+    return 116 * y ** (1 / 3) - 16 if y > 0.008856 else 903.3 * y
+
+
+def test_neighbouring_colours_differ_on_a_grey_printer():
+    levels = [lightness(colour) for colour in COLOURS]
+    assert all(abs(a - b) >= 4 for a, b in pairwise(levels))
+    assert all(abs(a - b) >= 10 for k, a in enumerate(levels[:4]) for b in levels[:k])
+
+
+def test_every_colour_has_a_line_style_and_a_mark_of_its_own():
+    assert len({str(line) for line in LINES}) == len(set(MARKS)) == len(set(COLOURS)) == len(COLOURS)
+
+
+def test_sizes_out_of_range_are_refused():
+    for wrong in ({"width": 1}, {"width": float("nan")}, {"height": 1e9}, {"font_size": 0}, {"dpi": 10**6}):
+        with pytest.raises(InputError, match="expected"):
+            Style(**wrong)

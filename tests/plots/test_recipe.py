@@ -1,0 +1,58 @@
+"""A picture tells how it was made: the recipe goes into PDF, SVG and PNG and comes out as it went in."""
+
+from __future__ import annotations
+
+import pytest
+
+from kahanmaps.errors import InputError
+from kahanmaps.plots.figures import FORMATS, drawing, new_figure, picture_bytes, write_picture
+from kahanmaps.plots.recipe import Recipe, read_recipe
+from kahanmaps.plots.style import Style
+
+STYLE = Style(width=4)
+RECIPES = {
+    "plain": Recipe("kahanmaps plot portrait euler_top --eps 1/10", 'name = "euler_top"\n'),
+    "brackets, quotes and backslashes": Recipe(
+        r"kahanmaps plot portrait 'a (b) \ c.toml' -p 'a=(1/2)'", "x = '\\\\)('\n"
+    ),
+    "letters beyond Latin-1": Recipe("kahanmaps plot portrait 'é α→.toml'", 'name = "ä→"\nvariables = ["α"]\n'),
+    "markup": Recipe("kahanmaps plot portrait '<&>.toml'", 'name = "<script>&amp;</script>"\n'),
+    "no system": Recipe("kahanmaps plot batch runs.db"),
+}
+
+
+def a_figure():
+    with drawing(STYLE):
+        figure = new_figure(STYLE)
+        figure.subplots().plot([0, 1], [0, 1])
+    return figure
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("recipe", RECIPES.values(), ids=RECIPES)
+def test_the_recipe_comes_out_as_it_went_in(tmp_path, kind, recipe):
+    path = str(tmp_path / f"picture.{kind}")
+    write_picture(a_figure(), path, kind, STYLE, recipe)
+    assert read_recipe(path) == recipe
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_a_picture_of_somebody_else_has_no_recipe(tmp_path, kind):
+    path = tmp_path / f"picture.{kind}"
+    a_figure().savefig(path)
+    with pytest.raises(InputError, match="no recipe"):
+        read_recipe(str(path))
+
+
+def test_a_file_that_is_no_picture_is_refused(tmp_path):
+    (tmp_path / "x.pdf").write_bytes(b"nothing of the kind")
+    with pytest.raises(InputError, match="neither PDF nor SVG nor PNG"):
+        read_recipe(str(tmp_path / "x.pdf"))
+
+
+@pytest.mark.parametrize("cut", [9, 20, 40])
+def test_a_picture_cut_short_is_refused(tmp_path, cut):
+    path = tmp_path / "x.png"
+    path.write_bytes(picture_bytes(a_figure(), "png", STYLE, RECIPES["plain"])[:cut])
+    with pytest.raises(InputError, match="no recipe"):
+        read_recipe(str(path))

@@ -1,0 +1,69 @@
+"""A figure as characters: dots where the picture has ink, texts in between, nothing outside the frame asked for."""
+
+from __future__ import annotations
+
+import pytest
+
+from kahanmaps.errors import InputError
+from kahanmaps.plots.figures import drawing, label_of, new_figure
+from kahanmaps.plots.style import COLOURS, Style
+from kahanmaps.plots.terminal import draw_in_characters
+
+STYLE = Style()
+
+
+def a_figure(x=(0, 1), y=(0, 1), **how):
+    with drawing(STYLE):
+        figure = new_figure(STYLE)
+        axes = figure.subplots()
+        axes.plot(x, y, **how)
+        axes.set_xlabel(label_of("x1"))
+        axes.set_ylabel(label_of("omega"))
+    return figure
+
+
+def lines(figure, columns=60, rows=20):
+    return ["".join(cell.character for cell in row) for row in draw_in_characters(figure, columns, rows, STYLE)]
+
+
+def dots(cells):
+    return sum(
+        bin(ord(cell.character) - 0x2800).count("1") for row in cells for cell in row if cell.character > "\u2800"
+    )
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(20, 8), (60, 20), (119, 40)])
+def test_the_picture_has_the_size_asked_for(columns, rows):
+    drawn = lines(a_figure(), columns, rows)
+    assert (len(drawn), {len(line) for line in drawn}) == (rows, {columns})
+
+
+def test_labels_can_be_read():
+    text = "\n".join(lines(a_figure()))
+    assert " x1 " in text
+    assert "omega" in text
+    assert "0.5" in text
+
+
+def test_a_curve_leaves_dots_in_its_colour():
+    with_curve = draw_in_characters(a_figure(color=COLOURS[1]), 60, 20, STYLE)
+    without = draw_in_characters(a_figure(x=(), y=()), 60, 20, STYLE)
+    vermilion = [cell for row in with_curve for cell in row if cell.colour and cell.colour[0] > 150 > cell.colour[2]]
+    assert dots(with_curve) > dots(without) + 20
+    assert len(vermilion) > 15
+
+
+def test_a_rising_line_rises():
+    colours = [
+        (i, j)
+        for i, row in enumerate(draw_in_characters(a_figure(color="#ff0000"), 60, 20, STYLE))
+        for j, cell in enumerate(row)
+        if cell.colour
+    ]
+    low, high = min(colours, key=lambda at: at[1]), max(colours, key=lambda at: at[1])
+    assert low[0] > high[0]
+
+
+def test_too_small_a_terminal_is_refused():
+    with pytest.raises(InputError, match="at least 20 and 8"):
+        draw_in_characters(a_figure(), 10, 5, STYLE)
