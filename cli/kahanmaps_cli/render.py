@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -11,32 +10,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.progress import say
+from kahanmaps_cli.terminal import COLOURS, NARROW, NUMBER_WIDTH, columns, console, tell
+from kahanmaps_cli.terminal import on_terminal as on_terminal
+from kahanmaps_cli.terminal import shorten as shorten
 
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Evidence, Finding, Report, Witness
 
-COLOURS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "yellow"}
-# On a terminal long numbers are shortened to this many characters, and long lists of claims to this many.
-NUMBER_WIDTH = 40
+# On a terminal long lists of claims are cut to this many.
 CLAIMS_SHOWN = 40
-
-
-def on_terminal() -> bool:
-    """Whether standard output is a terminal."""
-    return sys.stdout.isatty()
 
 
 def print_json(data: Mapping[str, Any]) -> None:
     """One JSON object on a line of its own."""
     click.echo(json.dumps(data))
-
-
-def shorten(text: str, width: int = NUMBER_WIDTH) -> str:
-    """A long number with its middle left out and its length told: 12345...67890 (1234 characters)."""
-    if len(text) <= width:
-        return text
-    keep = max(4, (width - 18) // 2)
-    return f"{text[:keep]}...{text[-keep:]} ({len(text)} chars)"
 
 
 def print_report(report: Report, as_json: bool, verbose: bool = False, quiet: bool = False) -> int:
@@ -45,7 +32,7 @@ def print_report(report: Report, as_json: bool, verbose: bool = False, quiet: bo
         if as_json:
             print_json(report.to_json())
         elif on_terminal():
-            _print_table(report, verbose)
+            _print_terminal(report, verbose)
         else:
             _print_plain(report)
     status = exit_status(report)
@@ -83,55 +70,76 @@ def _verdict_text(finding: Finding) -> str:
     return f"{verdict} (as expected)" if finding.control and finding.is_as_expected else verdict
 
 
+def verdict_style(finding: Finding) -> str:
+    """Red is for what nobody expected: a control that is refuted, as it should be, stays without a colour."""
+    if not finding.is_as_expected:
+        return "bold red"
+    return "" if finding.control else COLOURS[str(finding.verdict)]
+
+
 def _print_plain(report: Report) -> None:
-    click.echo(headline(report))
+    tell(headline(report))
     told: set[str] = set()
     for finding in report.findings:
-        click.echo(f"{_verdict_text(finding)}\t{finding.claim}")
+        tell(f"{_verdict_text(finding)}\t{finding.claim}")
         for line in _details(finding, told):
-            click.echo(f"\t{line}")
+            tell(f"\t{line}")
     for note in report.notes:
-        click.echo(f"note\t{note}")
-    click.echo(f"verdict\t{report.verdict}")
+        tell(f"note\t{note}")
+    tell(f"verdict\t{report.verdict}")
 
 
-def _print_table(report: Report, verbose: bool) -> None:
-    from rich.console import Console
+def _print_terminal(report: Report, verbose: bool) -> None:
+    tell(headline(report), style="bold")
+    shown = _selection(report.findings)
+    if columns() < NARROW:
+        _print_list(report, shown, verbose)
+    else:
+        _print_table(report, shown, verbose)
+    if len(shown) < len(report.findings):
+        tell(f"{len(report.findings) - len(shown)} more claims, proved like those above (--json has all)")
+    if not verbose:
+        for line in _below(shown):
+            tell(line)
+    for note in report.notes:
+        tell(f"note: {note}")
+    tell(f"verdict\t{report.verdict}", 9)
+
+
+def _print_list(report: Report, shown: list[Finding], verbose: bool) -> None:
+    """One claim below the other, where there is no room for a table."""
+    told: set[str] = set()
+    for finding in shown:
+        tell(f"{_verdict_text(finding)}\t{finding.claim}")
+        if verbose:
+            for line in _details(finding, told, NUMBER_WIDTH):
+                tell(f"\t{line}")
+        else:
+            tell(f"\t{_short(finding.evidence)}")
+
+
+def _print_table(report: Report, shown: list[Finding], verbose: bool) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    console = Console(markup=False, emoji=False, highlight=False)
-    console.print(Text(headline(report), style="bold"))
     table = Table(header_style="bold", show_lines=verbose)
     table.add_column("verdict", no_wrap=True)
     table.add_column("claim", overflow="fold")
     if not verbose:
         table.add_column("decided by", overflow="fold")
-    shown = _selection(report.findings)
     told: set[str] = set()
     for finding in shown:
-        style = COLOURS[str(finding.verdict)] if finding.is_as_expected else "yellow"
         claim = Text(finding.claim)
-        verdict = Text(_verdict_text(finding).replace(" (", "\n("), style=style)
+        verdict = Text(_verdict_text(finding).replace(" (", "\n("), style=verdict_style(finding))
         if verbose:
             for line in _details(finding, told, NUMBER_WIDTH):
-                claim.append("\n" + line, style="dim")
+                claim.append("\n  " + line)
             table.add_row(verdict, claim)
         else:
             if report.check != "commute" and finding.formula not in finding.claim:
-                claim.append("\n" + shorten(finding.formula, 300), style="dim")
+                claim.append("\n  " + shorten(finding.formula, 300))
             table.add_row(verdict, claim, _short(finding.evidence))
-    console.print(table)
-    if len(shown) < len(report.findings):
-        console.print(f"{len(report.findings) - len(shown)} more claims, proved like those above (--json has all)")
-    if not verbose:
-        for line in _below(shown):
-            console.print(line)
-    for note in report.notes:
-        console.print(f"note: {note}")
-    last = Text("verdict: ")
-    last.append(str(report.verdict), style=f"bold {COLOURS[str(report.verdict)]}")
-    console.print(last)
+    console().print(table)
 
 
 def _short(evidence: Evidence) -> str:

@@ -14,10 +14,11 @@ from collections.abc import Sequence
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
+from kahanmaps.algebra.reading import reading_order
 from kahanmaps.errors import InputError
 
 # TeX has no commands for the letters that look Latin, such as omicron and capital Alpha.
-_GREEK = re.compile(
+GREEK_NAMES = (
     "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|iota|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|upsilon|phi|chi|psi|omega"
     "|Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Upsilon|Phi|Psi|Omega"
 )
@@ -48,7 +49,7 @@ def latex_name(name: str) -> str:
     letters, digits = match.groups()
     if letters == "eps":
         letters = r"\varepsilon"
-    elif _GREEK.fullmatch(letters):
+    elif re.fullmatch(GREEK_NAMES, letters):
         letters = "\\" + letters
     return letters + ("_" + _braced(digits) if digits else "")
 
@@ -74,7 +75,7 @@ def latex_polynomial(polynomial: fmpq_mpoly) -> str:
     order = sorted(range(len(names)), key=lambda k: names[k] != "eps")
     ordered = [latex_name(names[k]) for k in order]
     text = ""
-    for monomial, coefficient in _terms(polynomial):
+    for monomial, coefficient in reading_order(polynomial):
         term = _term(abs(coefficient), [monomial[k] for k in order], ordered)
         if coefficient < 0:
             text += f" - {term}" if text else f"-{term}"
@@ -95,18 +96,10 @@ def latex_rational_function(function: RationalFunction) -> str:
     if function.is_polynomial:  # the denominator is 1 then
         return latex_polynomial(function.numerator)
     factor = fmpq(common_denominator(function.numerator))
-    if _terms(function.denominator)[0][1] < 0:
+    if reading_order(function.denominator)[0][1] < 0:
         factor = -factor
     above, below = function.numerator * factor, function.denominator * factor
     return rf"\frac{{{latex_polynomial(above)}}}{{{latex_polynomial(below)}}}"
-
-
-def _terms(polynomial: fmpq_mpoly) -> list[tuple[tuple[int, ...], fmpq]]:
-    """Exponents and coefficients, those without eps first: what remains for eps = 0 is read first."""
-    names = names_of(polynomial)
-    at = names.index("eps") if "eps" in names else None
-    terms = [(tuple(int(exponent) for exponent in monomial), value) for monomial, value in polynomial.terms()]
-    return terms if at is None else sorted(terms, key=lambda term: term[0][at])
 
 
 def _term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:

@@ -48,9 +48,9 @@ def test_labels_can_be_read():
 def test_a_curve_leaves_dots_in_its_colour():
     with_curve = draw_in_characters(a_figure(color=COLOURS[1]), 60, 20, STYLE)
     without = draw_in_characters(a_figure(x=(), y=()), 60, 20, STYLE)
-    vermilion = [cell for row in with_curve for cell in row if cell.colour and cell.colour[0] > 150 > cell.colour[2]]
+    coloured = [cell for row in with_curve for cell in row if cell.colour and cell.colour[2] > 150 > cell.colour[0]]
     assert dots(with_curve) > dots(without) + 20
-    assert len(vermilion) > 15
+    assert len(coloured) > 15
 
 
 def test_a_rising_line_rises():

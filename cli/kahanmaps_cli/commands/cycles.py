@@ -10,6 +10,7 @@ from kahanmaps_cli.options import load_system, output_options, system_or_prime_o
 from kahanmaps_cli.params import ExactNumber
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from flint import fmpq_mat
@@ -124,17 +125,17 @@ def _print(
 ) -> None:
     from kahanmaps.algebra.text import format_number
 
-    click.echo(f"# {file.name}, the Kahan map on P^{file.system.dim} over GF(p), eps is half the time step")
+    tell(f"# {file.name}, the Kahan map on P^{file.system.dim} over GF(p), eps is half the time step")
     rows = _rows(reversor)
     shown = "none known" if rows is None else ";".join(",".join(row) for row in rows)
-    click.echo(f"reversing symmetry\t{shown}")
+    tell(f"reversing symmetry\t{shown}")
     for census, found in runs:
-        click.echo(f"\n# p = {census.prime}, eps = {format_number(census.eps)}")
+        tell(f"\n# p = {census.prime}, eps = {format_number(census.eps)}")
         for name, text in _lines(census):
-            click.echo(f"{name}\t{text}")
+            tell(f"{name}\t{text}")
         for law, reason in found.reasons.items():
-            click.echo(f"{law}\t{found.verdict(law)}: {reason}")
-    click.echo(f"\n# compatible in all {len(runs)} runs with: {', '.join(common) or 'none of the laws'}")
+            tell(f"{law}\t{found.verdict(law)}: {reason}")
+    tell(f"\n# compatible in all {len(runs)} runs with: {', '.join(common) or 'none of the laws'}")
 
 
 def _lines(census: Census) -> list[tuple[str, str]]:

@@ -9,6 +9,7 @@ import click
 from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.degrees import DegreeGrowth
@@ -59,8 +60,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     else:
         lines = f"{len(found.primes)} random lines modulo primes of 63 bits"
         at = "generic eps" if eps is None else f"eps = {eps} (time step 2 eps = {2 * eps})"
-        click.echo(f"# {file.name}, {at}, {lines}: measured, not proved")
-        click.echo(found.text)
+        tell(f"# {file.name}, {at}, {lines}: measured, not proved")
+        tell(found.text)
     if _is_done(found, options["terms"]):
         return 0
     if not quiet:

@@ -13,8 +13,9 @@ from kahanmaps_cli.ensemble_starts import drawn, read_starts
 from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
 from kahanmaps_cli.params import Arithmetic, ExactNumber, NameValue
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import on_terminal, print_json
+from kahanmaps_cli.render import print_json
 from kahanmaps_cli.signals import interruptible
+from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.algebra.polynomials import RationalFunction
@@ -182,7 +183,7 @@ def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> Non
     """Tab-separated lines, aligned on a terminal."""
     backward = ", backward" if options["backward"] else ""
     arithmetic = _arithmetic(options)
-    click.echo(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic{backward}")
+    tell(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic{backward}")
     rows = [("orbits", str(run.shape[0])), ("steps", str(run.reached)), ("kernel", run.kernel)]
     rows += [(word, str(number)) for word, number in run.counts.items()]
     near = run.near()
@@ -198,7 +199,7 @@ def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> Non
     if more:
         rows.append(("ended early", f"and {_counted(more, 'more orbit')}"))
     for name, text in rows:
-        click.echo(f"{name:<15}{text.replace(chr(9), ': ')}" if on_terminal() else f"{name}\t{text}")
+        tell(f"{name}\t{text}", 15)
 
 
 def _record(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> dict[str, Any]:

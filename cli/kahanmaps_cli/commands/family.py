@@ -11,7 +11,8 @@ from kahanmaps.version import __version__
 from kahanmaps_cli.draw import draw_member, draw_options
 from kahanmaps_cli.options import load_system
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import on_terminal, print_json, shorten
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import on_terminal, shorten, tell
 
 if TYPE_CHECKING:
     from flint import fmpq_mat
@@ -111,19 +112,19 @@ def show(system: str, normal_form: bool, as_json: bool) -> None:
     if as_json:
         print_json(data)
         return
-    click.echo(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
+    tell(f"{file.name}: m = {member.m}, dimension {member.dim}, variables {', '.join(member.variables)}")
     if hidden is not None:
-        click.echo(f"found, not declared: {hidden.text}")
-    click.echo(data["diagnosis"])
+        tell(f"found, not declared: {hidden.text}")
+    tell(data["diagnosis"])
     if hidden is not None and not hidden.is_standard:
-        click.echo("x = T y, T =")
+        tell("x = T y, T =")
         _print_matrix(hidden.T)
-    click.echo("A =")
+    tell("A =")
     _print_matrix(member.A)
     for k, text in enumerate(data["hamiltonians"]):
-        click.echo(f"H_{k} = {_formula(text)}")
+        tell(f"H_{k} = {_formula(text)}")
     if any(sign < 0 for sign in member.signs):
-        click.echo(f"signs = {','.join(map(str, member.signs))}: K = {_formula(format_polynomial(member.chosen.K))}")
+        tell(f"signs = {','.join(map(str, member.signs))}: K = {_formula(format_polynomial(member.chosen.K))}")
     if form is not None:
         _print_normal_form(form, "x" if hidden is None or hidden.is_standard else "y")
 
@@ -165,13 +166,13 @@ def space(system: str | None, matrix: str | None, as_json: bool) -> None:
     if as_json:
         print_json(data)
         return
-    click.echo(
+    tell(
         f"dimension {found.dimension} (generic A: 4m = {found.expected}); "
         f"the linear system has {found.unknowns} unknowns and rank {found.rank}"
     )
-    click.echo(data["diagnosis"])
+    tell(data["diagnosis"])
     for k, text in enumerate(data["basis"], start=1):
-        click.echo(f"{k}\t{_formula(text)}")
+        tell(f"{k}\t{_formula(text)}")
 
 
 @command.command("associated")
@@ -218,10 +219,10 @@ def associated(system: str, write_to: str | None, as_json: bool) -> None:
         )
         return
     named = ", ".join(f"({factor})" for factor in member.factors)
-    click.echo(f"{file.name}: signs belong to the factors {named}; {len(rows)} associated up to sign, f_0 first")
+    tell(f"{file.name}: signs belong to the factors {named}; {len(rows)} associated up to sign, f_0 first")
     for row in rows:
         powers = ", ".join(row["B_in_powers_of_A"])
-        click.echo(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {_formula(row['K'])}")
+        tell(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {_formula(row['K'])}")
 
 
 def _normal_form(member: FamilyMember) -> NormalForm:
@@ -249,19 +250,19 @@ def _normal_form_data(form: NormalForm) -> dict[str, Any]:
 def _print_normal_form(form: NormalForm, point: str) -> None:
     from kahanmaps.algebra.text import format_number
 
-    click.echo(f"normal form over Q[t]/chi, chi = {_formula(form.chi_text)}:")
-    click.echo("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
-    click.echo(f"h = {_formula(form.h_text)}")
-    click.echo(f"D = {_formula(form.D_text)}")
-    click.echo(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
+    tell(f"normal form over Q[t]/chi, chi = {_formula(form.chi_text)}:")
+    tell("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
+    tell(f"h = {_formula(form.h_text)}")
+    tell(f"D = {_formula(form.D_text)}")
+    tell(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
     if form.parts:
         total = ", the Hamiltonian is the sum of weight * h" if len(form.parts) == form.m else ""
-        click.echo(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
-        click.echo("the Kahan map conserves h/(1 + eps^2 D) at each of them")
+        tell(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
+        tell("the Kahan map conserves h/(1 + eps^2 D) at each of them")
     for part in form.parts:
         root, weight = _formula(format_number(part.root)), _formula(format_number(part.weight))
-        click.echo(f"t = {root}: h = {_formula(part.text)}, D = {_formula(part.D_text)}, weight {weight}")
-    click.echo(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
+        tell(f"t = {root}: h = {_formula(part.text)}, D = {_formula(part.D_text)}, weight {weight}")
+    tell(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
     _print_matrix(form.S)
 
 
@@ -355,7 +356,7 @@ def _print_matrix(matrix: fmpq_mat) -> None:
     rows = [[_formula(cell, 24) for cell in row] for row in _rows(matrix)]
     widths = [max(len(row[j]) for row in rows) for j in range(len(rows))]
     for row in rows:
-        click.echo("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))
+        tell("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))
 
 
 def _formula(text: str, width: int = 400) -> str:

@@ -9,6 +9,7 @@ import click
 from kahanmaps_cli.options import load_system, output_options, system_options
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.commuting import CommutingField, CommutingSystems
@@ -78,43 +79,43 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
 
 def _print(file: SystemFile, found: CommutingSystems) -> None:
-    click.echo(f"# find-commuting: {file.name}, {_SHAPES[found.shape]}, every eps (the time step is 2 eps)")
+    tell(f"# find-commuting: {file.name}, {_SHAPES[found.shape]}, every eps (the time step is 2 eps)")
     if found.dimension is not None:
-        click.echo(f"bracket\tthe g with [f, g] = 0 have dimension {found.dimension}")
+        tell(f"bracket\tthe g with [f, g] = 0 have dimension {found.dimension}")
     if found.every_g_commutes:
-        click.echo("proved\tf = 0 and its map is x -> x: every g commutes")
+        tell("proved\tf = 0 and its map is x -> x: every g commutes")
     for g in found.solutions:
         if g.trivial:
-            click.echo(f"{g.finding.verdict}\ttrivial\tg = {g.trivial}")
+            tell(f"{g.finding.verdict}\ttrivial\tg = {g.trivial}")
     told: list[Any] = []
     for g in found.nontrivial:
         if g.system.scaled(-1) in told:
             continue
         told.append(g.system)
-        click.echo(f"{g.finding.verdict}\tg and -g\t{_pasted(g)}")
+        tell(f"{g.finding.verdict}\tg and -g\t{_pasted(g)}")
         _print_matrix(g)
-        click.echo(f"\t{g.finding.evidence.summary}")
+        tell(f"\t{g.finding.evidence.summary}")
     for family in found.families:
         letters = [f"t{k + 1}" for k in range(len(family.directions))]
         base = "" if family.base.trivial == "0" else "base + "
         total = " + ".join(f"{t}*g{k + 1}" for k, t in enumerate(letters))
-        click.echo(f"{family.finding.verdict}\tfamily\tg = {base}{total} for all {', '.join(letters)}")
+        tell(f"{family.finding.verdict}\tfamily\tg = {base}{total} for all {', '.join(letters)}")
         named = [("base", family.base)] * bool(base) + [(f"g{k + 1}", g) for k, g in enumerate(family.directions)]
         for name, g in named:
-            click.echo(f"\t{name}\t{_pasted(g)}")
+            tell(f"\t{name}\t{_pasted(g)}")
             _print_matrix(g)
-        click.echo(f"\t{family.finding.evidence.summary}")
+        tell(f"\t{family.finding.evidence.summary}")
     if found.irrational:
-        click.echo(f"note\tmore solutions, not rational: {'; '.join(found.irrational)}")
+        tell(f"note\tmore solutions, not rational: {'; '.join(found.irrational)}")
     if found.discarded:
-        click.echo(f"note\t{found.discarded} solutions of the equations up to eps^{found.order} do not commute")
+        tell(f"note\t{found.discarded} solutions of the equations up to eps^{found.order} do not commute")
     shape = _SHAPES["linear"] if found.shape == "linear" else "quadratic g"
     message = f"complete: no other rational {shape} commutes"
     if found.every_g_commutes:
         message = "complete: every g commutes"
     elif not found.complete:
         message = "undecided: there may be more, see standard error"
-    click.echo(f"# {message}")
+    tell(f"# {message}")
 
 
 def _pasted(g: CommutingField) -> str:
@@ -126,4 +127,4 @@ def _pasted(g: CommutingField) -> str:
 def _print_matrix(g: CommutingField) -> None:
     rows = g.to_json()["B"]
     if rows is not None:
-        click.echo(f"\tB = [{', '.join('[' + ', '.join(row) + ']' for row in rows)}]")
+        tell(f"\tB = [{', '.join('[' + ', '.join(row) + ']' for row in rows)}]")

@@ -9,6 +9,7 @@ import click
 from kahanmaps_cli.options import load_system, output_options, system_options
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.symmetries import Symmetries
@@ -57,30 +58,30 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
 
 def _print(file: SystemFile, found: Symmetries) -> None:
-    click.echo(f"# find-symmetry: {file.name}, every eps (the time step is 2 eps); everything here is proved")
+    tell(f"# find-symmetry: {file.name}, every eps (the time step is 2 eps); everything here is proved")
     for x in found.infinitesimal:
         kind = "linear" if x.is_linear else "affine"
-        click.echo(f"one-parameter group\t{kind}, the flow of ({', '.join(x.rhs)})")
+        tell(f"one-parameter group\t{kind}, the flow of ({', '.join(x.rhs)})")
     if found.scaling is not None:
         rhs = ", ".join(found.scaling.rhs)
-        click.echo(f"scaling\tthe flow of ({rhs}) by t takes the map at eps to that at e^-t eps")
+        tell(f"scaling\tthe flow of ({rhs}) by t takes the map at eps to that at e^-t eps")
     if found.order is not None:
         forward = sum(not t.reversing for t in found.signed)
         backward = len(found.signed) - forward
-        click.echo(
+        tell(
             f"group\torder {found.order}: {_count(forward, 'symmetry', 'symmetries')} and "
             f"{_count(backward, 'reversing one', 'reversing ones')} among signed permutations"
         )
     for t in found.generators:
-        click.echo(f"generator\t{'reversing ' * t.reversing}{t.text}{_remark(t.obvious)}")
+        tell(f"generator\t{'reversing ' * t.reversing}{t.text}{_remark(t.obvious)}")
     for name, elements in (("symmetry", found.symmetries), ("reversing", found.reversing)):
         for t in elements[:_SHOWN]:
-            click.echo(f"{name}\t{t.text}{_remark(t.obvious)}")
+            tell(f"{name}\t{t.text}{_remark(t.obvious)}")
         if len(elements) > _SHOWN:
-            click.echo(f"{name}\tand {len(elements) - _SHOWN} more (--json has more)")
+            tell(f"{name}\tand {len(elements) - _SHOWN} more (--json has more)")
     for sentence in found.searched:
-        click.echo(f"searched\t{sentence}")
-    click.echo(f"# {'complete: every search came to its end' if found.complete else 'undecided: see standard error'}")
+        tell(f"searched\t{sentence}")
+    tell(f"# {'complete: every search came to its end' if found.complete else 'undecided: see standard error'}")
 
 
 def _count(number: int, one: str, many: str) -> str:

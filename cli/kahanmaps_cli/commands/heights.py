@@ -10,6 +10,7 @@ from kahanmaps_cli.options import eps_options, load_system, output_options, syst
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.height_survey import HeightSurvey
@@ -79,11 +80,11 @@ def _print(file: SystemFile, found: HeightSurvey) -> None:
 
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
     each = ", ".join(f"{value} (time step 2 eps = {2 * value})" for value in values)
-    click.echo(f"# {file.name}, eps = {each}, exact arithmetic: measured, not proved")
+    tell(f"# {file.name}, eps = {each}, exact arithmetic: measured, not proved")
     for orbit in found.orbits:
         point = ",".join(format_number(entry) for entry in orbit.start)
-        click.echo("\t".join(["orbit", f"eps {orbit.eps}", f"start {point}", orbit.growth.text]))
-    click.echo(f"heights\t{found.text}")
+        tell("\t".join(["orbit", f"eps {orbit.eps}", f"start {point}", orbit.growth.text]))
+    tell(f"heights\t{found.text}")
 
 
 def _record(file: SystemFile, options: dict[str, Any], found: HeightSurvey) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from kahanmaps_cli.options import eps_options, load_system, output_options, syst
 from kahanmaps_cli.params import ExactNumber
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.maps.float_lyapunov import Lyapunov
@@ -92,16 +93,16 @@ def _require_sense(options: dict[str, Any], steps: int, transient: int) -> None:
 
 
 def _print(file: SystemFile, eps: Any, found: Lyapunov) -> None:
-    click.echo(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), double precision")
-    click.echo(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
-    click.echo(f"steps\t{found.steps} after {found.transient}")
-    click.echo("# exponent\tper unit of time\tper step\tspread\tchange from half")
+    tell(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), double precision")
+    tell(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
+    tell(f"steps\t{found.steps} after {found.transient}")
+    tell("# exponent\tper unit of time\tper step\tspread\tchange from half")
     columns = zip(found.mean, found.mean * (2 * found.eps), found.spread, found.change, strict=True)
     for k, numbers in enumerate(columns, 1):
-        click.echo("\t".join([str(k), *(f"{number:.6g}" for number in numbers)]))
+        tell("\t".join([str(k), *(f"{number:.6g}" for number in numbers)]))
     volume = found.log_volume.mean() if len(found.log_volume) else float("nan")
-    click.echo(f"sum\t{found.mean.sum():.6g}")
-    click.echo(f"log |det dPhi|\t{volume:.6g}\tresidual {found.residual:.2g}")
+    tell(f"sum\t{found.mean.sum():.6g}")
+    tell(f"log |det dPhi|\t{volume:.6g}\tresidual {found.residual:.2g}")
 
 
 def _numbers(values: Any) -> list[float | None]:

@@ -10,6 +10,7 @@ from kahanmaps_cli.options import eps_options, load_system, output_options, syst
 from kahanmaps_cli.params import Arithmetic, PointText
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.family.structure import Structure
@@ -102,13 +103,13 @@ def _message(found: OrbitPeriod) -> str:
 
 
 def _print(file: SystemFile, eps: Any, arithmetic: str, found: OrbitPeriod) -> None:
-    click.echo(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic")
-    click.echo(f"period\t{_word(found)}")
+    tell(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic")
+    tell(f"period\t{_word(found)}")
     for plane in found.planes:
-        click.echo("\t".join(["plane", plane.name, f"period {_word(plane)}", str(plane.kind), plane.reason]).rstrip())
+        tell("\t".join(["plane", plane.name, f"period {_word(plane)}", str(plane.kind), plane.reason]).rstrip())
     poles = {True: "the orbit meets one", False: "the orbit meets none", None: "not known whether the orbit meets one"}
-    click.echo(f"poles\t{poles[found.meets_pole]}")
-    click.echo(f"# {found.status}: {_message(found)}")
+    tell(f"poles\t{poles[found.meets_pole]}")
+    tell(f"# {found.status}: {_message(found)}")
 
 
 def _word(found: Any) -> str:

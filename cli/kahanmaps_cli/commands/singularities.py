@@ -8,7 +8,8 @@ import click
 
 from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import on_terminal, print_json, shorten
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import on_terminal, shorten, tell
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.fates import Hypersurface
@@ -110,20 +111,20 @@ def _print(
     def cut(text: str) -> str:
         return shorten(text, 60) if on_terminal() else text
 
-    click.echo(f"# {file.name}, dimension {file.system.dim}, eps is half the time step")
+    tell(f"# {file.name}, dimension {file.system.dim}, eps is half the time step")
     if symbolic is not None:
         factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
-        click.echo(f"factors of det(I - eps f')\t{cut(factors) or 'none'}")
+        tell(f"factors of det(I - eps f')\t{cut(factors) or 'none'}")
     for run in runs:
-        click.echo(f"\n# eps = {format_number(run.eps)}: map of degree {run.map_degree}, {run.verdict}")
-        click.echo(f"det(I - eps f')\t{cut(run.denominator)}")
+        tell(f"\n# eps = {format_number(run.eps)}: map of degree {run.map_degree}, {run.verdict}")
+        tell(f"det(I - eps f')\t{cut(run.denominator)}")
         for found in run.hypersurfaces:
             kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
             kind += " in all" if found.polynomial == "?" else ""
-            click.echo(f"{cut(found.polynomial)}\t{kind}\t{_told(found, steps)}")
+            tell(f"{cut(found.polynomial)}\t{kind}\t{_told(found, steps)}")
             if found.steps:
-                click.echo(f"  ranks {_ranks(found)}\tpoles {_poles(found)}")
-    click.echo(f"\n# {verdict}")
+                tell(f"  ranks {_ranks(found)}\tpoles {_poles(found)}")
+    tell(f"\n# {verdict}")
 
 
 def _record(

@@ -9,6 +9,7 @@ from importlib.metadata import version as version_of
 import click
 
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import tell
 
 
 @click.command("version")
@@ -38,4 +39,4 @@ def command(as_json: bool) -> None:
         print_json(versions)
         return
     for name, number in versions.items():
-        click.echo(f"{name}\t{number}")
+        tell(f"{name}\t{number}")
