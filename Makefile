@@ -18,9 +18,11 @@ demo: demo-venv  ## a short tour, from a fresh clone in under a minute
 	@PATH="$$PWD/.venv/bin:$$PATH" bash examples/demo.sh
 
 test: dev-venv  ## the tests and the examples in docstrings, without the slow ones
+	@.ci/tools
 	@$(python) -m pytest -n 2 -m "not slow" $(ARGS)
 
 test-slow: dev-venv  ## all tests, the slow ones too
+	@.ci/tools
 	@$(python) -m pytest -n 2 --timeout 1800 $(ARGS)
 
 check: lint types test  ## all that must hold before a commit: lint, types, test
