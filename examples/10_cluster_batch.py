@@ -1,0 +1,53 @@
+"""A batch on a cluster: the theorem for random members, and the growth of three maps, on workers of a dask scheduler.
+
+The scheduler and two workers are started here, on this machine; in earnest they are on many, and only the address
+changes. The same batch on one machine gives the same records, whatever came first. Needs `pip install
+'kahanmaps[cluster]'`.
+"""
+
+import subprocess
+import sys
+from collections import Counter
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import kahanmaps as km
+
+SPEC = """
+[experiments.commute]
+task = "check-commute"
+system = "family"
+axes = { m = "2..3", seed = "0..4" }
+
+[experiments.growth]
+task = "degrees"
+system = ["euler_top", "weierstrass", "lotka_volterra"]
+options = { max_degree = 300 }
+"""
+
+
+def start(module, *options):
+    command = [sys.executable, "-m", f"distributed.cli.{module}", *options]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    stack.callback(process.wait)
+    stack.callback(process.terminate)
+
+
+def results(records):
+    """The results by the key of their task, in which the order of arrival does not show."""
+    return {record.key: record.verdict or record.result["growth"] for record in records}
+
+
+with ExitStack() as stack:
+    folder = Path(stack.enter_context(TemporaryDirectory()))
+    scheduler = folder / "scheduler.json"
+    start("dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", str(scheduler))
+    for _ in range(2):
+        start("dask_worker", "--scheduler-file", str(scheduler), "--nthreads", "1", "--no-dashboard")
+    there = results(km.run(SPEC, folder / "cluster.db", scheduler=str(scheduler)))
+
+here = results(km.run(SPEC))
+print(len(here), "tasks; the same results on the cluster:", there == here)
+for word, count in sorted(Counter(here.values()).items()):
+    print(f"{count} {word}")
