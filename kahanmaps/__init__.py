@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.recurrences import Recurrence, find_recurrence
     from kahanmaps.laboratory.singularities import SingularityRun, singularities
     from kahanmaps.laboratory.symmetries import Symmetries, linear_symmetries
+    from kahanmaps.languages.convert import convert
     from kahanmaps.maps.fast import FloatOrbit, to_floats
     from kahanmaps.maps.float_ensemble import FloatEnsemble
     from kahanmaps.maps.float_lyapunov import Lyapunov, lyapunov_exponents
@@ -98,6 +99,7 @@ _HOME = {
     "maps.float_lyapunov": ("Lyapunov", "lyapunov_exponents"),
     "maps.modular": ("ModularEnsemble",),
     "invariants.heights": ("HeightGrowth", "height", "height_growth"),
+    "languages.convert": ("convert",),
     "checks.claims": ("Finding", "Report", "Verdict"),
     "checks.settings": ("Settings",),
     "checks.commute": ("check_commute",),
@@ -173,6 +175,7 @@ __all__ = [
     "lyapunov_exponents",
     "ModularEnsemble",
     "to_floats",
+    "convert",
     "HeightGrowth",
     "height",
     "height_growth",

@@ -1,14 +1,97 @@
-"""To come."""
+"""kahanmaps convert."""
 
 from __future__ import annotations
 
+import shlex
+from pathlib import Path
+from typing import Any
+
 import click
 
+from kahanmaps_cli.options import load_system, quiet_option, symbolic_option, system_options
+from kahanmaps_cli.progress import say
 
-@click.command(name="convert")
-def command() -> None:
-    """To come.
+# Those of kahanmaps.languages.convert, which --help does not load.
+_LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia")
+
+
+@click.command("convert")
+@system_options
+@click.option(
+    "--to",
+    "language",
+    type=click.Choice(_LANGUAGES),
+    required=True,
+    metavar="LANG",
+    help=f"{', '.join(_LANGUAGES[:-1])} or {_LANGUAGES[-1]}.",
+)
+@click.option(
+    "--what",
+    "parts",
+    metavar="PARTS",
+    multiple=True,
+    help="Of system, map, inverse, jacobian, map-formulas, integrals, density "
+    "(default: system, map, and integrals and density where known).",
+)
+@symbolic_option
+@click.option("--name", default="", metavar="NAME", help="Put before the names of all functions.")
+@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
+@quiet_option
+def command(system: str | None, language: str, output: str | None, quiet: bool, **options: Any) -> None:
+    """Write SYSTEM, its Kahan map and what is known of it for another program.
+
+    The output is a file that runs as it stands. eps is an argument of the map: the time step is 2 eps.
 
     \b
-      kahanmaps convert
+      kahanmaps convert euler_top --to pari
+      kahanmaps convert euler_top --to sympy --symbolic a1,a2,a3
+      kahanmaps convert lagrange_top --to latex -o lagrange_top.tex
+      kahanmaps convert weierstrass --to julia --what map-formulas,inverse
     """
+    from kahanmaps.languages.convert import convert
+
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
+    parts = [part for text in options["parts"] for part in _split(text)]
+    parametric = None
+    if symbols:
+        from kahanmaps.laboratory.parametric import ParametricSystem
+
+        parametric = ParametricSystem.of(file, symbols)
+    text = convert(
+        file,
+        language,
+        parts if options["parts"] else None,
+        name=options["name"],
+        parametric=parametric,
+        command=_command_line(system, language, options),
+    )
+    if output is None or output == "-":
+        click.echo(text, nl=False)
+        return
+    from kahanmaps.plots.figures import write_whole
+
+    write_whole(Path(output), text.encode())
+    if not quiet:
+        say(f"{output}: {file.name} for {language}, {len(text.splitlines())} lines")
+
+
+def _split(text: str) -> list[str]:
+    return [piece.strip() for piece in text.split(",") if piece.strip()]
+
+
+def _command_line(system: str | None, language: str, options: dict[str, Any]) -> str:
+    """The command that makes the same file again, without the place where it went."""
+    words = ["kahanmaps", "convert", *([system] if system is not None else [])]
+    if options["variables"] is not None:
+        words.append(f"--vars={options['variables']}")
+    words += [f"--rhs={text}" for text in options["rhs"]]
+    for name, value in options["parameters"]:
+        words += ["-p", f"{name}={value}"]
+    words += ["--to", language]
+    for text in options["parts"]:
+        words += ["--what", text]
+    for key in ("symbolic", "name"):
+        if options[key]:
+            words += [f"--{key}", options[key]]
+    return shlex.join(words)

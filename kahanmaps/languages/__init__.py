@@ -1,0 +1,12 @@
+"""Systems and their Kahan maps as files for other programs.
+
+formulas      what there is to write: right-hand sides, integrals, a density, the closed form of the map
+names         names that are reserved in a language, replaced
+language      a language as a table; the tables are in julia, maple, mathematica, pari, sage and sympy
+writer        the file, from formulas and a table
+latex         the document in LaTeX
+convert       all of it as one function
+
+A further language is a file with its table, an entry in `convert._TABLES` and one in the list of the command. Its tests
+need the program itself, or files that somebody who knows the language has read.
+"""

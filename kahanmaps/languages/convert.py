@@ -1,0 +1,86 @@
+"""One function for all languages: a system, its Kahan map, integrals and density as a file for another program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from kahanmaps.algebra.text import is_name
+from kahanmaps.errors import InputError
+from kahanmaps.languages.formulas import Formulas, WithSymbols, check_parts
+from kahanmaps.languages.julia import JULIA
+from kahanmaps.languages.language import Language
+from kahanmaps.languages.latex import write_latex
+from kahanmaps.languages.maple import MAPLE
+from kahanmaps.languages.mathematica import MATHEMATICA
+from kahanmaps.languages.pari import PARI
+from kahanmaps.languages.sage import SAGE
+from kahanmaps.languages.sympy import SYMPY
+from kahanmaps.languages.writer import PARTS, write
+from kahanmaps.systems.files import SystemFile
+
+_TABLES: dict[str, Language] = {table.key: table for table in (SYMPY, PARI, MAPLE, MATHEMATICA, SAGE, JULIA)}
+LANGUAGES = ("latex", *_TABLES)
+
+
+def convert(
+    file: SystemFile,
+    language: str,
+    what: Iterable[str] | None = None,
+    *,
+    name: str = "",
+    parametric: WithSymbols | None = None,
+    command: str = "",
+) -> str:
+    """A system, its Kahan map and what is known of it as a file that another program runs as it stands, exactly.
+
+    Args:
+        file: the system; its parameters are written as the numbers that the file gives.
+        language: one of `LANGUAGES`.
+        what: of `PARTS`; None for the system, the map, and integrals and density where they are known.
+        name: put before the names of all functions, so that two systems fit into one session; in LaTeX nothing.
+        parametric: the same system with some parameters left as symbols, a `ParametricSystem` of the laboratory; the
+            functions take the symbols as arguments after eps.
+        command: the command line that makes this file, for the comment on top.
+
+    Returns:
+        The text of the file. eps is always an argument (the time step is 2 eps, as the comment on top says). Nothing in
+        it depends on the day or the machine.
+
+    Raises:
+        InputError: for an unknown language or part, a name that is none, integrals or a density where none is known,
+            and a closed form ("map-formulas") that is too large.
+
+    >>> from kahanmaps.systems.catalog import load
+    >>> print(convert(load("harmonic"), "pari", ["system"]).split("\\n\\n")[1].strip())
+    \\\\ x' = f(x)
+    {vector_field(point) =
+      my(x = point[1], y = point[2]);
+      [y, -x]~
+    }
+    """
+    if language not in LANGUAGES:
+        raise InputError(f"found the language {str(language)[:40]!r}, expected one of {', '.join(LANGUAGES)}")
+    if name and not (is_name(name) and name[0] != "_"):
+        raise InputError(f"found the name {name[:40]!r}, expected a letter, then letters, digits and _")
+    formulas = Formulas.of(file, parametric)
+    parts = _parts(what, formulas)
+    if language == "latex":
+        return write_latex(formulas, parts, command)
+    return write(_TABLES[language], formulas, parts, name, command)
+
+
+def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
+    """The parts in the order of `PARTS`. Raises InputError for one that is unknown or cannot be written."""
+    if what is None:
+        known = [("integrals", formulas.knows_integrals), ("density", formulas.knows_density)]
+        return ["system", "map", *[part for part, is_known in known if is_known]]
+    if isinstance(what, str):
+        raise InputError(f"found the text {what[:40]!r}, expected a list of parts such as ['system', 'map']")
+    asked = list(what)
+    for part in asked:
+        if part not in PARTS:
+            raise InputError(f"found the part {str(part)[:40]!r}, expected one of {', '.join(PARTS)}")
+    if not asked:
+        raise InputError(f"found no part, expected some of {', '.join(PARTS)}")
+    check_parts(asked, formulas)
+    return [part for part in PARTS if part in asked]

@@ -1,0 +1,181 @@
+"""What can be written in another language: a system, and everything a formula is known for, as exact polynomials.
+
+A system has numbers for its parameters, or leaves some of them symbols; then all polynomials are in the variables, the
+symbols and, where it may occur, eps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+from flint import fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.errors import InputError
+from kahanmaps.systems.files import SystemFile
+
+# The closed form of the map, all components together, before common factors are removed.
+MAX_TERMS = 4_000
+MAX_DIMENSION_OF_FORMULAS = 8
+
+
+class WithSymbols(Protocol):
+    """A system whose parameters may be symbols: right-hand sides in the ring of the variables, then the symbols."""
+
+    @property
+    def variables(self) -> tuple[str, ...]: ...
+    @property
+    def symbols(self) -> tuple[str, ...]: ...
+    @property
+    def rhs(self) -> tuple[fmpq_mpoly, ...]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Formulas:
+    """The formulas of a system file, its parameters numbers or, those in `symbols`, symbols.
+
+    `names` are the variables, then the symbols; `rhs` and `H` are in these names, `integrals` and `density` in these
+    names and eps. `forms` are the bilinear integrals x^T M x~/eps of a member of the commuting family, by their names.
+    """
+
+    file: SystemFile
+    variables: tuple[str, ...]
+    symbols: tuple[str, ...]
+    rhs: tuple[fmpq_mpoly, ...]
+    integrals: Mapping[str, RationalFunction]
+    density: RationalFunction | None
+    H: fmpq_mpoly | None
+
+    @classmethod
+    def of(cls, file: SystemFile, parametric: WithSymbols | None = None) -> Formulas:
+        """The formulas of a file; `parametric` is the same system with some of its parameters left as symbols."""
+        hamiltonian = file.hamiltonian
+        if parametric is None or not parametric.symbols:
+            H = None if hamiltonian is None else hamiltonian.H
+            return cls(file, file.variables, (), file.system.rhs, file.integrals, file.density, H)
+        symbols, names = parametric.symbols, (*parametric.variables, *parametric.symbols)
+        constants = {name: value for name, value in file.parameters.items() if name not in symbols}
+        document = file.document
+
+        def claim(text: object) -> RationalFunction:
+            return parse_rational_function(str(text), (*names, "eps"), constants)
+
+        H = None
+        if file.kind == "hamiltonian":
+            H = parse_polynomial(str(document["hamiltonian"]["H"]), names, constants)
+        integrals = {name: claim(text) for name, text in document.get("integrals", {}).items()}
+        density = claim(document["density"]["phi"]) if "density" in document else None
+        return cls(file, parametric.variables, symbols, parametric.rhs, integrals, density, H)
+
+    @property
+    def dim(self) -> int:
+        """The number of variables."""
+        return len(self.variables)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The variables, then the symbols."""
+        return (*self.variables, *self.symbols)
+
+    @cached_property
+    def jacobian(self) -> list[list[fmpq_mpoly]]:
+        """f'(x), row by row."""
+        return [[polynomial.derivative(k) for k in range(self.dim)] for polynomial in self.rhs]
+
+    @cached_property
+    def gradient(self) -> list[fmpq_mpoly]:
+        """grad H, for a Hamiltonian system."""
+        assert self.H is not None
+        return [self.H.derivative(k) for k in range(self.dim)]
+
+    @cached_property
+    def forms(self) -> dict[str, fmpq_mat]:
+        """The matrices M = J (A^T)^k, k < m, of a member of the commuting family: x^T M x~/eps is an integral."""
+        member = self.file.member
+        if member is None:
+            return {}
+        J = member.chosen.hamiltonian.J
+        return {f"H{k}": J * (member.A**k).transpose() for k in range(member.m)}
+
+    @property
+    def knows_integrals(self) -> bool:
+        """Whether an integral is claimed by the file or given by a theorem."""
+        return bool(self.integrals) or self.H is not None
+
+    @property
+    def knows_density(self) -> bool:
+        """Whether a density is claimed by the file or given by a theorem: det(I - eps f'(x)) for Hamiltonian f."""
+        return self.density is not None or self.H is not None
+
+    def closed_form(self) -> list[RationalFunction]:
+        """The components of the Kahan map as rational functions of the names and eps, in lowest terms, exact.
+
+        Raises InputError where they are too large, which is found out on the way and costs a second at most.
+
+        >>> from kahanmaps.algebra.text import format_rational_function
+        >>> from kahanmaps.systems.catalog import load
+        >>> [format_rational_function(component) for component in Formulas.of(load("harmonic")).closed_form()]
+        ['(-x*eps^2 + 2*y*eps + x)/(eps^2 + 1)', '(-y*eps^2 - 2*x*eps + y)/(eps^2 + 1)']
+        """
+        n = self.dim
+        if n > MAX_DIMENSION_OF_FORMULAS:
+            raise _too_large(f"dimension {n}, expected at most {MAX_DIMENSION_OF_FORMULAS}")
+        context = ring((*self.names, "eps"))
+        images = context.gens()[:-1]
+        eps = context.gens()[-1]
+        zero, one = context.constant(0), context.constant(1)
+
+        def lifted(polynomial: fmpq_mpoly) -> fmpq_mpoly:
+            return polynomial.compose(*images, ctx=context)
+
+        f = [lifted(polynomial) for polynomial in self.rhs]
+        rows = [
+            [(one if i == j else zero) - eps * lifted(entry) for j, entry in enumerate(row)]
+            for i, row in enumerate(self.jacobian)
+        ]
+
+        def times(left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
+            product = left * right
+            if len(product) > MAX_TERMS:
+                raise _too_large(f"a polynomial of {len(product)} terms, expected at most {MAX_TERMS} in all")
+            return product
+
+        # (I - eps f' | 2 eps f) annihilates the vector of its maximal minors, the last of which is -+det.
+        minors = kernel_minors([[*row, 2 * eps * g] for row, g in zip(rows, f, strict=True)], times)
+        below = -minors[-1]
+        found = []
+        for k in range(n):
+            above = times(images[k], below) + minors[k]
+            common = above.gcd(below)
+            found.append(RationalFunction(above / common, below / common))
+        total = sum(len(function.numerator) + len(function.denominator) for function in found)
+        if total > MAX_TERMS:
+            raise _too_large(f"{total} terms, expected at most {MAX_TERMS}")
+        return found
+
+
+def _too_large(found: str) -> InputError:
+    return InputError(
+        f"the closed form of the map is too large: found {found}; "
+        "ask for 'map' instead, which solves the linear equations for x~ and works in every dimension"
+    )
+
+
+def check_parts(parts: Sequence[str], formulas: Formulas) -> None:
+    """Raise InputError where integrals or a density are asked for and none is known."""
+    name = formulas.file.name
+    if "integrals" in parts and not formulas.knows_integrals:
+        raise InputError(
+            f"found no integral of {name}, expected a section [integrals] in its file: "
+            "'kahanmaps find-integrals SYSTEM --toml' looks for some and prints one"
+        )
+    if "density" in parts and not formulas.knows_density:
+        raise InputError(
+            f"found no density of {name}, expected a section [density] in its file: "
+            "'kahanmaps find-density SYSTEM --toml' looks for one and prints it"
+        )

@@ -1,0 +1,88 @@
+"""Julia: exact numbers are p//q, functions take anything with coordinates and give a Vector, a file is `include`d."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flint import fmpq
+
+from kahanmaps.languages.language import Language, listed
+from kahanmaps.languages.names import Naming, words
+
+_RESERVED = words(
+    "abstract baremodule begin break catch const continue do else elseif end export false finally for function",
+    "global if import in isa let local macro module mutable primitive quote return struct true try type using where",
+    "while I im pi NaN Inf nothing missing exact collect hcat det transpose sum LinearAlgebra Rational BigInt",
+    "Integer Union Base Core Main",
+)
+
+
+def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
+    return ", ".join(["point", *["eps"] * eps, *symbols])
+
+
+def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
+    names = ", ".join(variables) if len(variables) > 1 else "".join(f"({name},)" for name in variables)
+    lines = [f"{names} = exact.(point)"] if variables else []
+    lines += [f"{name} = exact({name})" for name in (*["eps"] * eps, *symbols)]
+    return "".join(f"{line}\n    " for line in lines)
+
+
+def _matrix(rows: Sequence[Sequence[str]]) -> str:
+    # Column by column: between the brackets of [a b; c d] a blank and the end of a line mean something.
+    columns = [f"[{listed([row[k] for row in rows], '          ')}]" for k in range(len(rows))]
+    return "hcat(" + ",\n        ".join(columns) + ")"
+
+
+def _number(value: fmpq) -> str:
+    return str(value).replace("/", "//")
+
+
+_EXACT = """\
+using LinearAlgebra
+
+# Integers and fractions become fractions of BigInt, so that nothing overflows; floats stay what they are.
+exact(value) = value isa Union{Integer, Rational} ? Rational{BigInt}(value) : value"""
+
+JULIA = Language(
+    key="julia",
+    title="Julia",
+    naming=Naming(lambda name: name in _RESERVED),
+    comment=lambda line: f"# {line}".rstrip(),
+    number=_number,
+    vector=lambda entries: f"[{listed(entries, '        ')}]",
+    matrix=_matrix,
+    arguments=_arguments,
+    unpack=_unpack,
+    function="function <name>(<arguments>)\n    <unpack>return <body>\nend",
+    recipes={
+        "kahan_map": """\
+function <kahan_map>(<arguments>)
+    <unpack_eps>M = I - eps*<vector_field_jacobian>(point<more>)
+    return collect(exact.(point)) + 2*eps*(M \\ <vector_field>(point<more>))
+end""",
+        "kahan_inverse": "<kahan_inverse>(<arguments>) = <kahan_map>(point, -eps<more>)",
+        "kahan_jacobian": """\
+function <kahan_jacobian>(<arguments>)
+    <unpack_eps>image = <kahan_map>(point, eps<more>)
+    M = I - eps*<vector_field_jacobian>(point<more>)
+    return M \\ (I + eps*<vector_field_jacobian>(image<more>))
+end""",
+        "modified_hamiltonian": """\
+function <modified_hamiltonian>(<arguments>)
+    step = <kahan_map>(point, eps<more>) - collect(exact.(point))
+    return <hamiltonian>(point<more>) + sum(<hamiltonian_gradient>(point<more>) .* step)*1//3
+end""",
+        "form": """\
+function <name>(<arguments>)
+    <unpack_eps>M = <matrix>
+    return sum(collect(exact.(point)) .* (M*<kahan_map>(point, eps<more>)))/eps
+end""",
+        "determinant": """\
+function <density>(<arguments>)
+    <unpack_eps>return det(I - eps*<vector_field_jacobian>(point<more>))
+end""",
+    },
+    usage="<kahan_map>([<values>], 1//10<more>)",
+    head=_EXACT,
+)

@@ -1,0 +1,137 @@
+"""A language as a table: how it writes numbers, vectors, functions and the solution of linear equations.
+
+Everything but LaTeX is written by `writer.py` from such a table.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction, names_of
+from kahanmaps.languages.names import Naming
+
+LINE = 100  # characters of a line of an expression, after which it is broken
+_TERMS_TOGETHER = 100  # a sum of more terms is bracketed in parts: parsers recurse
+
+
+@dataclass(frozen=True)
+class Language:
+    """How a language writes what the Kahan map needs.
+
+    `comment` turns a line of text into a comment, `number` writes an exact number, `vector` and `matrix` write entries
+    that are texts. `arguments` and `unpack` take the variables (none where the point is used as a whole), whether eps
+    is an argument, and the symbols: the one writes the list of arguments of a definition, the other what makes the
+    variables out of them. `function` is the template of a function whose value is a formula, with <name>, <arguments>,
+    <unpack> and <body>. `recipes` are templates of the functions that are the same for all systems up to the dimension
+    <n>, the further arguments <more> of a call, and the names of functions, <vector_field> and so on. `naming` says
+    which names may be used; `head` is what the file loads first, with <functions>; `usage` is a call of the map.
+    """
+
+    key: str
+    title: str
+    naming: Naming
+    comment: Callable[[str], str]
+    number: Callable[[fmpq], str]
+    vector: Callable[[Sequence[str]], str]
+    matrix: Callable[[Sequence[Sequence[str]]], str]
+    arguments: Callable[[Sequence[str], bool, Sequence[str]], str]
+    unpack: Callable[[Sequence[str], bool, Sequence[str]], str]
+    function: str
+    recipes: Mapping[str, str]
+    usage: str
+    power: str = "^"
+    head: str = ""
+
+    def polynomial(self, polynomial: fmpq_mpoly, safe: Mapping[str, str]) -> str:
+        """A polynomial as an expression, exactly; blanks only around + and - between terms.
+
+        `safe` maps the names of its ring to those of the language.
+        """
+        names = [safe[name] for name in names_of(polynomial)]
+        terms: list[str] = []
+        for monomial, coefficient in polynomial.terms():
+            minus = coefficient < 0
+            term = self._term(-coefficient if minus else coefficient, monomial, names)
+            terms.append((" - " if minus else " + ") + term)
+        if not terms:
+            return self.number(fmpq(0))
+        if len(terms) > _TERMS_TOGETHER:
+            parts = [terms[k : k + _TERMS_TOGETHER] for k in range(0, len(terms), _TERMS_TOGETHER)]
+            return " + ".join(f"({_joined(part)})" for part in parts)
+        return _joined(terms)
+
+    def rational_function(self, function: RationalFunction, safe: Mapping[str, str]) -> str:
+        """A quotient of polynomials as an expression, exactly."""
+        above = self.polynomial(function.numerator, safe)
+        if function.is_polynomial:
+            return above
+        return f"({above})/({self.polynomial(function.denominator, safe)})"
+
+    def constant_matrix(self, matrix: fmpq_mat) -> str:
+        """A matrix of numbers."""
+        return self.matrix([[self.number(entry) for entry in row] for row in matrix.tolist()])
+
+    def _term(self, coefficient: fmpq, monomial: Sequence[int], names: Sequence[str]) -> str:
+        factors = [
+            name if exponent == 1 else f"{name}{self.power}{exponent}"
+            for name, exponent in zip(names, monomial, strict=True)
+            if exponent
+        ]
+        if not factors or coefficient != 1:
+            factors.insert(0, self.number(coefficient))
+        return "*".join(factors)
+
+
+def plain_number(value: fmpq) -> str:
+    """p or p/q, where that is an exact number.
+
+    >>> plain_number(fmpq(-1, 3))
+    '-1/3'
+    """
+    return str(value)
+
+
+def fill(template: str, values: Mapping[str, str]) -> str:
+    """The template with <key> replaced by values[key].
+
+    >>> print(fill("f(<x>)", {"x": "point"}))
+    f(point)
+    """
+    return re.sub(r"<([a-z_]+)>", lambda match: values[match[1]], template)
+
+
+def broken(text: str, indent: str) -> str:
+    """A long expression on several lines, each but the last ending with + or -.
+
+    A line that ends so cannot be a whole statement, in any of the languages.
+
+    >>> broken("a + b", "  ")
+    'a + b'
+    """
+    lines: list[str] = []
+    current = ""
+    for piece in re.split(r"(?<= [+-] )", text):
+        if current and len(current) + len(piece) > LINE:
+            lines.append(current.rstrip())
+            current = ""
+        current += piece
+    return f"\n{indent}".join([*lines, current])
+
+
+def listed(entries: Sequence[str], indent: str) -> str:
+    """Entries with commas between them, on one line where there is room and else one on each line.
+
+    >>> listed(["a", "b"], "  ")
+    'a, b'
+    """
+    room = all("\n" not in entry for entry in entries) and sum(len(entry) + 2 for entry in entries) <= LINE
+    return (", " if room else f",\n{indent}").join(entries)
+
+
+def _joined(terms: Sequence[str]) -> str:
+    text = "".join(terms)
+    return "-" + text[3:] if text.startswith(" - ") else text[3:]

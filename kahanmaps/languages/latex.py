@@ -1,0 +1,137 @@
+r"""LaTeX: an article of displayed formulas that compiles as it stands; long sums are broken between terms."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from flint import fmpq
+
+from kahanmaps.algebra.latex import latex_name, latex_polynomial, latex_rational_function
+from kahanmaps.algebra.polynomials import RationalFunction, common_denominator
+from kahanmaps.languages.formulas import Formulas
+from kahanmaps.languages.writer import header
+
+_LINE = 140  # characters of source on a line of a formula
+# The point and its image; x may be the name of a variable.
+_X, _Y = r"\mathbf x", r"\widetilde{\mathbf x}"
+
+
+def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
+    """The document as text: one display for each of the parts (of `writer.PARTS`), in LaTeX with amsmath.
+
+    Raises InputError where the closed form of the map is asked for and too large.
+    """
+    displays: list[str] = []
+    for part in parts:
+        displays += _display(part, formulas)
+    comment = "\n".join(f"% {line}" for line in header(formulas, command))
+    columns = f"\\setcounter{{MaxMatrixCols}}{{{formulas.dim}}}\n" if formulas.dim > 10 else ""
+    body = "\n\n".join(displays)
+    return (
+        f"{comment}\n\\documentclass{{article}}\n\\usepackage{{amsmath}}\n\\allowdisplaybreaks\n{columns}"
+        "\\begin{document}\n\n"
+        "\\noindent $\\varepsilon$ is half the time step: the time step is $2 \\varepsilon$.\n\n"
+        f"{body}\n\n\\end{{document}}\n"
+    )
+
+
+def _display(part: str, formulas: Formulas) -> list[str]:
+    if part == "system":
+        rows = [
+            (rf"\dot{{{latex_name(name)}}}", latex_polynomial(polynomial))
+            for name, polynomial in zip(formulas.variables, formulas.rhs, strict=True)
+        ]
+        return ["The system $\\dot{\\mathbf x} = f(\\mathbf x)$:\n" + _aligned(rows)]
+    if part == "map":
+        point = ", ".join(latex_name(name) for name in formulas.variables)
+        matrix = " \\\\\n".join(" & ".join(latex_polynomial(entry) for entry in row) for row in formulas.jacobian)
+        rows = [(_Y, rf"{_X} + 2 \varepsilon (I - \varepsilon f'({_X}))^{{-1}} f({_X})"), (_X, f"({point})")]
+        return [
+            f"The Kahan map ${_X} \\mapsto {_Y}$:\n{_aligned(rows)}",
+            f"where\n\\[\nf'({_X}) = \\begin{{pmatrix}}\n{matrix}\n\\end{{pmatrix}}.\n\\]",
+        ]
+    if part == "inverse":
+        rows = [(_X, rf"{_Y} - 2 \varepsilon (I + \varepsilon f'({_Y}))^{{-1}} f({_Y})")]
+        return ["Its inverse:\n" + _aligned(rows)]
+    if part == "jacobian":
+        derivative = rf"(I - \varepsilon f'({_X}))^{{-1}} (I + \varepsilon f'({_Y}))"
+        return ["Its Jacobi matrix:\n" + _aligned([(rf"\frac{{\partial {_Y}}}{{\partial {_X}}}", derivative)])]
+    if part == "map-formulas":
+        rows = []
+        for name, function in zip(formulas.variables, formulas.closed_form(), strict=True):
+            rows += _quotient(rf"\widetilde{{{latex_name(name)}}}", function)
+        return ["The Kahan map as rational functions:\n" + _aligned(rows)]
+    if part == "density":
+        if formulas.density is None:
+            rows = [(r"\varphi", rf"\det(I - \varepsilon f'({_X}))")]
+        else:
+            rows = _quotient(r"\varphi", formulas.density)
+        return ["The invariant measure $\\mathrm{d}\\mathbf x/\\varphi$:\n" + _aligned(rows)]
+    return ["Integrals of the map:\n" + _aligned(_integrals(formulas))]
+
+
+def _integrals(formulas: Formulas) -> list[tuple[str, str]]:
+    rows: list[tuple[str, str]] = []
+    for name, function in formulas.integrals.items():
+        rows += _quotient(latex_name(name or "I"), function)
+    for k in range(len(formulas.forms)):
+        power = "" if k == 0 else r" A^{\mathsf T}" if k == 1 else rf" (A^{{\mathsf T}})^{{{k}}}"
+        form = rf"\tfrac{{1}}{{\varepsilon}} {_X}^{{\mathsf T}} J{power} {_Y}"
+        rows.append((rf"\widetilde H_{{{k}}}", form))
+    if formulas.H is not None and not formulas.forms:
+        rows.append((r"\widehat H", rf"H({_X}) + \tfrac{{1}}{{3}} (\nabla H({_X}))^{{\mathsf T}} ({_Y} - {_X})"))
+        rows.append(("H", latex_polynomial(formulas.H)))
+    if formulas.forms:
+        member = formulas.file.member
+        assert member is not None
+        for letter, matrix in (("A", member.A), ("J", member.chosen.hamiltonian.J)):
+            entries = r" \\ ".join(" & ".join(str(entry) for entry in row) for row in matrix.tolist())
+            rows.append((letter, rf"\begin{{pmatrix}} {entries} \end{{pmatrix}}"))
+    return rows
+
+
+def _quotient(left: str, function: RationalFunction) -> list[tuple[str, str]]:
+    """left = P/Q in one row where it is short; else P and Q have rows of their own, without fractions as well."""
+    whole = latex_rational_function(function)
+    if len(whole) <= 2 * _LINE or function.is_polynomial:
+        return [(left, whole)]
+    factor = fmpq(common_denominator(function.numerator))
+    if latex_polynomial(function.denominator).startswith("-"):
+        factor = -factor
+    above, below = latex_polynomial(function.numerator * factor), latex_polynomial(function.denominator * factor)
+    P, Q = f"P_{{{left}}}", f"Q_{{{left}}}"
+    return [(left, rf"\frac{{{P}}}{{{Q}}}"), (P, above), (Q, below)]
+
+
+def _aligned(rows: Sequence[tuple[str, str]]) -> str:
+    r"""Rows left = right of an align* with right broken between its terms."""
+    lines = []
+    for left, right in rows:
+        pieces = _pieces(right)
+        lines.append(f"{left} &= {pieces[0]}")
+        lines += [rf"&\quad {piece}" for piece in pieces[1:]]
+    return "\\begin{align*}\n" + " \\\\\n".join(lines) + "\n\\end{align*}"
+
+
+def _pieces(text: str) -> list[str]:
+    """A sum cut into lines; only between terms, which no brace encloses."""
+    if len(text) <= _LINE or not _is_sum(text):
+        return [text]
+    lines, current = [], ""
+    for term in re.split(r" (?=[+-] )", text):
+        if current and len(current) + len(term) > _LINE:
+            lines.append(current)
+            current = ""
+        current = f"{current} {term}" if current else term
+    return [*lines, current]
+
+
+def _is_sum(text: str) -> bool:
+    """Whether no + or - between terms stands inside braces."""
+    depth = 0
+    for k, character in enumerate(text):
+        depth += {"{": 1, "}": -1}.get(character, 0)
+        if depth and text[k : k + 3] in (" + ", " - "):
+            return False
+    return True

@@ -1,0 +1,86 @@
+"""Maple: exact numbers are p/q, functions take a list or Vector and give a Vector, a file is read by `read`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kahanmaps.languages.language import Language, listed, plain_number
+from kahanmaps.languages.names import Naming, words
+
+_RESERVED = words(
+    "D I O Pi Psi Zeta Beta GAMMA gamma Catalan infinity undefined true false FAIL Digits NULL",
+    "and assuming break by catch description do done elif else end error export fi finally for from global if",
+    "implies in intersect local minus mod module next not od option options or proc quit read return save stop",
+    "subset then to try union until use uses while xor",
+    "Matrix Vector LinearAlgebra convert list op",
+)
+
+
+def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
+    return ", ".join(["point", *["eps"] * eps, *symbols])
+
+
+def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
+    names = ", ".join(variables)
+    return f"local {names};\n  {names} := op(convert(point, list));\n  "
+
+
+# A symbol times a Matrix may stay a product: hence ScalarMultiply. Where a singular matrix leaves equations that can be
+# solved, LinearSolve gives a family of solutions: hence the determinant.
+_REFUSE = """\
+  if LinearAlgebra:-Determinant(M) = 0 then error "det(I - eps f'(x)) = 0: the Kahan map has no value here" end if;
+"""
+
+MAPLE = Language(
+    key="maple",
+    title="Maple",
+    naming=Naming(lambda name: name in _RESERVED),
+    comment=lambda line: "# " + line.replace("\\", "/") if line else "#",  # a final \ would continue the comment
+    number=plain_number,
+    vector=lambda entries: f"Vector([{listed(entries, '   ')}])",
+    matrix=lambda rows: "Matrix([" + ",\n   ".join(f"[{listed(row, '     ')}]" for row in rows) + "])",
+    arguments=_arguments,
+    unpack=_unpack,
+    function="<name> := proc(<arguments>)\n  <unpack><body>;\nend proc:",
+    recipes={
+        "kahan_map": f"""\
+<kahan_map> := proc(<arguments>)
+  local M;
+  M := LinearAlgebra:-IdentityMatrix(<n>)
+    - LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(point<more>), eps);
+{_REFUSE}\
+  Vector(convert(point, list))
+    + LinearAlgebra:-ScalarMultiply(LinearAlgebra:-LinearSolve(M, <vector_field>(point<more>)), 2*eps);
+end proc:""",
+        "kahan_inverse": "<kahan_inverse> := proc(<arguments>)\n  <kahan_map>(point, -eps<more>);\nend proc:",
+        "kahan_jacobian": """\
+<kahan_jacobian> := proc(<arguments>)
+  local M, image;
+  image := <kahan_map>(point, eps<more>);
+  M := LinearAlgebra:-IdentityMatrix(<n>)
+    - LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(point<more>), eps);
+  LinearAlgebra:-LinearSolve(M,
+    LinearAlgebra:-IdentityMatrix(<n>)
+    + LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(image<more>), eps));
+end proc:""",
+        "modified_hamiltonian": """\
+<modified_hamiltonian> := proc(<arguments>)
+  local image;
+  image := <kahan_map>(point, eps<more>);
+  <hamiltonian>(point<more>) + (LinearAlgebra:-Transpose(<hamiltonian_gradient>(point<more>))
+    . (image - Vector(convert(point, list))))/3;
+end proc:""",
+        "form": """\
+<name> := proc(<arguments>)
+  local M;
+  M := <matrix>;
+  (LinearAlgebra:-Transpose(Vector(convert(point, list))) . M . <kahan_map>(point, eps<more>))/eps;
+end proc:""",
+        "determinant": """\
+<density> := proc(<arguments>)
+  LinearAlgebra:-Determinant(LinearAlgebra:-IdentityMatrix(<n>)
+    - LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(point<more>), eps));
+end proc:""",
+    },
+    usage="<kahan_map>([<values>], 1/10<more>);",
+)

@@ -1,0 +1,69 @@
+r"""PARI/GP: exact numbers are p/q, functions take vectors and give columns, a file is read by `gp FILE` or \r FILE."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from kahanmaps.languages.language import Language, listed, plain_number
+from kahanmaps.languages.names import Naming
+
+# GP has more than a thousand functions whose names are words, and more with each version; none is one letter with
+# digits, and an underscore is only in those of its debugger.
+_FREE = re.compile(r"[A-HJ-NP-Za-z][0-9]*|(?!dbg_)[A-Za-z][A-Za-z0-9]*_[A-Za-z0-9_]*")
+
+
+def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
+    # An argument that is not given is 0 in GP: a symbol stands for itself instead.
+    return ", ".join(["point", *["eps"] * eps, *[f"{name} = '{name}" for name in symbols]])
+
+
+def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
+    return f"my({', '.join(f'{name} = point[{k}]' for k, name in enumerate(variables, 1))});\n  "
+
+
+def _matrix(rows: Sequence[Sequence[str]]) -> str:
+    if len(rows) == 1:
+        return f"Mat({rows[0][0]})"
+    return "[" + ";\n   ".join(listed(row, "     ") for row in rows) + "]"
+
+
+PARI = Language(
+    key="pari",
+    title="PARI/GP",
+    naming=Naming(lambda name: _FREE.fullmatch(name) is None),
+    comment=lambda line: rf"\\ {line}".rstrip(),
+    number=plain_number,
+    vector=lambda entries: f"[{listed(entries, '   ')}]~",
+    matrix=_matrix,
+    arguments=_arguments,
+    unpack=_unpack,
+    function="{<name>(<arguments>) =\n  <unpack><body>\n}",
+    recipes={
+        "kahan_map": """\
+{<kahan_map>(<arguments>) =
+  Col(point) + 2*eps*matsolve(matid(<n>) - eps*<vector_field_jacobian>(point<more>), <vector_field>(point<more>))
+}""",
+        "kahan_inverse": "{<kahan_inverse>(<arguments>) =\n  <kahan_map>(point, -eps<more>)\n}",
+        "kahan_jacobian": """\
+{<kahan_jacobian>(<arguments>) =
+  my(image = <kahan_map>(point, eps<more>));
+  matsolve(matid(<n>) - eps*<vector_field_jacobian>(point<more>),
+           matid(<n>) + eps*<vector_field_jacobian>(image<more>))
+}""",
+        "modified_hamiltonian": """\
+{<modified_hamiltonian>(<arguments>) =
+  my(image = <kahan_map>(point, eps<more>));
+  <hamiltonian>(point<more>) + <hamiltonian_gradient>(point<more>)~*(image - Col(point))/3
+}""",
+        "form": """\
+{<name>(<arguments>) =
+  Col(point)~*<matrix>*<kahan_map>(point, eps<more>)/eps
+}""",
+        "determinant": """\
+{<density>(<arguments>) =
+  matdet(matid(<n>) - eps*<vector_field_jacobian>(point<more>))
+}""",
+    },
+    usage="<kahan_map>([<values>]~, 1/10<more>)",
+)

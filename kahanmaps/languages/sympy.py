@@ -1,0 +1,79 @@
+"""SymPy: exact numbers are Rational(p, q), functions take sequences and give column matrices, a file is a module."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flint import fmpq, fmpz
+
+from kahanmaps.languages.language import Language, listed
+from kahanmaps.languages.names import PYTHON_KEYWORDS, Naming, words
+
+# Names that sympify reads as something else than a symbol, and those that the file imports.
+_RESERVED = PYTHON_KEYWORDS | words(
+    "E I N O Q S C pi oo zoo nan beta gamma zeta im re ff fu id li ln rf yn Ci CC Ei Eq EX FF Ge Gt GF Id Le Li Lt",
+    "LC LM LT jn Ne Or QQ RR Si ZZ And Not Xor Chi Max Min Mod Poly abs sin cos tan cot exp log det",
+    "Matrix Rational Symbol eye sympify map list",
+)
+_DIGITS = 4000  # Python reads integers of up to 4300 decimal digits, hexadecimal ones of any length
+
+
+def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
+    return ", ".join(["point", *["eps"] * eps, *[f'{name}=Symbol("{name}")' for name in symbols]])
+
+
+def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
+    lines = [f"[{', '.join(variables)}] = Matrix(list(point))"] if variables else []
+    lines += [f"{name} = sympify({name})" for name in (*["eps"] * eps, *symbols)]
+    return "".join(f"{line}\n    " for line in lines)
+
+
+def _integer(value: fmpz) -> str:
+    text = str(value)
+    return text if len(text) <= _DIGITS else hex(int(value))
+
+
+def _number(value: fmpq) -> str:
+    if value.q == 1:
+        return _integer(value.p)
+    return f"Rational({_integer(value.p)}, {_integer(value.q)})"
+
+
+SYMPY = Language(
+    key="sympy",
+    title="SymPy",
+    naming=Naming(lambda name: name in _RESERVED),
+    comment=lambda line: f"# {line}".rstrip(),
+    number=_number,
+    vector=lambda entries: f"Matrix([{listed(entries, '        ')}])",
+    matrix=lambda rows: "Matrix([" + ",\n        ".join(f"[{listed(row, '         ')}]" for row in rows) + "])",
+    arguments=_arguments,
+    unpack=_unpack,
+    function="def <name>(<arguments>):\n    <unpack>return <body>",
+    recipes={
+        "kahan_map": """\
+def <kahan_map>(<arguments>):
+    <unpack_eps>M = eye(<n>) - eps*<vector_field_jacobian>(point<more>)
+    return Matrix(list(point)) + 2*eps*M.LUsolve(<vector_field>(point<more>))""",
+        "kahan_inverse": "def <kahan_inverse>(<arguments>):\n    return <kahan_map>(point, -sympify(eps)<more>)",
+        "kahan_jacobian": """\
+def <kahan_jacobian>(<arguments>):
+    <unpack_eps>image = <kahan_map>(point, eps<more>)
+    M = eye(<n>) - eps*<vector_field_jacobian>(point<more>)
+    return M.LUsolve(eye(<n>) + eps*<vector_field_jacobian>(image<more>))""",
+        "modified_hamiltonian": """\
+def <modified_hamiltonian>(<arguments>):
+    step = <kahan_map>(point, eps<more>) - Matrix(list(point))
+    return <hamiltonian>(point<more>) + <hamiltonian_gradient>(point<more>).dot(step)/3""",
+        "form": """\
+def <name>(<arguments>):
+    <unpack_eps>M = <matrix>
+    return Matrix(list(point)).dot(M*<kahan_map>(point, eps<more>))/eps""",
+        "determinant": """\
+def <density>(<arguments>):
+    <unpack_eps>return (eye(<n>) - eps*<vector_field_jacobian>(point<more>)).det()""",
+    },
+    usage="<kahan_map>([<values>], Rational(1, 10)<more>)",
+    power="**",
+    head="from sympy import Matrix, Rational, Symbol, eye, sympify",
+)

@@ -1,0 +1,99 @@
+"""kahanmaps convert: a whole file on standard output or in a file, and what was wrong where there is none."""
+
+from __future__ import annotations
+
+import pytest
+
+from kahanmaps.languages.convert import LANGUAGES, PARTS, convert
+from kahanmaps.systems.catalog import load
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_language_says_what_eps_is_and_how_the_file_was_made(kahanmaps, language):
+    outcome = kahanmaps(f"convert euler_top --to {language}")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert "eps is half the time step: the time step is 2 eps." in outcome.out
+    assert f"kahanmaps convert euler_top --to {language}" in outcome.out
+
+
+def test_the_library_writes_the_same_file(kahanmaps):
+    outcome = kahanmaps("convert euler_top --to maple --what map,inverse")
+    command = "kahanmaps convert euler_top --to maple --what map,inverse"
+    assert outcome.out == convert(load("euler_top"), "maple", ["map", "inverse"], command=command)
+
+
+def test_the_command_in_the_comment_makes_the_same_file_again(kahanmaps):
+    line = "convert --vars=I,y --rhs=I*y --rhs='-2/3*I^2' --to pari --what map,jacobian --name two"
+    first = kahanmaps(line).out
+    (told,) = [text for text in first.splitlines() if "kahanmaps convert" in text]
+    assert kahanmaps(told.split("kahanmaps ", 2)[2]).out == first
+
+
+def test_parts_may_be_repeated_or_separated_by_commas(kahanmaps):
+    one = kahanmaps("convert euler_top --to julia --what map,density").out
+    two = kahanmaps("convert euler_top --to julia --what density --what map").out
+    assert one.split("\n\n")[1:] == two.split("\n\n")[1:]
+
+
+def test_without_what_there_are_the_map_and_what_is_known(kahanmaps):
+    known = kahanmaps("convert euler_top --to sage").out
+    assert all(f"def {name}(" in known for name in ("vector_field", "kahan_map", "integral_F1", "density"))
+    unknown = kahanmaps("convert lorenz --to sage")
+    assert unknown.status == 0
+    assert "def kahan_map(" in unknown.out
+    assert "def density(" not in unknown.out
+
+
+def test_parameters_are_set_or_kept_as_symbols(kahanmaps):
+    assert "3/4*x2*x3" in kahanmaps("convert euler_top --to maple -p a1=3/4").out
+    symbolic = kahanmaps("convert euler_top --to maple --symbolic a1,eps").out
+    assert "vector_field := proc(point, a1)" in symbolic
+    assert "Parameters left as symbols: a1" in symbolic
+
+
+def test_a_family_file_brings_its_bilinear_integrals(kahanmaps, pair):
+    outcome = kahanmaps("convert", pair, "--to mathematica")
+    assert outcome.status == 0
+    assert "integralH0[point_List, eps_]" in outcome.out
+    assert "integralH1[point_List, eps_]" in outcome.out
+
+
+def test_a_file_is_written_whole_and_told_on_standard_error(kahanmaps, tmp_path):
+    path = tmp_path / "top.jl"
+    outcome = kahanmaps("convert euler_top --to julia -o", path)
+    assert (outcome.status, outcome.out) == (0, "")
+    assert outcome.err == f"{path}: euler_top for julia, {len(path.read_text().splitlines())} lines\n"
+    assert [file.name for file in tmp_path.iterdir()] == ["top.jl"]
+    assert path.read_text() == kahanmaps("convert euler_top --to julia").out
+    assert kahanmaps("convert euler_top --to julia -q -o", path).err == ""
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ("euler_top", "Missing option '--to'. Choose from:"),
+        ("--to pari", "missing SYSTEM"),
+        ("euler_top --to matlab", "'matlab' is not one of 'latex', 'sympy'"),
+        ("euler_top --to pari --what maps", "found the part 'maps', expected one of system, map"),
+        ("euler_top --to pari --what ,", "found no part, expected some of system, map"),
+        ("lorenz --to pari --what integrals", "found no integral of lorenz, expected a section [integrals]"),
+        ("lorenz --to pari --what density", "found no density of lorenz, expected a section [density]"),
+        ("paper_m3 --to pari --what map-formulas", "the closed form of the map is too large"),
+        ("euler_top --to pari --symbolic b", "found the symbol 'b', expected eps or a parameter of the system"),
+        ("paper_m2 --to pari --symbolic a", "found the symbol 'a'"),
+        ("euler_top --to pari --name 1x", "found the name '1x', expected a letter"),
+        ("no_such_system --to pari", "no_such_system"),
+        ("euler_top --to pari -o no_such_folder/x.gp", "no_such_folder"),
+    ],
+)
+def test_wrong_use_is_told_with_what_was_expected(kahanmaps, options, told, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    outcome = kahanmaps(f"convert {options}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert told in outcome.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_help_names_every_language_and_part(kahanmaps):
+    words = kahanmaps("convert --help").out.replace("\n", " ").replace(",", " ").replace(".", " ").split()
+    assert {*LANGUAGES, *PARTS} <= set(words)

@@ -1,0 +1,180 @@
+"""What the tests of `convert` share: systems, the values that a converted file has to give, and programs to run it."""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from flint import fmpq
+
+import kahanmaps as km
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
+from kahanmaps.languages.convert import convert
+
+HAS_GP = shutil.which("gp") is not None
+
+# Reserved or special somewhere: I, E, S, N, C, D, O, Q, gamma, beta, Pi, lambda, end, _x, a_1 next to a1, point.
+NASTY = {
+    "nasty-capitals": """
+        variables = ["I", "E", "S", "N"]
+        [system]
+        rhs = ["E*S/3 - I", "N^2 - 2/7*E", "I*E", "S + 5/2"]
+        [integrals]
+        "H~" = "(I - eps^2*E)/(S^2 + 1)"
+        H = "I*N"
+        D = "E/3"
+    """,
+    "nasty-words": """
+        variables = ["lambda", "a_1", "a1", "_x", "gamma", "point"]
+        [parameters]
+        end = "2/3"
+        [system]
+        rhs = ["a_1*a1", "end*_x^2 - lambda", "gamma*point", "a1 - 1", "1/2*point^2", "-_x*a_1"]
+        [density]
+        phi = "(gamma + _x*point)*eps^2 + 1"
+    """,
+    "nasty-letters": """
+        variables = ["C", "D", "O", "Q"]
+        [hamiltonian]
+        H = "C^3/3 + C*D*Q - O^2*Q + Q^3"
+        J = "standard"
+    """,
+    "constant": 'variables = ["x", "y"]\n[system]\nrhs = ["1", "0"]\n[integrals]\nI = "y/2"\nK = "1/2"\n',
+}
+
+
+@cache
+def systems() -> dict[str, km.SystemFile]:
+    """All systems of the catalogue, members of the family with m = 2 and m = 3, and names that are hard to write."""
+    found = {name: km.load(name) for name in km.names()}
+    for eigenvalues in ([1, -2], [1, -2, 3]):
+        member = km.draw_with_eigenvalues(eigenvalues, seed=7)
+        found[f"family-{len(eigenvalues)}"] = km.SystemFile.from_member(member)
+    for name, text in NASTY.items():
+        found[name] = km.parse_system(text, name)
+    return found
+
+
+@dataclass(frozen=True)
+class Question:
+    """A function of the converted file, an exact point and eps, and the values it has to give."""
+
+    function: str
+    point: tuple[fmpq, ...]
+    eps: fmpq
+    expected: list[fmpq]
+
+
+def questions(file: km.SystemFile, seed: int = 5) -> tuple[list[str], list[Question]]:
+    """What to ask a file of its converted form, and the parts that have to be written for it."""
+    draw = random.Random(seed)
+    asked: list[Question] = []
+    x, eps = None, fmpq(1, draw.randint(5, 9))
+    kahan = km.KahanMap(file.system, eps)
+    while x is None or kahan.determinant(x) == 0 or kahan.inverse.determinant(x) == 0:
+        x = tuple(fmpq(draw.randint(-9, 9), draw.randint(1, 4)) for _ in file.variables)
+
+    def ask(function: str, values: Any) -> None:
+        asked.append(Question(function, x, eps, [fmpq(value) for value in values]))
+
+    ask("kahan_map", kahan.step(x))
+    ask("kahan_inverse", kahan.inverse_step(x))
+    ask("kahan_jacobian", [entry for row in kahan.jacobian(x).tolist() for entry in row])
+    parts = ["system", "map", "inverse", "jacobian"]
+    for name, function in file.integrals.items():
+        # "H~" is written as H: the next one of that name gets a number.
+        shown = {"H~": "H", "H": "H_2"}.get(name, name) if "H~" in file.integrals else name
+        ask(f"integral_{shown}", [function.value(QQ, (*x, eps))])
+    if file.member is not None:
+        for k in range(file.member.m):
+            ask(f"integral_H{k}", [CommutantIntegral(file.hamiltonian, file.member.A, k).value(QQ, eps, x)])
+    elif file.hamiltonian is not None:
+        ask("modified_hamiltonian", [ModifiedHamiltonian(file.hamiltonian).value(QQ, eps, x)])
+    if file.integrals or file.hamiltonian:
+        parts.append("integrals")
+    if file.density is not None:
+        ask("density", [file.density.value(QQ, (*x, eps))])
+    elif file.hamiltonian is not None:
+        ask("density", [kahan.determinant(x)])
+    if file.density or file.hamiltonian:
+        parts.append("density")
+    if file.system.dim <= 3:
+        ask("kahan_map_formula", kahan.step(x))
+        parts.append("map-formulas")
+    return parts, asked
+
+
+def converted(language: str, file: km.SystemFile) -> tuple[str, list[Question]]:
+    """A file with everything in it, and what to ask it."""
+    parts, asked = questions(file)
+    return convert(file, language, parts), asked
+
+
+def ask_gp(text: str, asked: list[Question], folder: Path, more: str = "") -> list[list[fmpq]]:
+    """What PARI/GP answers, from a file that is read as it stands; `more` are further arguments of each function."""
+    lines = [f"print({q.function}([{', '.join(map(str, q.point))}]~, {q.eps}{more}));" for q in asked]
+    return [numbers(line) for line in gp_prints(text, lines, folder)]
+
+
+def gp_prints(text: str, lines: list[str], folder: Path) -> list[str]:
+    """The lines that GP prints after it has read a file."""
+    source = folder / "system.gp"
+    source.write_text(text)
+    done = subprocess.run(
+        ["gp", "-q", "-f", str(source)], input="\n".join(lines) + "\n", capture_output=True, text=True, timeout=60
+    )
+    assert not done.stderr, done.stderr
+    return done.stdout.splitlines()
+
+
+_DRIVER = """
+import contextlib, io, json, sys
+printed = {}
+for name, script in json.load(sys.stdin).items():
+    with contextlib.redirect_stdout(io.StringIO()) as held:
+        exec(compile(script, name, "exec"), {})
+    printed[name] = held.getvalue().splitlines()
+print(json.dumps(printed))
+"""
+
+
+def run_python(scripts: dict[str, str]) -> dict[str, list[str]]:
+    """The lines that scripts print, each in a namespace of its own, all in one process."""
+    done = subprocess.run(
+        [sys.executable, "-c", _DRIVER], input=json.dumps(scripts), capture_output=True, text=True, timeout=100
+    )
+    assert done.returncode == 0, done.stderr
+    return dict(json.loads(done.stdout))
+
+
+def question_in_python(asked: list[Question]) -> str:
+    """Lines for the end of a converted file that print its answers."""
+    text = ""
+    for q in asked:
+        point = ", ".join(f"Rational({x.p}, {x.q})" for x in q.point)
+        text += f"value = {q.function}([{point}], Rational({q.eps.p}, {q.eps.q}))\n"
+        text += "print(list(value) if hasattr(value, 'shape') else [value])\n"
+    return text
+
+
+def numbers(line: str) -> list[fmpq]:
+    """The rational numbers of a printed vector or matrix, row by row.
+
+    Anything else in it, such as a decimal point, is an error.
+    """
+    line = re.sub(r"^Mat\((.*)\)$", r"\1", line)  # how GP prints a matrix of one entry
+    assert re.fullmatch(r"[-0-9/,;\[\] ~]+", line), line
+    found = []
+    for piece in re.split(r"[,;]", line.strip("[]~ ")):
+        above, _, below = piece.strip(" []").partition("/")
+        found.append(fmpq(int(above), int(below or 1)))
+    return found

@@ -1,0 +1,74 @@
+# euler_top: Euler top
+#   x1' = x2*x3*a1
+#   x2' = x1*x3*a2
+#   x3' = x1*x2
+# eps is half the time step: the time step is 2 eps.
+# Parameters: a3 = 1
+# Parameters left as symbols: a1, a2
+# Convention of the source: the sources' epsilon is eps: x1~ - x1 = eps a1 (x2~ x3 + x2 x3~), and
+#   cyclic, so that the time step is 2 eps
+# Source: R. Hirota, K. Kimura. Discretization of the Euler top. J. Phys. Soc. Japan 69 (2000),
+#   627-630
+# Source: M. Petrera, Yu. B. Suris. On the Hamiltonian structure of Hirota-Kimura discretization of
+#   the Euler top. Math. Nachr. 283 (2010), 1654-1663. arXiv:0707.4382
+# Source: M. Petrera, A. Pfadler, Yu. B. Suris. On integrability of Hirota-Kimura type
+#   discretizations. Regul. Chaotic Dyn. 16 (2011), 245-289. arXiv:1008.1040
+# Written by kahanmaps VERSION
+# For example: top_kahan_map([1, 2, 3], 1//10, a1, a2)
+
+using LinearAlgebra
+
+# Integers and fractions become fractions of BigInt, so that nothing overflows; floats stay what they are.
+exact(value) = value isa Union{Integer, Rational} ? Rational{BigInt}(value) : value
+
+# x' = f(x)
+function top_vector_field(point, a1, a2)
+    x1, x2, x3 = exact.(point)
+    a1 = exact(a1)
+    a2 = exact(a2)
+    return [x2*x3*a1, x1*x3*a2, x1*x2]
+end
+
+# f'(x), the matrix of the derivatives
+function top_vector_field_jacobian(point, a1, a2)
+    x1, x2, x3 = exact.(point)
+    a1 = exact(a1)
+    a2 = exact(a2)
+    return hcat([0, x3*a2, x2],
+        [x3*a1, 0, x1],
+        [x2*a1, x1*a2, 0])
+end
+
+# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x)
+function top_kahan_map(point, eps, a1, a2)
+    eps = exact(eps)
+    M = I - eps*top_vector_field_jacobian(point, a1, a2)
+    return collect(exact.(point)) + 2*eps*(M \ top_vector_field(point, a1, a2))
+end
+
+# F1: the file says that it is an integral of the map
+function top_integral_F1(point, eps, a1, a2)
+    x1, x2, x3 = exact.(point)
+    eps = exact(eps)
+    a1 = exact(a1)
+    a2 = exact(a2)
+    return (x2^2*a1*eps^2 - 1)/(x3^2*a1*a2*eps^2 - 1)
+end
+
+# F2: the file says that it is an integral of the map
+function top_integral_F2(point, eps, a1, a2)
+    x1, x2, x3 = exact.(point)
+    eps = exact(eps)
+    a1 = exact(a1)
+    a2 = exact(a2)
+    return (x3^2*a1*a2*eps^2 - 1)/(x1^2*a2*eps^2 - 1)
+end
+
+# phi; the file says that dx/phi is invariant under the map
+function top_density(point, eps, a1, a2)
+    x1, x2, x3 = exact.(point)
+    eps = exact(eps)
+    a1 = exact(a1)
+    a2 = exact(a2)
+    return x3^4*a1^2*a2^2*eps^4 - 2*x3^2*a1*a2*eps^2 + 1
+end

@@ -1,0 +1,47 @@
+(* euler_top: Euler top *)
+(*   x1' = x2*x3*a1 *)
+(*   x2' = x1*x3*a2 *)
+(*   x3' = x1*x2 *)
+(* eps is half the time step: the time step is 2 eps. *)
+(* Parameters: a3 = 1 *)
+(* Parameters left as symbols: a1, a2 *)
+(* Convention of the source: the sources' epsilon is eps: x1~ - x1 = eps a1 (x2~ x3 + x2 x3~), and *)
+(*   cyclic, so that the time step is 2 eps *)
+(* Source: R. Hirota, K. Kimura. Discretization of the Euler top. J. Phys. Soc. Japan 69 (2000), *)
+(*   627-630 *)
+(* Source: M. Petrera, Yu. B. Suris. On the Hamiltonian structure of Hirota-Kimura discretization of *)
+(*   the Euler top. Math. Nachr. 283 (2010), 1654-1663. arXiv:0707.4382 *)
+(* Source: M. Petrera, A. Pfadler, Yu. B. Suris. On integrability of Hirota-Kimura type *)
+(*   discretizations. Regul. Chaotic Dyn. 16 (2011), 245-289. arXiv:1008.1040 *)
+(* Written by kahanmaps VERSION *)
+(* For example: topKahanMap[{1, 2, 3}, 1/10, a1, a2] *)
+
+ClearAll[topVectorField, topVectorFieldJacobian, topKahanMap, topIntegralF1, topIntegralF2, topDensity];
+
+(* x' = f(x) *)
+topVectorField[{x1_, x2_, x3_}, a1_, a2_] :=
+  {x2*x3*a1, x1*x3*a2, x1*x2};
+
+(* f'(x), the matrix of the derivatives *)
+topVectorFieldJacobian[{x1_, x2_, x3_}, a1_, a2_] :=
+  {{0, x3*a1, x2*a1},
+   {x3*a2, 0, x1*a2},
+   {x2, x1, 0}};
+
+(* The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x) *)
+topKahanMap[point_List, eps_, a1_, a2_] := Module[{m},
+  m = IdentityMatrix[3] - eps*topVectorFieldJacobian[point, a1, a2];
+  If[Det[m] === 0, $Failed, point + 2*eps*LinearSolve[m, topVectorField[point, a1, a2]]]
+];
+
+(* F1: the file says that it is an integral of the map *)
+topIntegralF1[{x1_, x2_, x3_}, eps_, a1_, a2_] :=
+  (x2^2*a1*eps^2 - 1)/(x3^2*a1*a2*eps^2 - 1);
+
+(* F2: the file says that it is an integral of the map *)
+topIntegralF2[{x1_, x2_, x3_}, eps_, a1_, a2_] :=
+  (x3^2*a1*a2*eps^2 - 1)/(x1^2*a2*eps^2 - 1);
+
+(* phi; the file says that dx/phi is invariant under the map *)
+topDensity[{x1_, x2_, x3_}, eps_, a1_, a2_] :=
+  x3^4*a1^2*a2^2*eps^4 - 2*x3^2*a1*a2*eps^2 + 1;

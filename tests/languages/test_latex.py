@@ -1,0 +1,89 @@
+"""What `convert` writes as LaTeX: whole documents, in which everything that opens is closed and nothing is left out."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from language_helpers import questions, systems
+
+import kahanmaps as km
+from kahanmaps.languages.convert import convert
+
+SYSTEMS = systems()
+DOCUMENTS = {name: convert(file, "latex", questions(file)[0]) for name, file in SYSTEMS.items()}
+
+
+def mistakes(document: str) -> list[str]:
+    """Braces, environments and alignment marks that do not fit together."""
+    found = []
+    body = "\n".join(line for line in document.splitlines() if not line.startswith("%"))
+    text = body.replace("\\\\", " NEWLINE ").replace("\\{", "").replace("\\}", "")
+    depth = 0
+    for character in text:
+        depth += {"{": 1, "}": -1}.get(character, 0)
+        if depth < 0:
+            found.append("} without {")
+            break
+    if depth > 0:
+        found.append("{ without }")
+    opened: list[str] = []
+    for what, name in re.findall(r"\\(begin|end)\{([a-z*]+)\}", body):
+        if what == "begin":
+            opened.append(name)
+        elif not opened or opened.pop() != name:
+            found.append(f"\\end{{{name}}} does not close what is open")
+    found += [f"{name} is not closed" for name in opened]
+    for rows in re.findall(r"\\begin\{align\*\}(.*?)\\end\{align\*\}", body, re.DOTALL):
+        outer = re.sub(r"\\begin\{pmatrix\}.*?\\end\{pmatrix\}", "", rows, flags=re.DOTALL)
+        found += [f"not one & in {row}" for row in outer.split("\\\\") if row.count("&") != 1]
+        if "\n\n" in rows:
+            found.append("an empty line in a display")
+    for matrix in re.findall(r"\\begin\{pmatrix\}(.*?)\\end\{pmatrix\}", body, re.DOTALL):
+        if len({row.count("&") for row in matrix.split("\\\\")}) != 1:
+            found.append("rows of different length")
+    return found
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_everything_that_opens_is_closed(name):
+    assert mistakes(DOCUMENTS[name]) == []
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("\\end{align*}", "\\end{aligned}"),
+        (" &= ", " = "),
+        ("\\frac{", "\\frac"),
+        ("f(\\mathbf x) \\\\", "f(\\mathbf x) \\\\ & & \\\\"),
+        ("\\end{document}", ""),
+    ],
+)
+def test_a_mistake_would_be_noticed(right, wrong):
+    document = DOCUMENTS["euler_top"]
+    assert right in document
+    assert mistakes(document.replace(right, wrong, 1)) != []
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_the_lines_of_a_right_hand_side_together_are_all_of_it(name):
+    whole = re.sub(r" \\\\\n&\\quad", "", DOCUMENTS[name])
+    for variable, polynomial in zip(SYSTEMS[name].variables, SYSTEMS[name].system.rhs, strict=True):
+        from kahanmaps.algebra.latex import latex_name
+
+        assert rf"\dot{{{latex_name(variable)}}} &= {km.latex_polynomial(polynomial)}" in whole
+
+
+def test_long_quotients_have_numerators_and_denominators_of_their_own():
+    document = DOCUMENTS["planar_cubic_hamiltonian"]
+    assert "P_{\\mathrm{modified\\_H}} &= " in document
+    assert "Q_{\\mathrm{modified\\_H}} &= -" not in document
+    assert max(len(line) for line in document.splitlines() if not line.startswith("%")) < 300
+
+
+def test_matrices_of_more_than_ten_columns_are_announced():
+    names = [f"x{k}" for k in range(1, 13)]
+    file = km.SystemFile.from_system(km.QuadraticSystem.from_text(names, names))
+    assert "\\setcounter{MaxMatrixCols}{12}" in convert(file, "latex")
+    assert "MaxMatrixCols" not in DOCUMENTS["euler_top"]

@@ -1,0 +1,112 @@
+"""What `convert` writes for SymPy runs as it stands and gives the same exact values as the library.
+
+Loading SymPy takes a second: all scripts are run by one process, each in a namespace of its own.
+"""
+
+from __future__ import annotations
+
+import pytest
+from language_helpers import converted, numbers, question_in_python, run_python, systems
+
+import kahanmaps as km
+from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.laboratory.parametric import ParametricSystem
+from kahanmaps.languages.convert import convert
+from kahanmaps.languages.sympy import SYMPY
+
+SYSTEMS = systems()
+FILES = {name: converted("sympy", file) for name, file in SYSTEMS.items()}
+TOP, TOP_ASKED = FILES["euler_top"]
+WRONG = {
+    "eps for 2 eps": TOP.replace("2*eps*M.LUsolve", "eps*M.LUsolve"),
+    "sign": TOP.replace("eye(3) - eps*", "eye(3) + eps*"),
+    "sign of a right-hand side": TOP.replace("-2*x1*x3", "2*x1*x3"),
+}
+# A polynomial of 1365 terms, and an integer of more digits than Python reads.
+MANY_TERMS = """
+variables = ["x1", "x2", "x3", "x4"]
+[system]
+rhs = ["1", "1", "1", "1"]
+[integrals]
+big = "(1 + x1 + 2*x2 + x3/3 - x4)^11"
+"""
+LONG_NUMBER = f'variables = ["x"]\n[system]\nrhs = ["{"7" * 5000}*x"]'
+SPECIAL = """
+import string
+from sympy import Symbol, sympify
+for name in [a + b for a in ("", *string.ascii_letters) for b in string.ascii_letters] + ["beta", "gamma", "zeta"]:
+    try:
+        same = sympify(name) == Symbol(name)
+    except Exception:
+        same = False
+    if not same:
+        print(name)
+"""
+
+
+def prints_of_right_hand_sides(file: km.SystemFile) -> str:
+    symbols = ", ".join(f'Symbol("{variable}")' for variable in file.variables)
+    return convert(file, "sympy", ["system"]) + f"for entry in vector_field([{symbols}]):\n    print(entry)\n"
+
+
+@pytest.fixture(scope="module")
+def printed() -> dict[str, list[str]]:
+    """What each of the scripts prints."""
+    scripts = {f"values {name}": text + question_in_python(asked) for name, (text, asked) in FILES.items()}
+    scripts |= {f"wrong {name}": text + question_in_python(TOP_ASKED) for name, text in WRONG.items()}
+    scripts |= {f"rhs {name}": prints_of_right_hand_sides(file) for name, file in SYSTEMS.items()}
+    weierstrass = convert(km.load("weierstrass"), "sympy", ["integrals"])
+    scripts["integers"] = weierstrass + "print(integral_modified_H([1, 2], 3))"
+    top = km.load("euler_top")
+    symbolic = convert(top, "sympy", parametric=ParametricSystem.of(top, ["a1", "a3"]))
+    scripts["symbols"] = symbolic + "print(vector_field([1, 2, 3])[0], vector_field([1, 2, 3], 5, 7)[2])"
+    many = convert(km.parse_system(MANY_TERMS, "many"), "sympy", ["integrals"])
+    scripts["many terms"] = many + "print(integral_big([3, 1, 3, 6], 1))"
+    long = convert(km.parse_system(LONG_NUMBER, "long"), "sympy", ["system"])
+    scripts["long number"] = long + "print(vector_field([1])[0] == sum(7*10**k for k in range(5000)))"
+    scripts["special"] = SPECIAL
+    return run_python(scripts)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_sympy_gives_the_values_of_the_library_exactly(name, printed):
+    _, asked = FILES[name]
+    answers = [numbers(line) for line in printed[f"values {name}"]]
+    assert answers == [question.expected for question in asked]
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_formula_would_be_noticed(name, printed):
+    assert WRONG[name] != TOP
+    answers = [numbers(line) for line in printed[f"wrong {name}"]]
+    assert answers != [question.expected for question in TOP_ASKED]
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_what_sympy_prints_of_the_right_hand_sides_is_read_back_as_the_same_polynomials(name, printed):
+    file = SYSTEMS[name]
+    read = [parse_polynomial(line, file.variables) for line in printed[f"rhs {name}"]]
+    assert read == list(file.system.rhs)
+
+
+def test_short_names_that_sympify_reads_otherwise_are_replaced(printed):
+    special = printed["special"]
+    assert "I" in special
+    assert [name for name in special if not SYMPY.naming.is_reserved(name)] == []
+
+
+def test_python_integers_stay_exact(printed):
+    claim = km.load("weierstrass").integrals["modified_H"]
+    assert printed["integers"] == [str(claim.value(km.QQ, [km.QQ.convert(k) for k in (1, 2, 3)]))]
+
+
+def test_parameters_that_are_left_as_symbols_are_arguments_and_stand_for_themselves(printed):
+    assert printed["symbols"] == ["6*a1 14"]
+
+
+def test_a_sum_of_many_terms_does_not_exhaust_the_parser(printed):
+    assert printed["many terms"] == [str((1 + 3 + 2 + 1 - 6) ** 11)]
+
+
+def test_an_integer_of_more_digits_than_python_reads_is_written_in_another_base(printed):
+    assert printed["long number"] == ["True"]
