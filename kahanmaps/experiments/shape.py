@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
 
-from kahanmaps.experiments.options import show, suggestion
+from kahanmaps.errors import suggestion
+from kahanmaps.experiments.options import show
 
 _TIME_UNITS = {"s": 1, "min": 60, "h": 3600, "d": 86400}
 _MEMORY_UNITS = {"kB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30}
@@ -66,19 +67,34 @@ def _read_system(value: Any) -> Any:
     return value
 
 
+def _amount(units: Mapping[str, int]) -> WithJsonSchema:
+    """How a schema says what `_with_unit` reads."""
+    number = r"\s*[0-9]{1,18}(\.[0-9]{1,9})?([eE][+-]?[0-9]{1,2})?\s*"
+    text = {"type": "string", "pattern": f"^({number}({'|'.join(units)})?\\s*|{_NONE})$"}
+    return WithJsonSchema({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, text]})
+
+
+_TEXT = {"type": "string", "minLength": 1}
+_SYSTEM_SCHEMA = WithJsonSchema({"anyOf": [_TEXT, {"type": "array", "items": _TEXT, "minItems": 1}]})
+
+
 class _Shape(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
 class _LimitsShape(_Shape):
-    time: Annotated[Any, BeforeValidator(read_time)] = Field(default=None, description="seconds, or a text like 90 s")
-    memory: Annotated[Any, BeforeValidator(read_memory)] = Field(default=None, description="bytes, or a text like 2 GB")
+    time: Annotated[Any, BeforeValidator(read_time), _amount(_TIME_UNITS)] = Field(
+        default=None, description="seconds, or a text like 90 s"
+    )
+    memory: Annotated[Any, BeforeValidator(read_memory), _amount(_MEMORY_UNITS)] = Field(
+        default=None, description="bytes, or a text like 2 GB"
+    )
     digits: int | None = Field(default=None, ge=1, le=2**63 - 1, description="a whole number of digits, at least 1")
 
 
 class _ExperimentShape(_Shape):
     task: str = Field(description="the name of a task, e.g. check-commute")
-    system: Annotated[Any, BeforeValidator(_read_system)] = Field(default=None, description=_SYSTEM)
+    system: Annotated[Any, BeforeValidator(_read_system), _SYSTEM_SCHEMA] = Field(default=None, description=_SYSTEM)
     options: dict[str, Any] = Field(default={}, description="a table of options with their values")
     axes: dict[str, Any] = Field(default={}, description="a table of options with lists or ranges of values")
     zip: list[list[str]] = Field(default=[], description='a list of lists of axes, e.g. [["m", "steps"]]')
@@ -102,6 +118,11 @@ def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[Place, str, str]]:
     except ValidationError as error:
         return [_mistake(detail) for detail in error.errors(include_url=False)]
     return []
+
+
+def shape_schema() -> dict[str, Any]:
+    """The shape as a JSON schema, with the parts `_ExperimentShape` and `_LimitsShape`."""
+    return _SpecShape.model_json_schema()
 
 
 def _mistake(detail: Any) -> tuple[Place, str, str]:

@@ -38,6 +38,7 @@ from kahanmaps.experiments.spec_document import SpecDocument
 
 __all__ = [
     "DEFAULT_LIMITS",
+    "EXPERIMENT_NAME",
     "MAX_BYTES",
     "MAX_TASKS",
     "Experiment",
@@ -49,6 +50,7 @@ __all__ = [
 
 MAX_BYTES = 4_000_000
 MAX_TASKS = 1_000_000
+EXPERIMENT_NAME = r"[A-Za-z0-9_.+-]{1,80}"
 _LARGEST_TOLD = 3
 
 
@@ -136,7 +138,7 @@ def _read(document: SpecDocument, where: str, max_tasks: int) -> Spec:
 
 
 def _require_name(document: SpecDocument, name: str) -> None:
-    if not re.fullmatch(r"[A-Za-z0-9_.+-]{1,80}", name):
+    if not re.fullmatch(EXPERIMENT_NAME, name):
         document.mistake(
             f"experiments.{name}", "expected a name of at most 80 letters, digits and the characters _ . + -"
         )
