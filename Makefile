@@ -9,7 +9,7 @@ export PYTHON
 
 python := .venv/bin/python
 
-.PHONY: help demo test test-slow check lint types format bench docs clean demo-venv dev-venv
+.PHONY: help demo test test-slow check lint types format bench docs docs-links clean demo-venv dev-venv
 
 help:  ## list the tasks
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -42,11 +42,14 @@ bench: dev-venv  ## ratios to other programs, also into docs/benchmarks.md; ARGS
 	@.ci/bootstrap peers
 	@$(python) benchmarks/run.py $(ARGS)
 
-docs:  ## say where the documentation is
-	@echo "The documentation is plain Markdown, to be read as it is; nothing is built:"
-	@for file in README.md CONTRIBUTING.md CHANGELOG.md docs/*.md; do \
-	    [ ! -e "$$file" ] || echo "  $$file"; \
-	done
+docs: dev-venv  ## the documentation as pages, in docs/_build/html
+	@rm -rf docs/_build/html docs/_build/trees
+	@$(python) -m sphinx -b html -q -n -W --keep-going -d docs/_build/trees docs docs/_build/html
+	@$(python) docs/_ext/check_pages.py docs/_build/html
+	@echo "docs/_build/html/index.html"
+
+docs-links: dev-venv  ## do the links of the documentation to other sites work? Needs the network
+	@$(python) -m sphinx -b linkcheck -q -d docs/_build/trees-links docs docs/_build/links
 
 clean:  ## remove .venv, caches and build leftovers
 	rm -rf .venv build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .demo docs/_build

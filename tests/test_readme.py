@@ -1,4 +1,7 @@
-"""What README and docs show is what happens: their console sessions are run and compared, their Python sessions too."""
+"""What README and docs show is what happens: their console sessions are run and compared, their Python sessions too.
+
+A block of TOML that opens with the comment `# NAME.toml` is that file, for all sessions of its page.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ import pytest
 from kahanmaps_cli.main import main
 
 ROOT = Path(__file__).parent.parent
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("**/*.md")])
 FLAGS = doctest.ELLIPSIS
 
 
@@ -26,21 +29,44 @@ def sessions(page: Path) -> list[tuple[str, str]]:
     return found
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if sessions(page)], ids=lambda page: page.name)
+def files(page: Path) -> dict[str, str]:
+    """The files that a page shows, by name."""
+    blocks = re.findall(r"```toml\n(# ([\w-]+\.toml)\n.*?)```", page.read_text(), re.DOTALL)
+    assert len({name for _, name in blocks}) == len(blocks), f"{page.name} shows two files of one name"
+    return {name: text for text, name in blocks}
+
+
+def go_where_the_files_of(page: Path, folder: Path, monkeypatch) -> None:
+    """Make `folder` the current one, with the examples and the files of the page in it."""
+    monkeypatch.chdir(folder)
+    (folder / "examples").symlink_to(ROOT / "examples")
+    for name, text in files(page).items():
+        (folder / name).write_text(text)
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if sessions(page)], ids=name_of)
 def test_console_sessions_print_what_the_page_shows(page, tmp_path, monkeypatch, capfd):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    go_where_the_files_of(page, tmp_path, monkeypatch)
     checker = doctest.OutputChecker()
+    status = 0
     for command, expected in sessions(page):
         words = shlex.split(command)
+        if words == ["echo", "$?"]:
+            assert expected == f"{status}\n", command
+            continue
         assert words[0] == "kahanmaps", command
-        main(words[1:])
+        status = main(words[1:])
         out, err = capfd.readouterr()
         assert checker.check_output(expected, err + out, FLAGS), f"$ {command}\n{err + out}"
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if ">>> " in page.read_text()], ids=lambda page: page.name)
-def test_python_sessions_print_what_the_page_shows(page):
+@pytest.mark.parametrize("page", [page for page in PAGES if ">>> " in page.read_text()], ids=name_of)
+def test_python_sessions_print_what_the_page_shows(page, tmp_path, monkeypatch):
+    go_where_the_files_of(page, tmp_path, monkeypatch)
     outcome = doctest.testfile(str(page), module_relative=False, optionflags=FLAGS)
     assert outcome.attempted > 0
     assert outcome.failed == 0
@@ -52,3 +78,9 @@ def test_a_session_that_shows_something_else_would_be_noticed(tmp_path):
     ((command, expected),) = sessions(page)
     assert command == "kahanmaps --version"
     assert not doctest.OutputChecker().check_output(expected, "kahanmaps 0.1.0\n", FLAGS)
+
+
+def test_a_file_that_a_page_shows_is_there_for_its_sessions(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text('```toml\n# mine.toml\nvariables = ["x"]\n```\n\n```toml\nwithout = "a name"\n```\n')
+    assert files(page) == {"mine.toml": '# mine.toml\nvariables = ["x"]\n'}

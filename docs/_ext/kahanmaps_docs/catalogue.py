@@ -1,0 +1,101 @@
+"""The page of the catalogue: every system with its equations, what is known of it, and from where."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from kahanmaps.algebra.latex import latex_name, latex_number, latex_polynomial, latex_rational_function
+from kahanmaps.systems.catalog import load, names
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.structured_facts import relations
+from kahanmaps_docs.literature import KEY, link
+from kahanmaps_docs.markdown import code, plain, table
+
+LONGEST_FORMULA = 900  # characters of LaTeX; longer ones are said to be long, and where to see them
+
+
+def catalogue() -> str:
+    """A table of all systems, then a section for each."""
+    files = [load(name) for name in names()]
+    rows = [
+        [
+            f"[{plain(f.name)}](#system-{f.name})",
+            str(f.system.dim),
+            plain(f.catalog["title"]),
+            f.catalog.get("verdict", ""),
+        ]
+        for f in files
+    ]
+    head = ["system", "dim", "", "verdict"]
+    return "\n".join([table(head, rows), *(section(file) for file in files)])
+
+
+def section(file: SystemFile) -> str:
+    """All about one system."""
+    known = file.catalog
+    pieces = [
+        f"(system-{file.name})=\n## {plain(file.name)}\n",
+        f"{plain(known['title'])}, dimension {file.system.dim}.",
+    ]
+    if file.parameters:
+        values = ", ".join(f"${latex_name(name)} = {latex_number(value)}$" for name, value in file.parameters.items())
+        pieces.append(f"Parameters, with the values that the formulas here are for: {values}.")
+    pieces += [displayed(formula) for formula in formulas(file)]
+    if "family" in file.document:
+        pieces.append("A member of the commuting family.")
+    pieces += ["\n".join(f"* {line}" for line in facts(file)), where_from(file, known)]
+    pieces.append(f"To copy and change: `kahanmaps systems {file.name} --toml`.\n")
+    return "\n\n".join(filter(None, pieces)) + "\n"
+
+
+def formulas(file: SystemFile) -> list[str]:
+    """The equations, H, integrals and density in LaTeX."""
+    sides = zip(file.variables, file.system.rhs, strict=True)
+    rows = [rf"{latex_name(x)}^\prime &= {latex_polynomial(f)}" for x, f in sides]
+    found = [r"\begin{aligned}" + r" \\ ".join(rows) + r"\end{aligned}"]
+    if file.hamiltonian is not None:
+        found.append(f"H = {latex_polynomial(file.hamiltonian.H)}")
+    for name, integral in file.integrals.items():
+        found.append(f"{latex_name(name) if name else 'I'} = {latex_rational_function(integral)}")
+    if file.density is not None:
+        found.append(rf"\phi = {latex_rational_function(file.density)}")
+    return found
+
+
+def displayed(formula: str) -> str:
+    """A displayed formula; of one that is too long to be read only the beginning, its left side."""
+    if len(formula) <= LONGEST_FORMULA or formula.startswith(r"\begin"):
+        return f"$$\n{formula}\n$$"
+    left = formula.partition(" = ")[0]
+    return f"${left}$ is too long to be read here: {len(formula)} characters of LaTeX."
+
+
+def facts(file: SystemFile) -> list[str]:
+    """What is known, first what programs can read as well."""
+    known = file.catalog
+    found = []
+    if "degrees" in known or "growth" in known:
+        degrees = ", ".join(map(str, known.get("degrees", [])))
+        growth = f"{known['growth']} growth" if "growth" in known else ""
+        root = f", by the largest root of {code(known['dynamical_degree'])}" if "dynamical_degree" in known else ""
+        found.append(f"degrees of the iterates: {degrees + ', ...: ' if degrees else ''}{growth}{root}")
+    if "codimension" in known:
+        found.append(f"a generic orbit lies in a variety of codimension {known['codimension']}")
+    for relation in relations(known, file.variables):
+        found.append(f"relations along an orbit: {relation.dimension} among {code(relation.text)}")
+    return found + [_linked(fact) for fact in known.get("facts", [])]
+
+
+def where_from(file: SystemFile, known: Mapping[str, Any]) -> str:
+    """The sources, and what eps is in them."""
+    sources = ", ".join(link(key) for key in known.get("sources", []))
+    lines = [f"Sources: {sources}."] if sources else []
+    if "convention" in known:
+        lines.append(f"The step: {_linked(known['convention'])}.")
+    return " ".join(lines)
+
+
+def _linked(text: str) -> str:
+    """Text in which the keys of sources lead to the bibliography."""
+    return KEY.sub(lambda key: link(key[1]), plain(text))

@@ -1,0 +1,38 @@
+"""Formulas as MathML, made when the pages are: browsers show it by themselves, without scripts and without the network.
+
+The converter is the one of docutils, which Sphinx is built on.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from docutils import nodes
+from docutils.utils.math import MathError
+from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.util import logging
+
+LOGGER = logging.getLogger(__name__)
+
+
+def mathml(node: nodes.Node, as_block: bool) -> str:
+    """The formula of a node; of one that cannot be read its text, with a warning."""
+    try:
+        return str(tex2mathml(node.astext(), as_block=as_block))
+    except MathError as error:
+        LOGGER.warning("the formula %s cannot be read: %s", node.astext(), error, location=node)
+        return str(nodes.literal(text=node.astext()))
+
+
+def inline_as_mathml(translator: Any, node: nodes.math) -> None:
+    """A formula in a line."""
+    translator.body.append(mathml(node, as_block=False))
+    raise nodes.SkipNode
+
+
+def block_as_mathml(translator: Any, node: nodes.math_block) -> None:
+    """A displayed formula; a long one is scrolled, not the page."""
+    translator.body.append('<div class="math-block" tabindex="0">')
+    translator.body.append(mathml(node, as_block=True))
+    translator.body.append("</div>\n")
+    raise nodes.SkipNode

@@ -1,0 +1,212 @@
+"""The documentation is complete and hangs together: pages, commands, names, sources and links. `make docs` builds it.
+
+What is made of the code is looked at as the Markdown that Sphinx is given; one slow test builds the pages.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+sys.path.insert(0, str(DOCS / "_ext"))
+
+from check_pages import mistakes  # noqa: E402
+from kahanmaps_docs import docstrings, expanded, part, reference  # noqa: E402
+from kahanmaps_docs.links import outside_code  # noqa: E402
+
+import kahanmaps  # noqa: E402
+from kahanmaps.sources import SOURCES  # noqa: E402
+from kahanmaps.systems.catalog import names  # noqa: E402
+from kahanmaps_cli.main import COMMANDS  # noqa: E402
+from kahanmaps_cli.schema_files import schema_titles  # noqa: E402
+
+NO_PAGES = {"_build", "_ext", "man", "schemas"}  # folders of docs, see conf.py
+
+
+def markdown_files() -> list[Path]:
+    """All pages, and the Markdown files that are read beside them."""
+    pages = [path for path in DOCS.rglob("*.md") if path.relative_to(DOCS).parts[0] not in NO_PAGES]
+    return sorted([*pages, ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"])
+
+
+def pages() -> dict[str, str]:
+    """The pages as Sphinx is given them, by name."""
+    left_out = set(reference.api_pages_without_names(DOCS))
+    found = {}
+    for path in markdown_files():
+        name = path.relative_to(ROOT).as_posix().removeprefix("docs/")
+        if path.is_relative_to(DOCS) and name not in left_out:
+            name = name.removesuffix(".md")
+            found[name] = expanded(name, path.read_text(encoding="utf-8"))
+    return found
+
+
+def entries(name: str, text: str, all_names: set[str]) -> set[str]:
+    """The pages that the tables of contents of a page name."""
+    found = set()
+    for body in re.findall(r"```\{toctree\}\n(.*?)```", text, re.DOTALL):
+        for line in body.splitlines():
+            if line and not line.startswith(":"):
+                entry = posixpath.normpath(posixpath.join(posixpath.dirname(name), line))
+                pattern = re.compile(re.escape(entry).replace(r"\*", "[^/]*"))
+                found |= {other for other in all_names if pattern.fullmatch(other)}
+    return found
+
+
+def anchors(text: str) -> set[str]:
+    """The anchors that a Git host gives the headings of a Markdown text, as MyST does."""
+    without_blocks = re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
+    found: set[str] = set()
+    for heading in re.findall(r"^#+ (.+)$", without_blocks, re.MULTILINE):
+        anchor = re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+        found.add(anchor)
+    return found
+
+
+def broken_links(path: Path) -> list[str]:
+    """The local links of a Markdown file that lead to no file, or to no heading of it."""
+    text = path.read_text(encoding="utf-8")
+    found = []
+    prose = "".join(piece for is_text, piece in outside_code(text) if is_text)
+    for target in re.findall(r"\]\(([^)\s]+)\)", prose):
+        if "://" in target:
+            continue
+        file, _, anchor = target.partition("#")
+        there = (path.parent / file).resolve() if file else path
+        if not there.exists() or (anchor and anchor not in anchors(there.read_text(encoding="utf-8"))):
+            found.append(target)
+    return found
+
+
+@pytest.fixture(scope="module")
+def built_from() -> dict[str, str]:
+    return pages()
+
+
+def test_every_page_is_in_a_table_of_contents(built_from):
+    reached = {"index"}.union(*(entries(name, text, set(built_from)) for name, text in built_from.items()))
+    assert set(built_from) - reached == set()
+
+
+def test_a_page_that_no_table_of_contents_names_is_noticed():
+    assert entries("howto/index", "```{toctree}\n:glob:\n\n*\n../batch\n```\n", {"howto/a", "batch", "alone"}) == {
+        "howto/a",
+        "batch",
+    }
+
+
+def test_every_command_has_its_entry(built_from):
+    missing = [name for name in COMMANDS if f"(command-{name})=" not in built_from["reference/commands"]]
+    assert missing == []
+
+
+def test_the_entry_of_a_command_has_its_options_and_its_examples(built_from):
+    entry = built_from["reference/commands"].partition("(command-find-integrals)=")[2].partition("(command-")[0]
+    assert "`--monomials LIST`" in entry
+    assert "\nkahanmaps find-integrals euler_top --symbolic" in entry
+    assert "(command-batch-run)=" in built_from["reference/commands"]
+
+
+def test_every_exported_name_has_its_entry(built_from):
+    api = "\n".join(text for name, text in built_from.items() if name.startswith("reference/api/"))
+    public = [name for name in kahanmaps.__all__ if not name.startswith("__")]
+    assert [name for name in public if not re.search(rf":: kahanmaps\.{name}$", api, re.MULTILINE)] == []
+    assert [name for name in public if f"(#kahanmaps.{name})" not in built_from["reference/api/index"]] == []
+
+
+def test_every_source_is_in_the_bibliography(built_from):
+    assert [key for key in SOURCES if f"(source-{key})=" not in built_from["reference/bibliography"]] == []
+
+
+def test_every_system_of_the_catalogue_has_its_section_with_its_sources(built_from):
+    text = built_from["reference/catalogue"]
+    assert [name for name in names() if f"(system-{name})=" not in text] == []
+    top = text.partition("(system-euler_top)=")[2].partition("(system-")[0]
+    assert "[`hirota-kimura-2000`](#source-hirota-kimura-2000)" in top
+    assert r"x_1^\prime &= x_2 x_3" in top
+
+
+def test_every_task_of_batches_has_its_section_with_its_options(built_from):
+    entry = built_from["reference/batch-tasks"].partition("(task-heights)=")[2].partition("(task-")[0]
+    assert re.search(r"\| `steps` \| .* \| `60` \|", entry)
+    assert re.search(r"\| `eps` \| .* \| required \|", entry)
+
+
+def test_every_schema_has_its_section_with_its_keys(built_from):
+    text = built_from["reference/schemas"]
+    assert [name for name in schema_titles() if f"(schema-{name})=" not in text] == []
+    entry = text.partition("(schema-find-density)=")[2].partition("(schema-")[0]
+    assert re.search(r"^\| `densities` \| .+ \|$", entry, re.MULTILINE)  # of what the schema refers to
+    assert re.search(r"^\| `time_step` \| .+ \|$", entry, re.MULTILINE)
+
+
+@pytest.mark.parametrize("path", markdown_files(), ids=lambda path: str(path.relative_to(ROOT)))
+def test_local_links_lead_to_a_file_and_to_a_heading_in_it(path):
+    assert broken_links(path) == []
+
+
+def test_links_that_lead_nowhere_are_noticed(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# One  thing\n[a](page.md#one--thing) [b](gone.md) [c](#two) `[d](code.md)` [e](https://e.org)\n")
+    assert broken_links(page) == ["gone.md", "#two"]
+
+
+def test_files_of_the_project_that_are_pages_are_linked_as_pages():
+    text = "[all](../CONTRIBUTING.md#tests), [study](../../examples/members), `petrera-suris-2016`"
+    assert expanded("howto/page", text.replace("../C", "../../C")) == (
+        "[all](../contributing.md#tests), [study](../study.md), [`petrera-suris-2016`](#source-petrera-suris-2016)"
+    )
+
+
+def test_a_part_that_nobody_makes_is_refused():
+    with pytest.raises(ValueError, match="expected one of"):
+        part("weather")
+
+
+@pytest.mark.parametrize(
+    ("written", "shown"),
+    [
+        (["The product a*b, and |x|."], [r"The product a\*b, and \|x\|."]),
+        (["As `find_integrals` and `x*y` do."], ["As :py:obj:`~kahanmaps.find_integrals` and ``x*y`` do."]),
+        (["Source: ward-1948."], ["Source: :ref:`ward-1948 <source-ward-1948>`."]),
+        (["Thus:", "", "    y = x*x", "", "so."], ["Thus:", "", "::", "", "    y = x*x", "", "so."]),
+        (["Args:", "    f_: a*b."], ["Args:", r"    f\_: a\*b."]),
+        (["Returns:", "    A pair: x, y.", "    z."], ["Returns:", "    : A pair: x, y.", "    z."]),
+        ([">>> 2*3", "6"], [">>> 2*3", "6"]),
+    ],
+)
+def test_docstrings_become_restructured_text(written, shown):
+    assert docstrings.as_rst(written)[:-1] == shown
+
+
+def test_a_built_page_that_leads_nowhere_or_needs_the_network_is_noticed(tmp_path):
+    (tmp_path / "b.html").write_text('<p id="here"></p>')
+    (tmp_path / "a.html").write_text(
+        '<a href="b.html#here"></a><a href="b.html#there"></a><a href="c.html"></a><a href="https://e.org"></a>'
+        '<script src="https://e.org/math.js"></script>'
+    )
+    assert mistakes(tmp_path) == [
+        "a.html: b.html#there is no place on that page",
+        "a.html: c.html is not there",
+        "a.html: https://e.org/math.js has to be fetched",
+    ]
+
+
+def test_a_folder_without_pages_is_not_in_order(tmp_path):
+    assert mistakes(tmp_path) == [f"{tmp_path.resolve()} has no pages"]
+
+
+@pytest.mark.slow
+def test_the_pages_are_built_without_a_warning_and_no_link_is_broken(tmp_path):
+    command = [sys.executable, "-m", "sphinx", "-b", "html", "-q", "-n", "-W", "--keep-going", "-d", tmp_path / "trees"]
+    built = subprocess.run([*command, DOCS, tmp_path / "html"], capture_output=True, text=True, check=False)
+    assert (built.returncode, built.stderr) == (0, "")
+    assert mistakes(tmp_path / "html") == []
+    assert "<math" in (tmp_path / "html" / "reference" / "catalogue.html").read_text(encoding="utf-8")
