@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     from kahanmaps.maps.periods import orbit_period, period_over_rationals
     from kahanmaps.paper.examiner import VerifyOptions
     from kahanmaps.paper.verify import verify, verify_universal
+    from kahanmaps.reports.report import report_html, write_report
     from kahanmaps.systems.catalog import load, names
     from kahanmaps.systems.files import SystemFile, parse_system, read_system
     from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -126,6 +127,7 @@ _HOME = {
     "experiments.spec": ("Spec", "parse_spec", "read_spec"),
     "experiments.store": ("Store",),
     "experiments.run": ("run",),
+    "reports.report": ("report_html", "write_report"),
     "errors": ("InputError", "KahanmapsError", "SingularStep", "SystemFileError"),
 }
 _MODULE_OF = {name: module for module, exported in _HOME.items() for name in exported}
@@ -226,6 +228,8 @@ __all__ = [
     "parse_spec",
     "read_spec",
     "run",
+    "report_html",
+    "write_report",
     "InputError",
     "KahanmapsError",
     "SingularStep",

@@ -48,7 +48,7 @@ class SystemFileError(InputError):
     def __init__(self, where: str, mistakes: Sequence[tuple[str, str]]) -> None:
         self.where = where
         self.mistakes = tuple(mistakes)
-        lines = [f"{where}: {_plural(len(self.mistakes), 'mistake')}"]
+        lines = [f"{where}: {counted(len(self.mistakes), 'mistake')}"]
         lines += [f"  {key}: {_indent(what)}" for key, what in self.mistakes[:_MISTAKES_SHOWN]]
         if len(self.mistakes) > _MISTAKES_SHOWN:
             lines.append(f"  and {len(self.mistakes) - _MISTAKES_SHOWN} more")
@@ -99,5 +99,18 @@ def _indent(message: str) -> str:
     return message.replace("\n", "\n    ")
 
 
-def _plural(count: int, word: str) -> str:
-    return f"{count} {word}" if count == 1 else f"{count} {word}s"
+def counted(number: int, word: str) -> str:
+    """1 step, 2 steps."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def suggestion(value: Any, known: Sequence[str]) -> str:
+    """A hint at what was probably meant, or nothing.
+
+    >>> suggestion("alhpa", ["alpha", "beta"])
+    '; did you mean alpha?'
+    """
+    from difflib import get_close_matches
+
+    close = get_close_matches(value, known, n=2, cutoff=0.6) if isinstance(value, str) else []
+    return f"; did you mean {' or '.join(close)}?" if close else ""

@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from kahanmaps_cli.progress import say
+from kahanmaps_cli.terminal import is_coloured
 
 if TYPE_CHECKING:
     from kahanmaps.experiments.records import Record
@@ -99,10 +100,16 @@ def _bar() -> Any:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     return Progress(
-        BarColumn(bar_width=None),
+        BarColumn(bar_width=None, style="default", complete_style="cyan", finished_style="green"),
         MofNCompleteColumn(),
         TextColumn("{task.fields[text]}", markup=False),
-        console=Console(stderr=True, markup=False, emoji=False, highlight=False),
+        console=Console(
+            stderr=True,
+            markup=False,
+            emoji=False,
+            highlight=False,
+            color_system="standard" if is_coloured(sys.stderr) else None,
+        ),
         transient=True,
         redirect_stdout=False,
         redirect_stderr=False,

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps.errors import counted, suggestion
 from kahanmaps_cli.batch_progress import BatchProgress, duration
 from kahanmaps_cli.batch_show import print_status, status_data
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.signals import interruptible
+from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.experiments.executor import Executor
@@ -27,6 +29,7 @@ _SHOWN = 3  # tasks of each experiment in a dry run
 
 def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
     """Read the spec, and say what it would do."""
+    from kahanmaps.checks.settings import CONVENTION
     from kahanmaps.experiments.spec import MAX_TASKS, read_spec
     from kahanmaps.version import __version__
 
@@ -50,6 +53,7 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
             {
                 "command": "batch run --dry-run",
                 "version": __version__,
+                "convention": CONVENTION,
                 "spec": path,
                 "tasks": sum(experiment.size for experiment in chosen),
                 "missing": missing,
@@ -58,16 +62,16 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
         )
         return 0
     for experiment in chosen:
-        click.echo(f"{experiment.name}\t{experiment.kind.name}\t{_tasks(experiment.size)}\t{experiment.product}")
+        tell(f"{experiment.name}\t{experiment.kind.name}\t{_tasks(experiment.size)}\t{experiment.product}")
         for k in range(min(_SHOWN, experiment.size)):
             task = experiment[k]
             given = {name: value for name, value in task.options.items() if value is not None}
             if "other" in given:
                 given["other"] = _recipe(given["other"])
-            click.echo(f"\t{task.key[:8]}\t{_recipe(task.system)}\t{_pairs(given)}")
+            tell(f"\t{task.key[:8]}\t{_recipe(task.system)}\t{_pairs(given)}")
         if experiment.size > _SHOWN:
-            click.echo(f"\t... and {experiment.size - _SHOWN} more")
-    click.echo(_tasks(sum(e.size for e in chosen)) + ("" if missing is None else f", {missing} of them without result"))
+            tell(f"\t... and {experiment.size - _SHOWN} more")
+    tell(_tasks(sum(e.size for e in chosen)) + ("" if missing is None else f", {missing} of them without result"))
     return 0
 
 
@@ -192,7 +196,6 @@ def _tell_end(
 
 def _require_names(only: tuple[str, ...], spec: Spec) -> None:
     from kahanmaps.errors import InputError
-    from kahanmaps.experiments.options import suggestion
 
     known = [experiment.name for experiment in spec.experiments]
     for name in only:
@@ -216,7 +219,6 @@ def _missing(db: str, spec: Spec, options: Mapping[str, Any]) -> int | None:
 
 
 def _tasks(number: int) -> str:
-    from kahanmaps.maps.orbits import counted
 
     return counted(number, "task")
 

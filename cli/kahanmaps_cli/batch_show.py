@@ -13,13 +13,13 @@ import click
 
 from kahanmaps_cli.batch_progress import duration
 from kahanmaps_cli.progress import printable
-from kahanmaps_cli.render import COLOURS, on_terminal, print_json, shorten
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import on_terminal, print_table, shorten, tell, tell_entry
 
 if TYPE_CHECKING:
     from kahanmaps.experiments.store import Found, Store
 
 _VALUE_WIDTH = 300
-_WORD_WIDTH = 10  # what words keep in a table that is too wide
 
 
 def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
@@ -68,41 +68,18 @@ def print_status(data: Mapping[str, Any]) -> None:
         click.echo(f"{data['unplanned']} more results belong to tasks that no experiment has now")
 
 
-def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
-    """Columns on a terminal, tabs elsewhere; the first `words` columns are texts, the others numbers."""
-    if not on_terminal():
-        for row in rows:
-            click.echo("\t".join(row))
-        return
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    console = Console(markup=False, emoji=False, highlight=False)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    padding = 1 if sum(widths) + 3 * len(widths) < console.width else 0
-    # Where a table is too wide words are broken, and numbers only where that is not enough.
-    least = sum(min(width, _WORD_WIDTH) for width in widths[:words])
-    least += sum(widths[words:]) + (1 + 2 * padding) * len(widths) + 1
-    table = Table(header_style="bold", padding=(0, padding))
-    for k, heading in enumerate(rows[0]):
-        table.add_column(
-            Text(heading, style=COLOURS.get(heading, "")),
-            justify="left" if k < words else "right",
-            overflow="fold",
-            no_wrap=k >= words and least <= console.width,
-        )
-    for row in rows[1:]:
-        table.add_row(*(Text(printable(cell)) for cell in row))
-    console.print(table)
-
-
 def found_data(store: Store, found: Found) -> dict[str, Any]:
     """A task and its record as plain data."""
+    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.version import __version__
+
     task, record, places, attempts = found
     recipes = (task.system, task.options.get("other"))
     digests = [recipe["document"] for recipe in recipes if recipe and "document" in recipe]
     return {
+        "command": "batch show",
+        "version": __version__,
+        "convention": CONVENTION,
         "key": task.key,
         "task": task.kind,
         "system": task.system,
@@ -141,7 +118,7 @@ def print_found(data: Sequence[Mapping[str, Any]]) -> None:
             lines.append(("where", f"{one['host']}, {one['finished']}, {versions}"))
         for name, text in lines:
             text = printable(text)
-            click.echo(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
+            tell(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
 
 
 def print_summary(
@@ -155,12 +132,13 @@ def print_summary(
     only: Sequence[str],
 ) -> None:
     """The tables of a summary."""
+    from kahanmaps.checks.settings import CONVENTION
     from kahanmaps.experiments.summary import summarise
     from kahanmaps.version import __version__
 
     found = summarise(store.rows(list(only) or None, missing=True), by, list(values) or None, stable=stable)
     if as_json:
-        print_json({"command": "batch summary", "version": __version__, **found.to_json()})
+        print_json({"command": "batch summary", "version": __version__, "convention": CONVENTION, **found.to_json()})
     elif as_markdown:
         click.echo(found.markdown(), nl=False)
     elif on_terminal():
@@ -232,25 +210,25 @@ def print_tasks(name: str | None, as_json: bool) -> None:
             }
             for kind in kinds
         ]
-        print_json({"version": __version__, "tasks": data})
+        print_json({"command": "batch tasks", "version": __version__, "tasks": data})
         return
     width = max(len(kind.name) for kind in kinds)
     for kind in kinds:
-        click.echo(f"{kind.name:<{width}}  {kind.summary}")
+        tell_entry(f"{kind.name:<{width}}  ", kind.summary)
     if name is None:
-        click.echo("'kahanmaps batch tasks NAME' has the options of one of them")
+        tell("'kahanmaps batch tasks NAME' has the options of one of them")
         return
     kind = kinds[0]
-    click.echo(f"system: {_NEEDS[kind.needs]}")
+    tell(f"system: {_NEEDS[kind.needs]}")
     for key, option in kind.options.items():
         default = "required" if key in kind.required else f"default {json.dumps(kind.defaults[key])}"
-        click.echo(f"  {key:<12}  {option.help}" + (f" ({default})" if default != "default null" else ""))
+        tell_entry(f"  {key:<12}  ", option.help + (f" ({default})" if default != "default null" else ""))
     if kind.needs is not None:
-        click.echo('with system = "family" also:')
+        tell('with system = "family" also:')
         for key, option in FAMILY.items():
-            click.echo(f"  {key:<12}  {option.help}")
+            tell_entry(f"  {key:<12}  ", option.help)
         if "seed" not in kind.options:
-            click.echo(f"  {'seed':<12}  seed of everything drawn at random (default 0)")
+            tell_entry(f"  {'seed':<12}  ", "seed of everything drawn at random (default 0)")
 
 
 _NEEDS = {

@@ -17,11 +17,13 @@ def draw_options(function: F) -> F:
     """--m, --eigenvalues, --generic, --chi and --size."""
     for option in reversed(
         (
-            click.option("--m", type=int, help="Half the dimension, 1 to 16 (for verify 1 to 8)."),
+            click.option("--m", type=int, metavar="M", help="Half the dimension, 1 to 16 (for verify 1 to 8)."),
             click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
             click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q."),
             click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'."),
-            click.option("--size", type=int, help="Bound for the integer coefficients drawn (default 2 or 1)."),
+            click.option(
+                "--size", type=int, metavar="N", help="Bound for the integer coefficients drawn (default 2 or 1)."
+            ),
         )
     ):
         function = option(function)

@@ -12,47 +12,92 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 import click
 
+from kahanmaps_cli.colour_option import colour_option, with_colour_option
+from kahanmaps_cli.groups import SuggestingGroup, with_hint
 from kahanmaps_cli.progress import say
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 HOLDS, REFUTED, WRONG_USE, UNDECIDED, INTERNAL, INTERRUPTED = 0, 1, 2, 3, 70, 130
 
-# name -> (module in kahanmaps_cli.commands, one line for the list of commands)
-COMMANDS = {
-    "orbit": ("orbit", "Iterate the Kahan map: exactly, modulo a prime, in balls or floats."),
-    "period": ("period", "The exact period of an orbit, modulo a prime or over the rationals."),
-    "ensemble": ("ensemble", "Many orbits at once, in machine numbers or modulo a prime."),
-    "check-commute": ("check_commute", "Do two Kahan maps commute?"),
-    "check-integrals": ("check_integrals", "Are the known or claimed integrals conserved?"),
-    "check-measure": ("check_measure", "Is the measure dx/phi invariant?"),
-    "check-poisson": ("check_poisson", "Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?"),
-    "analyze": ("analyze", "What a Kahan map preserves and how it grows: everything below, as one report."),
-    "degrees": ("degrees", "Degrees of the iterates, their recurrence and the dynamical degree."),
-    "heights": ("heights", "How fast the heights of exact orbits grow."),
-    "find-integrals": ("find_integrals", "Integrals in closed form: Hirota-Kimura bases, Darboux polynomials."),
-    "find-density": ("find_density", "Invariant measures dx/phi with phi polynomial."),
-    "find-symmetry": ("find_symmetry", "Linear symmetries and reversing symmetries of the map."),
-    "find-commuting": ("find_commuting", "The quadratic systems whose Kahan maps commute with this one's."),
-    "singularities": ("singularities", "Are the singularities confined, and after how many steps?"),
-    "cycles": ("cycles", "The orbits of the map on projective space over a finite field."),
-    "lyapunov": ("lyapunov", "Lyapunov exponents of float orbits, by the exact tangent map."),
-    "verify": ("verify", "Every statement of the paper, for a random or given member, any m."),
-    "family": ("family", "Make and look at members of the commuting family."),
-    "plot": ("plot", "Pictures: portraits, invariant curves, drift, growth, batches."),
-    "report": ("report", "A page about a system, a member or a batch: one HTML file, pictures inside."),
-    "convert": ("convert", "A system, its map or its integrals as LaTeX, SymPy, PARI/GP, Maple, ..."),
-    "batch": ("batch", "Thousands of experiments from one file: run, resume, summarise."),
-    "systems": ("systems", "The catalogue of named systems."),
-    "schema": ("schema", "JSON schemas of files and of what --json prints."),
-    "completion": ("completion", "Completion of commands, systems and options for your shell."),
-    "manual": ("manual", "The manual page, for man."),
-    "version": ("version", "The versions of kahanmaps and of what it computes with."),
+COMPLETION = "_KAHANMAPS_COMPLETE"  # set by the shell that asks what may follow
+
+# heading -> name -> (module in kahanmaps_cli.commands, one line for the list of commands)
+SECTIONS = {
+    "Maps and orbits": {
+        "systems": ("systems", "The catalogue of named systems."),
+        "orbit": ("orbit", "Iterate the map: exactly, modulo p, in balls or floats."),
+        "period": ("period", "The exact period of an orbit, modulo p or over Q."),
+        "ensemble": ("ensemble", "Many orbits at once, in machine numbers or modulo p."),
+    },
+    "Checks": {
+        "check-commute": ("check_commute", "Do two Kahan maps commute?"),
+        "check-integrals": ("check_integrals", "Are the known or claimed integrals conserved?"),
+        "check-measure": ("check_measure", "Is the measure dx/phi invariant?"),
+        "check-poisson": ("check_poisson", "Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?"),
+    },
+    "Laboratory": {
+        "analyze": ("analyze", "What a map preserves, how it grows: all of it, a verdict."),
+        "degrees": ("degrees", "Degrees of the iterates, recurrence, dynamical degree."),
+        "heights": ("heights", "How fast the heights of exact orbits grow."),
+        "find-integrals": ("find_integrals", "Integrals in closed form, with their proofs."),
+        "find-density": ("find_density", "Invariant measures dx/phi with phi polynomial."),
+        "find-symmetry": ("find_symmetry", "Linear symmetries and reversing symmetries of the map."),
+        "find-commuting": ("find_commuting", "All quadratic systems whose maps commute with this one."),
+        "singularities": ("singularities", "Are the singularities confined, and after how many steps?"),
+        "cycles": ("cycles", "The cycles of the map over a finite field."),
+        "lyapunov": ("lyapunov", "Lyapunov exponents of float orbits."),
+    },
+    "The paper's family": {
+        "verify": ("verify", "Every statement of the paper, for a member with any m."),
+        "family": ("family", "Make and look at members of the commuting family."),
+    },
+    "Many experiments": {
+        "batch": ("batch", "Thousands of experiments: run, resume, summarise."),
+    },
+    "Pictures and pages": {
+        "plot": ("plot", "Pictures: portraits, invariant curves, drift, growth."),
+        "report": ("report", "A page about a system, member or batch: one HTML file."),
+        "convert": ("convert", "LaTeX, SymPy, PARI/GP, Maple, ... of a system, its map."),
+    },
+    "About": {
+        "schema": ("schema", "JSON schemas of files and of what --json prints."),
+        "completion": ("completion", "Completion of commands, systems and options for your shell."),
+        "manual": ("manual", "The manual page, for man."),
+        "version": ("version", "The versions of kahanmaps and of what it computes with."),
+    },
 }
+COMMANDS = {name: entry for commands in SECTIONS.values() for name, entry in commands.items()}
+
+WELCOME = """\
+What does the Kahan map of a system preserve, and is it integrable?
+
+  a system of the catalogue, from its equations to a verdict:
+    kahanmaps systems
+    kahanmaps analyze euler_top
+
+  a system of your own, on the line, or in a file like the one written here:
+    kahanmaps analyze --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)'
+    kahanmaps systems euler_top --toml > my-top.toml
+
+  the theorem of the paper, on a random member of its commuting family:
+    kahanmaps family new --m 3 --seed 7 -o pair.toml
+    kahanmaps check-commute pair.toml
+
+  help:
+    kahanmaps --help              all commands
+    kahanmaps COMMAND --help      one of them, examples first
+    kahanmaps manual | man -l -   the manual page
+
+eps is the paper's epsilon throughout: the time step is 2 eps."""
 
 
-class LazyGroup(click.Group):
+class LazyGroup(SuggestingGroup):
     """A group that imports a command only when it is needed, so that --help stays light."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -63,40 +108,53 @@ class LazyGroup(click.Group):
             return None
         module = import_module(f"kahanmaps_cli.commands.{COMMANDS[cmd_name][0]}")
         command: click.Command = module.command
-        return command
+        return with_colour_option(command)
 
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
-            from difflib import get_close_matches
+    def hint(self, written: str, known: list[str]) -> str:
+        from kahanmaps.systems.catalog import names
 
-            close = get_close_matches(args[0], COMMANDS, n=3, cutoff=0.5)
-            hint = f" Did you mean {' or '.join(close)}?" if close else ""
-            raise click.UsageError(f"There is no command {args[0]!r}.{hint}", ctx)
-        return super().resolve_command(ctx, args)
+        if written in names() or written.endswith(".toml"):
+            return f" To see what the map of {written} preserves: kahanmaps analyze {written}"
+        return super().hint(written, known)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        from click.shell_completion import CompletionItem
+
+        if incomplete.startswith("-"):
+            return super().shell_complete(ctx, incomplete)
+        return [CompletionItem(name, help=line) for name, (_, line) in COMMANDS.items() if name.startswith(incomplete)]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
+        width = max(map(len, COMMANDS))
+        for heading, commands in SECTIONS.items():
+            with formatter.section(heading):
+                formatter.write_dl([(name.ljust(width), line) for name, (_, line) in commands.items()])
 
 
-@click.group(cls=LazyGroup, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=LazyGroup,
+    params=[colour_option()],
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.option("--version", "show_version", is_flag=True, help="Print the version and exit.")
 @click.pass_context
 def cli(ctx: click.Context, show_version: bool) -> None:
     """Kahan (Hirota-Kimura) maps of quadratic systems, exactly over the rationals: what do they preserve, do they
     commute, are they integrable?
 
-    eps is the paper's epsilon throughout: the time step is 2 eps.
-
     \b
-    First steps:
+      kahanmaps systems
+      kahanmaps analyze euler_top
+      kahanmaps orbit lotka_volterra --start 1,2 --eps 1/10 --steps 5
       kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
       kahanmaps check-commute pair.toml
-      kahanmaps check-integrals pair.toml
-      kahanmaps orbit pair.toml --start 1/2,-1/3,0,1,2/5,-1 --eps 1/10 --steps 5
-      kahanmaps systems
+
+    eps is the paper's epsilon throughout: the time step is 2 eps. Every command has a help of its own, examples
+    first: kahanmaps COMMAND --help.
+
+    Exit status: 0 done, or the claim holds, 1 refuted, 2 wrong use, 3 undecided or stopped early, 70 an internal
+    error, 130 interrupted.
     """
     if show_version:
         from kahanmaps.version import __version__
@@ -104,7 +162,7 @@ def cli(ctx: click.Context, show_version: bool) -> None:
         click.echo(f"kahanmaps {__version__}")
         ctx.exit()
     elif ctx.invoked_subcommand is None:
-        click.echo(ctx.get_help())
+        click.echo(WELCOME)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -126,7 +184,7 @@ def _run(argv: Sequence[str] | None) -> int:
         return stop.exit_code
     except click.ClickException as error:
         with suppress(OSError):
-            error.show(sys.stderr)
+            with_hint(error).show(sys.stderr)
         return WRONG_USE
     except (click.Abort, KeyboardInterrupt):
         say("interrupted")
@@ -134,7 +192,7 @@ def _run(argv: Sequence[str] | None) -> int:
     except (BrokenPipeError, SystemExit):  # click turns the one into the other
         pass  # the reader (head, say) has what it wanted
     except Exception as error:
-        return _report(error)
+        return INTERNAL if os.environ.get(COMPLETION) else _report(error)  # no traceback in the middle of a line
     return status
 
 
@@ -150,7 +208,7 @@ def _report(error: Exception) -> int:
         return WRONG_USE if isinstance(error, InputError) else UNDECIDED
     if isinstance(error, OSError):
         where = f": {error.filename or repr('')}" if error.filename is not None else ""
-        say(f"Error: {error.strerror or error}{where}")
+        say(f"Error: {error.strerror or error}{where}{_missing_folder(error)}")
         return WRONG_USE
     if isinstance(error, MemoryError):
         say("Error: out of memory: ask for fewer steps or a smaller --max-digits")
@@ -160,6 +218,13 @@ def _report(error: Exception) -> int:
         "This is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened."
     )
     return INTERNAL
+
+
+def _missing_folder(error: OSError) -> str:
+    """A hint, where a file cannot be made because its folder is not there."""
+    folder = os.path.dirname(error.filename) if isinstance(error.filename, str) else ""
+    is_missing = isinstance(error, FileNotFoundError) and bool(folder) and not os.path.isdir(folder)
+    return f" (there is no folder {folder}: make it first, or check the name)" if is_missing else ""
 
 
 def _leave_nothing_to_flush() -> None:

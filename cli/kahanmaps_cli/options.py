@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from kahanmaps_cli.params import ExactNumber, NameValue, PointText
+from kahanmaps_cli.complete import complete_parameter, complete_symbols, complete_system
+from kahanmaps_cli.groups import close_to
+from kahanmaps_cli.params import ExactNumber, NameValue, PointText, Seconds, Whole
 
 if TYPE_CHECKING:
     from kahanmaps.checks.settings import Settings
@@ -27,48 +30,141 @@ def _stack(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     return apply
 
 
-def _inline_options(parameter: NameValue, help_text: str) -> Callable[[F], F]:
-    return _stack(
-        click.option("--vars", "variables", metavar="X,Y,...", help="Inline system: its variables."),
-        click.option("--rhs", multiple=True, metavar="EXPR", help="Inline system: one right-hand side a variable."),
-        click.option("-p", "--parameter", "parameters", type=parameter, multiple=True, help=help_text),
+class Renamed(click.Option):
+    """An option whose help shows its first name only: the others are old ones, which scripts may use."""
+
+    old_names = True
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        names, self.opts = self.opts, self.opts[:1]
+        try:
+            return super().get_help_record(ctx)
+        finally:
+            self.opts = names
+
+    def get_error_hint(self, ctx: click.Context | None) -> str:
+        return f"'{self.opts[0]}'"
+
+
+system_argument: Callable[[F], F] = click.argument("system", required=False, shell_complete=complete_system)
+
+
+def _parameter_option(kind: NameValue, help_text: str) -> Callable[[F], F]:
+    return click.option(
+        "-p",
+        "--parameter",
+        "parameters",
+        type=kind,
+        multiple=True,
+        metavar="NAME=VALUE",
+        help=help_text,
+        shell_complete=complete_parameter,
     )
 
 
-inline_options: Callable[[F], F] = _inline_options(NameValue(), "Set a parameter of the system.")
+def _inline_options(parameter: Callable[[F], F]) -> Callable[[F], F]:
+    return _stack(
+        click.option("--vars", "variables", metavar="X,Y,...", help="Inline system: its variables."),
+        click.option("--rhs", multiple=True, metavar="EXPR", help="Inline system: one right-hand side a variable."),
+        parameter,
+    )
 
-system_options: Callable[[F], F] = _stack(click.argument("system", required=False), inline_options)
+
+parameter_option: Callable[[F], F] = _parameter_option(NameValue(), "Set a parameter of the system.")
+
+inline_options: Callable[[F], F] = _inline_options(parameter_option)
+
+system_options: Callable[[F], F] = _stack(system_argument, inline_options)
 
 # For commands about one prime, where -p 101 is natural: values without a name come under the name "".
 system_or_prime_options: Callable[[F], F] = _stack(
-    click.argument("system", required=False),
-    _inline_options(NameValue(name_is_optional=True), "Set a parameter NAME=VALUE; a number alone is the prime."),
+    system_argument,
+    _inline_options(
+        _parameter_option(
+            NameValue(name_is_optional=True), "Set a parameter of the system; a number alone is the prime."
+        )
+    ),
 )
+
+_EPS_HELP = "The paper's epsilon, exact; the time step is 2 eps."
+_TIME_STEP_HELP = "The time step h = 2 eps, instead of --eps."
 
 eps_options: Callable[[F], F] = _stack(
-    click.option("--eps", type=ExactNumber(), help="The paper's epsilon, exact; the time step is 2 eps."),
-    click.option("--time-step", type=ExactNumber(), help="The time step h = 2 eps, instead of --eps."),
+    click.option("--eps", type=ExactNumber(), metavar="E", help=_EPS_HELP),
+    click.option("--time-step", type=ExactNumber(), metavar="H", help=_TIME_STEP_HELP),
 )
 
-output_options: Callable[[F], F] = _stack(
-    click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output."),
-    click.option("-q", "--quiet", is_flag=True, help="No progress and no talk on standard error."),
+several_eps_options: Callable[[F], F] = _stack(
+    click.option("--eps", type=ExactNumber(), multiple=True, metavar="E", help=f"{_EPS_HELP} Repeatable."),
+    click.option("--time-step", type=ExactNumber(), multiple=True, metavar="H", help=f"{_TIME_STEP_HELP} Repeatable."),
+)
+
+json_option: Callable[[F], F] = click.option(
+    "--json", "as_json", is_flag=True, help="One JSON object on standard output."
+)
+quiet_option: Callable[[F], F] = click.option(
+    "-q", "--quiet", is_flag=True, help="No progress and no talk on standard error."
+)
+output_options: Callable[[F], F] = _stack(json_option, quiet_option)
+
+seed_option: Callable[[F], F] = click.option(
+    "--seed", type=Whole(), metavar="S", default=0, show_default=True, help="Seed of everything drawn at random."
+)
+
+random_starts_options: Callable[[F], F] = _stack(
+    click.option(
+        "--starts",
+        type=click.Path(),
+        metavar="FILE",
+        help="One point a line (text, csv) or a row (.npy); - standard input.",
+    ),
+    click.option("--random", "count", type=Whole(1), metavar="N", help="Instead: N starts drawn at random."),
+    click.option("--box", type=ExactNumber(), metavar="R", help="... with coordinates from -R to R (default 1)."),
+    click.option("--seed", type=Whole(), metavar="S", help="... with this seed (default 0)."),
+)
+
+symbolic_option: Callable[[F], F] = click.option(
+    "--symbolic",
+    metavar="NAMES",
+    help="Parameters that formulas are to contain, e.g. a1,a2 (eps is one).",
+    shell_complete=complete_symbols,
+)
+
+backward_option: Callable[[F], F] = click.option(
+    "--backward", is_flag=True, help="Step by the inverse map, Phi(., -eps)."
+)
+
+
+def seconds_option(default: float | None, help_text: str) -> Callable[[F], F]:
+    """--seconds T; None where the default depends on the system, and `help_text` says how."""
+    return click.option(
+        "--seconds", type=Seconds(), metavar="T", default=default, show_default=default is not None, help=help_text
+    )
+
+
+def error_bits_option(help_text: str) -> Callable[[F], F]:
+    """--error-bits BITS."""
+    return click.option("--error-bits", type=int, metavar="BITS", default=100, show_default=True, help=help_text)
+
+
+evidence_options: Callable[[F], F] = _stack(
+    seed_option,
+    error_bits_option("Random points until the probability of error is below 2^-BITS."),
+)
+
+verbose_option: Callable[[F], F] = click.option(
+    "-v", "--verbose", is_flag=True, help="On a terminal: all evidence (a pipe always gets it)."
 )
 
 check_options: Callable[[F], F] = _stack(
     eps_options,
-    click.option("--start", type=PointText(), help="Start of the exact orbit that is tried (default: a random one)."),
-    click.option("--steps", type=int, help="Steps of that orbit (default 10)."),
-    click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random."),
     click.option(
-        "--error-bits",
-        type=int,
-        default=100,
-        show_default=True,
-        help="Random points until the probability of error is below 2^-BITS.",
+        "--start", type=PointText(), metavar="X", help="Start of the exact orbit that is tried (default: a random one)."
     ),
-    click.option("--max-digits", type=int, help="Digit budget of that orbit (default: by dimension)."),
-    click.option("-v", "--verbose", is_flag=True, help="On a terminal: all evidence (a pipe always gets it)."),
+    click.option("--steps", type=int, metavar="N", help="Steps of that orbit (default 10)."),
+    evidence_options,
+    click.option("--max-digits", type=int, metavar="N", help="Digit budget of that orbit (default: by dimension)."),
+    verbose_option,
     output_options,
 )
 
@@ -89,7 +185,6 @@ def load_system(
 ) -> SystemFile:
     """The system that a command line names: a path, a catalogue name, `-` for standard input, or an inline system."""
     from kahanmaps.errors import InputError
-    from kahanmaps.systems.catalog import load
     from kahanmaps.systems.files import MAX_FILE_BYTES, parse_system
 
     given = dict(parameters)
@@ -112,7 +207,34 @@ def load_system(
         if not text.strip():
             raise InputError("found nothing on standard input, expected a system file")
         return parse_system(text, "standard input", given)
-    return load(reference, given)
+    return load_reference(reference, given)
+
+
+def load_reference(reference: str, parameters: Mapping[str, str]) -> SystemFile:
+    """The system of that name or in that file; where there is no such file, those that are named like it are told."""
+    from kahanmaps.errors import InputError
+    from kahanmaps.systems.catalog import load
+
+    try:
+        return load(reference, parameters)
+    except InputError as error:
+        looks_like_a_path = reference.endswith(".toml") or os.sep in reference
+        if not looks_like_a_path or os.path.lexists(reference):
+            raise
+        raise InputError(f"{error}{_files_like(reference)}") from error
+
+
+def _files_like(path: str) -> str:
+    """A hint at system files that are named like the one that is not there."""
+    folder, name = os.path.split(path)
+    try:
+        here = sorted(other.removesuffix(".toml") for other in os.listdir(folder or ".") if other.endswith(".toml"))
+    except OSError:
+        return f" (there is no folder {folder})"
+    close = close_to(name.removesuffix(".toml"), here)
+    if close:
+        return f", did you mean {' or '.join(os.path.join(folder, f'{other}.toml') for other in close)}?"
+    return ""
 
 
 def _inline_file(variables: Sequence[str], rhs: Sequence[str], parameters: Mapping[str, str]) -> str:

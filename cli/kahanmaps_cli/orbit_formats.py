@@ -11,8 +11,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import IO, Any
 
+from kahanmaps_cli.render import ending
+from kahanmaps_cli.terminal import tell
+
 # An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
 MAX_PADDED_BYTES = 512_000_000
+_NARROWEST = 9  # a column of numbers with the middle left out
 
 
 class OutputFull(Exception):
@@ -86,33 +90,58 @@ class Csv(Writer):
 
 
 class Text(Writer):
-    """Tab-separated columns; on a terminal long numbers are shortened and columns aligned."""
+    """Tab-separated columns; on a terminal of that many columns numbers are shortened so that a row fits a line.
+
+    Where that leaves too little of them a point takes a line for each coordinate.
+    """
 
     def __init__(self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str], width: int | None) -> None:
         super().__init__(stream, columns, integrals)
-        self._cell = None if width is None else max(9, (width - 8) // max(1, len(columns) + len(integrals)) - 2)
+        self._width = width
+        self._first = 6
+        self._cell = 0  # no table
 
     def header(self, header: dict[str, Any]) -> None:
-        self._line(
+        names = [*self.columns, *self.integrals]
+        title = (
             f"# {header['system']}, eps = {header['eps']} (time step 2 eps = {header['time_step']}), "
             f"{header['arithmetic']} arithmetic"
             + (f" ({header['kernel']})" if "kernel" in header else "")
             + (", backward" if header["direction"] == "backward" else "")
         )
-        self._row("step", [*self.columns, *self.integrals])
+        if self._width is None:
+            self._line(title)
+            self._line("\t".join(["step", *names]))
+            return
+        tell(title)
+        self._first = max(6, len(str(header["steps"])))
+        cell = (self._width - self._first) // len(names) - 2
+        if cell >= _NARROWEST:
+            self._cell = cell
+            self._line("step".rjust(self._first) + self._row(names))
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
-        self._row(str(step), [*x, *("pole" if value is None else value for value in values)])
+        cells = [*x, *("pole" if value is None else value for value in values)]
+        if self._width is None:
+            self._line("\t".join([str(step), *cells]))
+        elif self._cell:
+            self._line(str(step).rjust(self._first) + self._row(cells))
+        else:
+            self._line(f"step {step}")
+            for name, cell in zip((*self.columns, *self.integrals), cells, strict=True):
+                room = max(_NARROWEST, self._width - len(name) - 5)
+                self._line(f"  {name} = {_elided(cell, room)}")
 
     def end(self, end: dict[str, Any]) -> None:
-        self._line(f"# {end['status']}: {end['message']}")
+        last = f"# {ending(end['status'], end['message'])}"
+        if self._width is None:
+            self._line(last)
+        else:
+            tell(last)
         self.stream.flush()
 
-    def _row(self, first: str, cells: Sequence[str]) -> None:
-        if self._cell is None:
-            self._line("\t".join([first, *cells]))
-        else:
-            self._line(first.rjust(6) + "".join("  " + _elided(cell, self._cell).rjust(self._cell) for cell in cells))
+    def _row(self, cells: Sequence[str]) -> str:
+        return "".join("  " + _elided(cell, self._cell).rjust(self._cell) for cell in cells)
 
 
 class Npz(Writer):

@@ -1,7 +1,8 @@
-"""Kinds of option values: exact numbers, points, names with values, kinds of arithmetic."""
+"""Kinds of option values: exact numbers, points, times, names with values, kinds of arithmetic."""
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -44,6 +45,38 @@ class PointText(OptionType):
             return parse_point(value)
         except InputError as error:
             self.fail(str(error), param, ctx)
+
+
+class Whole(OptionType):
+    """An integer that is at least `least`."""
+
+    name = "integer"
+
+    def __init__(self, least: int = 0) -> None:
+        self.least = least
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        text = str(value).strip()
+        digits = text.removeprefix("-").removeprefix("+")
+        # Longer ones are refused before they meet Python's own limit on digits.
+        if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= self.least):
+            self.fail(f"found {_shorten(text)}, expected an integer, {self.least} or more", param, ctx)
+        return int(text)
+
+
+class Seconds(OptionType):
+    """A time above 0."""
+
+    name = "seconds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            seconds = float(value)
+        except ValueError:
+            seconds = 0.0
+        if not (isfinite(seconds) and seconds > 0):
+            self.fail(f"found {_shorten(str(value))}, expected a number of seconds above 0", param, ctx)
+        return seconds
 
 
 class NameValue(OptionType):

@@ -6,6 +6,7 @@ has to listen: a standard error that cannot be written to changes neither the wo
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from contextlib import suppress
@@ -41,8 +42,9 @@ class Progress:
         self._last = now
         text = f"{sentence} ({now - self._start:.0f} s)"
         if self._terminal:
-            _write("\r" + text[:79].ljust(self._shown))
-            self._shown = len(text[:79])
+            text = text[: _width() - 1]
+            _write("\r" + text.ljust(self._shown))
+            self._shown = len(text)
         else:
             _write(text + "\n")
 
@@ -54,6 +56,14 @@ class Progress:
     ) -> None:
         if self._shown:
             _write("\r" + " " * self._shown + "\r")
+
+
+def _width() -> int:
+    """Columns of the terminal below standard error: a longer line could not be drawn again."""
+    try:
+        return max(20, os.get_terminal_size(sys.stderr.fileno()).columns)
+    except (OSError, ValueError):
+        return 80
 
 
 def _write(text: str) -> None:

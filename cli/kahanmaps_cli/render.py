@@ -41,6 +41,11 @@ def print_report(report: Report, as_json: bool, verbose: bool = False, quiet: bo
     return status
 
 
+def ending(status: str, message: str) -> str:
+    """How something ended, in a sentence that says it once."""
+    return message if message.startswith(status) else f"{status}: {message}"
+
+
 def exit_status(report: Report) -> int:
     """0 holds, 1 refuted, 3 undecided, or an orbit that was asked for and ended early."""
     from kahanmaps.checks.claims import Verdict

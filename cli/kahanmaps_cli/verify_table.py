@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.render import COLOURS, exit_status, headline, on_terminal, print_report, shorten, witness_lines
+from kahanmaps_cli.render import exit_status, headline, print_report, verdict_style, witness_lines
+from kahanmaps_cli.terminal import NARROW, NUMBER_WIDTH, columns, console, on_terminal, shorten, tell
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -49,7 +50,7 @@ def print_verification(report: Report, as_json: bool, as_markdown: bool, verbose
     if as_json or not on_terminal():
         return print_report(report, as_json, verbose, quiet)
     with suppress(BrokenPipeError):
-        _print_tables(report, verbose)
+        _print_terminal(report, verbose)
     return exit_status(report)
 
 
@@ -74,12 +75,8 @@ def markdown(report: Report) -> str:
     return "\n".join([*lines, "", f"Verdict: {report.verdict} ({_count(report)})"])
 
 
-def _print_tables(report: Report, verbose: bool) -> None:
-    from rich.console import Console
-    from rich.text import Text
-
-    console = Console(markup=False, emoji=False, highlight=False)
-    console.print(Text(headline(report), style="bold"))
+def _print_terminal(report: Report, verbose: bool) -> None:
+    tell(headline(report), style="bold")
     by_section: dict[tuple[int, str], list[Finding]] = {}
     others = []
     for finding in report.findings:
@@ -88,22 +85,48 @@ def _print_tables(report: Report, verbose: bool) -> None:
             by_section.setdefault(key, []).append(finding)
         else:
             others.append(finding)
+    controls = bool(report.context.get("controls"))
     for (number, title), findings in by_section.items():
         name = title if number == 10 else f"Section {number}. {title}"
-        console.print(_table(name, findings, verbose, bool(report.context.get("controls"))))
+        if columns() < NARROW:
+            _print_list(name, findings, verbose, controls)
+        else:
+            console().print(_table(name, findings, verbose, controls))
     for finding in others:
-        console.print(Text(f"{finding.claim}: {finding.evidence.summary}"))
+        tell(f"{finding.claim}: {finding.evidence.summary}")
     for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
         if method in _LEGEND:
-            console.print(Text(_LEGEND[method], style="dim"))
+            tell(_LEGEND[method])
     for line in _below(report):
-        console.print(Text(line))
+        tell(line)
     for note in report.notes:
-        console.print(Text(f"note: {note}"))
-    last = Text("verdict: ")
-    last.append(str(report.verdict), style=f"bold {COLOURS[str(report.verdict)]}")
-    last.append(f" ({_count(report)})")
-    console.print(last)
+        tell(f"note: {note}")
+    tell(f"verdict\t{report.verdict}\t({_count(report)})", 9)
+
+
+def _rows(finding: Finding, verbose: bool) -> list[str]:
+    """What is said of a finding, its formula first."""
+    lines = [finding.formula or finding.claim]
+    misprint = finding.place.get("misprint")
+    if misprint:
+        lines.append(f"misprint: {misprint}")
+    if verbose:
+        lines.append(finding.claim.split(": ", 1)[-1])
+        lines += [f"{evidence.method}: {evidence.summary}" for evidence in (finding.evidence, *finding.also)]
+    shows = finding.witness is not None and (verbose or not finding.control)
+    if shows and finding.witness is not None:
+        lines += witness_lines(finding.witness, NUMBER_WIDTH)
+    return lines
+
+
+def _print_list(name: str, findings: list[Finding], verbose: bool, controls: bool) -> None:
+    """One statement below the other, where there is no room for a table."""
+    tell(f"\n{name}", style="bold")
+    for finding in findings:
+        printed = ", as printed" if finding.place.get("misprint") else ""
+        tell(f"{finding.verdict}\t{finding.place['place']}{printed} ({_decided(finding, controls)})")
+        for line in _rows(finding, verbose):
+            tell(f"\t{line}")
 
 
 def _table(name: str, findings: list[Finding], verbose: bool, controls: bool) -> Table:
@@ -119,25 +142,20 @@ def _table(name: str, findings: list[Finding], verbose: bool, controls: bool) ->
     table.add_column("broken" if controls else "how", overflow="fold", min_width=11, max_width=24 if controls else 14)
     table.add_column("verdict", no_wrap=True)
     for finding in findings:
-        style = COLOURS[str(finding.verdict)] if finding.is_as_expected else "yellow"
-        if finding.is_as_expected and finding.control:
-            style = "magenta"
-        formula = Text(finding.formula or finding.claim)
-        misprint = finding.place.get("misprint")
-        if misprint:
-            formula.append(f"\nmisprint: {misprint}", style="dim")
-        if verbose:
-            formula.append("\n" + finding.claim.split(": ", 1)[-1], style="italic")
-            for evidence in (finding.evidence, *finding.also):
-                formula.append(f"\n{evidence.method}: {evidence.summary}", style="dim")
-        shows = finding.witness is not None and (verbose or not finding.control)
-        if shows and finding.witness is not None:
-            for line in witness_lines(finding.witness, 40):
-                formula.append("\n" + line, style="dim")
-        how = finding.place["broken"] if controls and "broken" in finding.place else _how(finding.evidence)
-        verdict = f"{finding.verdict}\nas printed" if misprint else str(finding.verdict)
-        table.add_row(finding.place["place"], formula, how, Text(verdict, style=style))
+        formula, *more = _rows(finding, verbose)
+        verdict = f"{finding.verdict}\nas printed" if finding.place.get("misprint") else str(finding.verdict)
+        table.add_row(
+            finding.place["place"],
+            Text("\n  ".join([formula, *more])),
+            _decided(finding, controls),
+            Text(verdict, style=verdict_style(finding)),
+        )
     return table
+
+
+def _decided(finding: Finding, controls: bool) -> str:
+    """Which hypothesis was broken, or what kind of evidence decided."""
+    return str(finding.place["broken"]) if controls and "broken" in finding.place else _how(finding.evidence)
 
 
 def _how(evidence: Evidence) -> str:

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
-from kahanmaps.algebra.reading import reading_order
-from kahanmaps.errors import InputError
+from kahanmaps.algebra.reading import first_terms, reading_order
+from kahanmaps.errors import InputError, counted
 
 # TeX has no commands for the letters that look Latin, such as omicron and capital Alpha.
 GREEK_NAMES = (
@@ -100,6 +100,35 @@ def latex_rational_function(function: RationalFunction) -> str:
         factor = -factor
     above, below = function.numerator * factor, function.denominator * factor
     return rf"\frac{{{latex_polynomial(above)}}}{{{latex_polynomial(below)}}}"
+
+
+def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
+    r"""A polynomial as LaTeX; only its beginning and the number of its terms where it takes more characters, about.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> print(latex_cut(parse_polynomial("(x + 1)^9", ["x"]), 20))
+    x^9 + 9 x^8 + \cdots\ \text{(10 terms)}
+    """
+    shown = first_terms(polynomial, characters)
+    if len(shown) == len(polynomial):
+        return latex_polynomial(polynomial)
+    terms = counted(len(polynomial), "term")
+    if len(shown) == 0:
+        return rf"\text{{({terms}, not shown)}}"
+    return rf"{latex_polynomial(shown)} + \cdots\ \text{{({terms})}}"
+
+
+def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:
+    r"""Equations left = right, both LaTeX, one below the other, for a notebook; at most so many, and then dots.
+
+    >>> print(latex_aligned([("x", "1"), ("y", "2")]))
+    $\displaystyle \begin{aligned} x &= 1 \\ y &= 2 \end{aligned}$
+    """
+    rows = [f"{left} &= {right}" for left, right in equations[:most]]
+    if len(equations) > most:
+        rows.append(rf"&\ \vdots\ \text{{({len(equations)} equations)}}")
+    inside = r" \\ ".join(rows)
+    return rf"$\displaystyle \begin{{aligned}} {inside} \end{{aligned}}$"
 
 
 def _term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:

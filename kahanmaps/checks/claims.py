@@ -13,8 +13,10 @@ from dataclasses import field as field_of
 from enum import StrEnum
 from typing import Any
 
+from kahanmaps.checks.shown import ShownAsWord, finding_html, report_html
 
-class Verdict(StrEnum):
+
+class Verdict(ShownAsWord, StrEnum):
     """How much is known of a claim."""
 
     PROVED = "proved"
@@ -88,6 +90,9 @@ class Finding:
         """Whether a control was refuted; true for everything that is not a control."""
         return not self.control or self.verdict is Verdict.REFUTED
 
+    def _repr_html_(self) -> str:
+        return finding_html(self)
+
     def to_json(self) -> dict[str, Any]:
         plain: dict[str, Any] = {
             **self.place,
@@ -129,6 +134,9 @@ class Report:
     def holds(self) -> bool | None:
         """Whether everything claimed holds; None where that is undecided."""
         return self.verdict.holds
+
+    def _repr_html_(self) -> str:
+        return report_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """The report as plain data, the shape that scripts rely on."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, suggestion
 from kahanmaps.experiments.experiment import PARAMETERS, Experiment
 from kahanmaps.experiments.experiment_systems import ExperimentSystems
 from kahanmaps.experiments.grid import Grid, Values, read_values
-from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of, show, suggestion
+from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of, show
 from kahanmaps.experiments.records import Limits
 from kahanmaps.experiments.registry import MEMBER_OR_OTHER, TaskKind, task_kind
 from kahanmaps.experiments.shape import read_memory, read_time

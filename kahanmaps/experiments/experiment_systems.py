@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, suggestion
 from kahanmaps.experiments.grid import Values
-from kahanmaps.experiments.options import OTHER, show, suggestion
+from kahanmaps.experiments.options import OTHER, show
 from kahanmaps.experiments.recipes import find_file, recipe_of
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind
 from kahanmaps.experiments.spec_document import ExperimentTable

@@ -16,7 +16,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, RR, rational
 from kahanmaps.algebra.text import format_number, format_point, format_univariate, parse_number, parse_point
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, suggestion
 from kahanmaps.family.draw import MAX_M, parse_chi
 
 _LARGEST = 2**63 - 1
@@ -169,14 +169,6 @@ def show(value: Any, width: int = 60) -> str:
     except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
         return "a value too large to show"
     return found if len(found) <= width else f"{found[: width - 20]}...{found[-15:]}"
-
-
-def suggestion(value: Any, known: Sequence[str]) -> str:
-    """A hint at what was probably meant, or nothing."""
-    from difflib import get_close_matches
-
-    close = get_close_matches(value, known, n=2, cutoff=0.6) if isinstance(value, str) else []
-    return f"; did you mean {' or '.join(close)}?" if close else ""
 
 
 def number_of(value: Any) -> fmpq:

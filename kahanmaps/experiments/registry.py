@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from kahanmaps.errors import InputError
-from kahanmaps.experiments.options import OTHER, VOCABULARY, Option, suggestion
+from kahanmaps.errors import InputError, suggestion
+from kahanmaps.experiments.options import OTHER, VOCABULARY, Option
 
 ENVIRONMENT = "KAHANMAPS_TASKS"
 LIBRARY = tuple(f"kahanmaps.experiments.{name}" for name in ("tasks", "laboratory_tasks", "dynamics_tasks"))

@@ -41,6 +41,7 @@ from kahanmaps.experiments.plans import (
 from kahanmaps.experiments.records import KEY_LENGTH, Job, Limits, Outcome, Record, Row, Task
 from kahanmaps.experiments.results import RECORD, RESULT_CHUNK, find_result, put_result, record_of, row_of
 from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT
+from kahanmaps.experiments.shown import store_html
 
 __all__ = [
     "APPLICATION_ID",
@@ -128,6 +129,9 @@ class Store:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()
+
+    def _repr_html_(self) -> str:
+        return store_html(self)
 
     # Experiments and their plans
 

@@ -20,6 +20,7 @@ from typing import Any
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.export import NUMBER, Entry, entries, plain
 from kahanmaps.experiments.records import Outcome, Row, canonical
+from kahanmaps.experiments.shown import summary_html
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
 VERDICTS = ("proved", "supported", "refuted", "undecided")
@@ -93,6 +94,9 @@ class Summary:
 
     by: tuple[str, ...]
     groups: tuple[Group, ...]
+
+    def _repr_html_(self) -> str:
+        return summary_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """The summary as plain data: numbers as they were, all quantiles, all outcomes and verdicts."""

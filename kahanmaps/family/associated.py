@@ -17,6 +17,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 from kahanmaps.algebra.polynomials import names_of
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.cubics import chain
+from kahanmaps.family.shown import associated_html, member_html
 from kahanmaps.family.skew_hamiltonian import (
     Factor,
     evaluate_at_matrix,
@@ -50,6 +51,9 @@ class AssociatedSystem:
     def label(self) -> str:
         """The signs as text, `++-`."""
         return "".join("+" if sign > 0 else "-" for sign in self.signs)
+
+    def _repr_html_(self) -> str:
+        return associated_html(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +143,9 @@ class FamilyMember:
     def chosen(self) -> AssociatedSystem:
         """The associated system that `signs` picks."""
         return self.associate(self.signs)
+
+    def _repr_html_(self) -> str:
+        return member_html(self)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FamilyMember):

@@ -30,6 +30,7 @@ from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.errors import HypothesisError, InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import third_derivatives
+from kahanmaps.family.shown import normal_form_html
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.family.skew_hamiltonian import format_univariate
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -98,6 +99,9 @@ class NormalForm:
 
     def __post_init__(self) -> None:
         self.verify()
+
+    def _repr_html_(self) -> str:
+        return normal_form_html(self)
 
     @property
     def dim(self) -> int:

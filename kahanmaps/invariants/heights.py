@@ -40,12 +40,12 @@ from itertools import pairwise
 from typing import Any
 
 from kahanmaps.algebra.fields import QQ, rational
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.methods import choose_method
-from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, counted, require_steps
+from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, require_steps
 
 FEWEST_HEIGHTS = 9  # for a decision; exponential growth is plain from fewer, and a budget leaves no more of it
 _FEWEST_FOR_EXPONENTIAL = 6

@@ -27,6 +27,7 @@ from kahanmaps.laboratory.height_survey import HeightSurvey, height_survey
 from kahanmaps.laboratory.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.report import Conclusion, Statement, conclude, sections
+from kahanmaps.laboratory.shown import analysis_html
 from kahanmaps.laboratory.singularities import MAX_DIMENSION as MAX_SINGULAR_DIMENSION
 from kahanmaps.laboratory.singularities import SingularityRun, default_eps, singularities
 from kahanmaps.laboratory.sparse_relations import SparseRelation, sparse_relations
@@ -88,6 +89,9 @@ class Analysis:
     def sections(self) -> list[tuple[str, list[Statement]]]:
         """The report: titles and their statements."""
         return [(title, lines) for title, lines in sections(self) if lines]
+
+    def _repr_html_(self) -> str:
+        return analysis_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: the verdict, the statements, and all results."""

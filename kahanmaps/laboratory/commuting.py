@@ -34,6 +34,7 @@ from kahanmaps.laboratory.commuting_space import (
     field_at,
     unknowns,
 )
+from kahanmaps.laboratory.shown import commuting_html
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 DEFAULT_SECONDS = 60
@@ -125,6 +126,9 @@ class CommutingSystems:
         """The weakest verdict on what was found; undecided where the list may not be complete."""
         found = [g.finding.verdict for g in self.solutions] + [family.finding.verdict for family in self.families]
         return combined([*found, *([] if self.complete else [Verdict.UNDECIDED])])
+
+    def _repr_html_(self) -> str:
+        return commuting_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, the shape that scripts rely on."""

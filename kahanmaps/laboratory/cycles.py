@@ -17,6 +17,7 @@ from flint import fmpq, fmpq_mat
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.reversors import require_reversor
+from kahanmaps.laboratory.shown import census_html
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_POINTS = 2_000_000  # up to which the whole graph is made, up to dimension 6
@@ -56,6 +57,9 @@ class Census:
     factor: str | None
     degree: int
     is_undefined: bool
+
+    def _repr_html_(self) -> str:
+        return census_html(self)
 
     @property
     def periodic(self) -> int:

@@ -31,6 +31,7 @@ from kahanmaps.laboratory.cofactors import (
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, exponents_up_to
+from kahanmaps.laboratory.shown import darboux_html
 from kahanmaps.maps.kahan import KahanMapOver
 from kahanmaps.systems.files import SystemFile
 
@@ -73,6 +74,9 @@ class DarbouxSearch:
     cofactors: tuple[str, ...] = ()
     spaces: list[DarbouxPolynomials] = field(default_factory=list)
     reason: str = ""
+
+    def _repr_html_(self) -> str:
+        return darboux_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

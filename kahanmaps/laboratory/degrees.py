@@ -23,10 +23,10 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
-from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.laboratory.curves import Line, Stopped
 from kahanmaps.laboratory.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence, rate_json
-from kahanmaps.maps.orbits import counted
+from kahanmaps.laboratory.shown import degrees_html
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 DEFAULT_SECONDS = 10.0
@@ -121,6 +121,9 @@ class DegreeGrowth:
                 lines.append(("closed form", self.recurrence.closed_form))
         lines += [("ended", self.message), *(("note", note) for note in self.notes)]
         return "\n".join(f"{word}\t{rest}" for word, rest in lines)
+
+    def _repr_html_(self) -> str:
+        return degrees_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; primes are text, for they exceed what readers of JSON hold exactly."""

@@ -33,6 +33,7 @@ from kahanmaps.laboratory.identities import density_verdict
 from kahanmaps.laboratory.integrals import closing_note, toml_comment
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
+from kahanmaps.laboratory.shown import densities_html
 from kahanmaps.systems.files import SystemFile
 
 _MAX_UNKNOWNS = 1000
@@ -87,6 +88,9 @@ class DensitySearch:
     def note(self) -> str:
         """That orbits close, and for which eps; empty where they do not."""
         return closing_note(self.period, self.eps)
+
+    def _repr_html_(self) -> str:
+        return densities_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -24,6 +24,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals import ModifiedHamiltonian
 from kahanmaps.invariants.measures import DeterminantDensity
 from kahanmaps.laboratory.affine_functions import QuotientForms, affine_integrals, quotient_by
+from kahanmaps.laboratory.shown import structures_html
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -49,6 +50,9 @@ class ConstantStructures:
     casimirs: tuple[fmpq_mpoly, ...]
     reason: str
     proved: bool
+
+    def _repr_html_(self) -> str:
+        return structures_html(self)
 
     @property
     def integral(self) -> ModifiedHamiltonian | None:

@@ -17,11 +17,11 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.heights import Growth, HeightGrowth, height_growth
+from kahanmaps.laboratory.shown import heights_html
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits import counted
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 DEFAULT_EPS = (fmpq(1, 10), fmpq(3, 11))
@@ -91,6 +91,9 @@ class HeightSurvey:
             if orbit.growth.kind is not Growth.UNDECIDED:
                 kinds.setdefault(orbit.eps, set()).add(orbit.growth.kind)
         return all(len(found) == 1 for found in kinds.values())
+
+    def _repr_html_(self) -> str:
+        return heights_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -32,6 +32,7 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, rank
 from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.laboratory.search import Found, may_be_conjugate, repeat, search
+from kahanmaps.laboratory.shown import integrals_html
 from kahanmaps.systems.files import SystemFile
 
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
@@ -97,6 +98,9 @@ class IntegralSearch:
     def is_complete(self) -> bool:
         """Whether there is a closed form for every integral that the orbits show."""
         return len(self.integrals) >= self.codimension
+
+    def _repr_html_(self) -> str:
+        return integrals_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from kahanmaps.errors import counted
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.family.structure import Structure
 from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.commuting import CommutingField
 from kahanmaps.laboratory.recurrences import GrowthClass
-from kahanmaps.maps.orbits import counted
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis

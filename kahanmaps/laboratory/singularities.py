@@ -26,6 +26,7 @@ from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.laboratory.fates import NOT_CONTRACTED, UNDECIDED, Hypersurface, fate_of, unwritten
+from kahanmaps.laboratory.shown import singularities_html
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -55,6 +56,9 @@ class SingularityRun:
     stopped: bool
     is_undefined: bool
     is_dominant: bool
+
+    def _repr_html_(self) -> str:
+        return singularities_html(self)
 
     @property
     def verdict(self) -> str:

@@ -20,7 +20,7 @@ from flint import fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.float_blocks import PlanarBlocks, planar_blocks, require_same_system
 from kahanmaps.maps.float_numbers import FloatArray, to_float, to_floats
@@ -33,7 +33,7 @@ from kahanmaps.maps.float_steps import (
     distances,
     generic_equation,
 )
-from kahanmaps.maps.orbits import OrbitEnd, counted, require_steps
+from kahanmaps.maps.orbits import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 KERNELS = ("numpy", "numba")

@@ -22,6 +22,7 @@ from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.matrices import det, solve
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
+from kahanmaps.maps.shown import map_latex
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 
 
@@ -167,6 +168,9 @@ class KahanMap(KahanMapOver):
 
     def _named(self) -> str:
         return f": {', '.join(self.system.variables)}"
+
+    def _repr_latex_(self) -> str:
+        return map_latex(self)
 
     def __repr__(self) -> str:
         return f"KahanMap({', '.join(self.system.variables)}; eps={self.field.format(self.eps)}, over {self.field})"

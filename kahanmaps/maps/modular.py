@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import GF, PrimeField
-from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits import counted, require_steps
+from kahanmaps.maps.orbits import require_steps
 from kahanmaps.maps.planar_block import Triple
 from kahanmaps.maps.splitting import Splitting
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure

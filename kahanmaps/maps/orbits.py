@@ -15,15 +15,17 @@ from threading import get_ident
 from typing import Any
 
 from kahanmaps.algebra.fields import QQ, BallField, Field
-from kahanmaps.errors import InputError, PrecisionLost, SingularStep
+from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.family.structure import Structure
 from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.jump import Jump, OverBudget
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_steps import NormalSteps
 from kahanmaps.maps.planes_point import PlanesPoint
+from kahanmaps.maps.shown import orbit_html
 
 DEFAULT_MAX_DIGITS = 200_000
+FIRST_POINTS = 3  # that an orbit remembers
 _DIGITS_PER_BIT = 0.30103
 
 
@@ -84,7 +86,7 @@ class Orbit:
     back), `backward` steps by the inverse map. `max_digits` bounds the decimal digits of the integers over one common
     denominator (over Q). With a `structure` (family.structure.structure_of) the orbit is walked in normal form: over
     Q plane by plane, if chi splits there; over balls every point directly, so that balls do not widen from step to
-    step.
+    step. `first` and `last` are the first points and the last one that were delivered so far.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> orbit = Orbit(KahanMap(QuadraticSystem.from_text(["x"], ["x^2"]), "1/2"), ["1/5"], 3)
@@ -114,6 +116,8 @@ class Orbit:
         self.max_digits = max_digits
         self.structure = structure
         self.end: OrbitEnd | None = None
+        self.first: list[OrbitPoint] = []  # up to FIRST_POINTS of them
+        self.last: OrbitPoint | None = None
         self._interrupted = False
 
     def interrupt(self) -> None:
@@ -121,6 +125,17 @@ class Orbit:
         self._interrupted = True
 
     def __iter__(self) -> Iterator[OrbitPoint]:
+        self.first, self.last = [], None
+        for point in self._points():
+            if point.step < FIRST_POINTS:
+                self.first.append(point)
+            self.last = point
+            yield point
+
+    def _repr_html_(self) -> str:
+        return orbit_html(self)
+
+    def _points(self) -> Iterator[OrbitPoint]:
         field = self.map.field
         images = self._images()
         value = start = next(images)
@@ -283,11 +298,6 @@ class Iterates:
 def digits_of(point: IntegerPoint | PlanesPoint) -> int:
     """About how many decimal digits the largest of the integers has."""
     return int(point.bits * _DIGITS_PER_BIT) + 1
-
-
-def counted(number: int, word: str) -> str:
-    """1 step, 2 steps."""
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
 def require_steps(steps: int | None) -> None:

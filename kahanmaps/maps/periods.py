@@ -35,6 +35,7 @@ from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.structure import Structure
 from kahanmaps.maps.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.planar_block import PlanarBlock, Triple, same_point
+from kahanmaps.maps.shown import period_html
 from kahanmaps.maps.splitting import Plane, Splitting
 
 LARGEST_FIELD = 1 << 192  # of so many elements: it takes a minute or two
@@ -97,6 +98,9 @@ class OrbitPeriod:
         """A sentence, and a line for each plane."""
         lines = [self._sentence(), *(plane.text for plane in self.planes)]
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return period_html(self)
 
     def _sentence(self) -> str:
         if self.period is None:

@@ -82,16 +82,22 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def points(axes: Axes, *coordinates: Any, **how: Any) -> Any:
-    """Points as dots, smaller where they are many and stored as an image above RASTERISE_ABOVE; `how` goes to plot."""
-    count = len(coordinates[0])
-    size = how.pop("markersize", 2.4 if count <= 500 else 1.4 if count <= 5_000 else 0.7 if count <= 50_000 else 0.35)
+def points(axes: Axes, *coordinates: Any, of: int | None = None, **how: Any) -> Any:
+    """Points as dots, smaller where they are many and stored as an image above RASTERISE_ABOVE; `how` goes to plot.
+
+    `of` is how many there are in the whole picture, where they are drawn in several parts.
+    """
+    count = len(coordinates[0]) if of is None else of
     return axes.plot(
         *coordinates,
-        **{"marker": "o", "linestyle": "none", "markeredgewidth": 0, **how},
-        markersize=size,
+        **{"marker": "o", "linestyle": "none", "markeredgewidth": 0, "markersize": dot_size(count), **how},
         rasterized=count > RASTERISE_ABOVE,
     )[0]
+
+
+def dot_size(count: int) -> float:
+    """The diameter of dots, in points, where there are `count` of them."""
+    return 2.4 if count <= 500 else 1.4 if count <= 5_000 else 0.7 if count <= 50_000 else 0.35
 
 
 def format_of(path: str, asked: str | None) -> str:

@@ -50,7 +50,7 @@ def draw_in_characters(figure: Figure, columns: int, rows: int, style: Style) ->
         _coarsen(figure)
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
-        texts = [_placed(text, columns, rows) for text in _visible(figure, Text)]
+        texts = [placed for text in _visible(figure, Text) for placed in _placed(text, columns, rows)]
         figure.set_layout_engine("none")
         for text in figure.findobj(Text):
             text.set_visible(False)
@@ -90,34 +90,49 @@ def _off_scale(figure: Figure) -> set[int]:
     return off
 
 
-def _placed(text: Any, columns: int, rows: int) -> tuple[int, int, str]:
+def _placed(text: Any, columns: int, rows: int) -> list[tuple[int, int, str]]:
+    """Row, column and content of a text, line by line."""
     box = text.get_window_extent()
-    content = " ".join(readable(text.get_text()).split())[:columns]
-    middle = (box.x0 + box.x1) / 4
-    anchor = {"left": box.x0 / 2, "right": box.x1 / 2 - len(content)}.get(
-        text.get_horizontalalignment(), middle - len(content) / 2
-    )
-    column = min(max(0, round(anchor)), columns - len(content))
-    row = rows - 1 - int((box.y0 + box.y1) / 8)
-    return min(max(0, row), rows - 1), column, content
+    lines = [" ".join(readable(line).split())[:columns] for line in text.get_text().split("\n")]
+    middle_row = rows - 1 - int((box.y0 + box.y1) / 8)
+    found = []
+    for k, content in enumerate(lines):
+        middle = (box.x0 + box.x1) / 4
+        anchor = {"left": box.x0 / 2, "right": box.x1 / 2 - len(content)}.get(
+            text.get_horizontalalignment(), middle - len(content) / 2
+        )
+        column = min(max(0, round(anchor)), columns - len(content))
+        row = middle_row + k - (len(lines) - 1) // 2
+        found.append((min(max(0, row), rows - 1), column, content))
+    return found
 
 
 def readable(text: str) -> str:
     r"""A label of matplotlib as plain text.
 
-    >>> readable(r"$x_{12}$"), readable(r"$\mathdefault{10^{-3}}$"), readable(r"$\varepsilon$ = 1/10")
-    ('x12', '10^-3', 'eps = 1/10')
+    >>> readable(r"$x_{12}$"), readable(r"$\mathdefault{10^{-3}}$"), readable(r"euler_top, $\varepsilon$ = 1/10")
+    ('x12', '10^-3', 'euler_top, eps = 1/10')
     """
-    text = re.sub(r"\\math\w+|\\left|\\right|\\operatorname", "", text.replace(r"\$", "\0"))
+    pieces = text.replace(r"\$", "\0").split("$")
+    if len(pieces) % 2 == 0:  # a dollar sign without another is no formula
+        pieces = ["$".join(pieces)]
+    read = "".join(_readable_formula(piece) if k % 2 else piece for k, piece in enumerate(pieces))
+    return read.replace("\0", "$").replace("\N{MINUS SIGN}", "-")
+
+
+def _readable_formula(text: str) -> str:
+    text = re.sub(r"\\math\w+|\\left|\\right|\\operatorname", "", text)
     text = text.replace(r"\varepsilon", "eps").replace(r"\times", "*").replace(r"\cdot", "*").replace(r"\,", " ")
-    text = text.replace(r"\tilde", "~").replace(r"\leq", "<=").replace(r"\geq", ">=")
-    text = re.sub(r"_\{?", "", text)
-    return re.sub(r"[\\${}]", "", text).replace("\0", "$").replace("\N{MINUS SIGN}", "-")
+    text = text.replace(r"\tilde", "~").replace(r"\leq", "<=").replace(r"\geq", ">=").replace(r"\neq", "!=")
+    text = text.replace(r"\nabla", "grad ").replace(r"\pm", "+-")
+    text = text.replace(r"\approx", "~").replace(r"\ldots", "...")
+    return re.sub(r"[\\{}]", "", re.sub(r"_\{?", "", text))
 
 
 def _coarsen(figure: Figure) -> None:
     """Lines one dot wide, marks of a dot, letters of one row: what can be seen at this size."""
     from matplotlib.collections import LineCollection, PathCollection
+    from matplotlib.legend import Legend
     from matplotlib.lines import Line2D
     from matplotlib.text import Text
 
@@ -128,6 +143,7 @@ def _coarsen(figure: Figure) -> None:
         line.set_antialiased(False)
         line.set_linewidth(min(line.get_linewidth(), 0.8))
         line.set_markersize(min(line.get_markersize(), 1.2))
+        line.set_markerfacecolor(line.get_markeredgecolor())  # hollow marks of a dot would be nothing
         line.set_markeredgewidth(0)
     for collection in figure.findobj(LineCollection):
         collection.set_antialiased(False)
@@ -135,11 +151,43 @@ def _coarsen(figure: Figure) -> None:
     for cloud in figure.findobj(PathCollection):
         cloud.set_sizes([1.2])
         cloud.set_linewidth(0)
+    for legend in figure.findobj(Legend):
+        _close_up(legend)
+    _put_labels_above(figure)
     for axes in figure.axes:
         axes.tick_params(which="both", length=0, pad=2)
         for spine in axes.spines.values():
             spine.set_color(_FRAME)
             spine.set_linewidth(0.5)
+
+
+def _put_labels_above(figure: Figure) -> None:
+    """Labels of vertical axes above their axes: lying, they would cover the numbers beside which they stood."""
+    for axes in figure.axes:
+        label = axes.get_ylabel()
+        if not label or hasattr(axes, "zaxis") or axes.get_title():
+            continue
+        side: Any = axes.yaxis.get_label_position()  # left or right
+        before = axes.get_title(loc=side)
+        axes.set_title(f"{before}  {label}" if before else label, loc=side, fontsize=4, family="monospace", pad=2)
+        axes.set_ylabel("")
+
+
+def _close_up(legend: Any) -> None:
+    """Lines of a legend one below the other: it was laid out for letters of another size."""
+    from matplotlib.offsetbox import DrawingArea, VPacker
+    from matplotlib.patches import Rectangle
+
+    for column in legend.findobj(VPacker):
+        column.sep = 0
+    for area in legend.findobj(DrawingArea):
+        area.height, area.ydescent = 2.5, 0
+    for handle in legend.legend_handles:
+        if isinstance(handle, Rectangle):
+            handle.set_y(0)
+            handle.set_height(2.5)
+        elif hasattr(handle, "set_ydata"):
+            handle.set_ydata([1.25] * len(handle.get_ydata()))
 
 
 def _braille(pixels: Any, columns: int, rows: int) -> list[list[Cell]]:

@@ -21,7 +21,7 @@ from kahanmaps.algebra.text import (
     parse_rational_function,
     shorten,
 )
-from kahanmaps.errors import InputError, SystemFileError
+from kahanmaps.errors import InputError, SystemFileError, counted, suggestion
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.sources import SOURCES
@@ -148,7 +148,8 @@ class DocumentReader:
         for name in self.overrides:
             if not isinstance(declared, dict) or name not in declared:
                 known = ", ".join(self.parameters) or "none"
-                self._mistake("parameters", f"unknown parameter {name!r}, this system has: {known}")
+                hint = suggestion(name, list(self.parameters))
+                self._mistake("parameters", f"unknown parameter {name!r}, this system has: {known}{hint}")
 
     def _read_variables(self, kind: str) -> None:
         given = self.document.get("variables")
@@ -247,7 +248,8 @@ class DocumentReader:
             return None
         if len(rhs) != len(self.variables):
             count = len(self.variables)
-            self._mistake("system.rhs", f"found {len(rhs)} right-hand sides, expected {count}, one for each variable")
+            found = counted(len(rhs), "right-hand side")
+            self._mistake("system.rhs", f"found {found}, expected {count}, one for each variable")
             return None
         known = [polynomial for polynomial in polynomials if polynomial is not None]
         return QuadraticSystem.from_polynomials(known) if len(known) == len(rhs) else None

@@ -23,6 +23,7 @@ from kahanmaps.family.cubics import default_variables
 from kahanmaps.systems.document import KINDS, DocumentReader
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.systems.shown import file_html
 from kahanmaps.systems.toml_text import to_toml
 
 MAX_FILE_BYTES = 16_000_000
@@ -98,6 +99,9 @@ class SystemFile:
     def to_toml(self) -> str:
         """The file as text; `parse_system` reads it back equal."""
         return to_toml(self.document, ("name", "variables"), _SECTIONS)
+
+    def _repr_html_(self) -> str:
+        return file_html(self)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, SystemFile):

@@ -15,6 +15,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.polynomials import degree, gradient, is_homogeneous, names_of
 from kahanmaps.errors import InputError
 from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.systems.shown import hamiltonian_latex
 
 
 def standard_structure(dim: int) -> fmpq_mat:
@@ -85,6 +86,9 @@ class CubicHamiltonian:
     def system(self) -> QuadraticSystem:
         """The quadratic system x' = J grad H(x)."""
         return QuadraticSystem.from_polynomials(linear_combinations(self.J, self.gradient))
+
+    def _repr_latex_(self) -> str:
+        return hamiltonian_latex(self)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, CubicHamiltonian):

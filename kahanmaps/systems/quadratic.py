@@ -18,6 +18,7 @@ from kahanmaps.algebra.fields import Field, rational
 from kahanmaps.algebra.polynomials import degree, evaluate, names_of, ring
 from kahanmaps.algebra.text import check_names, format_polynomial, parse_polynomial
 from kahanmaps.errors import InputError
+from kahanmaps.systems.shown import system_latex
 
 # f'' has dim^3 entries: 10^6 of them at the largest dimension.
 MAX_DIMENSION = 100
@@ -198,6 +199,9 @@ class QuadraticSystem:
     def __hash__(self) -> int:
         # B and Q would make it slow; equal systems have equal hashes all the same.
         return hash((self.variables, self.c))
+
+    def _repr_latex_(self) -> str:
+        return system_latex(self)
 
     def __str__(self) -> str:
         pairs = zip(self.variables, self.rhs, strict=True)

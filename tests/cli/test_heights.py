@@ -85,10 +85,10 @@ def test_wrong_values_in_the_library():
         ("heights", "missing SYSTEM"),
         ("heights lorenz --eps 0", "found eps = 0"),
         ("heights lorenz --start 1,2", "with 2 coordinates, expected 3"),
-        ("heights lorenz --starts 0", "found 0 starts"),
+        ("heights lorenz --starts 0", "found '0', expected an integer, 1 or more"),
         ("heights lorenz --steps -1", "found -1 steps"),
         ("heights lorenz --max-digits 0", "found --max-digits 0"),
-        ("heights lorenz --seconds 0", "found 0.0 seconds"),
+        ("heights lorenz --seconds 0", "found '0', expected a number of seconds above 0"),
     ],
 )
 def test_wrong_use_gives_2(kahanmaps, command, words):

@@ -67,12 +67,12 @@ def test_a_clock_that_stops_is_status_three(kahanmaps):
         ("lorenz --eps 0", "eps = 0"),
         ("lorenz --eps 1/10 --steps 1", "found 1 steps"),
         ("lorenz --eps 1/10 --transient -1", "found 10000 steps after -1"),
-        ("lorenz --eps 1/10 --random 0", "--random 0"),
-        ("lorenz --eps 1/10 --seed -1", "--seed -1"),
+        ("lorenz --eps 1/10 --random 0", "found '0', expected an integer, 1 or more"),
+        ("lorenz --eps 1/10 --seed -1", "found '-1', expected an integer, 0 or more"),
         ("lorenz --eps 1/10 --box 0", "--box 0"),
         ("lorenz --eps 1/10 --starts nowhere.csv", "nowhere.csv"),
         ("lorenz --eps 1/10 --starts nowhere.csv --seed 1", "do not go with --starts"),
-        ("lorenz --eps 1/10 --seconds 0", "found --seconds 0.0"),
+        ("lorenz --eps 1/10 --seconds 0", "found '0', expected a number of seconds above 0"),
     ],
 )
 def test_wrong_use(kahanmaps, arguments, words):

@@ -517,7 +517,7 @@ def test_nothing_is_shortened_in_a_file_written_from_a_terminal(tmp_path, kahanm
 
 
 def test_columns_are_aligned_on_a_terminal(on_terminal):
-    table = [line for line in on_terminal.out.splitlines() if not line.startswith("#")]
+    table = [line for line in on_terminal.out.splitlines() if "#" not in line]
     assert len({len(line) for line in table}) == 1
 
 
@@ -557,7 +557,7 @@ def test_an_interrupted_orbit_leaves_valid_lines_up_to_its_end(interrupted):
 
 
 def test_an_interrupt_is_told_without_a_traceback(interrupted):
-    assert "orbit.jsonl: interrupted: interrupted after step " in interrupted.err
+    assert "orbit.jsonl: interrupted after step " in interrupted.err
     assert "Traceback" not in interrupted.err
 
 

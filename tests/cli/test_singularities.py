@@ -62,8 +62,8 @@ def test_other_verdicts(kahanmaps, arguments, verdict, status):
         ("weierstrass --eps 0", "eps = 0"),
         ("weierstrass --eps 1 --time-step 2", "not both"),
         ("weierstrass --steps 0", "found 0 steps"),
-        ("weierstrass --seed -1", "found --seed -1"),
-        ("weierstrass --seconds -1", "found --seconds -1.0"),
+        ("weierstrass --seed -1", "found '-1', expected an integer, 0 or more"),
+        ("weierstrass --seconds -1", "found '-1', expected a number of seconds above 0"),
         ("nowhere", "nowhere"),
     ],
 )

@@ -383,7 +383,7 @@ def test_the_last_line_on_a_terminal_counts_verdicts(kahanmaps):
     report = kahanmaps("verify --m 1 --json").json
     for verdict, count in Counter(c["verdict"] for c in report["claims"] if "misprint" not in c).items():
         assert f"{count} {verdict}" in last
-    assert last.startswith(f"verdict: {report['verdict']}")
+    assert last.startswith(f"verdict  {report['verdict']}  (")
     assert f"{sum('misprint' in c for c in report['claims'])} misprints" in last
 
 

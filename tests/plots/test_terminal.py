@@ -67,3 +67,29 @@ def test_a_rising_line_rises():
 def test_too_small_a_terminal_is_refused():
     with pytest.raises(InputError, match="at least 20 and 8"):
         draw_in_characters(a_figure(), 10, 5, STYLE)
+
+
+def test_the_label_of_a_vertical_axis_stands_above_it_and_covers_no_number():
+    with drawing(STYLE):
+        figure = new_figure(STYLE)
+        axes = figure.subplots()
+        axes.plot([0, 1], [0, 1])
+        axes.set_yticks([0.5], ["1/2"])
+        axes.set_ylabel("relative error of I")
+    rows = lines(figure)
+    [above] = [k for k, row in enumerate(rows) if "relative error of I" in row]
+    [beside] = [k for k, row in enumerate(rows) if "1/2" in row]
+    assert above < beside
+
+
+def test_entries_of_a_legend_stand_in_rows_of_their_own():
+    with drawing(STYLE):
+        figure = new_figure(STYLE)
+        axes = figure.subplots()
+        for name in ("first", "second", "third"):
+            axes.plot([0, 1], [0, 1], label=name)
+        figure.legend(loc="outside upper left")
+    rows = lines(figure, 60, 24)
+    found = [next(k for k, row in enumerate(rows) if name in row) for name in ("first", "second", "third")]
+    assert len(set(found)) == 3
+    assert found[2] - found[0] <= 3

@@ -6,31 +6,34 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.commands.find_integrals import symbols_and_eps
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options
+from kahanmaps_cli.options import (
+    eps_options,
+    load_system,
+    output_options,
+    seconds_option,
+    seed_option,
+    symbolic_option,
+    system_options,
+)
 from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.render import on_terminal, print_json, shorten
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.search import formula, symbols_and_eps
+from kahanmaps_cli.terminal import on_terminal, tell
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
-
-_COLOURS = {"proved": "green", "supported": "cyan", "measured": "blue", "undecided": "yellow", "note": "bright_black"}
 
 
 @click.command("analyze")
 @system_options
 @eps_options
-@click.option("--symbolic", metavar="NAMES", help="Parameters that formulas are to contain, e.g. a1,a2 (eps is one).")
-@click.option("--seconds", type=click.FloatRange(min=1), help="Time for everything (default: 16 to 150 by dimension).")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@symbolic_option
+@seconds_option(None, "Time for everything (default: 16 to 150 by dimension).")
+@seed_option
 @click.option("--markdown", is_flag=True, help="The report in Markdown.")
 @output_options
 def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **options: Any) -> int:
     """What the Kahan map of SYSTEM preserves, and how it grows: one report, and a verdict in words.
-
-    Integrals and densities in closed form with their proofs, Hirota-Kimura relations, degrees of the iterates and
-    their recurrence, heights, symmetries, commuting systems, singularity confinement, and whether the system belongs
-    to the commuting family. Claims in the file are not read. Without --eps everything is for every eps.
 
     \b
       kahanmaps analyze euler_top --symbolic a1,a2,a3
@@ -38,9 +41,12 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
       kahanmaps analyze my-system.toml --markdown > report.md
       kahanmaps analyze --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
 
-    proved, supported: formulas, as identities in x and eps. measured: modulo
-    primes and along orbits, which is evidence. The number of integrals and
-    the growth are separate findings.
+    Integrals and densities in closed form with their proofs, Hirota-Kimura relations, degrees of the iterates and
+    their recurrence, heights, symmetries, commuting systems, singularity confinement, and whether the system belongs
+    to the commuting family. Claims in the file are not read. Without --eps everything is for every eps.
+
+    proved, supported: formulas, as identities in x and eps. measured: modulo primes and along orbits, which is
+    evidence. The number of integrals and the growth are separate findings.
 
     Exit status: 0 there is a verdict, 2 wrong use, 3 undecided.
     """
@@ -74,19 +80,14 @@ def _title(found: Analysis) -> str:
 
 
 def _print(found: Analysis) -> None:
-    terminal = on_terminal()
-    click.echo(f"analyze: {_title(found)}")
+    tell(f"analyze: {_title(found)}")
     for name, lines in found.sections:
-        click.echo(click.style(f"\n{name}", bold=True) if terminal else f"\n{name}")
+        tell(f"\n{name}", style="bold")
         for line in lines:
-            if terminal:
-                status = click.style(f"{line.status:<10}", fg=_COLOURS[line.status])
-                click.echo(f"  {status}{shorten(line.text, 400)}")
-            else:
-                click.echo(f"{line.status}\t{line.text}")
+            tell(f"{line.status}\t{formula(line.text)}")
     final = found.conclusion
-    click.echo(f"\n{click.style('verdict', bold=True)}" if terminal else "\nverdict")
-    click.echo(f"  {final.sentence}" if terminal else f"{final.kind}\t{final.sentence}")
+    tell("\nverdict", style="bold")
+    tell(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
 
 
 def _print_markdown(found: Analysis) -> None:

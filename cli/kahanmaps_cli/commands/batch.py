@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from kahanmaps_cli.complete import complete_task, complete_toml
+from kahanmaps_cli.groups import SuggestingGroup
+from kahanmaps_cli.options import json_option, output_options
 from kahanmaps_cli.params import OptionType
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json
@@ -18,10 +21,8 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
-_QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress and no talk on standard error.")
 _ONLY = click.option(
-    "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment (may be repeated)."
+    "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment . Repeatable."
 )
 
 
@@ -51,31 +52,39 @@ class Shard(OptionType):
         return tuple(numbers)
 
 
-@click.group("batch")
+@click.group("batch", cls=SuggestingGroup)
 def command() -> None:
     """Thousands of experiments from one file: planned, run in child processes, stored, resumed.
 
     \b
-      kahanmaps batch run study.toml -j 2              results go to study.db
+      kahanmaps batch run study.toml -j 2       # results go to study.db
       kahanmaps batch run study.toml --dry-run
       kahanmaps batch status --db study.db
       kahanmaps batch summary --db study.db --by m,eps
       kahanmaps batch export --db study.db --csv -o study.csv
-      kahanmaps batch tasks                            what an experiment can do
+      kahanmaps batch tasks                     # what an experiment can do
 
     docs/batch.md describes the file, and how to use many machines.
     """
 
 
 @command.command("run", short_help="Do the tasks of a spec, with the results in a database.")
-@click.argument("spec", required=False, type=click.Path(dir_okay=False))
+@click.argument("spec", required=False, type=click.Path(dir_okay=False), shell_complete=complete_toml)
 @_database(required=False)
-@click.option("-j", "--jobs", type=click.IntRange(1, 1024), help="Child processes at a time (default: the processors).")
+@click.option(
+    "-j",
+    "--jobs",
+    type=click.IntRange(1, 1024),
+    metavar="N",
+    help="Child processes at a time (default: the processors).",
+)
 @_ONLY
 @click.option("--shard", type=Shard(), metavar="I/N", help="Only the I-th of N parts: for job arrays.")
 @click.option("--retry-failed", is_flag=True, help="Do failed tasks again as well.")
 @click.option("--dry-run", is_flag=True, help="Check the spec, show how many tasks there are and the first few.")
-@click.option("--max-tasks", type=click.IntRange(1), help="Refuse specs with more tasks (default 1000000).")
+@click.option(
+    "--max-tasks", type=click.IntRange(1), metavar="N", help="Refuse specs with more tasks (default 1000000)."
+)
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Use the workers of a dask scheduler: tcp://host:port or its file."
 )
@@ -83,21 +92,21 @@ def command() -> None:
 @click.option(
     "--group-seconds",
     type=click.FloatRange(0, 86400),
+    metavar="T",
     default=5.0,
     show_default=True,
     help="Short tasks share a child, or a command on the cluster, for so long.",
 )
 @click.option("--jsonl", "as_jsonl", is_flag=True, help="Every record on standard output, as it comes in.")
-@_JSON
-@_QUIET
+@output_options
 def run(spec: str | None, db: str | None, **options: Any) -> int:
     """Do the tasks of SPEC that have no result yet, and put the results into a database.
 
     \b
       kahanmaps batch run study.toml --dry-run
-      kahanmaps batch run study.toml -j 2              results in study.db
-      kahanmaps batch run study.toml --db all.db       again: does what is missing
-      kahanmaps batch run --db all.db --retry-failed   continue without the spec
+      kahanmaps batch run study.toml -j 2              # results in study.db
+      kahanmaps batch run study.toml --db all.db       # does what is missing
+      kahanmaps batch run --db all.db --retry-failed   # without the spec
       kahanmaps batch run study.toml --shard 3/16 --db part3.db
       kahanmaps batch run study.toml --scheduler tcp://head:8786
 
@@ -124,13 +133,15 @@ def run(spec: str | None, db: str | None, **options: Any) -> int:
 @command.command("status")
 @_database()
 @_ONLY
-@_JSON
+@json_option
 def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
-    """How far the experiments in a database have come. May be asked while a batch is running.
+    """How far the experiments in a database have come.
 
     \b
       kahanmaps batch status --db study.db
       kahanmaps batch status --db study.db --json | jq '.experiments[].missing'
+
+    May be asked while a batch is running.
     """
     from kahanmaps_cli.batch_show import print_status, status_data
 
@@ -145,13 +156,15 @@ def status(db: str, only: tuple[str, ...], as_json: bool) -> None:
 @command.command("show")
 @click.argument("key")
 @_database()
-@_JSON
+@json_option
 def show(key: str, db: str, as_json: bool) -> None:
-    """One task with all that is known of it. KEY: the first digits of its key, four or more.
+    """One task with all that is known of it.
 
     \b
       kahanmaps batch show 3fa8 --db study.db
       kahanmaps batch show 3fa8 --db study.db --json | jq .result
+
+    KEY: the first digits of its key, four or more.
     """
     from kahanmaps.errors import InputError
     from kahanmaps_cli.batch_show import found_data, print_found
@@ -173,9 +186,7 @@ def show(key: str, db: str, as_json: bool) -> None:
 @click.option("--csv", "form", flag_value="csv", help="A table, a column for each option and each entry of results.")
 @click.option("--jsonl", "form", flag_value="jsonl", help="One JSON object a line, everything in it.")
 @click.option("--parquet", "form", flag_value="parquet", help="The table of --csv with types; needs pyarrow and -o.")
-@click.option(
-    "-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE (-: standard output)."
-)
+@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
 @click.option("--stable", is_flag=True, help="Leave out times, memory, hosts and versions: the same work, same bytes.")
 @_ONLY
 def export(db: str, form: str | None, output: str | None, stable: bool, only: tuple[str, ...]) -> None:
@@ -202,18 +213,18 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
 @command.command("summary", short_help="Counts and quantiles for groups of tasks.")
 @_database()
 @click.option("--by", default="experiment", show_default=True, metavar="NAME,...", help="Group by these, e.g. m,eps.")
-@click.option("--value", "values", multiple=True, metavar="NAME", help="Only these numbers (may be repeated).")
+@click.option("--value", "values", multiple=True, metavar="NAME", help="Only these numbers . Repeatable.")
 @click.option("--stable", is_flag=True, help="Leave out times and memory.")
 @click.option("--markdown", "as_markdown", is_flag=True, help="Tables in Markdown.")
 @_ONLY
-@_JSON
+@json_option
 def summary(db: str, by: str, as_markdown: bool, as_json: bool, **options: Any) -> None:
     """Counts of outcomes and verdicts, and quantiles of the numbers, for groups of tasks.
 
     \b
       kahanmaps batch summary --db study.db --by m,eps
       kahanmaps batch summary --db study.db --by m --value constant --markdown
-      kahanmaps batch summary --db study.db --by outcome,message   why some failed
+      kahanmaps batch summary --db study.db --by outcome,message  # why they fail
 
     --by takes options (eps), parts of the system (name, m, seed, parameters.a), entries of results (dimension,
     growth), and experiment, task, outcome, verdict, message.
@@ -230,8 +241,7 @@ def summary(db: str, by: str, as_markdown: bool, as_json: bool, **options: Any) 
 @command.command("merge", short_help="Bring the results of several databases together.")
 @click.argument("target", type=click.Path(dir_okay=False))
 @click.argument("sources", nargs=-1, required=True, type=click.Path(dir_okay=False))
-@_JSON
-@_QUIET
+@output_options
 def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> int:
     """Bring the results of SOURCES into TARGET, which is made if it is not there.
 
@@ -241,8 +251,8 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
 
     Exit status: 0 done, 2 wrong use, 3 some task has different results in two of them (those of TARGET are kept).
     """
+    from kahanmaps.errors import counted
     from kahanmaps.experiments.store import Store
-    from kahanmaps.maps.orbits import counted
     from kahanmaps.version import __version__
 
     with Store.open(target, create=True) as store:
@@ -265,8 +275,8 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
 
 
 @command.command("tasks", short_help="What an experiment can do, with all options.")
-@click.argument("name", required=False)
-@_JSON
+@click.argument("name", required=False, shell_complete=complete_task)
+@json_option
 def tasks(name: str | None, as_json: bool) -> None:
     """What an experiment can do: the kinds of tasks, and their options with defaults.
 

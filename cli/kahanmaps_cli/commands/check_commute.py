@@ -6,32 +6,36 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli.options import check_options, inline_options, load_system, settings_from
+from kahanmaps_cli.complete import complete_system
+from kahanmaps_cli.options import check_options, inline_options, load_system, settings_from, system_argument
 from kahanmaps_cli.params import ExactNumber
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
 
 
 @click.command("check-commute")
-@click.argument("system", required=False)
-@click.argument("other", required=False)
+@system_argument
+@click.argument("other", required=False, shell_complete=complete_system)
 @inline_options
-@click.option("--eps2", type=ExactNumber(), help="Another step for the second map (needs --eps).")
+@click.option("--eps2", type=ExactNumber(), metavar="E", help="Another eps for the second map (needs --eps).")
 @check_options
 def command(system: str | None, other: str | None, eps2: Any, **options: Any) -> int:
-    """Do the Kahan maps of SYSTEM and OTHER commute?  Without --eps the question is asked for every eps.
+    """Do the Kahan maps of SYSTEM and OTHER commute?
 
     \b
-      kahanmaps check-commute pair.toml                       all associated maps of a family member, pairwise
+      kahanmaps check-commute paper_m3        # its associated maps, pairwise
       kahanmaps check-commute f.toml g.toml --eps 1/10
       kahanmaps check-commute f.toml g.toml --eps 1/10 --eps2 1/7
-      kahanmaps check-commute --vars x,y --rhs y --rhs=-x g.toml
-      kahanmaps check-commute pair.toml --json | jq .verdict
+      kahanmaps check-commute --vars x,y --rhs y --rhs=-x harmonic
+      kahanmaps check-commute paper_m2 --json | jq .verdict
+
+    Without --eps the question is asked for every eps.
 
     For one SYSTEM of kind [family] the maps of H_0 and H_1 = A H_0 come along as a control: they are expected NOT
     to commute, and this does not change the exit status.
 
     SYSTEM and OTHER are files, names of the catalogue, or - for standard input.
+
     Exit status: 0 they commute (proved or supported), 1 refuted, 2 wrong use, 3 undecided or stopped early.
     """
     from kahanmaps.checks.commute import check_commute

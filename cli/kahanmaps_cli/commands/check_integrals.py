@@ -29,17 +29,20 @@ if TYPE_CHECKING:
 )
 @check_options
 def command(system: str | None, integrals: tuple[tuple[str, str], ...], **options: Any) -> int:
-    """Are the integrals of SYSTEM conserved by its Kahan map?  Without --eps the question is asked for every eps.
+    """Are the integrals of SYSTEM conserved by its Kahan map?
+
+    \b
+      kahanmaps check-integrals paper_m3
+      kahanmaps check-integrals euler_top -p a1=1 -p a2=2 -p a3=-3
+      kahanmaps check-integrals my.toml --eps 1/10 \\
+          --integral 'I1=(x^2+y^2)/(1-eps^2*z^2)'
+      kahanmaps check-integrals --vars x,y --rhs y --rhs=-x --integral x^2+y^2
+
+    Without --eps the question is asked for every eps.
 
     Known ones: the modified Hamiltonian of Hamiltonian systems, in both normalisations of the paper, and for
     members of the family the K~ of all rational associated systems. Claimed ones: the [integrals] of the file, and
     --integral.
-
-    \b
-      kahanmaps check-integrals pair.toml
-      kahanmaps check-integrals euler_top -p a1=1 -p a2=2 -p a3=-3
-      kahanmaps check-integrals my.toml --integral 'I1=(x^2+y^2)/(1-eps^2*z^2)' --eps 1/10
-      kahanmaps check-integrals --vars x,y --rhs y --rhs=-x --integral x^2+y^2
 
     Exit status: 0 conserved (proved or supported), 1 refuted, 2 wrong use, 3 undecided or stopped early.
     """

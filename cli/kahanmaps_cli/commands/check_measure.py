@@ -16,14 +16,16 @@ from kahanmaps_cli.render import print_report
 @click.option("--density", metavar="EXPR", help="A claimed density phi: a rational function of the variables and eps.")
 @check_options
 def command(system: str | None, density: str | None, **options: Any) -> int:
-    """Is the measure dx/phi invariant under the Kahan map of SYSTEM?  Without --eps: for every eps.
-
-    For Hamiltonian systems phi = det(I - eps f'(x)); otherwise the [density] of the file, or --density.
+    """Is the measure dx/phi invariant under the Kahan map of SYSTEM?
 
     \b
-      kahanmaps check-measure pair.toml
+      kahanmaps check-measure paper_m3
       kahanmaps check-measure lotka_volterra --eps 1/10
-      kahanmaps check-measure --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --density x*y
+      kahanmaps check-measure --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' \\
+          --density x*y
+
+    Without --eps the question is asked for every eps. For Hamiltonian systems phi = det(I - eps f'(x)); otherwise the
+    [density] of the file, or --density.
 
     Exit status: 0 invariant (proved or supported), 1 refuted, 2 wrong use, 3 undecided or stopped early.
     """

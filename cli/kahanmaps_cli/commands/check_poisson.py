@@ -17,12 +17,12 @@ from kahanmaps_cli.render import print_report
 def command(system: str | None, **options: Any) -> int:
     """Is Pi(x) = J - eps^2 f'(x)^2 J a Poisson tensor that the Kahan map of SYSTEM preserves?
 
+    \b
+      kahanmaps check-poisson paper_m3
+      kahanmaps check-poisson henon_heiles    # Hamiltonian, and it fails
+
     Both the transformation law dPhi Pi(x) dPhi^T = Pi(x~) and the Jacobi identity are put to the test. Without --eps
     the question is asked for every eps.
-
-    \b
-      kahanmaps check-poisson pair.toml
-      kahanmaps check-poisson henon_heiles            a Hamiltonian system for which it fails
 
     Exit status: 0 it is (proved or supported), 1 refuted, 2 wrong use, 3 undecided or stopped early.
     """

@@ -6,8 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import load_system, output_options, system_or_prime_options
-from kahanmaps_cli.params import ExactNumber
+from kahanmaps_cli.options import (
+    load_system,
+    output_options,
+    seconds_option,
+    seed_option,
+    several_eps_options,
+    system_or_prime_options,
+)
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
@@ -25,18 +31,15 @@ _LENGTHS_SHOWN = 12
 @click.command("cycles")
 @system_or_prime_options
 @click.option("--prime", "primes", type=int, multiple=True, metavar="P", help="The prime; repeatable.")
-@click.option("--eps", type=ExactNumber(), multiple=True, help="The paper's epsilon, exact; repeatable.")
+@several_eps_options
 @click.option("--samples", type=int, metavar="N", help="Follow N random points instead of making the whole graph.")
-@click.option("--steps", type=int, metavar="K", help="... for at most K steps (default 8 (p + 1 + 2 sqrt p)).")
+@click.option("--steps", type=int, metavar="N", help="... for at most N steps (default 8 (p + 1 + 2 sqrt p)).")
 @click.option("--reversor", metavar="ROWS", help="A matrix R with f(R x) = -R f(x): '1,0;0,-1'.")
-@click.option("--seconds", type=float, default=60.0, show_default=True, help="Time for the samples of one run.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@seconds_option(60.0, "Time for the samples of one run.")
+@seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """The orbits of the Kahan map on projective space over a finite field, and how long its cycles are.
-
-    All points of P^n over GF(P), or random ones where they are more than two million (from dimension 7 on, half as many
-    with each dimension). Without --eps two values are tried for each prime: one alone may be special.
 
     \b
       kahanmaps cycles weierstrass -p 101
@@ -44,6 +47,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps cycles lotka_volterra --prime 997 --eps 1/10 --eps 1/7
       kahanmaps cycles weierstrass --prime 10007 --samples 200 --json
       kahanmaps cycles --vars x,y --rhs 'x*y' --rhs '-x^2' --prime 31
+
+    All points of P^n over GF(P), or random ones where they are more than two million (from dimension 7 on, half as many
+    with each dimension). Without --eps two values are tried for each prime: one alone may be special.
 
     A point is lost where the map has no value; where forms have a common factor it is divided out first (up to
     dimension 6). It falls if its orbit gets to a lost point, and is transient if its orbit gets to a cycle. The lengths
@@ -56,12 +62,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     from kahanmaps.laboratory.cycles import cycle_census, default_eps
     from kahanmaps.laboratory.reversors import find_reversor
 
-    if options["seed"] < 0:
-        raise click.UsageError(f"found --seed {options['seed']}, expected 0 or more")
     if options["steps"] is not None and options["samples"] is None:
-        raise click.UsageError("--steps K is for --samples N")
-    if not options["seconds"] > 0:
-        raise click.UsageError(f"found --seconds {options['seconds']}, expected more than 0")
+        raise click.UsageError("--steps N is for --samples N")
     options["primes"] = (*options["primes"], *map(_prime, (text for name, text in options["parameters"] if not name)))
     if not options["primes"]:
         raise click.UsageError("missing --prime P, or -p P")
@@ -71,7 +73,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     runs: list[tuple[Census, Comparison]] = []
     with Progress(quiet) as progress:
         for prime in dict.fromkeys(options["primes"]):
-            values = list(options["eps"]) or default_eps(prime)
+            values = [*options["eps"], *(step / 2 for step in options["time_step"])] or default_eps(prime)
             for eps in values:
                 census = cycle_census(
                     file.system,

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.options import (
+    eps_options,
+    load_system,
+    output_options,
+    seconds_option,
+    seed_option,
+    system_options,
+    the_eps,
+)
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
@@ -19,22 +27,26 @@ if TYPE_CHECKING:
 @click.command("degrees")
 @system_options
 @eps_options
-@click.option("--seconds", type=float, default=10.0, show_default=True, help="Stop after about so many seconds.")
-@click.option("--terms", type=int, help="Measure d_1, ..., d_N (default: until a recurrence is certain enough).")
-@click.option("--max-degree", type=int, default=20_000, show_default=True, help="Work out no larger degree.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@seconds_option(10.0, "Stop after about so many seconds.")
+@click.option(
+    "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
+)
+@click.option(
+    "--max-degree", type=int, metavar="D", default=20_000, show_default=True, help="Work out no larger degree."
+)
+@seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Degrees of the iterates of the Kahan map of SYSTEM, their recurrence and the dynamical degree.
 
-    The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 63 bits, two of
-    each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
-
     \b
       kahanmaps degrees euler_top
-      kahanmaps degrees henon_heiles --seconds 20 --json
+      kahanmaps degrees lotka_volterra --seconds 20 --json
       kahanmaps degrees weierstrass --eps 1/10 --terms 60
       kahanmaps degrees --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)'
+
+    The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 63 bits, two of
+    each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
 
     A recurrence is accepted where it holds for at least 2 terms more than determine it; how many is told.
 

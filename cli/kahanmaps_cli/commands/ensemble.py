@@ -8,10 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps.errors import counted
 from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, FloatRun, ModularRun, Run, structure_for
 from kahanmaps_cli.ensemble_starts import drawn, read_starts
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
-from kahanmaps_cli.params import Arithmetic, ExactNumber, NameValue
+from kahanmaps_cli.options import (
+    backward_option,
+    eps_options,
+    load_system,
+    output_options,
+    random_starts_options,
+    system_options,
+    the_eps,
+)
+from kahanmaps_cli.params import Arithmetic, NameValue
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.signals import interruptible
@@ -27,19 +36,18 @@ _MAX_BITS = 61
 
 @click.command("ensemble")
 @system_options
-@click.option(
-    "--starts",
-    type=click.Path(),
-    metavar="FILE",
-    help="One point a line (text, csv) or a row (.npy); - standard input.",
-)
-@click.option("--random", "count", type=int, metavar="N", help="Instead: N starts drawn at random.")
-@click.option("--box", type=ExactNumber(), metavar="R", help="... with coordinates from -R to R (default 1).")
-@click.option("--seed", type=int, metavar="S", help="... with this seed (default 0).")
+@random_starts_options
 @eps_options
-@click.option("--steps", type=int, required=True, help="How many steps to take.")
-@click.option("--backward", is_flag=True, help="Step by the inverse map, Phi(., -eps).")
-@click.option("--arithmetic", type=Arithmetic(), default="float", show_default=True, help="float or mod:P, P < 2^61.")
+@click.option("--steps", type=int, metavar="N", required=True, help="How many steps to take.")
+@backward_option
+@click.option(
+    "--arithmetic",
+    type=Arithmetic(),
+    metavar="KIND",
+    default="float",
+    show_default=True,
+    help="float or mod:P, P < 2^61.",
+)
 @click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE.npy", help="Write the points there.")
 @click.option("--every", type=int, metavar="K", help="Write every K-th iterate (default: the start and the last one).")
 @click.option(
@@ -59,10 +67,14 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     """Many orbits of the Kahan map of SYSTEM at once: how many go through, and how well integrals are kept.
 
     \b
-      kahanmaps ensemble pair.toml --random 1000 --box 1/2 --seed 1 --eps 1/10 --steps 10000
-      kahanmaps ensemble pair.toml --random 1000 --eps 1/10 --steps 10000 --every 100 -o orbits.npy
-      kahanmaps ensemble euler_top --starts starts.csv --eps 1/20 --steps 1000 --integral F1
-      kahanmaps ensemble pair.toml --random 100 --eps 1/10 --steps 100000 --arithmetic mod:2305843009213693951 --json
+      kahanmaps ensemble paper_m2 --random 1000 --box 1/2 --seed 1 \\
+          --eps 1/10 --steps 1000
+      kahanmaps ensemble paper_m2 --random 1000 --eps 1/10 --steps 10000 \\
+          --every 100 -o orbits.npy
+      kahanmaps ensemble euler_top --starts starts.csv --eps 1/20 \\
+          --steps 1000 --integral F1
+      kahanmaps ensemble paper_m2 --random 100 --eps 1/10 --steps 10000 \\
+          --arithmetic mod:2305843009213693951 --json
 
     FILE.npy is an array (records, orbits, dimension): row k holds step k K. It grows while the orbits are walked, and
     is valid at every moment, also after Ctrl-C. Orbits that have ended early are NaN there; residues stay at their last
@@ -105,7 +117,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
         _print(file, eps, options, run)
     interrupted = run.reached < steps
     if not quiet and output is not None:
-        say(f"{output}: {_counted(run.records, 'record')} of {_counted(run.shape[0], 'orbit')}")
+        say(f"{output}: {counted(run.records, 'record')} of {counted(run.shape[0], 'orbit')}")
     if not quiet and interrupted:
         say(f"interrupted after step {run.reached}")
     return 130 if interrupted else 0 if run.counts["completed"] == run.shape[0] else 3
@@ -175,10 +187,6 @@ def _arithmetic(options: dict[str, Any]) -> str:
     return f"mod:{number}" if kind == "mod" else str(kind)
 
 
-def _counted(number: int, word: str) -> str:
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
-
-
 def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> None:
     """Tab-separated lines, aligned on a terminal."""
     backward = ", backward" if options["backward"] else ""
@@ -189,15 +197,13 @@ def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> Non
     near = run.near()
     if near is not None:
         where = f", first in orbit {near['first']['orbit']} at step {near['first']['step']}" if near["first"] else ""
-        rows.append(
-            ("near-singular", f"{_counted(near['steps'], 'step')} in {_counted(near['orbits'], 'orbit')}{where}")
-        )
+        rows.append(("near-singular", f"{counted(near['steps'], 'step')} in {counted(near['orbits'], 'orbit')}{where}"))
     rows += [("drift", line) for line in run.moved_lines()]
     shown = list(islice(run.failures(), FAILURES_SHOWN))
     rows += [("ended early", f"orbit {end['orbit']}\t{end['status']}: {end['message']}") for end in shown]
     more = run.shape[0] - run.counts["completed"] - len(shown)
     if more:
-        rows.append(("ended early", f"and {_counted(more, 'more orbit')}"))
+        rows.append(("ended early", f"and {counted(more, 'more orbit')}"))
     for name, text in rows:
         tell(f"{name}\t{text}", 15)
 

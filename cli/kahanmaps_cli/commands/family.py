@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,16 @@ import click
 
 from kahanmaps.version import __version__
 from kahanmaps_cli.draw import draw_member, draw_options
-from kahanmaps_cli.options import load_system
+from kahanmaps_cli.groups import SuggestingGroup
+from kahanmaps_cli.options import (
+    json_option,
+    load_system,
+    parameter_option,
+    quiet_option,
+    seed_option,
+    system_argument,
+    system_options,
+)
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import on_terminal, shorten, tell
@@ -22,39 +32,36 @@ if TYPE_CHECKING:
     from kahanmaps.family.planar import NormalForm
     from kahanmaps.systems.files import SystemFile
 
-_JSON = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
 
-
-@click.group("family")
+@click.group("family", cls=SuggestingGroup)
 def command() -> None:
     """Members of the commuting family: A skew-Hamiltonian (A^T J = J A), H a cubic with A Hess(H) = Hess(H) A^T.
 
     \b
       kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
-      kahanmaps family new --m 3 --generic --seed 7
-      kahanmaps family show pair.toml
-      kahanmaps family space pair.toml
-      kahanmaps family associated pair.toml
+      kahanmaps family show paper_m3
+      kahanmaps family space paper_m3
+      kahanmaps family associated paper_m3
     """
 
 
 @command.command("new")
 @draw_options
 @click.option("--signs", metavar="S1,S2,...", help="Pick an associated system: 1 or -1 for each factor of chi.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@seed_option
 @click.option("--name", help="The name in the file.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
-@click.option("-q", "--quiet", is_flag=True, help="No talk on standard error.")
+@quiet_option
 def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **options: Any) -> None:
     """Draw a member at random and write it as a system file.
-
-    Without --eigenvalues, --generic or --chi the eigenvalues are distinct small integers drawn from the seed.
 
     \b
       kahanmaps family new --m 3 --eigenvalues 1,-2,3 --seed 7 -o pair.toml
       kahanmaps family new --m 3 --generic --seed 7
       kahanmaps family new --chi '(t-1)*(t^2-2)' --seed 1
       kahanmaps family new --m 2 --seed 3 --signs 1,-1 -o g.toml
+
+    Without --eigenvalues, --generic or --chi the eigenvalues are distinct small integers drawn from the seed.
     """
     from kahanmaps.family.skew_hamiltonian import diagnosis
     from kahanmaps.systems.files import SystemFile
@@ -71,26 +78,29 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
 
 
 @command.command("show")
-@click.argument("system")
+@system_options
 @click.option("--normal-form", is_flag=True, help="Also the system as one planar cubic h(X, Y) over K = Q[t]/chi.")
-@_JSON
-def show(system: str, normal_form: bool, as_json: bool) -> None:
+@json_option
+def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -> None:
     """Show a member: A, how chi factors, and H_0, ..., H_{m-1} with grad H_i = A grad H_{i-1}.
+
+    \b
+      kahanmaps family show paper_m3
+      kahanmaps family show paper_m3 --normal-form
+      kahanmaps family show hamiltonian.toml
+      kahanmaps family show paper_m3 --json | jq -r '.hamiltonians[1]'
 
     For a SYSTEM of kind [hamiltonian] or [system] an A is looked for: any with A^T J = J A and
     A Hess(H) = Hess(H) A^T that is not a multiple of I makes it a member.
-
-    \b
-      kahanmaps family show pair.toml
-      kahanmaps family show pair.toml --normal-form
-      kahanmaps family show hamiltonian.toml
-      kahanmaps family show pair.toml --json | jq -r '.hamiltonians[1]'
     """
     from kahanmaps.algebra.text import format_polynomial
     from kahanmaps.family.skew_hamiltonian import chi, diagnosis, format_univariate
 
-    file, member, hidden = _member_or_hidden(system)
+    file, member, hidden = _member_or_hidden(
+        load_system(system, options["variables"], options["rhs"], options["parameters"])
+    )
     data: dict[str, Any] = {
+        "command": "family show",
         "version": __version__,
         "system": file.name,
         "m": member.m,
@@ -130,14 +140,15 @@ def show(system: str, normal_form: bool, as_json: bool) -> None:
 
 
 @command.command("space")
-@click.argument("system", required=False)
+@system_argument
+@parameter_option
 @click.option("--matrix", metavar="ROWS", help="A itself instead of a file: '1,0;0,1'.")
-@_JSON
-def space(system: str | None, matrix: str | None, as_json: bool) -> None:
+@json_option
+def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: str | None, as_json: bool) -> None:
     """The space of cubics H with A Hess(H) = Hess(H) A^T: its dimension, 4m for generic A, and a basis.
 
     \b
-      kahanmaps family space pair.toml
+      kahanmaps family space paper_m3
       kahanmaps family space --matrix '1,0,0,0; 0,2,0,0; 0,0,1,0; 0,0,0,2'
     """
     from kahanmaps.algebra.text import format_polynomial
@@ -149,10 +160,11 @@ def space(system: str | None, matrix: str | None, as_json: bool) -> None:
     if matrix is not None:
         A, variables = _parse_matrix(matrix), None
     else:
-        member = _member(str(system))[1]
+        member = _member(system, parameters)[1]
         A, variables = member.A, member.variables
     found = cubic_space(A, variables)
     data: dict[str, Any] = {
+        "command": "family space",
         "version": __version__,
         "A": _rows(A),
         "dim": A.nrows(),
@@ -176,21 +188,24 @@ def space(system: str | None, matrix: str | None, as_json: bool) -> None:
 
 
 @command.command("associated")
-@click.argument("system")
+@system_argument
+@parameter_option
 @click.option("--write-to", type=click.Path(file_okay=False), metavar="DIR", help="Write each as a system file to DIR.")
-@_JSON
-def associated(system: str, write_to: str | None, as_json: bool) -> None:
+@json_option
+def associated(
+    system: str | None, parameters: tuple[tuple[str, str], ...], write_to: str | None, as_json: bool
+) -> None:
     """All rational associated systems up to sign: signs, B_s as a polynomial in A, and K_s with grad K_s = B_s grad H.
 
     \b
-      kahanmaps family associated pair.toml
+      kahanmaps family associated paper_m3
       kahanmaps family associated pair.toml --write-to associated/
     """
     from kahanmaps.algebra.text import format_number, format_polynomial
     from kahanmaps.family.associated import FamilyMember
     from kahanmaps.systems.files import SystemFile
 
-    file, member = _member(system)
+    file, member = _member(system, parameters)
     rows = []
     for associate in member.associated():
         row: dict[str, Any] = {
@@ -211,6 +226,7 @@ def associated(system: str, write_to: str | None, as_json: bool) -> None:
     if as_json:
         print_json(
             {
+                "command": "family associated",
                 "version": __version__,
                 "system": file.name,
                 "factors": [str(f) for f in member.factors],
@@ -277,21 +293,20 @@ def _with_signs(member: FamilyMember, signs: str | None) -> FamilyMember:
     return FamilyMember(member.A, member.H, tuple(int(piece) for piece in pieces))
 
 
-def _member(reference: str) -> tuple[SystemFile, FamilyMember]:
+def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[SystemFile, FamilyMember]:
     from kahanmaps.errors import InputError
 
-    file = load_system(reference, None, (), ())
+    file = load_system(reference, None, (), parameters)
     if file.member is None:
         raise InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]: A and H")
     return file, file.member
 
 
-def _member_or_hidden(reference: str) -> tuple[SystemFile, FamilyMember, HiddenMember | None]:
+def _member_or_hidden(file: SystemFile) -> tuple[SystemFile, FamilyMember, HiddenMember | None]:
     """The member that a system is declared to be, or is found to be."""
     from kahanmaps.errors import InputError
     from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member, reason_against
 
-    file = load_system(reference, None, (), ())
     if file.member is not None:
         return file, file.member, None
     hamiltonian = file.hamiltonian or hidden_hamiltonian(file.system)
@@ -319,12 +334,12 @@ def _parse_matrix(text: str) -> fmpq_mat:
     from flint import fmpq_mat
 
     from kahanmaps.algebra.text import parse_point
-    from kahanmaps.errors import InputError
+    from kahanmaps.errors import InputError, counted
     from kahanmaps.systems.quadratic import MAX_DIMENSION
 
     rows = [parse_point(row) for row in text.split(";")]
     if len(rows) > MAX_DIMENSION or any(len(row) != len(rows) for row in rows):
-        found = f"{len(rows)} rows of lengths {sorted({len(row) for row in rows})}"
+        found = f"{counted(len(rows), 'row')} of lengths {sorted({len(row) for row in rows})}"
         raise InputError(f"found {found}, expected a square matrix, at most {MAX_DIMENSION} x {MAX_DIMENSION}")
     return fmpq_mat([list(row) for row in rows])
 

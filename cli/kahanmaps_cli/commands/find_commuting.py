@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import load_system, output_options, system_options
+from kahanmaps_cli.options import (
+    error_bits_option,
+    load_system,
+    output_options,
+    seconds_option,
+    seed_option,
+    system_options,
+)
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
@@ -27,15 +34,9 @@ _SHAPES = {"linear": "g = B f with a constant matrix B", "quadratic": "any quadr
     show_default=True,
     help="linear: g = B f with a constant B; quadratic: any g of degree at most 2.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
-@click.option(
-    "--error-bits",
-    type=int,
-    default=100,
-    show_default=True,
-    help="What is supported is false with probability below 2^-BITS.",
-)
-@click.option("--seconds", type=float, default=60, show_default=True, help="Stop about then, and say what is open.")
+@seed_option
+@error_bits_option("What is supported is false with probability below 2^-BITS.")
+@seconds_option(60, "Stop about then, and say what is open.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """All rational g whose Kahan map commutes with that of SYSTEM, x' = f(x), at the same eps, for every eps.

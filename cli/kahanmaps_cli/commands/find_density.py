@@ -6,22 +6,15 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli.commands.find_integrals import heading, scope, symbols_and_eps
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options
+from kahanmaps_cli.options import load_system, system_options
 from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.render import on_terminal, print_json, shorten
+from kahanmaps_cli.search import print_search, require_one_form, search_options, symbols_and_eps
 
 
 @click.command("find-density")
 @system_options
-@eps_options
-@click.option("--symbolic", metavar="NAMES", help="Parameters that formulas are to contain, e.g. a1,a2 (eps is one).")
-@click.option("--max-degree", type=click.IntRange(0, 20), help="Largest degree of phi.")
-@click.option("--seconds", type=click.FloatRange(min=1), default=60, show_default=True, help="Time for the search.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
-@click.option("--toml", "as_toml", is_flag=True, help="The section [density] of a system file.")
-@click.option("--latex", "as_latex", is_flag=True, help="The formulas in LaTeX.")
-@output_options
+@click.option("--max-degree", type=click.IntRange(0, 20), metavar="D", help="Largest degree of phi.")
+@search_options("density")
 def command(system: str | None, **options: Any) -> int:
     """Densities of SYSTEM: polynomials phi of the least degree, or 1/phi, for which the measure dx/phi is invariant.
 
@@ -34,8 +27,7 @@ def command(system: str | None, **options: Any) -> int:
     """
     from kahanmaps.laboratory.densities import find_densities
 
-    if sum((options["as_toml"], options["as_latex"], options["as_json"])) > 1:
-        raise click.UsageError("give one of --toml, --latex and --json")
+    require_one_form(options)
     with Progress(options["quiet"]) as progress:
         file = load_system(system, options["variables"], options["rhs"], options["parameters"])
         symbols, eps = symbols_and_eps(options)
@@ -48,18 +40,5 @@ def command(system: str | None, **options: Any) -> int:
             seed=options["seed"],
             progress=progress,
         )
-    if options["as_json"]:
-        print_json({**heading("find-density", found), **found.to_json(), "document": dict(file.document)})
-    elif options["as_toml"]:
-        click.echo(found.toml_section(), nl=False)
-    elif options["as_latex"]:
-        for one in found.densities:
-            click.echo(f"phi = {one.to_json()['latex']}")
-    else:
-        click.echo(f"find-density: {file.name}, {scope(found)}")
-        for one in found.densities:
-            formula = shorten(one.text, 400) if on_terminal() else one.text
-            click.echo(f"phi\t{one.verdict}\t{formula}\n\t{one.evidence.summary}")
-        for text in filter(None, (found.note, found.reason)):
-            click.echo(f"note\t{text}")
+    print_search("find-density", found, options, [("phi", one, "") for one in found.densities])
     return 0 if found.densities else 3

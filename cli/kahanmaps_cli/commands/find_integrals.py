@@ -6,15 +6,23 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.options import load_system, system_options
 from kahanmaps_cli.progress import Progress
-from kahanmaps_cli.render import on_terminal, print_json, shorten
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.search import (
+    formula,
+    heading,
+    print_search,
+    require_one_form,
+    scope,
+    search_options,
+    symbols_and_eps,
+)
+from kahanmaps_cli.terminal import tell
 
 
 @click.command("find-integrals")
 @system_options
-@eps_options
-@click.option("--symbolic", metavar="NAMES", help="Parameters that formulas are to contain, e.g. a1,a2 (eps is one).")
 @click.option(
     "--monomials",
     "sets",
@@ -28,17 +36,10 @@ from kahanmaps_cli.render import on_terminal, print_json, shorten
     metavar="DEGREE",
     help="Instead: all discrete Darboux polynomials up to it.",
 )
-@click.option("--max-degree", type=click.IntRange(1, 20), help="Largest degree of relations along orbits.")
-@click.option("--seconds", type=click.FloatRange(min=1), default=60, show_default=True, help="Time for the search.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
-@click.option("--toml", "as_toml", is_flag=True, help="The section [integrals] of a system file.")
-@click.option("--latex", "as_latex", is_flag=True, help="The formulas in LaTeX.")
-@output_options
+@click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
+@search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
-    """Integrals of the Kahan map of SYSTEM, in closed form: how many there are, formulas P/Q, and their proofs.
-
-    Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals orbits show is
-    measured modulo primes; every formula is verified as an identity.
+    """Integrals of the Kahan map of SYSTEM in closed form: how many, formulas P/Q, and their proofs.
 
     \b
       kahanmaps find-integrals euler_top --symbolic a1,a2,a3
@@ -47,13 +48,15 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals volterra_periodic_4 --darboux 2
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
-    Exit status: 0 every integral that orbits show has a formula, 2 wrong use,
-    3 some have none, orbits were not measured, or the time was too short.
+    Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals orbits show is
+    measured modulo primes; every formula is verified as an identity.
+
+    Exit status: 0 every integral that orbits show has a formula, 2 wrong use, 3 some have none, orbits were not
+    measured, or the time was too short.
     """
     from kahanmaps.laboratory.integrals import find_integrals
 
-    if sum((options["as_toml"], options["as_latex"], options["as_json"])) > 1:
-        raise click.UsageError("give one of --toml, --latex and --json")
+    require_one_form(options)
     with Progress(options["quiet"]) as progress:
         file = load_system(system, options["variables"], options["rhs"], options["parameters"])
         symbols, eps = symbols_and_eps(options)
@@ -76,59 +79,9 @@ def command(system: str | None, **options: Any) -> int:
             seed=options["seed"],
             progress=progress,
         )
-    if options["as_json"]:
-        print_json({**heading("find-integrals", found), **found.to_json(), "document": dict(file.document)})
-    elif options["as_toml"]:
-        click.echo(found.toml_section(), nl=False)
-    elif options["as_latex"]:
-        for one in found.integrals:
-            click.echo(f"{one.name} = {one.to_json()['latex']}")
-    else:
-        click.echo(f"find-integrals: {file.name}, {scope(found)}")
-        for one in found.integrals:
-            formula = shorten(one.text, 400) if on_terminal() else one.text
-            click.echo(f"{one.name}\t{one.verdict}\t{formula}\n\t{one.origin}: {one.evidence.summary}")
-        click.echo(_count(found))
-        for text in filter(None, (found.note, found.reason)):
-            click.echo(f"note\t{text}")
+    named = [(one.name, one, f"{one.origin}: ") for one in found.integrals]
+    print_search("find-integrals", found, options, named, _count(found))
     return 3 if found.reason else 0
-
-
-def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
-    """The names of --symbolic without eps, and the number eps or None."""
-    named = [name.strip() for name in (options["symbolic"] or "").split(",") if name.strip()]
-    eps = the_eps(options["eps"], options["time_step"], required=False)
-    if eps is not None and "eps" in named:
-        raise click.UsageError("give --eps as a number, or eps among --symbolic, not both")
-    return tuple(name for name in named if name != "eps"), eps
-
-
-def scope(found: Any) -> str:
-    """For which eps and which symbols the formulas hold."""
-    if found.eps is None:
-        step = "every eps (the time step is 2 eps)"
-    else:
-        step = f"eps = {found.eps} (time step 2 eps = {2 * found.eps})"
-    return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
-
-
-def heading(name: str, found: Any) -> dict[str, Any]:
-    """What is needed to redo a search, as plain data."""
-    from kahanmaps.checks.settings import CONVENTION
-    from kahanmaps.version import __version__
-
-    return {
-        "command": name,
-        "version": __version__,
-        "system": found.file.name,
-        "parameters": {key: str(value) for key, value in found.file.parameters.items()},
-        "symbols": list(found.symbols),
-        "eps": "every" if found.eps is None else str(found.eps),
-        "time_step": "every" if found.eps is None else str(2 * found.eps),
-        "convention": CONVENTION,
-        "arithmetic": "exact formulas, from residues modulo primes",
-        "seed": found.seed,
-    }
 
 
 def _was_not_measured(found: Any) -> bool:
@@ -161,15 +114,15 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
     if options["as_json"]:
         print_json({**heading("darboux-polynomials", found), **found.to_json(), "document": dict(file.document)})
     else:
-        click.echo(f"Darboux polynomials: {file.name}, {scope(found)}")
-        click.echo("P(x~) = C P(x), C a product of C[g] = g(x~, -eps)/g(x, eps); spaces spanned by products left out")
+        tell(f"Darboux polynomials: {file.name}, {scope(found)}")
+        tell("P(x~) = C P(x), C a product of C[g] = g(x~, -eps)/g(x, eps); spaces spanned by products left out")
         for space in found.spaces:
-            click.echo(f"C = {space.cofactor}")
+            tell(f"C = {space.cofactor}")
             for P in space.polynomials:
                 text = format_polynomial(P)
-                click.echo(f"\t{space.verdict}\t{shorten(text, 400) if on_terminal() else text}")
+                tell(f"\t{space.verdict}\t{formula(text)}")
         if found.reason:
-            click.echo(f"note\t{found.reason}")
+            tell(f"note\t{found.reason}")
     return 3 if found.reason else 0
 
 
@@ -218,14 +171,14 @@ def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
         )
         return 3 if reason else 0
     step = "generic eps" if laboratory.eps is None else scope(laboratory)
-    click.echo(f"Hirota-Kimura bases: {file.name}, {step}, measured on two orbits modulo each of two primes")
+    tell(f"Hirota-Kimura bases: {file.name}, {step}, measured on two orbits modulo each of two primes")
     for row in rows:
-        click.echo(f"dimension {row.dimension}\t{', '.join(row.functions)}")
+        tell(f"dimension {row.dimension}\t{', '.join(row.functions)}")
         for vector in row.constant:
             names = [name for name, same in zip(row.functions, vector, strict=True) if not same]
-            click.echo(f"\tcoefficients that are integrals: {', '.join(names) or 'none'}")
+            tell(f"\tcoefficients that are integrals: {', '.join(names) or 'none'}")
         if not row.agree:
-            click.echo("\tthe orbits that were compared do not agree: try another --seed")
+            tell("\tthe orbits that were compared do not agree: try another --seed")
     for text in filter(None, (note, reason)):
-        click.echo(f"note\t{text}")
+        tell(f"note\t{text}")
     return 3 if reason else 0

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import load_system, output_options, system_options
+from kahanmaps_cli.options import load_system, output_options, seconds_option, system_options
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
@@ -20,7 +20,7 @@ _SHOWN = 40
 
 @click.command("find-symmetry")
 @system_options
-@click.option("--seconds", type=float, default=30, show_default=True, help="Stop about then, and say what is open.")
+@seconds_option(30, "Stop about then, and say what is open.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Affine symmetries T Phi T^-1 = Phi and reversing symmetries T Phi T^-1 = Phi^-1 of the map of SYSTEM.

@@ -6,8 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
-from kahanmaps_cli.params import PointText
+from kahanmaps_cli.options import (
+    Renamed,
+    eps_options,
+    load_system,
+    output_options,
+    seconds_option,
+    seed_option,
+    system_options,
+    the_eps,
+)
+from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
@@ -20,25 +29,42 @@ if TYPE_CHECKING:
 @click.command("heights")
 @system_options
 @eps_options
-@click.option("--starts", type=int, help="Number of random starts (default 3).")
-@click.option("--start", "given", type=PointText(), multiple=True, metavar="X", help="A start; may be repeated.")
-@click.option("--steps", type=int, default=60, show_default=True, help="Steps of each orbit.")
-@click.option("--max-digits", type=int, default=20_000, show_default=True, help="Digit budget of each orbit.")
-@click.option("--seconds", type=float, default=30.0, show_default=True, help="Begin no orbit after so many seconds.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random starts.")
+@click.option(
+    "--random",
+    "--starts",
+    "count",
+    cls=Renamed,
+    type=Whole(1),
+    metavar="N",
+    help="N starts drawn at random (default 3).",
+)
+@click.option(
+    "--start",
+    "given",
+    type=PointText(),
+    multiple=True,
+    metavar="X",
+    help="Instead: this start, e.g. 1/2,-1/3,0.25. Repeatable.",
+)
+@click.option("--steps", type=int, metavar="N", default=60, show_default=True, help="Steps of each orbit.")
+@click.option(
+    "--max-digits", type=int, metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
+)
+@seconds_option(30.0, "Begin no orbit after so many seconds.")
+@seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """How fast the heights of exact orbits of the Kahan map of SYSTEM grow, from several starts.
 
+    \b
+      kahanmaps heights weierstrass
+      kahanmaps heights henon_heiles --eps 1/10 --random 5
+      kahanmaps heights euler_top --start 1,2,3 --start 1/2,1,-1 --steps 100
+      kahanmaps heights --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
+
     The height is the bit length of the largest integer that a point needs. Quadratic growth goes with integrable
     maps, exponential growth with others; bounded and linear growth are seen on special curves, too. Without --eps the
     values 1/10 and 3/11 are taken and compared: one eps may be special. This is evidence, and no proof.
-
-    \b
-      kahanmaps heights weierstrass
-      kahanmaps heights henon_heiles --eps 1/10 --starts 5
-      kahanmaps heights euler_top --start 1,2,3 --start 1/2,1,-1 --steps 100
-      kahanmaps heights --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
 
     Exit status: 0 all orbits that were decided agree, 2 wrong use, 3 undecided, or the orbits disagree, or the time was
     over.
@@ -48,8 +74,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     from kahanmaps.invariants.heights import Growth
     from kahanmaps.laboratory.height_survey import DEFAULT_STARTS, height_survey
 
-    if options["starts"] is not None and options["given"]:
-        raise click.UsageError("give --start X or --starts N, not both: --starts counts random starts")
+    if options["count"] is not None and options["given"]:
+        raise click.UsageError("give --start X or --random N, not both")
     if options["max_digits"] < 1:
         raise InputError(f"found --max-digits {options['max_digits']}, expected at least 1")
     eps = the_eps(options["eps"], options["time_step"], required=False)
@@ -58,7 +84,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         found = height_survey(
             file.system,
             eps,
-            starts=options["given"] or (DEFAULT_STARTS if options["starts"] is None else options["starts"]),
+            starts=options["given"] or (DEFAULT_STARTS if options["count"] is None else options["count"]),
             steps=options["steps"],
             max_digits=options["max_digits"],
             seconds=options["seconds"],

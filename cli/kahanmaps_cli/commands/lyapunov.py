@@ -8,11 +8,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.ensemble_starts import drawn, read_starts
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
-from kahanmaps_cli.params import ExactNumber
+from kahanmaps_cli.options import (
+    eps_options,
+    load_system,
+    output_options,
+    random_starts_options,
+    seconds_option,
+    system_options,
+    the_eps,
+)
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
-from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.terminal import on_terminal, print_table, tell
 
 if TYPE_CHECKING:
     from kahanmaps.maps.float_lyapunov import Lyapunov
@@ -24,25 +31,22 @@ _DEFAULT_STARTS = 16
 
 @click.command("lyapunov")
 @system_options
-@click.option("--starts", type=click.Path(), metavar="FILE", help="One point a line (text, csv), or .npy; - is stdin.")
-@click.option("--random", "count", type=int, metavar="N", help="Instead: N random starts (default 16).")
-@click.option("--box", type=ExactNumber(), metavar="R", help="... with coordinates from -R to R (default 1).")
-@click.option("--seed", type=int, metavar="S", help="... with this seed (default 0).")
+@random_starts_options
 @eps_options
-@click.option("--steps", type=int, default=10_000, show_default=True, help="How many steps to count.")
+@click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="How many steps to count.")
 @click.option("--transient", type=int, metavar="K", help="Steps before those, not counted (default: a tenth).")
-@click.option("--seconds", type=float, default=60.0, show_default=True, help="Time for all steps.")
+@seconds_option(60.0, "Time for all steps.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Lyapunov exponents of float orbits of the Kahan map, by the exact tangent map.
-
-    Per unit of time, which is 1/(2 eps) steps, and per step: means over the starts, their spread, and how far the first
-    half of the steps is from all of them.
+    """Lyapunov exponents of float orbits of the Kahan map of SYSTEM, by the exact tangent map.
 
     \b
       kahanmaps lyapunov lorenz --eps 1/400 --box 5 --steps 20000
       kahanmaps lyapunov euler_top --eps 1/10 --random 100 --seed 1
       kahanmaps lyapunov henon_heiles --eps 1/10 --box 1/3 --json
+
+    Per unit of time, which is 1/(2 eps) steps, and per step: means over the starts, their spread, and how far the first
+    half of the steps is from all of them. Without --starts and --random there are 16 random starts.
 
     Numbers in double precision from finitely many steps are measured, not proved: a small exponent need not be 0, and
     those of integrable maps tend to 0 like log(steps)/steps. The sum is checked against log |det dPhi|.
@@ -88,18 +92,16 @@ def _require_sense(options: dict[str, Any], steps: int, transient: int) -> None:
         raise click.UsageError("--random, --box and --seed draw starts: they do not go with --starts FILE")
     if not 2 <= steps <= _MAX_STEPS or not 0 <= transient <= _MAX_STEPS:
         raise click.UsageError(f"found {steps} steps after {transient}, expected 2 to {_MAX_STEPS} after 0 or more")
-    if not options["seconds"] > 0:
-        raise click.UsageError(f"found --seconds {options['seconds']}, expected more than 0")
 
 
 def _print(file: SystemFile, eps: Any, found: Lyapunov) -> None:
     tell(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), double precision")
     tell(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
     tell(f"steps\t{found.steps} after {found.transient}")
-    tell("# exponent\tper unit of time\tper step\tspread\tchange from half")
     columns = zip(found.mean, found.mean * (2 * found.eps), found.spread, found.change, strict=True)
-    for k, numbers in enumerate(columns, 1):
-        tell("\t".join([str(k), *(f"{number:.6g}" for number in numbers)]))
+    rows = [[str(k), *(f"{number:.6g}" for number in numbers)] for k, numbers in enumerate(columns, 1)]
+    first = "exponent" if on_terminal() else "# exponent"
+    print_table([[first, "per unit of time", "per step", "spread", "change from half"], *rows])
     volume = found.log_volume.mean() if len(found.log_volume) else float("nan")
     tell(f"sum\t{found.mean.sum():.6g}")
     tell(f"log |det dPhi|\t{volume:.6g}\tresidual {found.residual:.2g}")

@@ -1,14 +1,21 @@
-"""To come."""
+"""kahanmaps manual."""
 
 from __future__ import annotations
 
 import click
 
 
-@click.command(name="manual")
+@click.command("manual")
 def command() -> None:
-    """To come.
+    """Print the manual page: all commands, their options and examples, exit statuses, environment, files.
 
     \b
-      kahanmaps manual
+      kahanmaps manual | man -l -
+      kahanmaps manual > kahanmaps.1
     """
+    from kahanmaps.version import __version__
+    from kahanmaps_cli.main import SECTIONS, cli
+    from kahanmaps_cli.manual_page import manual_page
+
+    sections = {heading: list(commands) for heading, commands in SECTIONS.items()}
+    click.echo(manual_page(cli, sections, __version__), nl=False)

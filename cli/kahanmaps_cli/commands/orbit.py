@@ -12,11 +12,12 @@ from typing import IO, TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.numbers import json_float, short_float
-from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
+from kahanmaps_cli.options import backward_option, eps_options, load_system, quiet_option, system_options, the_eps
 from kahanmaps_cli.orbit_formats import Csv, JsonLines, Npz, OutputFull, Text, Writer
 from kahanmaps_cli.orbit_run import OrbitRun
 from kahanmaps_cli.params import Arithmetic, NameValue, PointText, Steps
 from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.render import ending
 from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
@@ -28,15 +29,16 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 
 @click.command("orbit")
 @system_options
-@click.option("--start", type=PointText(), required=True, metavar="X", help="The start: 1/2,-1/3,0.25")
+@click.option("--start", type=PointText(), required=True, metavar="X", help="The start, e.g. 1/2,-1/3,0.25.")
 @eps_options
-@click.option("--steps", type=int, help="How many steps to take.")
-@click.option("--at", type=Steps(), metavar="N1,N2,...", help="Only these iterates.")
-@click.option("--every", type=int, default=1, show_default=True, help="Only every K-th iterate.")
-@click.option("--backward", is_flag=True, help="Step by the inverse map, Phi(., -eps).")
+@click.option("--steps", type=int, metavar="N", help="How many steps to take.")
+@click.option("--at", type=Steps(), metavar="N1,N2,...", help="Only these iterates, instead of --steps.")
+@click.option("--every", type=int, metavar="K", default=1, show_default=True, help="Only every K-th iterate.")
+@backward_option
 @click.option(
     "--arithmetic",
     type=Arithmetic(),
+    metavar="KIND",
     default="exact",
     show_default=True,
     help="exact, float, mod:P, ball:BITS or ball:auto.",
@@ -57,30 +59,35 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
     help="A column beside the point: an expression in the variables and eps, the name of an integral of the file, or "
     "the word known for all that theorems give (not in floats).",
 )
-@click.option("--max-digits", type=int, help="Digit budget (exact arithmetic; default 200000).")
+@click.option("--max-digits", type=int, metavar="N", help="Digit budget (exact arithmetic; default 200000).")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="Default text, or what the name of FILE says.")
 @click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
 @click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress and no talk on standard error.")
+@quiet_option
 def command(
     system: str | None, form: str | None, output: str | None, verbose: bool, quiet: bool, **options: Any
 ) -> int:
     """Iterate the Kahan map of SYSTEM from a start.
 
     \b
-      kahanmaps orbit pair.toml --start 1/2,-1/3,0,1,2/5,-1 --eps 1/10 --steps 20
-      kahanmaps orbit lotka_volterra --start 1,2 --time-step 1/5 --steps 1000 --arithmetic float -o lv.npz
-      kahanmaps orbit --vars x,y,z --rhs y*z --rhs=-2*z*x --rhs x*y --start 1,1/2,1/3 --eps 1/10 --steps 5
-      kahanmaps orbit pair.toml --start 1,2,3,4,5,6 --eps 1/10 --at 1000000000000 --arithmetic mod:2305843009213693951
-      kahanmaps orbit pair.toml --start 1,2,3,4,5,6 --eps 1/10 --at 10,1000000 --arithmetic ball:auto --accuracy 30
-      kahanmaps orbit pair.toml --start 1,2,3,4,5,6 --eps 1/10 --steps 1000000 --arithmetic float --every 100 -o x.npy
-      kahanmaps orbit pair.toml --start 1,2,3,4,5,6 --eps 1/10 --steps 5 --integral known --format jsonl
+      kahanmaps orbit lotka_volterra --start 1,2 --eps 1/10 --steps 5
+      kahanmaps orbit lotka_volterra --start 1,2 --time-step 1/5 \\
+          --steps 1000 --arithmetic float -o lv.npz
+      kahanmaps orbit paper_m3 --start 1,2,3,4,5,6 --eps 1/10 \\
+          --at 1000000000000 --arithmetic mod:2305843009213693951
+      kahanmaps orbit paper_m3 --start 1,2,3,4,5,6 --eps 1/10 \\
+          --at 10,1000000 --arithmetic ball:auto --accuracy 30
+      kahanmaps orbit --vars x,y,z --rhs y*z --rhs=-2*z*x --rhs x*y \\
+          --start 1,1/2,1/3 --eps 1/10 --steps 5 --integral y^2+2*x^2
 
     SYSTEM is a file, a name of the catalogue, or - for standard input. A right-hand side that starts with - is written
     --rhs=-x. Numbers are exact: integers, p/q, decimals. Ctrl-C ends after the step in flight and leaves a valid file.
 
     Members of the commuting family are stepped in their normal form, and --at reaches an iterate directly, by
     doublings: modulo P and in balls for steps of thirty digits. Poles on the way are passed over then, except over Q.
+
+    --integral adds a column: an expression, the name of an integral of the file, or the word known for all that
+    theorems give (not in floats).
 
     Exit status: 0 done, 2 wrong use, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
     """
@@ -131,7 +138,7 @@ def command(
     told = output is None and form == "text" and sys.stdout.isatty()  # the last line says how it ended
     if not quiet and not told and (output is not None or end.status not in _STATUS):
         where = f"{output}: " if output is not None else ""
-        say(f"{where}{end.status}: {record['message']}")
+        say(f"{where}{ending(end.status, record['message'])}")
     return _STATUS.get(end.status, 3)
 
 
@@ -156,7 +163,7 @@ def _stream(run: OrbitRun, output: str, quiet: bool) -> int:
         error.filename = error.filename or output
         raise
     if not quiet:
-        say(f"{output}: {end.status}: {_end_record(end, run)['message']}")
+        say(f"{output}: {ending(end.status, _end_record(end, run)['message'])}")
     return _STATUS.get(end.status, 3)
 
 

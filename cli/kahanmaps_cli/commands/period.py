@@ -23,21 +23,25 @@ _LONG_PRIME, _LONGEST_PRIME = 90, 192  # bits, between which it takes from secon
 
 @click.command("period")
 @system_options
-@click.option("--start", type=PointText(), required=True, metavar="X", help="The start: 1/2,-1/3,0.25")
+@click.option("--start", type=PointText(), required=True, metavar="X", help="The start, e.g. 1/2,-1/3,0.25.")
 @eps_options
-@click.option("--arithmetic", type=Arithmetic(), default="exact", show_default=True, help="exact or mod:P.")
+@click.option(
+    "--arithmetic", type=Arithmetic(), metavar="KIND", default="exact", show_default=True, help="exact or mod:P."
+)
 @click.option("-v", "--verbose", is_flag=True, help="Say on standard error what was found in the system.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
     """The exact period of an orbit of a member of the commuting family, without walking it.
 
+    \b
+      kahanmaps period paper_m3 --start 1,2,3,4,5,6 --eps 1/10
+      kahanmaps period paper_m3 --start 1,2,3,4,5,6 --eps 1/10 \\
+          --arithmetic mod:2305843009213693951
+      kahanmaps period paper_m2 --start 1,2,3,4 --eps 1/10 \\
+          --arithmetic mod:10007 --json
+
     In every plane of its normal form the map is a translation on a cubic curve, and the period is the order of a point.
     Modulo P it is computed; over Q the orbit is proved periodic or aperiodic.
-
-    \b
-      kahanmaps period pair.toml --start 1/2,-1/3,0,1 --eps 1/10 --arithmetic mod:2305843009213693951
-      kahanmaps period pair.toml --start 1/2,-1/3,0,1 --eps 1/10
-      kahanmaps period paper_m3 --start 1,2,3,4,5,6 --eps 1/10 --arithmetic mod:10007 --json
 
     SYSTEM may be a member of the family without saying so. The translation goes on where the map does not, through
     poles: if the orbit meets one, the period is that of the orbit continued, and the output says so.

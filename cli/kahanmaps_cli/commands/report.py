@@ -1,14 +1,243 @@
-"""To come."""
+"""kahanmaps report."""
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import click
 
+from kahanmaps_cli.draw import draw_member, draw_options
+from kahanmaps_cli.options import (
+    eps_options,
+    load_system,
+    quiet_option,
+    seconds_option,
+    seed_option,
+    symbolic_option,
+    system_options,
+    the_eps,
+)
+from kahanmaps_cli.pictures.output import PictureCommand, _command
+from kahanmaps_cli.progress import Progress, say
 
-@click.command(name="report")
-def command() -> None:
-    """To come.
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from kahanmaps.checks.claims import Report
+    from kahanmaps.checks.settings import Settings
+    from kahanmaps.systems.files import SystemFile
+
+_DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
+_ONLY_FOR = {
+    "symbolic": ("analyze",),
+    "seconds": ("analyze",),
+    "sections": ("verify",),
+    **dict.fromkeys(_DRAWN, ("verify", "checks")),
+}
+
+
+@click.command("report", cls=PictureCommand)
+@system_options
+@click.option(
+    "--from",
+    "source",
+    type=click.Choice(["analyze", "verify", "checks"]),
+    default="analyze",
+    show_default=True,
+    help="What the page is made of.",
+)
+@click.option("--db", metavar="BATCH.db", help="Instead: the results of a batch.")
+@click.option("--by", metavar="NAME,...", help="With --db: group results by these (default: experiment).")
+@click.option("--value", "values", multiple=True, metavar="NAME", help="With --db: only this number, with a picture.")
+@eps_options
+@symbolic_option
+@seconds_option(None, "Time for the analysis (default: 16 to 150 by dimension).")
+@seed_option
+@draw_options
+@click.option("--section", "sections", type=int, multiple=True, metavar="N", help="With verify: only this section.")
+@click.option("-o", "--output", default="-", show_default=True, metavar="FILE", help="FILE.html; - is standard output.")
+@click.option("--title", help="The title of the page (default: the name of the system).")
+@click.option("--no-pictures", is_flag=True, help="Formulas and tables only.")
+@quiet_option
+def command(system: str | None, **options: Any) -> int:
+    """One HTML page about SYSTEM, a member of the family or a batch, to be read, printed or sent.
 
     \b
-      kahanmaps report
+      kahanmaps report euler_top -o top.html
+      kahanmaps report henon_heiles -p c=-6 --seconds 30 -o hh.html
+      kahanmaps report --from verify --m 2 -o paper.html
+      kahanmaps report --db first.db --by m -o batch.html
+
+    analyze: what the map preserves and how it grows, the verdict first. verify: the paper's claims for a member of the
+    family, section by section. checks: the four checks, those that apply. The page is one file with its pictures
+    inside; it needs no network and no JavaScript, and says how it was made.
+
+    Exit status: as the command that the page is made of, and 0 for a batch.
     """
+    _require_consistent(system, options)
+    _require_output(options["output"])
+    with Progress(options["quiet"]) as progress:
+        html, status = _page(system, options, progress)
+    _write(html, options)
+    return status
+
+
+def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
+    context = click.get_current_context()
+    if options["db"] is not None:
+        names = ("source", "variables", "rhs", "parameters", "eps", "time_step", "seed", *_ONLY_FOR)
+        clash = [_option_name(name) for name in names if _is_given(context, name)]
+        clash += ["SYSTEM"] * (system is not None)
+        if clash:
+            raise click.UsageError(f"found --db and {clash[0]}, expected one of the two: a batch has its own systems")
+    else:
+        clash = [_option_name(name) for name in ("by", "values") if _is_given(context, name)]
+        if clash:
+            raise click.UsageError(f"{clash[0]} is for --db BATCH.db")
+    for name, sources in _ONLY_FOR.items():
+        if _is_given(context, name) and options["source"] not in sources:
+            raise click.UsageError(f"{_option_name(name)} is for --from {' or '.join(sources)}")
+    drawn = [name for name in _DRAWN if _is_given(context, name)]
+    if drawn and (system is not None or options["variables"] or options["rhs"]):
+        raise click.UsageError(f"give a system or say which member to draw ({_option_name(drawn[0])}), not both")
+
+
+def _is_given(context: click.Context, name: str) -> bool:
+    return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+
+
+def _option_name(name: str) -> str:
+    return {
+        "source": "--from",
+        "sections": "--section",
+        "values": "--value",
+        "variables": "--vars",
+        "parameters": "-p",
+    }.get(name, "--" + name.replace("_", "-"))
+
+
+def _require_output(path: str) -> None:
+    """Refuse, before anything is computed, an output that cannot be written."""
+    from kahanmaps.errors import InputError
+
+    if path == "-":
+        if sys.stdout.isatty():
+            raise click.UsageError("a terminal cannot show a page: give -o FILE.html")
+        return
+    if Path(path).is_dir():
+        raise InputError(f"{path}: found a folder, expected the name of a file")
+    if not Path(path).resolve().parent.is_dir():
+        raise InputError(f"{path}: found no folder {Path(path).resolve().parent}, expected an existing one")
+
+
+def _write(html: str, options: dict[str, Any]) -> None:
+    from kahanmaps.plots.figures import write_whole
+
+    content = html.encode()
+    if options["output"] == "-":
+        sys.stdout.buffer.write(content)
+        sys.stdout.buffer.flush()
+        return
+    write_whole(Path(options["output"]), content)
+    if not options["quiet"]:
+        say(f"{options['output']}: {len(content)} bytes")
+
+
+def _page(system: str | None, options: dict[str, Any], progress: Progress) -> tuple[str, int]:
+    """The page, and the exit status."""
+    from kahanmaps.reports.report import report_html
+
+    how: dict[str, Any] = {
+        "title": options["title"],
+        "pictures": not options["no_pictures"],
+        "command": _command(),
+    }
+    if options["db"] is not None:
+        from kahanmaps.experiments.store import Store
+
+        with Store.open(options["db"], readonly=True) as store:
+            by = [name.strip() for name in (options["by"] or "").split(",") if name.strip()]
+            return report_html(store, by=by, values=options["values"], **how), 0
+    if options["source"] == "analyze":
+        return _analysis(system, options, progress, how)
+    file = _system_or_member(system, options)
+    settings = _settings(options, progress)
+    left_out: list[str] = []
+    if options["source"] == "verify":
+        from kahanmaps.paper.examiner import VerifyOptions
+        from kahanmaps.paper.verify import verify
+
+        reports = [verify(file, settings, VerifyOptions(options["sections"] or None))]
+    else:
+        reports, left_out = _checks(file, settings)
+    progress("the page")
+    return report_html(reports, file=file, left_out=left_out, **how), _status(reports)
+
+
+def _analysis(system: str | None, options: dict[str, Any], progress: Progress, how: dict[str, Any]) -> tuple[str, int]:
+    from kahanmaps.laboratory.analysis import analyze
+    from kahanmaps.reports.report import report_html
+    from kahanmaps_cli.search import symbols_and_eps
+
+    symbols, eps = symbols_and_eps(options)
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    found = analyze(file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress)
+    progress("the page")
+    return report_html(found, **how), 3 if found.conclusion.kind == "undecided" else 0
+
+
+def _settings(options: dict[str, Any], progress: Progress) -> Settings:
+    from kahanmaps.checks.settings import Settings
+
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    return Settings(eps=eps, seed=options["seed"], progress=progress)
+
+
+def _system_or_member(system: str | None, options: dict[str, Any]) -> SystemFile:
+    """The system that is named; for verify, and where one is to be drawn, a member of the family."""
+    from kahanmaps.systems.files import SystemFile
+
+    drawn = {name: options[name] for name in _DRAWN}
+    is_drawn = any(value is not None and value is not False for value in drawn.values())
+    named = system is not None or options["variables"] or options["rhs"]
+    if named or not (is_drawn or options["source"] == "verify"):
+        return load_system(system, options["variables"], options["rhs"], options["parameters"])
+    if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
+        drawn["m"] = 3
+    member = draw_member(**drawn, seed=options["seed"])
+    return SystemFile.from_member(member, f"random member, m = {member.m}, seed {options['seed']}")
+
+
+def _checks(file: SystemFile, settings: Settings) -> tuple[list[Report], list[str]]:
+    """The reports of the checks that apply, and a sentence for each that does not."""
+    from kahanmaps.checks.commute import check_commute
+    from kahanmaps.checks.conserve import check_integrals
+    from kahanmaps.checks.preserve import check_measure, check_poisson
+    from kahanmaps.errors import InputError
+
+    checks: dict[str, Callable[[], Report]] = {
+        "check-integrals": lambda: check_integrals(file, settings),
+        "check-measure": lambda: check_measure(file, settings),
+        "check-poisson": lambda: check_poisson(file, settings),
+        "check-commute": lambda: check_commute(file, None, settings),
+    }
+    reports: list[Report] = []
+    left_out: list[str] = []
+    for name, check in checks.items():
+        settings.progress(name)
+        try:
+            reports.append(check())
+        except InputError as error:
+            left_out.append(f"{name} does not apply: {error}")
+    if not reports:
+        raise InputError(f"no check applies to {file.name}: {'; '.join(left_out)}")
+    return reports, left_out
+
+
+def _status(reports: list[Report]) -> int:
+    from kahanmaps.checks.claims import Verdict, combined
+
+    verdict = combined(report.verdict for report in reports)
+    return {Verdict.REFUTED: 1, Verdict.UNDECIDED: 3}.get(verdict, 0)

@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
+from kahanmaps_cli.options import (
+    eps_options,
+    load_system,
+    output_options,
+    seconds_option,
+    seed_option,
+    system_options,
+    the_eps,
+)
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import on_terminal, shorten, tell
@@ -20,21 +28,23 @@ if TYPE_CHECKING:
 @click.command("singularities")
 @system_options
 @eps_options
-@click.option("--steps", type=int, default=12, show_default=True, help="How many steps to follow each hypersurface.")
-@click.option("--seconds", type=float, default=60.0, show_default=True, help="Time for each eps.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@click.option(
+    "--steps", type=int, metavar="N", default=12, show_default=True, help="Steps to follow each hypersurface for."
+)
+@seconds_option(60.0, "Time for each eps.")
+@seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Are the singularities of the Kahan map confined, and after how many steps?
-
-    The hypersurfaces that the map contracts are found over Q, its poles det(I - eps f'(x)) = 0 among them, and followed
-    along power series modulo large primes: what dimension do their images have, and when is it full again? Without
-    --eps two values are tried and compared.
+    """Are the singularities of the Kahan map of SYSTEM confined, and after how many steps?
 
     \b
       kahanmaps singularities euler_top
       kahanmaps singularities lotka_volterra --eps 1/10 --steps 20
-      kahanmaps singularities --vars x,y --rhs 'y' --rhs '6*x^2 - 2' --json
+      kahanmaps singularities --vars x,y --rhs y --rhs '6*x^2 - 2' --json
+
+    The hypersurfaces that the map contracts are found over Q, its poles det(I - eps f'(x)) = 0 among them, and followed
+    along power series modulo large primes: what dimension do their images have, and when is it full again? Without
+    --eps two values are tried and compared.
 
     "ranks" are the dimensions of the images after 1, 2, ... steps, "poles" the orders of their poles. Z is the
     hyperplane at infinity. Confined singularities are evidence for, and no proof of integrability: those of
@@ -50,10 +60,6 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     from kahanmaps.laboratory.singularities import default_eps, singularities, symbolic_denominator
 
     eps = the_eps(options["eps"], options["time_step"], required=False)
-    if options["seed"] < 0:
-        raise click.UsageError(f"found --seed {options['seed']}, expected 0 or more")
-    if not options["seconds"] > 0:
-        raise click.UsageError(f"found --seconds {options['seconds']}, expected more than 0")
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     with Progress(quiet) as progress:
         runs = [
@@ -109,7 +115,7 @@ def _print(
     from kahanmaps.algebra.text import format_number
 
     def cut(text: str) -> str:
-        return shorten(text, 60) if on_terminal() else text
+        return shorten(text, 200) if on_terminal() else text
 
     tell(f"# {file.name}, dimension {file.system.dim}, eps is half the time step")
     if symbolic is not None:

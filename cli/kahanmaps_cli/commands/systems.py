@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import shutil
-import textwrap
 from typing import Any
 
 import click
 
 from kahanmaps.version import __version__
-from kahanmaps_cli.params import NameValue
-from kahanmaps_cli.render import on_terminal, print_json, shorten
+from kahanmaps_cli.complete import complete_system
+from kahanmaps_cli.options import json_option, load_reference, parameter_option
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import on_terminal, shorten, tell, tell_entry
 
 
 @click.command("systems")
-@click.argument("name", required=False)
-@click.option("-p", "--parameter", "parameters", type=NameValue(), multiple=True, help="Set a parameter of the system.")
+@click.argument("name", required=False, shell_complete=complete_system)
+@parameter_option
 @click.option("--toml", "as_toml", is_flag=True, help="The system file itself, to copy and change.")
 @click.option("--latex", "as_latex", is_flag=True, help="Equations, integrals and density in LaTeX.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+@json_option
 def command(
     name: str | None, parameters: tuple[tuple[str, str], ...], as_toml: bool, as_latex: bool, as_json: bool
 ) -> None:
@@ -39,13 +39,13 @@ def command(
             raise click.UsageError("--toml, --latex and -p need the NAME of a system")
         rows = [(key, load(key)) for key in names()]
         if as_json:
-            print_json({"version": __version__, "systems": [_summary(file) for _, file in rows]})
+            print_json({"command": "systems", "version": __version__, "systems": [_summary(file) for _, file in rows]})
             return
         width = max(len(key) for key, _ in rows)
         for key, file in rows:
-            click.echo(f"{key:<{width}}  {file.system.dim:>2}  {file.catalog.get('title', '')}")
+            tell_entry(f"{key:<{width}}  {file.system.dim:>2}  ", file.catalog.get("title", ""), "bold")
         return
-    file = load(name, dict(parameters))
+    file = load_reference(name, dict(parameters))
     if as_toml:
         click.echo(file.to_toml(), nl=False)
     elif as_latex:
@@ -53,6 +53,7 @@ def command(
     elif as_json:
         print_json(
             {
+                "command": "systems",
                 "version": __version__,
                 **_summary(file),
                 **_equations(file),
@@ -143,40 +144,29 @@ def _formula(text: str) -> str:
     return shorten(text, 300) if on_terminal() else text
 
 
-def _say(text: str) -> None:
-    """A line, on a terminal broken between words; what follows the first line is indented."""
-    if on_terminal():
-        width = max(shutil.get_terminal_size().columns - 1, 20)
-        pieces = textwrap.wrap(
-            text, width, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False, tabsize=4
-        )
-        text = "\n".join(pieces)
-    click.echo(text)
-
-
 def _show(file: Any) -> None:
     from kahanmaps.algebra.text import format_polynomial
 
     facts = _equations(file)
-    _say(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
+    tell(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
     for name, value in file.parameters.items():
-        click.echo(f"  {name} = {value}")
+        tell(f"  {name} = {value}")
     for name, text in zip(facts["variables"], facts["rhs"], strict=True):
-        _say(f"{name}' = {_formula(text)}")
+        tell(f"{name}' = {_formula(text)}")
     if file.hamiltonian is not None:
-        _say(f"H = {_formula(format_polynomial(file.hamiltonian.H))}")
+        tell(f"H = {_formula(format_polynomial(file.hamiltonian.H))}")
     for name, text in facts["integrals"].items():
-        _say(f"integral {name} = {_formula(text)}")
+        tell(f"integral {name} = {_formula(text)}")
     if facts["density"]:
-        _say(f"density phi = {_formula(facts['density'])}  (dx/phi is invariant)")
+        tell(f"density phi = {_formula(facts['density'])}  (dx/phi is invariant)")
     known = _known_lines(file)
     if known:
-        click.echo("for generic parameters and eps:" if file.parameters else "for generic eps:")
+        tell("for generic parameters and eps:" if file.parameters else "for generic eps:")
     for line in known:
-        _say(f"  {line}")
+        tell(f"  {line}")
     for fact in facts["facts"]:
-        _say(f"* {fact}")
+        tell(f"* {fact}")
     if facts["convention"]:
-        _say(f"step: {facts['convention']}")
+        tell(f"step: {facts['convention']}")
     for text in facts["sources"]:
-        _say(f"source: {text}")
+        tell(f"source: {text}")

@@ -7,49 +7,64 @@ from typing import Any
 import click
 
 from kahanmaps_cli.draw import draw_member, draw_options
-from kahanmaps_cli.options import eps_options, load_system, output_options, the_eps
+from kahanmaps_cli.options import (
+    eps_options,
+    evidence_options,
+    load_system,
+    output_options,
+    parameter_option,
+    system_argument,
+    the_eps,
+    verbose_option,
+)
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.verify_table import print_verification
 
 
 @click.command("verify")
-@click.argument("system", required=False)
+@system_argument
+@parameter_option
 @draw_options
 @eps_options
 @click.option("--universal", is_flag=True, help="Not one member: everything at random over GF(p), for every member.")
 @click.option("--controls", is_flag=True, help="Run every claim on input that breaks one hypothesis: it has to fail.")
 @click.option(
-    "--section", "sections", type=int, multiple=True, help="Only this section (1 to 9; 10: beyond the paper)."
-)
-@click.option("--order", type=int, default=3, show_default=True, help="Order in eps^2 of the series of the integrals.")
-@click.option("--balls", "ball_bits", type=int, metavar="BITS", help="Also over complex balls, all roots enclosed.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
-@click.option(
-    "--error-bits",
+    "--section",
+    "sections",
     type=int,
-    default=100,
-    show_default=True,
-    help="Random points until the probability of error is below 2^-BITS.",
+    metavar="N",
+    multiple=True,
+    help="Only this section (1 to 9; 10: beyond the paper). Repeatable.",
 )
-@click.option("--markdown", "as_markdown", is_flag=True, help="The table in Markdown, on standard output.")
-@click.option("-v", "--verbose", is_flag=True, help="On a terminal: all evidence (a pipe always gets it).")
+@click.option(
+    "--order",
+    type=int,
+    metavar="N",
+    default=3,
+    show_default=True,
+    help="Order in eps^2 of the series of the integrals.",
+)
+@click.option("--balls", "ball_bits", type=int, metavar="BITS", help="Also over complex balls, all roots enclosed.")
+@evidence_options
+@click.option("--markdown", "as_markdown", is_flag=True, help="The table in Markdown.")
+@verbose_option
 @output_options
 def command(system: str | None, **options: Any) -> int:
-    """Every statement and display of the paper of Petrera and Suris, put to the test for a member of its family.
+    """Every statement of the paper of Petrera and Suris, put to the test for a member of its family.
+
+    \b
+      kahanmaps verify                        # a random member with m = 3
+      kahanmaps verify paper_m3
+      kahanmaps verify --m 4 --generic --seed 2          # chi irreducible over Q
+      kahanmaps verify --chi '(t-1)*(t^2+1)' --balls 128
+      kahanmaps verify --universal --m 3      # theorems for the generic member
+      kahanmaps verify --controls --section 6            # what makes it fail
+      kahanmaps verify --m 2 --json | jq '.claims[0]'
 
     The member is SYSTEM, or drawn from --m, --eigenvalues, --generic or --chi; without any of these m = 3. Claims are
     proved by expanding them symbolically, verified exactly, or supported at random points over GF(p) with a bound on
     the error. Misprints stand in the table in both forms. m = 1 to 8; beyond m = 6 claims that sum over all eigenvalues
     are supported only.
-
-    \b
-      kahanmaps verify                                      a random member with m = 3
-      kahanmaps verify pair.toml
-      kahanmaps verify --m 4 --generic --seed 2             chi irreducible over Q
-      kahanmaps verify --chi '(t-1)*(t^2+1)' --balls 128    complex roots, with enclosures
-      kahanmaps verify --universal --m 3                    the theorems for the generic member
-      kahanmaps verify --controls --section 6               what makes each claim fail
-      kahanmaps verify --m 2 --json | jq '.claims[] | select(.verdict != "proved")'
 
     Exit status: 0 every claim holds (proved or supported), 1 one is refuted, 2 wrong use, 3 one is undecided.
     Misprints are expected to be refuted and do not count.
@@ -82,7 +97,7 @@ def command(system: str | None, **options: Any) -> int:
             report = verify_universal(3 if drawn["m"] is None else drawn["m"], settings, what)
         else:
             if system is not None:
-                file = load_system(system, None, (), ())
+                file = load_system(system, None, (), options["parameters"])
             else:
                 if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
                     drawn["m"] = 3

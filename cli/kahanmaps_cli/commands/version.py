@@ -8,12 +8,13 @@ from importlib.metadata import version as version_of
 
 import click
 
+from kahanmaps_cli.options import json_option
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
 
 
 @click.command("version")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
+@json_option
 def command(as_json: bool) -> None:
     """The versions of kahanmaps and of what it computes with.
 

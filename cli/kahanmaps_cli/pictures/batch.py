@@ -2,15 +2,127 @@
 
 from __future__ import annotations
 
-import click
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
 
-from kahanmaps_cli.pictures.output import PictureCommand
+import click
+from click.core import ParameterSource
+
+from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
+from kahanmaps_cli.progress import Progress, say
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from kahanmaps.experiments.records import Row
+
+_TOLD = 1000  # rows between words of progress
 
 
 @click.command("batch", cls=PictureCommand)
-def command() -> None:
-    """To come.
+@click.argument("database", required=False, type=click.Path(dir_okay=False), metavar="[DB]")
+@click.option(
+    "--db",
+    type=click.Path(dir_okay=False),
+    envvar="KAHANMAPS_DB",
+    metavar="FILE",
+    help="The database of results, instead of DB (or set KAHANMAPS_DB).",
+)
+@click.option("--by", metavar="NAME,...", help="Group by these, e.g. m,eps (default: experiment).")
+@click.option("--value", "values", multiple=True, metavar="NAME", help="The distribution of a number (repeatable).")
+@click.option("--x", metavar="NAME", help="With --y: a dot for each task, along this axis ...")
+@click.option("--y", metavar="NAME", help="... and at the height of this number; --by NAME colours them.")
+@click.option("--scale", type=click.Choice(["linear", "log"]), help="Of the numbers (default: by their range).")
+@click.option(
+    "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment (may be repeated)."
+)
+@picture_options
+def command(database: str | None, db: str | None, **options: Any) -> int:
+    """Results of a batch: counts, distributions, or one number against another.
 
     \b
-      kahanmaps plot batch
+      kahanmaps plot batch study.db --by m,eps
+      kahanmaps plot batch study.db --by m --value constant -o constants.pdf
+      kahanmaps plot batch study.db --x eps --y constant --by m -o eps.svg
+
+    Without --value: how many tasks of each group are proved, refuted, failed,
+    missing and so on. A box holds the middle half of the numbers, with the
+    median; whiskers hold nine tenths, dots are the least and the largest. Names
+    are those of 'kahanmaps batch summary'. A batch that is running may be drawn.
     """
+    from kahanmaps.errors import InputError
+    from kahanmaps.experiments.store import Store
+
+    require_output(options)
+    source = click.get_current_context().get_parameter_source("db")
+    if database is not None and source is ParameterSource.COMMANDLINE:
+        raise click.UsageError("give DB or --db FILE, not both")
+    path = database or db
+    if path is None:
+        raise click.UsageError("missing DB, the database of a batch (or --db FILE, or set KAHANMAPS_DB)")
+    by = [name.strip() for name in (options["by"] or "").split(",") if name.strip()]
+    if (options["x"] is None) != (options["y"] is None):
+        raise click.UsageError("give --x NAME and --y NAME, both or none")
+    if options["x"] is not None and (options["values"] or len(by) > 1):
+        raise click.UsageError("found --x with --value or several names in --by, expected at most one name in --by")
+    with Store.open(path, readonly=True) as store, Progress(options["quiet"]) as progress:
+        rows = _Counted(store.rows(list(options["only"]) or None, missing=True), progress)
+        figure, talk = _pairs(rows, by, options) if options["x"] is not None else _groups(rows, by, options)
+    if not rows.count:
+        raise InputError(f"found no task in {path}, expected at least one to draw")
+    if figure is None:
+        raise AssertionError("tasks, and no picture of them")
+    deliver(figure, options)
+    if not options["quiet"]:
+        for sentence in talk:
+            say(sentence)
+    return 0
+
+
+def _groups(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tuple[Figure | None, list[str]]:
+    from kahanmaps.errors import counted
+    from kahanmaps.experiments.summary import summarise
+    from kahanmaps.plots.batch import draw_batch, groups_beyond
+
+    values = list(dict.fromkeys(options["values"]))
+    summary = summarise(rows, by or ["experiment"], values)
+    if not summary.groups:
+        return None, []
+    missing = sum(group.missing for group in summary.groups)
+    talk = [f"{missing} tasks have no result yet"] if missing and values else []
+    for name in values:
+        if beyond := groups_beyond(summary, name):
+            talk.append(f"{name}: {counted(beyond, 'group')} with numbers beyond the range of machine floats (1.8e308)")
+    return draw_batch(summary, values, style_from(options), scale=options["scale"]), talk
+
+
+def _pairs(rows: _Counted, by: list[str], options: dict[str, Any]) -> tuple[Figure | None, list[str]]:
+    from kahanmaps.experiments.columns import value_pairs
+    from kahanmaps.plots.batch import clipped, draw_pairs
+
+    pairs = value_pairs(rows, options["x"], options["y"], by[0] if by else None)
+    if not rows.count:
+        return None, []
+    talk = []
+    if pairs.missing:
+        talk.append(f"{pairs.missing} tasks have no result yet")
+    if pairs.left_out:
+        talk.append(f"{pairs.left_out} results have no {options['x']} or no number {options['y']}: left out")
+    if clipped(pairs):
+        talk.append(f"{clipped(pairs)} numbers are beyond the range of machine floats (1.8e308): left out")
+    return draw_pairs(pairs, style_from(options), scale=options["scale"]), talk
+
+
+class _Counted:
+    """Rows as they come, counted, with a word of progress now and then."""
+
+    def __init__(self, rows: Iterable[Row], progress: Progress) -> None:
+        self._rows, self._progress = rows, progress
+        self.count = 0
+
+    def __iter__(self) -> Iterator[Row]:
+        for row in self._rows:
+            self.count += 1
+            if self.count % _TOLD == 0:
+                self._progress(f"{self.count} tasks read")
+            yield row

@@ -2,15 +2,76 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
-from kahanmaps_cli.pictures.output import PictureCommand
+from kahanmaps_cli.options import eps_options, inline_options, load_system, the_eps
+from kahanmaps_cli.params import ExactNumber, PointText
+from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
+from kahanmaps_cli.pictures.variables import two_variables
+from kahanmaps_cli.progress import Progress, say
+
+HOLDS, UNDECIDED = 0, 3
 
 
 @click.command("commute", cls=PictureCommand)
-def command() -> None:
-    """To come.
+@click.argument("system", required=False)
+@click.argument("other", required=False)
+@inline_options
+@click.option("--start", type=PointText(), required=True, help="The point x.")
+@eps_options
+@click.option("--eps2", type=ExactNumber(), help="Another eps for the map of OTHER.")
+@click.option("--steps", type=int, default=1, show_default=True, help="Steps of each map: a lattice, up to 12.")
+@click.option("--axes", "axes", metavar="X,Y", help="The two variables shown (default: where squares are widest).")
+@picture_options
+def command(system: str | None, other: str | None, **options: Any) -> int:
+    """The square x, Phi_f x, Phi_g x: do its two fourth corners coincide?
 
     \b
-      kahanmaps plot commute
+      kahanmaps plot commute paper_m2 --start 1/2,-1/3,0,1 --eps 1/50
+      kahanmaps plot commute paper_m2 --start 1/2,-1/3,0,1 --eps 1/100 \\
+          --steps 5 -o lattice.pdf
+      kahanmaps plot commute euler_top zhukovski_volterra_1 \\
+          --start 1,1/2,-1 --eps 1/10 -o open.svg
+
+    For one SYSTEM, a member of the commuting family: on the left two associated maps, which commute; on the right the
+    maps of H_0 and H_1, grad H_1 = A grad H_0, which do not in general. For two systems one panel.
+
+    Blue arrows are steps of f from points that g has reached, red ones steps of g from points that f has reached. All
+    points are exact: "closes exactly" means that they are equal; a gap is the largest distance in all coordinates.
+
+    Exit status: 0 done, 2 wrong use, 3 some points are missing (a map has no value there, or numbers are too long).
     """
+    require_output(options)
+    from kahanmaps.plots.draw_squares import draw_squares
+    from kahanmaps.plots.squares import pair_of_systems, pairs_of_member, squares
+
+    eps = the_eps(options["eps"], options["time_step"])
+    inline = options["variables"] is not None or options["rhs"]
+    if inline and system is not None and other is None:
+        system, other = None, system  # the inline system is the first, the argument the second
+    if system == other == "-":
+        raise click.UsageError("found - twice, but standard input holds one system only")
+    if options["eps2"] is not None and other is None:
+        raise click.UsageError("--eps2 needs a second system: kahanmaps plot commute SYSTEM OTHER --eps E --eps2 E2")
+    with Progress(options["quiet"]) as progress:
+        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        chosen = two_variables("--axes", options["axes"], file.variables)
+        if other is None:
+            second, captions = None, list[str]()
+            pairs = list(pairs_of_member(file))
+        else:
+            second = load_system(other, None, (), ())
+            captions = [f"f = {file.name}, g = {second.name}"]
+            pairs = [pair_of_systems(file, second, eps, options["eps2"])]
+        found = [squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
+        figure = draw_squares(found, style_from(options), chosen, captions)
+    if not options["quiet"]:
+        for square in found:
+            names = captions[0] if captions else " and ".join(square.pair.names)
+            say(f"{names}: {square.verdict}")
+            if square.stopped:
+                say(f"  points are missing: {square.stopped}")
+    deliver(figure, options, file if second is None else None)
+    return UNDECIDED if any(square.stopped for square in found) else HOLDS

@@ -2,15 +2,106 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import click
 
-from kahanmaps_cli.pictures.output import PictureCommand
+from kahanmaps_cli.options import eps_options, inline_options, load_system, the_eps
+from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
+from kahanmaps_cli.pictures.records import read_record
+from kahanmaps_cli.progress import Progress, say
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.degrees import DegreeGrowth
+    from kahanmaps.systems.files import SystemFile
 
 
 @click.command("degrees", cls=PictureCommand)
-def command() -> None:
-    """To come.
+@click.argument("systems", nargs=-1, metavar="[SYSTEM]...")
+@inline_options
+@click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json (may be repeated).")
+@eps_options
+@click.option("--seconds", type=float, default=10.0, show_default=True, help="Stop each system after about so many.")
+@click.option("--terms", type=int, help="Measure d_1, ..., d_N (default: until a recurrence is certain enough).")
+@click.option("--max-degree", type=int, default=20_000, show_default=True, help="Work out no larger degree.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@click.option("--scale", type=click.Choice(["linear", "log", "loglog"]), help="Chosen by itself unless given.")
+@picture_options
+def command(systems: tuple[str, ...], **options: Any) -> int:
+    """Degrees of the iterates of Kahan maps, with the recurrence they satisfy.
 
     \b
-      kahanmaps plot degrees
+      kahanmaps plot degrees euler_top
+      kahanmaps plot degrees euler_top lotka_volterra weierstrass -o degrees.pdf
+      kahanmaps plot degrees weierstrass --eps 1/10 --scale loglog -o degrees.svg
+      kahanmaps degrees euler_top --json | kahanmaps plot degrees --from -
+
+    Marks are measured degrees (docs: kahanmaps degrees --help), a solid line is
+    the recurrence they satisfy. Dots join degrees for which none was checked:
+    what the legend says of their growth is then estimated.
+
+    Exit status: 0 done, 2 wrong use, 3 some system was stopped before a
+    recurrence was found (the picture is written).
     """
+    from kahanmaps.plots.growth import draw_degrees
+
+    require_output(options)
+    growths: dict[str, DegreeGrowth] = {}
+    files: list[SystemFile] = []
+    early: list[str] = []
+    for path in options["records"]:
+        _from_record(path, growths)
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    inline = bool(options["variables"] or options["rhs"])
+    asked: list[str | None] = list(systems)
+    if inline or not (asked or growths):
+        asked.append(None)
+    if inline and len(asked) > 1:
+        raise click.UsageError("give SYSTEMs or an inline one (--vars and --rhs), not both")
+    if len(asked) > 1 and options["parameters"]:
+        raise click.UsageError("-p is for one system: write several as files, or draw --from records")
+    with Progress(options["quiet"]) as progress:
+        for reference in asked:
+            file = load_system(reference, options["variables"], options["rhs"], options["parameters"])
+            found = _measured(file, eps, options, progress)
+            _add(growths, file.name, found)
+            files.append(file)
+            if found.recurrence is None and found.ended not in ("terms", "constant", "singular"):
+                early.append(f"{file.name}: stopped early: {found.message}")
+    figure = draw_degrees(growths, style_from(options), scale=options["scale"])
+    deliver(figure, options, files[0] if len(files) == 1 else None)
+    if not options["quiet"]:
+        for sentence in early:
+            say(sentence)
+    return 3 if early else 0
+
+
+def _measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> DegreeGrowth:
+    from kahanmaps.laboratory.degrees import degree_growth
+
+    return degree_growth(
+        file.system,
+        eps,
+        seconds=options["seconds"],
+        max_terms=options["terms"],
+        max_degree=options["max_degree"],
+        seed=options["seed"],
+        progress=lambda sentence: progress(f"{file.name}: {sentence}"),
+    )
+
+
+def _from_record(path: str, growths: dict[str, DegreeGrowth]) -> None:
+    from kahanmaps.plots.degree_records import degrees_of_record
+
+    name, found = degrees_of_record(read_record(path), path)
+    _add(growths, name, found)
+
+
+def _add(growths: dict[str, DegreeGrowth], name: str, found: DegreeGrowth) -> None:
+    """Two systems may have one name: the second is called name (2)."""
+    free = name
+    k = 1
+    while free in growths:
+        k += 1
+        free = f"{name} ({k})"
+    growths[free] = found

@@ -2,15 +2,99 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import click
 
-from kahanmaps_cli.pictures.output import PictureCommand
+from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
+from kahanmaps_cli.params import PointText
+from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
+from kahanmaps_cli.pictures.records import read_record
+from kahanmaps_cli.progress import Progress, say
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.height_survey import HeightSurvey
+    from kahanmaps.systems.files import SystemFile
+
+# Of OrbitEnd: a number limit or a return are ends that the picture is made for, a hole in the map is not.
+_EARLY = ("singular",)
 
 
 @click.command("heights", cls=PictureCommand)
-def command() -> None:
-    """To come.
+@system_options
+@click.option("--from", "record", metavar="FILE", help="Written by heights --json, instead of SYSTEM.")
+@eps_options
+@click.option("--starts", type=int, help="Number of random starts (default 3).")
+@click.option("--start", "given", type=PointText(), multiple=True, metavar="X", help="A start; may be repeated.")
+@click.option("--steps", type=int, default=60, show_default=True, help="Steps of each orbit.")
+@click.option("--max-digits", type=int, default=20_000, show_default=True, help="Digit budget of each orbit.")
+@click.option("--seconds", type=float, default=30.0, show_default=True, help="Begin no orbit after so many seconds.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random starts.")
+@click.option("--scale", type=click.Choice(["linear", "log", "loglog"]), help="Chosen by itself unless given.")
+@picture_options
+def command(system: str | None, **options: Any) -> int:
+    """Heights of exact orbits against the step: how fast the numbers grow.
 
     \b
-      kahanmaps plot heights
+      kahanmaps plot heights weierstrass
+      kahanmaps plot heights weierstrass --eps 1/10 --starts 5 -o heights.pdf
+      kahanmaps plot heights lotka_volterra --scale log -o heights.svg
+      kahanmaps heights weierstrass --json | kahanmaps plot heights --from -
+
+    The height is the bit length of the largest integer that a point needs; a
+    colour is an eps, a curve an orbit, a line the growth that was fitted.
+    Records hold heights at the steps 0, 1, 2, 4, 8, ... only.
+
+    Exit status: 0 done, 2 wrong use, 3 some orbit met a singular point, or the
+    time was over before all orbits were begun (the picture is written).
     """
+    from kahanmaps.plots.growth import draw_heights
+    from kahanmaps.plots.height_curves import curves_of_record, height_curves
+
+    require_output(options)
+    if options["starts"] is not None and options["given"]:
+        raise click.UsageError("give --start X or --starts N, not both: --starts counts random starts")
+    file: SystemFile | None = None
+    whole = True
+    if options["record"] is not None:
+        if system is not None or options["variables"] or options["rhs"]:
+            raise click.UsageError("give a SYSTEM or --from FILE, not both")
+        record = read_record(options["record"])
+        curves = curves_of_record(record, options["record"])
+        whole = record.get("whole") is not False
+    else:
+        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        survey = _surveyed(file, options)
+        curves, whole = height_curves(survey), survey.is_whole
+    deliver(draw_heights(curves, style_from(options), scale=options["scale"]), options, file)
+    early = sum(curve.status in _EARLY for curve in curves)
+    if not options["quiet"]:
+        short = sum(curve.status == "budget" for curve in curves)
+        if short:
+            say(f"{short} of {len(curves)} orbits ended where the numbers exceed --max-digits {options['max_digits']}")
+        if early:
+            say(f"{early} of {len(curves)} orbits ended early, at a singular point of the map")
+        if not whole:
+            say("stopped early: the time was over before all orbits were begun")
+    return 3 if early or not whole else 0
+
+
+def _surveyed(file: SystemFile, options: dict[str, Any]) -> HeightSurvey:
+    from kahanmaps.errors import InputError
+    from kahanmaps.family.structure import structure_of
+    from kahanmaps.laboratory.height_survey import DEFAULT_STARTS, height_survey
+
+    if options["max_digits"] < 1:
+        raise InputError(f"found --max-digits {options['max_digits']}, expected at least 1")
+    with Progress(options["quiet"]) as progress:
+        return height_survey(
+            file.system,
+            the_eps(options["eps"], options["time_step"], required=False),
+            starts=options["given"] or (DEFAULT_STARTS if options["starts"] is None else options["starts"]),
+            steps=options["steps"],
+            max_digits=options["max_digits"],
+            seconds=options["seconds"],
+            structure=structure_of(file.system, file.hamiltonian, file.member),
+            seed=options["seed"],
+            progress=progress,
+        )

@@ -2,15 +2,98 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import click
 
-from kahanmaps_cli.pictures.output import PictureCommand
+from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
+from kahanmaps_cli.params import PointText
+from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
+from kahanmaps_cli.pictures.variables import two_variables
+from kahanmaps_cli.progress import Progress, say
+
+if TYPE_CHECKING:
+    from kahanmaps.plots.invariant_curves import InvariantCurves
+
+HOLDS, UNDECIDED = 0, 3
 
 
 @click.command("invariant-curves", cls=PictureCommand)
-def command() -> None:
-    """To come.
+@system_options
+@click.option(
+    "--start", "starts", type=PointText(), multiple=True, required=True, help="Start of an orbit; repeatable."
+)
+@eps_options
+@click.option("--steps", type=int, default=120, show_default=True, help="Steps of each orbit.")
+@click.option("--original", metavar="X,Y", help="A first panel with the orbit in these two variables.")
+@click.option("--projective", is_flag=True, help="All of each plane as a disc, infinity as its rim.")
+@click.option("--flow", is_flag=True, help="Dashed: the level curves of the differential equation.")
+@picture_options
+def command(**options: Any) -> int:
+    """The curves that carry the orbits of a member of the commuting family, plane by plane.
 
     \b
-      kahanmaps plot invariant-curves
+      kahanmaps plot invariant-curves paper_m2 --start 1/2,-1/3,0,1 --eps 1/10
+      kahanmaps plot invariant-curves paper_m3 --start 1,0,1/2,0,1/3,1 \\
+          --eps 1/20 --original x1,x2 -o product.pdf
+      kahanmaps plot invariant-curves paper_m2 --start 1,0,1/2,0 \\
+          --start 1/2,-1/3,0,1 --eps 1/20 --projective -o curves.svg
+      kahanmaps plot invariant-curves paper_m3_irreducible \\
+          --start 1,0,1/2,0,1/3,1 --eps 1/20 -o generic.png
+
+    In its normal form the Kahan map of a member is a product of planar maps, one for each root of chi, and each of
+    them moves its part of the orbit along a plane cubic. A colour is a step, the same in all panels.
+
+    Real roots have real planes; their coordinates keep areas, and h = kappa (u^3 - 3 u v^2) or kappa (u^3 + 3 u v^2).
+    A pair of complex roots has one complex plane: dots without a curve, u and v in panels of their own. The system may
+    be a member that does not say so. Where chi has a repeated root there are no planes.
+
+    Exit status: 0 done, 2 wrong use or no normal form, 3 an orbit met a pole (the picture shows what came before).
     """
+    require_output(options)
+    from kahanmaps.algebra.text import format_point
+    from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
+    from kahanmaps.plots.invariant_curves import find_invariant_curves
+
+    eps = the_eps(options["eps"], options["time_step"])
+    with Progress(options["quiet"]) as progress:
+        file = load_system(options["system"], options["variables"], options["rhs"], options["parameters"])
+        original = two_variables("--original", options["original"], file.variables)
+        found = find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
+        labels = [f"start {_short(format_point(start))}" for start in options["starts"]]
+        figure = draw_invariant_curves(
+            found, style_from(options), options["projective"], options["flow"], original, labels
+        )
+    if not options["quiet"]:
+        _tell(found, options["projective"])
+    deliver(figure, options, file)
+    return HOLDS if all(pole is None for pole in found.poles) else UNDECIDED
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 30 else text[:30] + "..."
+
+
+def _tell(found: InvariantCurves, projective: bool) -> None:
+    from kahanmaps.algebra.text import format_number
+    from kahanmaps.plots.draw_invariant_curves import panels_of
+    from kahanmaps.plots.plane_views import view_of
+
+    eps, twice = _short(format_number(found.eps)), _short(format_number(2 * found.eps))
+    say(f"{found.structure}; eps = {eps} (time step 2 eps = {twice})")
+    for k, pole in enumerate(found.poles, 1):
+        if pole is not None:
+            which = f"start {k}: " if len(found.poles) > 1 else ""
+            say(f"{which}the orbit ends before step {pole}: a pole, or closer to one than 2^-96")
+    for plane in found.planes:
+        if plane.shape == "0":
+            say(f"lambda = {plane.root_text}: h = 0, nothing moves in this plane")
+    if projective:
+        return
+    outside = [
+        f"{view.outside} ({'' if column == 'uv' else column + ', '}lambda = {plane.root_text})"
+        for _, plane, column in panels_of(found)
+        if (view := view_of(plane, column)).outside
+    ]
+    if outside:
+        say(f"dots outside the windows: {', '.join(outside)}; --projective shows all of them")

@@ -2,15 +2,237 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 import click
 
-from kahanmaps_cli.pictures.output import PictureCommand
+from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
+from kahanmaps_cli.params import ExactNumber, PointText
+from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
+from kahanmaps_cli.pictures.portrait_orbits import Orbits
+from kahanmaps_cli.pictures.stored import read_orbits
+from kahanmaps_cli.progress import Progress, say
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from kahanmaps.plots.level_sets import LevelCurves
+    from kahanmaps.plots.windows import Window
+
+_MAX_STEPS = 10**9
+_STEPS, _DENSITY_STEPS = 1000, 100_000
+_WALKING = ("start", "starts", "count", "box", "seed", "steps", "backward", "euler")
 
 
 @click.command("portrait", cls=PictureCommand)
-def command() -> None:
-    """To come.
+@system_options
+@eps_options
+@click.option("--start", type=PointText(), multiple=True, metavar="X", help="A start, 1/2,-1/3; again for more orbits.")
+@click.option(
+    "--starts", type=click.Path(), metavar="FILE", help="Starts: one a line (text, csv), or .npy; - is stdin."
+)
+@click.option("--random", "count", type=int, metavar="N", help="N random starts.")
+@click.option("--box", type=ExactNumber(), metavar="R", help="... with coordinates from -R to R (default 1).")
+@click.option("--seed", type=int, metavar="S", help="... with this seed (default 0).")
+@click.option("--steps", type=int, metavar="N", help="Steps of each orbit (default 1000; with --density 100000).")
+@click.option("--backward", is_flag=True, help="Step by the inverse map, Phi(., -eps).")
+@click.option(
+    "--from",
+    "stored",
+    type=click.Path(exists=True, dir_okay=False),
+    metavar="FILE",
+    help="Draw the orbits in a .npy, .npz, .jsonl or .csv file that orbit or ensemble wrote; SYSTEM may be left out.",
+)
+@click.option(
+    "--axes", metavar="A,B[,C]", help="Two or three variables or expressions; step is the number of the step."
+)
+@click.option("--3d", "space", is_flag=True, help="Three axes, chosen by themselves.")
+@click.option(
+    "--colour-by",
+    "--color-by",
+    "colour",
+    default="orbit",
+    show_default=True,
+    metavar="F",
+    help="orbit, step, an integral (or H) by its name, or an expression.",
+)
+@click.option("--lines", is_flag=True, help="Join the points of each orbit.")
+@click.option("--levels", metavar="F", help="Level curves of an integral or expression in the plane of the axes.")
+@click.option("--levels-at", type=PointText(), metavar="C1,C2,...", help="... at these values, not through the starts.")
+@click.option("--density", is_flag=True, help="Count the points in cells: for 10^5 to 10^10 of them.")
+@click.option("--euler", is_flag=True, help="Explicit Euler from the same starts too, in grey below.")
+@click.option("--window", type=PointText(), metavar="X0,X1,Y0,Y1", help="The part that is shown.")
+@click.option("--equal", is_flag=True, help="The same unit of length along both axes.")
+@picture_options
+def command(system: str | None, **options: Any) -> int:
+    """The phase portrait of SYSTEM: float orbits of its Kahan map, projected.
 
     \b
-      kahanmaps plot portrait
+      kahanmaps plot portrait lotka_volterra --eps 1/20
+      kahanmaps plot portrait euler_top --eps 1/10 --3d --lines -o top.pdf
+      kahanmaps plot portrait weierstrass --eps 1/20 --levels modified_H -o w.svg
+      kahanmaps plot portrait henon_heiles --eps 1/10 --density -o heat.png
+
+    Without starts sixteen are chosen around an equilibrium. Without --axes the
+    plane is drawn that the points fill most. Standard error says what was chosen,
+    how many points lie outside, and which orbits ended early. Colours go from dark
+    to light with the value; the widest orbits are drawn first.
+
+    Ctrl-C draws what has been computed so far.
+
+    Exit status: 0 done, 2 wrong use, 3 some orbits ended early, 130 interrupted.
     """
+    require_output(options)
+    style_from(options)
+    _require_sense(system, options)
+    orbits = _stored(system, options) if options["stored"] else _walked(system, options)
+    with Progress(options["quiet"]) as progress:
+        figure = (_density if options["density"] else _portrait)(orbits, options, progress)
+    if orbits.walked is not None and not options["quiet"]:
+        for line in (*orbits.told(), *orbits.notes):
+            say(line)
+    deliver(figure, options, orbits.file)
+    return 130 if orbits.interrupted else 3 if orbits.ended else 0
+
+
+def _require_sense(system: str | None, options: dict[str, Any]) -> None:
+    """Options that contradict each other, or themselves."""
+    if options["stored"]:
+        given = next((name for name in _WALKING if options[name] not in (None, (), False)), None)
+        if given is not None:
+            raise click.UsageError(f"--from draws orbits that are there: it does not go with --{_word(given)}")
+    kinds = [name for name in ("start", "starts", "count") if options[name] not in (None, ())]
+    if len(kinds) > 1:
+        raise click.UsageError(f"give --{_word(kinds[0])} or --{_word(kinds[1])}, not both")
+    if options["count"] is None and (options["box"] is not None or options["seed"] is not None):
+        raise click.UsageError("--box and --seed are for --random N")
+    if options["starts"] == "-" and system == "-":
+        raise click.UsageError("found - twice, and there is one standard input")
+    steps = options["steps"]
+    if steps is not None and not 0 <= steps <= _MAX_STEPS:
+        raise click.UsageError(f"found --steps {steps}, expected 0 to {_MAX_STEPS} (--backward steps backward)")
+    if options["space"] and options["axes"] is not None:
+        raise click.UsageError("give --axes A,B,C or --3d, not both")
+    if options["levels_at"] is not None and options["levels"] is None:
+        raise click.UsageError("--levels-at says where: add --levels F, of which function")
+    if options["density"]:
+        for name in ("space", "lines", "levels", "euler"):
+            if options[name]:
+                raise click.UsageError(f"--density counts points in a plane: it does not go with --{_word(name)}")
+        if options["colour"] != "orbit":
+            raise click.UsageError("--density shows counts by colour: it does not go with --colour-by")
+
+
+def _word(name: str) -> str:
+    return {"count": "random", "space": "3d"}.get(name, name)
+
+
+def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
+    from kahanmaps.algebra.text import parse_number
+
+    file = None
+    if system is not None or options["variables"] is not None or options["rhs"]:
+        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    elif options["parameters"]:
+        raise click.UsageError("-p sets a parameter of the system: name the SYSTEM as well")
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    stored = read_orbits(options["stored"], None if file is None else file.variables)
+    told = stored.header.get("eps")
+    if eps is None and isinstance(told, str):
+        eps = parse_number(told)
+    return Orbits.of_file(stored, file, eps, stored.header.get("system", options["stored"]))
+
+
+def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
+    from kahanmaps.maps.float_numbers import to_floats
+    from kahanmaps.maps.kahan import KahanMap
+    from kahanmaps_cli.ensemble_starts import drawn, read_starts
+
+    eps = the_eps(options["eps"], options["time_step"])
+    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    KahanMap(file.system, eps)  # the demands of all commands on eps, in the same words
+    starts: Any = None
+    if options["start"]:
+        wrong = next((x for x in options["start"] if len(x) != file.system.dim), None)
+        if wrong is not None:
+            raise click.UsageError(
+                f"found a start with {len(wrong)} coordinates, expected {file.system.dim}: {', '.join(file.variables)}"
+            )
+        starts = to_floats([entry for x in options["start"] for entry in x]).reshape(-1, file.system.dim)
+    elif options["starts"] is not None:
+        starts = read_starts(options["starts"], file.variables, None)
+    elif options["count"] is not None:
+        box = 1 if options["box"] is None else options["box"]
+        starts = drawn(options["count"], file.system.dim, box, options["seed"] or 0, None)
+    steps = options["steps"]
+    if steps is None:
+        steps = _DENSITY_STEPS if options["density"] else _STEPS
+    return Orbits.to_walk(file, eps, starts, steps, backward=options["backward"], axes=options["axes"])
+
+
+def _window(options: dict[str, Any], axes: int) -> Window | None:
+    from kahanmaps.maps.float_numbers import to_floats
+    from kahanmaps.plots.windows import require_window
+
+    return None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), axes)
+
+
+def _portrait(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Figure:
+    from dataclasses import replace
+
+    from kahanmaps.plots.draw_portrait import draw_portrait
+    from kahanmaps.plots.portrait import portrait_of
+
+    colour = options["colour"] if options["colour"] in ("orbit", "step") else orbits.colouring(options["colour"])
+    levels = None if options["levels"] is None else orbits.function(options["levels"])
+    found = orbits.walk(progress)
+    axes = orbits.axes_from(options["axes"], 3 if options["space"] else 2)
+    window = _window(options, len(axes))
+    shown = portrait_of(found, axes, colour=colour, window=window, euler=orbits.euler() if options["euler"] else None)
+    if levels is not None:
+        shown = replace(shown, levels=_levels(orbits, levels, axes, options["levels_at"], shown.window))
+    count = found.points.shape[0] * found.points.shape[1]
+    orbits.note_outside(shown.left_out, count)
+    if orbits.counts_records and "step" in (colour, *axes):
+        orbits.notes.append("step is the number of the record here: a .npy file does not say which steps it holds")
+    if shown.undefined:
+        orbits.notes.append(f"{shown.undefined} of {count} points are left out: an axis or the colour has a pole there")
+    note = f"{shown.left_out} points outside" if shown.left_out and window is None else ""
+    return draw_portrait(shown, style_from(options), lines=options["lines"], equal=options["equal"], note=note)
+
+
+def _levels(orbits: Orbits, function: Any, axes: Sequence[Any], at: Any, window: Window) -> LevelCurves:
+    from kahanmaps.errors import InputError
+    from kahanmaps.maps.float_numbers import to_floats
+    from kahanmaps.plots.level_sets import level_curves, levels_through
+
+    plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]
+    if len(plane) != 2 or len(axes) != 2:
+        raise InputError("level curves are drawn in the plane of two variables: take --axes X,Y with two of them")
+    values = levels_through(function, orbits.starts) if at is None else to_floats(at).tolist()
+    found = level_curves(function, plane, len(orbits.variables), values, window)
+    if found.missing:
+        orbits.notes.append(f"{found.missing} of {len(values)} levels of {function.name} have no curve in the window")
+    return found
+
+
+def _density(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Figure:
+    from kahanmaps.plots.draw_portrait import cells_for, draw_density
+    from kahanmaps.plots.windows import window_of
+
+    pilot = orbits.pilot()
+    axes: Any = orbits.axes_from(options["axes"], 2, pilot)
+    if len(axes) != 2 or any(isinstance(axis, str) for axis in axes):
+        raise click.UsageError("--density counts points in a plane: it takes two axes, and step is not one")
+    window = _window(options, 2)
+    if window is None:
+        import numpy as np
+
+        points, starts = (np.stack([axis(x) for axis in axes], axis=-1) for x in (pilot, orbits.starts))
+        window = window_of(points, starts)
+    style = style_from(options)
+    found = orbits.counted(axes, window, cells_for(style), progress)
+    orbits.note_outside(found.outside, found.points)
+    note = f"{found.outside} points outside" if found.outside and options["window"] is None else ""
+    return draw_density(found, style, equal=options["equal"], note=note)

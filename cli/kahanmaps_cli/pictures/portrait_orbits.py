@@ -1,0 +1,252 @@
+"""The orbits of a portrait, wherever they come from: walked now, or read from a file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from kahanmaps.errors import InputError
+from kahanmaps_cli.signals import interruptible
+
+if TYPE_CHECKING:
+    from kahanmaps.maps.float_numbers import FloatArray
+    from kahanmaps.plots.density import Density
+    from kahanmaps.plots.drift_functions import WatchedFunction
+    from kahanmaps.plots.point_functions import PointFunction
+    from kahanmaps.plots.portrait import Colouring
+    from kahanmaps.plots.trajectories import Trajectories
+    from kahanmaps.plots.windows import Window
+    from kahanmaps.systems.files import SystemFile
+    from kahanmaps_cli.pictures.stored import Stored
+
+_PILOT = 4_000_000  # coordinates, from which the axes and the window of a density are chosen
+
+Told = Callable[[str], None]
+
+
+@dataclass(eq=False)
+class Orbits:
+    """Either `stored` or (`ensemble`, `steps`); `notes` are for standard error, `ended` counts by reason."""
+
+    name: str
+    variables: tuple[str, ...]
+    file: SystemFile | None
+    eps: Any
+    starts: FloatArray
+    stored: Stored | None = None
+    ensemble: Any = None
+    form: Any = None
+    steps: int = 0
+    backward: bool = False
+    chosen: bool = False
+    notes: list[str] = field(default_factory=list)
+    ended: dict[str, int] = field(default_factory=dict)
+    interrupted: bool = False
+    walked: int | None = None
+
+    @classmethod
+    def of_file(cls, stored: Stored, file: SystemFile | None, eps: Any, name: str) -> Orbits:
+        """Orbits of a file."""
+        import numpy as np
+
+        starts = np.asarray(stored.points[0], dtype=np.float64)
+        return cls(name, stored.variables, file, eps, starts, stored=stored, ended=stored.ended)
+
+    @classmethod
+    def to_walk(
+        cls, file: SystemFile, eps: Any, starts: Any, steps: int, *, backward: bool, axes: str | None
+    ) -> Orbits:
+        """Orbits that are to be walked, from `starts` or where those are None from chosen ones."""
+        from kahanmaps.family.structure import NoStructure
+        from kahanmaps.plots.automatic_starts import automatic_starts
+        from kahanmaps.plots.trajectories import ensemble_for
+        from kahanmaps_cli.ensemble_run import structure_for
+
+        chosen = starts is None
+        if chosen:
+            named = [text.strip() for text in (axes or "").split(",")]
+            plane = [file.variables.index(text) for text in named if text in file.variables]
+            plane = [*plane, *(k for k in range(file.system.dim) if k not in plane)][:2]
+            starts = automatic_starts(file.system, eps, plane, backward=backward)
+        structure = structure_for(file, None)
+        form = None if isinstance(structure, NoStructure) else structure.form
+        ensemble = ensemble_for(file.system, eps, starts, steps, backward=backward, form=form)
+        return cls(
+            file.name,
+            file.variables,
+            file,
+            eps,
+            starts,
+            ensemble=ensemble,
+            form=form,
+            steps=steps,
+            backward=backward,
+            chosen=chosen,
+        )
+
+    def interrupt(self) -> None:
+        """Ask to end after the portion in hand."""
+        self.interrupted = True
+        if self.ensemble is not None:
+            self.ensemble.interrupt()
+
+    @property
+    def counts_records(self) -> bool:
+        """Whether the numbers of the steps are not known, only their order."""
+        return self.stored is not None and not self.stored.header
+
+    def function(self, text: str) -> PointFunction:
+        """An integral of the system's file or H by its name, or an expression."""
+        from kahanmaps.plots.drift_functions import Expression
+        from kahanmaps.plots.point_functions import point_function
+
+        named = {name: known.function for name, known in self._known().items() if isinstance(known, Expression)}
+        parameters = {} if self.file is None else self.file.parameters
+        return point_function(text.strip(), self.variables, self.eps, parameters, named)
+
+    def colouring(self, text: str) -> Colouring:
+        """The same, and integrals that theorems give, in which the image of the point occurs."""
+        known = self._known().get(text.strip())
+        return self.function(text) if known is None else known
+
+    def _known(self) -> Mapping[str, WatchedFunction]:
+        from flint import fmpq
+
+        from kahanmaps.plots.drift_functions import functions_of
+
+        if self.file is None:
+            return {}
+        return functions_of(self.file, fmpq(0) if self.eps is None else self.eps)
+
+    def walk(self, progress: Told) -> Trajectories:
+        """All points."""
+        import numpy as np
+
+        from kahanmaps.plots.trajectories import Trajectories, require_points, walked
+
+        if self.stored is not None:
+            points = self.stored.points
+            require_points(*points.shape)
+            found = Trajectories(self.variables, np.array(points, dtype=np.float64), self.stored.steps, self.ended)
+        else:
+
+            def told(step: int) -> None:
+                progress(f"step {step} of {self.steps}")
+                if self.interrupted:  # pressed before the first portion, an ensemble forgets it
+                    self.ensemble.interrupt()
+
+            with interruptible(self.interrupt):
+                found = walked(self.ensemble, self.steps, told)
+            self.ended, self.interrupted = found.ended, found.interrupted
+        self._points = found.points
+        self.walked = len(found.points) - 1
+        return found
+
+    def pilot(self) -> FloatArray:
+        """Some points of a long walk, (points, dim): its beginning, or records all over a file."""
+        import numpy as np
+
+        from kahanmaps.plots.trajectories import ensemble_for
+
+        if self.stored is not None:
+            points = self.stored.points
+            rows = np.linspace(0, len(points) - 1, max(1, min(len(points), _PILOT // points[0].size)))
+            self._points = np.asarray(points[rows.astype(int)], dtype=np.float64)
+        else:
+            steps = max(1, min(self.steps, _PILOT // self.starts.size))
+            system = self.ensemble.system
+            ensemble = ensemble_for(system, self.eps, self.starts, steps, backward=self.backward, form=self.form)
+            self._points = np.concatenate(list(ensemble.records(steps, 1)))
+        flat: FloatArray = self._points.reshape(-1, len(self.variables))
+        return flat
+
+    def axes_from(
+        self, text: str | None, count: int, points: FloatArray | None = None
+    ) -> tuple[PointFunction | str, ...]:
+        """The axes that were asked for, or the `count` variables whose points fill most (said in the notes)."""
+        from kahanmaps.plots.windows import fullest_axes
+
+        if text is not None:
+            pieces = [piece.strip() for piece in text.split(",")]
+            if len(pieces) not in (2, 3) or not all(pieces):
+                raise InputError(f"found --axes {text[:60]}, expected two or three: x,y or x,y,z")
+            return tuple(
+                "step" if piece == "step" and "step" not in self.variables else self.function(piece) for piece in pieces
+            )
+        dim = len(self.variables)
+        if dim < count and not (dim == 1 and count == 2):
+            raise InputError(f"found {dim} variables, expected at least {count} for that many axes")
+        if dim == 1:
+            return "step", self.function(self.variables[0])
+        flat = self._points.reshape(-1, dim) if points is None else points
+        chosen = [self.variables[k] for k in fullest_axes(flat, count)]
+        if dim > count:
+            self.notes.append(f"axes {', '.join(chosen)}: their points fill most of the picture (--axes chooses)")
+        return tuple(self.function(name) for name in chosen)
+
+    def euler(self) -> Trajectories:
+        """Explicit Euler from the same starts."""
+        from kahanmaps.plots.trajectories import euler_orbits
+
+        assert self.file is not None
+        found = euler_orbits(self.file.system, -self.eps if self.backward else self.eps, self.starts, self.steps)
+        for reason, count in found.ended.items():
+            self.notes.append(f"explicit Euler: {_counted(count, 'orbit')} {reason}")
+        return found
+
+    def counted(self, axes: Sequence[PointFunction], window: Window, shape: tuple[int, int], progress: Told) -> Density:
+        """The points of all orbits counted in cells."""
+        from kahanmaps.plots.density import density_of
+        from kahanmaps.plots.trajectories import ended_early, portions_of
+
+        began = time.monotonic()
+
+        def told(points: int) -> None:
+            rate = points / max(1e-9, time.monotonic() - began)
+            progress(f"{points:.3g} of {total:.3g} points, {rate:.2g} a second")
+
+        if self.stored is not None:
+            total = self.stored.points.shape[0] * self.stored.points.shape[1]
+            with interruptible(self.interrupt):
+                found = density_of(self._while_wanted(portions_of(self.stored.points)), axes, window, shape, told)
+            self.walked = len(self.stored.points) - 1
+            return found
+        total = self.ensemble.n * (self.steps + 1)
+        with interruptible(self.interrupt):
+            found = density_of(self._while_wanted(self.ensemble.records(self.steps, 1)), axes, window, shape, told)
+        self.ended = ended_early(self.ensemble)
+        self.walked = self.ensemble.step
+        self.interrupted = self.walked < self.steps
+        return found
+
+    def _while_wanted(self, portions: Iterator[FloatArray]) -> Iterator[FloatArray]:
+        for portion in portions:
+            yield portion
+            if self.interrupted:
+                return
+
+    def note_outside(self, left_out: int, count: int) -> None:
+        """Say that points lie outside the window."""
+        if left_out:
+            self.notes.append(f"{left_out} of {count} points lie outside the window (--window)")
+
+    def told(self) -> Iterator[str]:
+        """What is drawn, and what became of it."""
+        orbits = _counted(len(self.starts), "orbit")
+        eps = "" if self.eps is None else f", eps = {self.eps} (time step 2 eps = {2 * self.eps})"
+        if self.stored is not None:
+            yield f"{self.name}: {orbits} of {_counted(len(self.stored.points), 'point')}{eps}"
+        else:
+            backward = ", backward" if self.backward else ""
+            chosen = " from chosen starts" if self.chosen else ""
+            yield f"{self.name}: {orbits}{chosen}, {_counted(self.walked or 0, 'step')}{backward}{eps}"
+        for reason, count in self.ended.items():
+            yield f"{count} of {orbits} ended early: {reason}"
+        if self.interrupted:
+            yield f"interrupted after step {self.walked}"
+
+
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"

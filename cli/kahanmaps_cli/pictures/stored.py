@@ -1,0 +1,208 @@
+"""Orbits in files that `kahanmaps orbit` and `kahanmaps ensemble` wrote: .npy, .npz, .jsonl and .csv, read as doubles.
+
+Exact numbers and balls (their middles) are rounded; residues are taken as the integers they are. Points of a .npy file
+stay on the disk until they are drawn.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kahanmaps.errors import InputError
+
+if TYPE_CHECKING:
+    from kahanmaps.maps.float_numbers import FloatArray
+
+_ENDINGS = (".npy", ".npz", ".jsonl", ".csv")
+_MAX_POINTS = 4_000_000  # of a file that has to be read as text
+_EARLY = ("completed", "periodic")
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """Points (records, orbits, dim), their steps, and what the file says: `header` is empty for .npy."""
+
+    variables: tuple[str, ...]
+    points: FloatArray
+    steps: Any
+    header: dict[str, Any]
+    end: dict[str, Any]
+
+    @property
+    def ended(self) -> dict[str, int]:
+        """How many orbits ended early, in words."""
+        import numpy as np
+
+        if self.end and self.end.get("status") not in _EARLY:
+            return {str(self.end.get("message", self.end.get("status")))[:200]: 1}
+        if len(self.points) == 0:
+            return {}
+        gone = int(np.isnan(self.points[-1]).any(axis=1).sum())
+        return {"NaN in the last record": gone} if gone else {}
+
+
+def read_orbits(path: str, variables: Sequence[str] | None) -> Stored:
+    """The orbits in a file; `variables` are those of the system, if there is one: the file has to agree.
+
+    Raises InputError with what is wrong with the file.
+    """
+    ending = Path(path).suffix
+    if ending not in _ENDINGS:
+        raise InputError(
+            f"{path}: found {ending or 'no ending'}, expected a file of kahanmaps orbit or ensemble: "
+            f"{', '.join(_ENDINGS)}"
+        )
+    if ending == ".npy":
+        found = _from_npy(path, variables)
+    else:
+        read = {".npz": _from_npz, ".jsonl": _from_jsonl, ".csv": _from_csv}[ending]
+        try:
+            found = read(path)
+        except InputError:
+            raise
+        except (ValueError, TypeError, LookupError, ZeroDivisionError) as error:
+            raise InputError(f"{path}: found no orbit that kahanmaps wrote ({_first(error)})") from None
+    if variables is not None and tuple(variables) != found.variables:
+        raise InputError(
+            f"{path}: found the variables {', '.join(found.variables)}, expected those of the system: "
+            f"{', '.join(variables)}"
+        )
+    if found.points.size == 0:
+        raise InputError(f"{path}: found no point in it")
+    return found
+
+
+def _from_npy(path: str, variables: Sequence[str] | None) -> Stored:
+    import numpy as np
+
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise InputError(f"{path}: found no .npy file that can be read ({_first(error)})") from None
+    if array.dtype.kind not in "fiu" or array.ndim not in (2, 3):
+        raise InputError(
+            f"{path}: found an array of type {array.dtype} and shape {array.shape}, expected numbers (points, dim) of "
+            "one orbit or (records, orbits, dim) of an ensemble"
+        )
+    points = array[:, None, :] if array.ndim == 2 else array
+    dim = points.shape[2]
+    if variables is not None and dim != len(variables):
+        raise InputError(f"{path}: found points of dimension {dim}, expected {len(variables)}: {', '.join(variables)}")
+    names = tuple(variables) if variables is not None else tuple(f"x{k}" for k in range(1, dim + 1))
+    return Stored(names, points, np.arange(len(points)), {}, {})
+
+
+def _from_npz(path: str) -> Stored:
+    import zipfile
+
+    import numpy as np
+
+    try:
+        with np.load(path, allow_pickle=False) as held:
+            meta = json.loads(str(held["meta"]))
+            steps, x = held["step"], held["x"]
+    except (zipfile.BadZipFile, OSError, EOFError, ValueError) as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
+        raise InputError(f"{path}: found no .npz file that can be read ({_first(error)})") from None
+    if x.ndim != 2:
+        raise InputError(f"{path}: found an array of shape {x.shape}, expected (points, dim)")
+    if x.dtype.kind == "S":
+        rows = [[cell.decode() for cell in row] for row in x.tolist()]
+        return _stored(path, [int(step) for step in steps], rows, meta["header"], meta["end"])
+    points = np.asarray(x, dtype=np.float64)
+    numbers = [int(step) for step in steps]
+    return Stored(
+        _names(meta["header"], points.shape[1]), points[:, None], _steps(numbers), meta["header"], meta["end"]
+    )
+
+
+def _from_jsonl(path: str) -> Stored:
+    header: dict[str, Any] = {}
+    end: dict[str, Any] = {}
+    steps: list[int] = []
+    rows: list[list[str]] = []
+    for line in _lines(path):
+        record = json.loads(line)
+        if record["record"] == "header":
+            header = record
+        elif record["record"] == "end":
+            end = record
+        else:
+            steps.append(int(record["step"]))
+            rows.append([str(entry) for entry in record["x"]])
+    return _stored(path, steps, rows, header, end)
+
+
+def _from_csv(path: str) -> Stored:
+    told: list[dict[str, Any]] = []
+    table: list[str] = []
+    for line in _lines(path):
+        if line.startswith("#"):
+            told.append(json.loads(line[1:]))
+        else:
+            table.append(line)
+    header = told[0]
+    width = len(header["variables"])
+    cells = list(csv.reader(table))[1:]
+    end = told[-1] if len(told) > 1 else {}
+    return _stored(path, [int(row[0]) for row in cells], [row[1 : 1 + width] for row in cells], header, end)
+
+
+def _lines(path: str) -> Iterator[str]:
+    with open(path, encoding="utf-8") as stream:
+        for number, line in enumerate(stream):
+            if number > _MAX_POINTS:
+                raise InputError(f"{path}: found more than {_MAX_POINTS} lines, expected fewer: take .npy")
+            if line.strip():
+                yield line
+
+
+def _stored(path: str, steps: list[int], rows: list[list[str]], header: dict[str, Any], end: dict[str, Any]) -> Stored:
+    import numpy as np
+
+    width = len(rows[0]) if rows else 0
+    points = np.array([[_number(cell) for cell in row] for row in rows], dtype=np.float64).reshape(len(rows), width)
+    return Stored(_names(header, width), points[:, None], _steps(steps), header, end)
+
+
+def _names(header: dict[str, Any], width: int) -> tuple[str, ...]:
+    names = tuple(str(name) for name in header["variables"])
+    if width and len(names) != width:
+        raise ValueError(f"{len(names)} names for {width} columns")
+    return names
+
+
+def _steps(steps: list[int]) -> Any:
+    """Doubles: steps that were jumped to may be longer than machine integers."""
+    import numpy as np
+
+    return np.array([float(step) for step in steps])
+
+
+def _number(text: str) -> float:
+    """An integer, a decimal, p/q of any length, or the middle of a ball."""
+    from flint import fmpz
+
+    middle = text.partition(" +/- ")[0].strip("[] ")
+    above, slash, below = middle.partition("/")
+    try:
+        value = int(fmpz(above)) / int(fmpz(below)) if slash else float(middle)
+    except OverflowError:
+        value = inf
+    if not isfinite(value):
+        raise InputError(f"found the number {middle[:40]}, expected one in the range of machine floats")
+    return value
+
+
+def _first(error: Exception) -> str:
+    if isinstance(error, KeyError):
+        return f"no {error} in it"
+    lines = str(error).splitlines()
+    return lines[0][:120] if lines else type(error).__name__

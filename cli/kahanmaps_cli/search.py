@@ -1,0 +1,109 @@
+"""What the commands share that search for formulas: find-integrals, find-density and analyze."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+import click
+
+from kahanmaps_cli.options import eps_options, output_options, seconds_option, seed_option, symbolic_option, the_eps
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import on_terminal, shorten, tell
+
+F = TypeVar("F", bound=Callable[..., Any])
+_FORMULA_WIDTH = 400
+
+
+def search_options(section: str) -> Callable[[F], F]:
+    """eps, --symbolic, --seconds, --seed and the forms of output; `section` is that of a system file."""
+
+    def apply(function: F) -> F:
+        for option in reversed(
+            (
+                eps_options,
+                symbolic_option,
+                seconds_option(60, "Time for the search."),
+                seed_option,
+                click.option("--toml", "as_toml", is_flag=True, help=f"The section [{section}] of a system file."),
+                click.option("--latex", "as_latex", is_flag=True, help="The formulas in LaTeX."),
+                output_options,
+            )
+        ):
+            function = option(function)
+        return function
+
+    return apply
+
+
+def require_one_form(options: dict[str, Any]) -> None:
+    """At most one of --toml, --latex and --json."""
+    if sum((options["as_toml"], options["as_latex"], options["as_json"])) > 1:
+        raise click.UsageError("give one of --toml, --latex and --json")
+
+
+def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
+    """The names of --symbolic without eps, and the number eps or None."""
+    named = [name.strip() for name in (options["symbolic"] or "").split(",") if name.strip()]
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    if eps is not None and "eps" in named:
+        raise click.UsageError("give --eps as a number, or eps among --symbolic, not both")
+    return tuple(name for name in named if name != "eps"), eps
+
+
+def scope(found: Any) -> str:
+    """For which eps and which symbols the formulas hold."""
+    if found.eps is None:
+        step = "every eps (the time step is 2 eps)"
+    else:
+        step = f"eps = {found.eps} (time step 2 eps = {2 * found.eps})"
+    return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
+
+
+def heading(name: str, found: Any) -> dict[str, Any]:
+    """What is needed to redo a search, as plain data."""
+    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.version import __version__
+
+    return {
+        "command": name,
+        "version": __version__,
+        "system": found.file.name,
+        "parameters": {key: str(value) for key, value in found.file.parameters.items()},
+        "symbols": list(found.symbols),
+        "eps": "every" if found.eps is None else str(found.eps),
+        "time_step": "every" if found.eps is None else str(2 * found.eps),
+        "convention": CONVENTION,
+        "arithmetic": "exact formulas, from residues modulo primes",
+        "seed": found.seed,
+    }
+
+
+def formula(text: str) -> str:
+    """A long formula is shortened on a terminal only."""
+    return shorten(text, _FORMULA_WIDTH) if on_terminal() else text
+
+
+def print_search(
+    name: str, found: Any, options: dict[str, Any], formulas: Iterable[tuple[str, Any, str]], count: str = ""
+) -> None:
+    """The result of a search in the form that was asked for.
+
+    `formulas` are the name, the object (`text`, `verdict`, `evidence`) and the origin of each; `count` is a line below
+    them.
+    """
+    if options["as_json"]:
+        print_json({**heading(name, found), **found.to_json(), "document": dict(found.file.document)})
+    elif options["as_toml"]:
+        click.echo(found.toml_section(), nl=False)
+    elif options["as_latex"]:
+        for label, one, _ in formulas:
+            click.echo(f"{label} = {one.to_json()['latex']}")
+    else:
+        tell(f"{name}: {found.file.name}, {scope(found)}")
+        for label, one, origin in formulas:
+            tell(f"{label}\t{one.verdict}\t{formula(one.text)}\n\t{origin}{one.evidence.summary}")
+        if count:
+            tell(count)
+        for text in filter(None, (found.note, found.reason)):
+            tell(f"note\t{text}")

@@ -1,0 +1,198 @@
+"""What a terminal gets and a pipe does not: colours, and lines broken at words with what follows indented.
+
+A pipe gets every line as it is, with tabs. Colours go to a terminal, or wherever --color says, and say nothing that
+words do not say as well. They are the named ones of the terminal that can be read on light and on dark ground: no
+yellow, no blue, no grey, no dim.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TextIO
+
+import click
+
+from kahanmaps_cli.progress import printable
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+COLOURS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "magenta"}
+# On a terminal long numbers are shortened to this many characters.
+NUMBER_WIDTH = 40
+NARROW = 60  # columns, below which there is no room for a table of texts
+_LABEL = 12
+_WORD_WIDTH = 10  # what words keep in a table that is too wide
+_BREAKABLE = re.compile(r"(?<=[*/,;])")
+
+
+def on_terminal() -> bool:
+    """Whether standard output is a terminal."""
+    return sys.stdout.isatty()
+
+
+def columns() -> int:
+    """The width of the terminal."""
+    return max(20, shutil.get_terminal_size().columns)
+
+
+def is_coloured(stream: TextIO | None = None) -> bool:
+    """Whether a stream gets colours: --color decides, then NO_COLOR, FORCE_COLOR, CLICOLOR_FORCE, a terminal.
+
+    The stream is standard output unless given.
+    """
+    context = click.get_current_context(silent=True)
+    if context is not None and context.color is not None:
+        return context.color
+    if os.environ.get("NO_COLOR"):
+        return False
+    if any(os.environ.get(name, "0") not in ("", "0") for name in ("FORCE_COLOR", "CLICOLOR_FORCE")):
+        return True
+    return (on_terminal() if stream is None else stream.isatty()) and os.environ.get("TERM") != "dumb"
+
+
+def paint(text: str, style: str) -> str:
+    """The text in a style such as "bold green", where colours are wanted."""
+    words = style.split()
+    if not words or not is_coloured():
+        return text
+    colour = next((word for word in words if word != "bold"), None)
+    return click.style(text, fg=colour, bold="bold" in words or None)
+
+
+def console() -> Console:
+    """Where rich prints tables: no markup in texts, and no escape sequence at all where colours are not wanted."""
+    from rich.console import Console
+
+    coloured = is_coloured()
+    return Console(
+        markup=False,
+        emoji=False,
+        highlight=False,
+        force_terminal=coloured,
+        color_system="standard" if coloured else None,
+        no_color=False,
+        width=columns(),
+    )
+
+
+def shorten(text: str, width: int = NUMBER_WIDTH) -> str:
+    """A long number with its middle left out and its length told: 12345...67890 (1234 characters)."""
+    if len(text) <= width:
+        return text
+    keep = max(4, (width - 18) // 2)
+    return f"{text[:keep]}...{text[-keep:]} ({len(text)} chars)"
+
+
+def tell(text: str, hang: int = _LABEL, style: str = "") -> None:
+    """Print lines of cells separated by tabs; on a terminal the first cell is a label, and the others stand beside it.
+
+    Verdicts are coloured, lines that start with # are headings. `hang` is the column of what stands beside a label.
+    """
+    for line in text.split("\n"):
+        cells = line.split("\t")
+        shown = _laid_out(cells, hang) if on_terminal() else line
+        if style or line.startswith("# "):
+            shown = "\n".join(paint(piece, style or "bold") if piece else "" for piece in shown.split("\n"))
+        for cell in cells[:2]:
+            verdict, *rest = cell.split(" (")
+            if verdict in COLOURS and not rest and not style:
+                shown = shown.replace(verdict, paint(verdict, COLOURS[verdict]), 1)
+        click.echo(shown, color=is_coloured())
+
+
+def tell_entry(head: str, text: str, style: str = "") -> None:
+    """Print an entry of a list whose heads have the same length; on a terminal its text goes on below itself."""
+    lines = [head + text]
+    if on_terminal():
+        lines = wrapped(text, columns(), head, " " * (len(head) if columns() >= NARROW else 4))
+    lines[0] = paint(lines[0][: len(head)], style) + lines[0][len(head) :]
+    click.echo("\n".join(lines), color=is_coloured())
+
+
+def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
+    """Columns on a terminal, tabs elsewhere; the first `words` columns are texts, the others numbers."""
+    if not on_terminal():
+        for row in rows:
+            click.echo("\t".join(row))
+        return
+    from rich.table import Table
+    from rich.text import Text
+
+    screen = console()
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    padding = 1 if sum(widths) + 3 * len(widths) < screen.width else 0
+    # Where a table is too wide words are broken, and numbers only where that is not enough.
+    least = sum(min(width, _WORD_WIDTH) for width in widths[:words])
+    least += sum(widths[words:]) + (1 + 2 * padding) * len(widths) + 1
+    table = Table(header_style="bold", padding=(0, padding))
+    for k, heading in enumerate(rows[0]):
+        table.add_column(
+            Text(heading, style=COLOURS.get(heading, "")),
+            justify="left" if k < words else "right",
+            overflow="fold",
+            no_wrap=k >= words and least <= screen.width,
+        )
+    for row in rows[1:]:
+        table.add_row(*(Text(printable(cell)) for cell in row))
+    screen.print(table)
+
+
+def _laid_out(cells: list[str], hang: int) -> str:
+    width = columns()
+    label, *others = cells
+    if not others:
+        margin = " " * (len(label) - len(label.lstrip()))
+        return "\n".join(wrapped(label.lstrip(), width, margin, margin + "    "))
+    if width < NARROW:
+        hang = min(hang, 4)
+    first = label.ljust(hang) if len(label) < hang else f"{label}  "
+    # What a long label would push to the right margin stands below it.
+    if len(first) > max(hang, width // 2):
+        return "\n".join([*wrapped(label, width), *wrapped("  ".join(others), width, " " * hang, " " * hang)])
+    return "\n".join(wrapped("  ".join(others), width, first, " " * hang))
+
+
+def wrapped(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
+    """The text in lines of at most `width`, broken at blanks, before + and - and not after them, each with its margin.
+
+    A number that is longer than a line is shortened, another word folded, after * / , ; if that is possible.
+    """
+    room = max(8, width - len(rest))
+    text = re.sub(rf"\d{{{room + 1},}}", lambda number: shorten(number[0]), text)
+    words = re.sub(r" ([-+]) (?=\S)", r" \1" + "\0", text).split(" ")
+    lines = [first]
+    empty = True  # nothing but the margin on the last line
+    for word in words:
+        blank = "" if empty else " "
+        if len(lines[-1]) + len(blank) + len(word) <= width:
+            lines[-1] += blank + word
+        elif not word:  # a second blank, where the line ends anyway
+            continue
+        elif len(word) <= room:
+            lines.append(rest + word)
+        else:
+            if len(lines[-1]) + 8 > width:
+                lines.append(rest)
+                blank = ""
+            lines[-1] += blank
+            _fold(lines, word, width, rest)
+        empty = False
+    return [line.replace("\0", " ").rstrip() for line in lines]
+
+
+def _fold(lines: list[str], word: str, width: int, rest: str) -> None:
+    """Put a word that is longer than a line on the last line and on as many more as it needs."""
+    for piece in _BREAKABLE.split(word):
+        if len(lines[-1]) + len(piece) > width and len(piece) <= width - len(rest):
+            lines.append(rest)
+        while len(lines[-1]) + len(piece) > width:
+            room = width - len(lines[-1])
+            lines[-1] += piece[:room]
+            piece = piece[room:]
+            lines.append(rest)
+        lines[-1] += piece

@@ -1,0 +1,222 @@
+r"""Names, polynomials and rational functions as MathML, exactly: formulas that a browser shows without JavaScript.
+
+Only MathML Core is used, and the same normal form as in latex.py: terms by increasing powers of eps, fractions without
+fractions inside. Core has no line breaks. So a long formula is a <span class="formula"> of several <math> elements,
+between which the browser wraps, one for each term. Every <math> has its plain text as `alttext`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.latex import GREEK_NAMES
+from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
+from kahanmaps.algebra.reading import first_terms, reading_order
+from kahanmaps.algebra.text import format_number
+from kahanmaps.errors import InputError, counted
+from kahanmaps.markup import escape
+
+_GREEK = dict(zip(GREEK_NAMES.split("|"), "αβγδϵζηθικλμνξπρστυϕχψωΓΔΘΛΞΠΣΥΦΨΩ", strict=True), eps="ε")
+_WITH_INDEX = re.compile(r"([A-Za-z]+)([0-9]*)")
+# A formula of at most so many characters of plain text is one <math>: it has room on a telephone.
+_ONE_PIECE = 32
+# Names of several letters would run together without a little space.
+_TIMES = '<mo lspace="0em" rspace="0.12em">\u2062</mo>'
+_PRIME = "<mo>′</mo>"
+
+
+def mathml_name(name: str) -> str:
+    """A name as MathML: final digits become an index, eps ε, Greek names Greek letters.
+
+    `name` is printable text; what is not letters followed by digits is set upright. Returns an element that belongs
+    into <math>. Raises InputError for text that is empty or not printable.
+
+    >>> mathml_name("x1"), mathml_name("eps"), mathml_name("modified_H")
+    ('<msub><mi>x</mi><mn>1</mn></msub>', '<mi>ε</mi>', '<mi>modified_H</mi>')
+    """
+    if not name or not name.isprintable():
+        raise InputError(f"found the name {name[:40]!r}, expected printable text")
+    match = _WITH_INDEX.fullmatch(name)
+    letters, digits = match.groups() if match else (name, "")
+    letter = f"<mi>{_GREEK.get(letters) or escape(letters)}</mi>"
+    return f"<msub>{letter}<mn>{digits}</mn></msub>" if digits else letter
+
+
+def mathml_number(value: fmpq) -> str:
+    """An exact number as MathML.
+
+    >>> mathml_number(fmpq(-3, 2))
+    '<mrow><mo form="prefix">−</mo><mfrac><mn>3</mn><mn>2</mn></mfrac></mrow>'
+    """
+    above = f"<mn>{abs(value.p)}</mn>"
+    size = above if value.q == 1 else f"<mfrac>{above}<mn>{value.q}</mn></mfrac>"
+    return f'<mrow><mo form="prefix">−</mo>{size}</mrow>' if value < 0 else size
+
+
+def mathml_polynomial(polynomial: fmpq_mpoly) -> str:
+    """A polynomial over Q as one row of MathML, exact; it belongs into <math>. `formula` breaks long ones.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> mathml_polynomial(parse_polynomial("x^2 - eps", ["x", "eps"]))
+    '<mrow><msup><mi>x</mi><mn>2</mn></msup><mo form="infix">−</mo><mi>ε</mi></mrow>'
+    """
+    return f"<mrow>{''.join(piece for piece, _ in _pieces(polynomial))}</mrow>"
+
+
+def mathml_rational_function(function: RationalFunction) -> str:
+    """A quotient of polynomials over Q as MathML, exact, without fractions inside the fraction.
+
+    The denominator starts with a positive term. Common factors stay, as they do in `RationalFunction`.
+
+    >>> from kahanmaps.algebra.text import parse_rational_function
+    >>> mathml_rational_function(parse_rational_function("x/y^2", ["x", "y"]))
+    '<mfrac><mrow><mi>x</mi></mrow><mrow><msup><mi>y</mi><mn>2</mn></msup></mrow></mfrac>'
+    """
+    above, below = _above_and_below(function)
+    if below.is_one():
+        return mathml_polynomial(above)
+    return f"<mfrac>{mathml_polynomial(above)}{mathml_polynomial(below)}</mfrac>"
+
+
+def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters: int | None = None) -> str:
+    """A polynomial or a rational function as HTML that wraps between its terms, exact.
+
+    `left` is the name of what it is: "I1" makes I_1 = ...; "x1'" is the derivative. Where more than about
+    `characters` characters would be shown, the rest is left out, and the number of terms is told.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> print(formula(parse_polynomial("x^2", ["x"])))
+    <span class="formula"><math alttext="x^2"><mrow><msup><mi>x</mi><mn>2</mn></msup></mrow></math></span>
+    """
+    parts = [_math(f'<mrow>{_left(left)}<mo form="infix">=</mo></mrow>', f"{left} =")] if left else []
+    if isinstance(function, RationalFunction):
+        parts += _quotient(function, characters)
+    else:
+        parts += _sum(function, characters)
+    if left:  # no break after "I ="
+        parts[:2] = ["\u00a0".join(parts[:2])]
+    return f'<span class="formula">{" ".join(parts)}</span>'
+
+
+def equations(variables: Sequence[str], rhs: Sequence[fmpq_mpoly], characters: int | None = None) -> str:
+    """The equations x' = f(x), one below the other, as HTML; long ones wrap, and are cut after `characters` each."""
+    lines = (formula(f, f"{name}'", characters) for name, f in zip(variables, rhs, strict=True))
+    return "<br/>\n".join(lines)
+
+
+def matrix(entries: fmpq_mat, left: str = "", most: int = 8) -> str:
+    """A matrix over Q as HTML, exact; only its size where it has more than `most` rows or columns, or long entries."""
+    rows, columns = int(entries.nrows()), int(entries.ncols())
+    texts = [[format_number(entry) for entry in row] for row in entries.tolist()]
+    if max(rows, columns) > most or any(len(text) > _ONE_PIECE for row in texts for text in row):
+        name = f"{left}: " if left else ""
+        return f'<span class="formula">{escape(name)}a matrix with {rows} rows and {columns} columns</span>'
+    cells = (f"<mtr>{''.join(f'<mtd>{mathml_number(entry)}</mtd>' for entry in row)}</mtr>" for row in entries.tolist())
+    name = f'{_left(left)}<mo form="infix">=</mo>' if left else ""
+    inside = f"<mrow>{name}<mo>(</mo><mtable>{''.join(cells)}</mtable><mo>)</mo></mrow>"
+    plain = ", ".join("[" + ", ".join(row) + "]" for row in texts)
+    return f'<span class="formula">{_math(inside, f"{left} = [{plain}]" if left else f"[{plain}]")}</span>'
+
+
+def _left(name: str) -> str:
+    if not name.endswith("'"):
+        return mathml_name(name)
+    return f"<msup>{mathml_name(name[:-1])}{_PRIME}</msup>"
+
+
+def _math(inside: str, alttext: str) -> str:
+    return f'<math alttext="{escape(alttext)}">{inside}</math>'
+
+
+def _sum(polynomial: fmpq_mpoly, characters: int | None = None) -> list[str]:
+    """The <math> elements of a sum: one if it is short, else one for each term."""
+    shown = polynomial if characters is None else first_terms(polynomial, characters)
+    left_out = len(polynomial) - len(shown)
+    if left_out and not len(shown):
+        return [f"<span>(a polynomial of {counted(len(polynomial), 'term')}, not shown)</span>"]
+    if not left_out and (len(shown) <= 1 or len(_plain(shown)) <= _ONE_PIECE):
+        return [_math(mathml_polynomial(shown), _plain(shown))]
+    found = [_math(f"<mrow>{piece}</mrow>", text) for piece, text in _pieces(shown)]
+    return [*found, f"<span>+ … ({counted(len(polynomial), 'term')})</span>"] if left_out else found
+
+
+def _quotient(function: RationalFunction, characters: int | None) -> list[str]:
+    above, below = _above_and_below(function)
+    if below.is_one():
+        return _sum(above, characters)
+    fits = characters is None or all(len(first_terms(part, characters)) == len(part) for part in (above, below))
+    if fits and max(len(_plain(above)), len(_plain(below))) <= _ONE_PIECE:
+        # Without a style of its own a fraction within a line is set in the small letters of an index.
+        fraction = f'<mstyle displaystyle="true">{mathml_rational_function(function)}</mstyle>'
+        return [_math(fraction, f"({_plain(above)})/({_plain(below)})")]
+    return [*_bracketed(above, characters), _math("<mo>/</mo>", "/"), *_bracketed(below, characters)]
+
+
+def _bracketed(polynomial: fmpq_mpoly, characters: int | None) -> list[str]:
+    """The elements of a sum in brackets, with no break between a bracket and the term beside it."""
+    inside = _sum(polynomial, characters)
+    opening, closing = (_math(f'<mo stretchy="false">{bracket}</mo>', bracket) for bracket in "()")
+    inside[0] = opening + inside[0]
+    inside[-1] += closing
+    return inside
+
+
+def _plain(polynomial: fmpq_mpoly) -> str:
+    return " ".join(text for _, text in _pieces(polynomial))
+
+
+def _above_and_below(function: RationalFunction) -> tuple[fmpq_mpoly, fmpq_mpoly]:
+    """Numerator and denominator with integer coefficients, the first term of the denominator positive."""
+    if function.is_polynomial:  # the denominator is 1 then
+        return function.numerator, function.denominator
+    factor = fmpq(common_denominator(function.numerator))
+    if reading_order(function.denominator)[0][1] < 0:
+        factor = -factor
+    return function.numerator * factor, function.denominator * factor
+
+
+def _pieces(polynomial: fmpq_mpoly) -> list[tuple[str, str]]:
+    """Each term with its sign: as MathML, and as plain text."""
+    names = names_of(polynomial)
+    order = sorted(range(len(names)), key=lambda k: names[k] != "eps")
+    ordered = [mathml_name(names[k]) for k in order]
+    plain = [names[k] for k in order]
+    found: list[tuple[str, str]] = []
+    for monomial, coefficient in reading_order(polynomial):
+        exponents, size = [monomial[k] for k in order], abs(coefficient)
+        sign = "−" if coefficient < 0 else "+" if found else ""
+        form = "infix" if found else "prefix"
+        mark = f'<mo form="{form}">{sign}</mo>' if sign else ""
+        text = {"−": "- ", "+": "+ ", "": ""}[sign] if found else "-" * bool(sign)
+        found.append((mark + _term(size, exponents, ordered), text + _plain_term(size, exponents, plain)))
+    return found or [("<mn>0</mn>", "0")]
+
+
+def _term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:
+    """One term with a positive coefficient; a coefficient 1 is left out before factors."""
+    factors = [
+        name if exponent == 1 else _power(name, exponent)
+        for name, exponent in zip(names, exponents, strict=True)
+        if exponent
+    ]
+    if not factors or coefficient != 1:
+        factors.insert(0, mathml_number(coefficient))
+    return _TIMES.join(factors)
+
+
+def _power(name: str, exponent: int) -> str:
+    return f"<msup>{name}<mn>{exponent}</mn></msup>"
+
+
+def _plain_term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:
+    factors = [
+        name if exponent == 1 else f"{name}^{exponent}"
+        for name, exponent in zip(names, exponents, strict=True)
+        if exponent
+    ]
+    if not factors or coefficient != 1:
+        factors.insert(0, format_number(coefficient))
+    return "*".join(factors)

@@ -1,0 +1,39 @@
+"""The order in which a polynomial is read, and the beginning of one that is too long to be shown."""
+
+from __future__ import annotations
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import names_of
+
+
+def reading_order(polynomial: fmpq_mpoly) -> list[tuple[tuple[int, ...], fmpq]]:
+    """Exponents and coefficients of the terms, those without eps first: what remains for eps = 0 is read first.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> reading_order(parse_polynomial("eps*x^2 - 1/2", ["x", "eps"]))
+    [((0, 0), -1/2), ((2, 1), 1)]
+    """
+    names = names_of(polynomial)
+    at = names.index("eps") if "eps" in names else None
+    terms = [(tuple(int(exponent) for exponent in monomial), value) for monomial, value in polynomial.terms()]
+    return terms if at is None else sorted(terms, key=lambda term: term[0][at])
+
+
+def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
+    """The first terms in reading order that take about so many characters, perhaps none; exact, all if they fit.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> first_terms(parse_polynomial("(x + y)^20", ["x", "y"]), 30)
+    x^20 + 20*x^19*y + 190*x^18*y^2
+    """
+    kept: dict[tuple[int, ...], fmpq] = {}
+    names, left = names_of(polynomial), characters
+    for monomial, value in reading_order(polynomial):
+        # The length of a number without writing it: a coefficient of a million digits takes seconds.
+        left -= int((value.p.bit_length() + value.q.bit_length()) * 0.30103) + 3
+        left -= sum(len(name) + 2 for name, exponent in zip(names, monomial, strict=True) if exponent)
+        if left < 0:
+            break
+        kept[monomial] = value
+    return polynomial if len(kept) == len(polynomial) else polynomial.context().from_dict(kept)

@@ -1,0 +1,220 @@
+"""How the results of the laboratory look in a notebook: bounded in size, nothing computed anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from flint import fmpq
+
+from kahanmaps import markup
+from kahanmaps.algebra.mathml import formula
+from kahanmaps.algebra.text import format_number
+from kahanmaps.maps.shown import eps_words
+from kahanmaps.systems.shown import CHARACTERS, equations_html
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.analysis import Analysis
+    from kahanmaps.laboratory.commuting import CommutingSystems
+    from kahanmaps.laboratory.cycles import Census
+    from kahanmaps.laboratory.darboux import DarbouxSearch
+    from kahanmaps.laboratory.degrees import DegreeGrowth
+    from kahanmaps.laboratory.densities import DensitySearch
+    from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures
+    from kahanmaps.laboratory.height_survey import HeightSurvey
+    from kahanmaps.laboratory.integrals import IntegralSearch
+    from kahanmaps.laboratory.singularities import SingularityRun
+    from kahanmaps.laboratory.symmetries import Symmetries
+    from kahanmaps.systems.files import SystemFile
+
+_ROWS = 20
+_FORMULAS = 5  # rows of which each has several formulas
+_STATEMENTS = 60
+_TEXT = 300
+Row = tuple[str, str]
+
+
+def eps_sentence(eps: fmpq | None) -> str:
+    """For which eps a result is, with the time step: a phrase."""
+    return eps_words() if eps is None else eps_words(format_number(eps), format_number(2 * eps))
+
+
+def analysis_html(found: Analysis) -> str:
+    """The verdict first, then the statements."""
+    final = found.conclusion
+    statements = [(title, line) for title, lines in found.sections for line in lines]
+    rows = [(_text(title), markup.verdict(line.status), _text(line.text)) for title, line in statements[:_STATEMENTS]]
+    more = f"<p>… and {len(statements) - _STATEMENTS} more statements</p>" if len(statements) > _STATEMENTS else ""
+    inside = [
+        f"<p>{equations_html(found.file.system)}</p>",
+        f"<p><strong>{_text(final.kind)}</strong>: {_text(final.sentence, 800)}</p>",
+        markup.table(["", "known how", ""], rows) + more,
+    ]
+    return markup.titled(_name(found.file), "\n".join(inside), f"dimension {found.dim}, {eps_sentence(found.eps)}")
+
+
+def integrals_html(search: IntegralSearch) -> str:
+    """The integrals with their verdicts, and how many there should be."""
+    rows = [
+        (formula(one.function, one.name, CHARACTERS), markup.verdict(one.verdict), _text(one.origin))
+        for one in search.integrals[:_FORMULAS]
+    ]
+    said = f"{len(search.integrals)} found; orbits show {search.codimension} (measured)"
+    notes = _notes([_rest(search.integrals, _FORMULAS), search.note, search.reason])
+    inside = markup.table(["integral", "verdict", "found by"], rows) if rows else ""
+    return markup.titled(
+        f"integrals of {_name(search.file)}", f"{inside}\n<p>{said}</p>{notes}", eps_sentence(search.eps)
+    )
+
+
+def densities_html(search: DensitySearch) -> str:
+    """The densities phi with dx/phi invariant."""
+    rows = [
+        (formula(one.function, "phi", CHARACTERS), markup.verdict(one.verdict)) for one in search.densities[:_FORMULAS]
+    ]
+    inside = markup.table(["dx/phi is invariant", "verdict"], rows) if rows else ""
+    notes = _notes([_rest(search.densities, _FORMULAS), search.note, search.reason])
+    more = eps_sentence(search.eps)
+    return markup.titled(f"densities of {_name(search.file)}", inside + notes, more)
+
+
+def darboux_html(search: DarbouxSearch) -> str:
+    """The spaces of Darboux polynomials by cofactor."""
+    rows = [
+        (
+            _code(space.cofactor),
+            "<br/>".join(formula(P, characters=CHARACTERS) for P in space.polynomials[:4]),
+            markup.verdict(space.verdict),
+        )
+        for space in search.spaces[:_FORMULAS]
+    ]
+    inside = markup.table(["cofactor", "polynomials", "verdict"], rows) if rows else "<p>none</p>"
+    notes = _notes([_rest(search.spaces, _FORMULAS), search.reason])
+    more = f"up to degree {search.degree}, {eps_sentence(search.eps)}"
+    return markup.titled(f"Darboux polynomials of {_name(search.file)}", inside + notes, more)
+
+
+def degrees_html(found: DegreeGrowth) -> str:
+    """The degrees of the iterates, and what they say."""
+    lines = [line.split("\t", 1) for line in found.text.split("\n")]
+    rows = [(word, _text(rest)) for word, rest in lines[:_ROWS]]
+    return markup.titled("degrees of the iterates", markup.definitions(rows), "measured, " + eps_sentence(found.eps))
+
+
+def heights_html(survey: HeightSurvey) -> str:
+    """The kind of growth of each orbit."""
+    rows = [
+        (
+            _text(format_number(one.eps)),
+            _text(", ".join(map(format_number, one.start))),
+            _text(str(one.growth.kind)),
+            str(len(one.growth.heights)),
+            _text(one.growth.end.message),
+        )
+        for one in survey.orbits[:_ROWS]
+    ]
+    inside = markup.table(["eps", "start", "growth", "heights", "ended"], rows) + _notes([_rest(survey.orbits)])
+    return markup.titled("heights of exact orbits", f"<p>{_text(survey.text)}</p>\n{inside}", "the time step is 2 eps")
+
+
+def singularities_html(run: SingularityRun) -> str:
+    """Each contracted hypersurface and its fate."""
+    rows = [
+        (
+            _code(h.polynomial),
+            _text(h.status),
+            "" if h.contracted_at is None else str(h.contracted_at),
+            "" if h.confined_at is None else str(h.confined_at),
+        )
+        for h in run.hypersurfaces[:_ROWS]
+    ]
+    inside = markup.table(["hypersurface", "fate", "contracted at step", "confined at step"], rows) if rows else ""
+    inside += _notes([_rest(run.hypersurfaces)])
+    return markup.titled(f"singularities: {run.verdict}", inside, eps_sentence(run.eps))
+
+
+def symmetries_html(found: Symmetries) -> str:
+    """Symmetries and reversing symmetries."""
+    rows: list[Row] = [("infinitesimal", _text(f"({', '.join(one.rhs)})")) for one in found.infinitesimal[:_ROWS]]
+    if found.order is not None:
+        rows.append(("signed permutations", f"{found.order}, generated by"))
+    rows += [_symmetry_row(one.reversing, one.text) for one in found.generators[:_ROWS]]
+    rows += [_symmetry_row(one.reversing, one.text) for one in found.others[:_ROWS]]
+    inside = (markup.definitions(rows) if rows else "<p>none but the identity</p>") + _notes(
+        [_rest(found.others), *found.undecided]
+    )
+    return markup.titled("affine symmetries of the map", inside, "proved, for every eps")
+
+
+def _symmetry_row(reversing: bool, text: str) -> Row:
+    return ("reversing" if reversing else "symmetry", _text(text))
+
+
+def commuting_html(found: CommutingSystems) -> str:
+    """The systems whose Kahan maps commute."""
+    rows = [
+        (
+            equations_html(one.system, CHARACTERS // 4),
+            _text(one.trivial and f"g = {one.trivial}"),
+            markup.verdict(one.finding.verdict),
+        )
+        for one in sorted(found.solutions, key=lambda one: bool(one.trivial))[:_FORMULAS]
+    ]
+    rows += [
+        (
+            equations_html(family.base.system, CHARACTERS // 4),
+            f"and {len(family.directions)} directions",
+            markup.verdict(family.finding.verdict),
+        )
+        for family in found.families[:_FORMULAS]
+    ]
+    rest = [_rest(found.solutions, _FORMULAS), _rest(found.families, _FORMULAS)]
+    notes = _notes([*rest, "every g commutes" * found.every_g_commutes, *found.irrational, *found.undecided])
+    inside = markup.table(["g", "", "commutes"], rows) if rows else ""
+    return markup.titled("systems x' = g(x) whose Kahan maps commute", inside + notes, f"{found.shape} g, every eps")
+
+
+def census_html(census: Census) -> str:
+    """The counts of points and cycles."""
+    kind = "all points" if census.complete else "random points"
+    rows = [
+        ("points", f"{census.points} ({kind}: {census.looked_at} looked at)"),
+        ("on cycles", str(census.periodic)),
+        ("cycles", "not counted" if census.cycles is None else str(census.cycles)),
+        ("longest cycle", str(census.longest)),
+        ("lost, falling, transient, open", f"{census.lost}, {census.falling}, {census.transient}, {census.open}"),
+    ]
+    title = f"cycles on P^{census.dim} over GF({census.prime})"
+    return markup.titled(title, markup.definitions(rows), eps_sentence(census.eps))
+
+
+def structures_html(found: ConstantStructures) -> str:
+    """The Hamiltonian form, or why there is none."""
+    if found.hamiltonian is None:
+        word = markup.verdict("proved" if found.proved else "undecided")
+        return markup.titled("not Hamiltonian with a constant J", f"<p>{word}: {_text(found.reason)}</p>")
+    kind = "the standard J" if found.hamiltonian.is_standard else "a constant skew J"
+    rows = [("H", formula(found.hamiltonian.H, characters=CHARACTERS))]
+    rows += [("Casimir", formula(casimir, characters=CHARACTERS)) for casimir in found.casimirs[:_ROWS]]
+    return markup.titled(f"Hamiltonian with {kind}", markup.definitions(rows), "proved")
+
+
+def _name(file: SystemFile) -> str:
+    return markup.shortened(file.name)
+
+
+def _notes(texts: Iterable[str]) -> str:
+    return "".join(f"\n<p>{_text(text)}</p>" for text in list(texts)[:_ROWS] if text)
+
+
+def _rest(found: Sequence[object], shown: int = _ROWS) -> str:
+    """How many are not shown, empty where all are."""
+    return f"… and {len(found) - shown} more" if len(found) > shown else ""
+
+
+def _code(text: str) -> str:
+    return f"<code>{_text(text)}</code>"
+
+
+def _text(text: str, width: int = _TEXT) -> str:
+    return markup.escape(markup.shortened(text, width))

@@ -1,0 +1,130 @@
+"""How maps and orbits look in a notebook: nothing is computed that was not computed before, and the size is bounded."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flint import fmpq
+
+from kahanmaps import markup
+from kahanmaps.algebra.latex import latex_aligned, latex_name, latex_number
+
+if TYPE_CHECKING:
+    from kahanmaps.maps.kahan import KahanMap
+    from kahanmaps.maps.orbits import Orbit, OrbitPoint
+    from kahanmaps.maps.periods import OrbitPeriod
+    from kahanmaps.systems.quadratic import QuadraticSystem
+
+_EQUATIONS = 8
+_TERMS = 12
+_COORDINATES = 8
+_LARGEST_SHOWN = 2_000  # digits: the text of a longer number is not even made
+
+
+def eps_words(eps: object = None, step: object = None) -> str:
+    """For which eps something is said, with the time step, as text; None is every eps.
+
+    >>> eps_words(), eps_words("1/10", "1/5")
+    ('every eps (the time step is 2 eps)', 'eps = 1/10 (time step 2 eps = 1/5)')
+    """
+    if eps is None:
+        return "every eps (the time step is 2 eps)"
+    return f"eps = {markup.shortened(eps)} (time step 2 eps = {markup.shortened(step)})"
+
+
+def map_latex(kahan: KahanMap) -> str:
+    """The equation that defines the map, for its system and its eps."""
+    system, field = kahan.system, kahan.field
+    rows = [
+        (rf"\frac{{{_image(name)} - {latex_name(name)}}}{{2 \varepsilon}}", _polarised(system, k))
+        for k, name in enumerate(system.variables[:_EQUATIONS])
+    ]
+    if system.dim > _EQUATIONS:
+        rows.append((r"\vdots", rf"\text{{({system.dim} equations)}}"))
+    with field.working():
+        eps, step = (markup.shortened(field.format(value)) for value in (kahan.eps, kahan.eps + kahan.eps))
+    where = "" if str(field) == "QQ" else rf"\text{{ over {_plain(field)}}}"
+    rows.append(
+        (
+            r"\varepsilon",
+            rf"\text{{{_plain(eps)}}},\quad \text{{time step }} 2 \varepsilon = \text{{{_plain(step)}}}{where}",
+        )
+    )
+    return latex_aligned(rows, _EQUATIONS + 2)
+
+
+def _image(name: str) -> str:
+    return rf"\widetilde{{{latex_name(name)}}}"
+
+
+def _polarised(system: QuadraticSystem, k: int) -> str:
+    """The right-hand side Q(x, x~) + B (x + x~)/2 + c of one component."""
+    names = [(latex_name(name), _image(name)) for name in system.variables]
+    terms: list[tuple[fmpq, str]] = []
+    for monomial, value in system.rhs[k].terms():
+        where = [j for j, exponent in enumerate(monomial) for _ in range(int(exponent))]
+        if len(where) == 2 and where[0] == where[1]:
+            terms.append((value, " ".join(names[where[0]])))
+        elif len(where) == 2:
+            (x, x_image), (y, y_image) = (names[j] for j in where)
+            terms.append((value / 2, rf"({x} {y_image} + {x_image} {y})"))
+        elif where:
+            terms.append((value / 2, rf"({' + '.join(names[where[0]])})"))
+        else:
+            terms.append((value, ""))
+    text = ""
+    for value, factors in terms[:_TERMS]:
+        number = latex_number(abs(value)) if abs(value) != 1 or not factors else ""
+        number = number if len(number) < 200 else r"\text{(a long number)}"
+        sign = "-" if value < 0 else "+" if text else ""
+        text += f" {sign} {number} {factors}"
+    more = rf" + \cdots\ \text{{({len(terms)} terms)}}" if len(terms) > _TERMS else ""
+    return " ".join(text.split()) + more or "0"
+
+
+def _plain(text: object) -> str:
+    """Text of a number or a field for \\text{...}."""
+    return str(text).replace("_", r"\_")
+
+
+def orbit_html(orbit: Orbit) -> str:
+    """The first points and the last one that were computed, and how the orbit ended."""
+    variables = orbit.map.system.variables
+    shown, last = list(orbit.first), orbit.last
+    head = ["step", *variables[:_COORDINATES], *(["…"] if len(variables) > _COORDINATES else []), "digits"]
+    rows = [_cells(point, len(variables)) for point in shown]
+    if last is not None and last.step > shown[-1].step:
+        if last.step > shown[-1].step + 1:
+            rows.append(["…"] * len(head))
+        rows.append(_cells(last, len(variables)))
+    if orbit.end is not None:
+        word = orbit.end.status
+        status = f"{markup.verdict(word)}: {markup.escape(orbit.end.message)}"
+    elif last is not None:
+        status = f"walked to step {last.step}, not to its end"
+    else:
+        status = "not walked yet: iterate over it"
+    field = orbit.map.field
+    direction = " backward" if orbit.backward else ""
+    eps = markup.shortened(field.format(orbit.map.eps))
+    title = f"orbit{direction}, eps = {eps} (the time step is 2 eps), over {field}"
+    return markup.titled(title, f"{markup.table(head, rows)}\n<p>{status}</p>" if rows else f"<p>{status}</p>")
+
+
+def _cells(point: OrbitPoint, count: int) -> list[str]:
+    """One row: the step, the first coordinates of `count`, and the number of digits."""
+    is_long = point.digits > _LARGEST_SHOWN
+    texts = ["(long)"] * count if is_long else [_beginning_and_end(text) for text in point.text]
+    cells = texts[:_COORDINATES] + ["…"] * (count > _COORDINATES)
+    return [str(point.step), *(markup.escape(text) for text in cells), str(point.digits or "")]
+
+
+def _beginning_and_end(number: str) -> str:
+    return number if len(number) <= 24 else f"{number[:10]}…{number[-10:]}"
+
+
+def period_html(found: OrbitPeriod) -> str:
+    """The period, and that of every plane."""
+    sentence, *planes = found.text.split("\n")
+    inside = markup.listed(markup.escape(markup.shortened(line, 200)) for line in planes[:20])
+    return markup.titled(markup.shortened(sentence, 200), inside)

@@ -1,0 +1,103 @@
+"""The few pieces of HTML that notebooks and the report share; well-formed XML, always the same bytes.
+
+Nothing here sets a background or a font: what is shown takes the colours of the page around it, light or dark. Words
+such as *proved* carry a mark beside their colour, so that they can be told apart without seeing the colour.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Sequence
+
+# A mark, and a colour to be mixed with that of the text: with a contrast above 4.5 : 1 on white and on near black.
+_WORDS = {
+    "proved": ("✓", "#1a9f4b"),
+    "completed": ("✓", "#1a9f4b"),
+    "supported": ("≈", "#0e8fa8"),
+    "measured": ("~", "#3f7ae0"),
+    "refuted": ("✗", "#e0353f"),
+    "undecided": ("?", "#b8860b"),
+}
+_LEFT = 'style="text-align: left"'  # Jupyter sets tables as if they were all numbers
+_SHORTENED = 60  # characters of a number or a name
+
+
+def escape(text: object) -> str:
+    """Text as HTML that shows it and nothing else; what XML does not allow, control characters above all, is spelt out.
+
+    >>> escape('<b title="x">&')
+    '&lt;b title=&quot;x&quot;&gt;&amp;'
+    >>> escape("a" + chr(0) + chr(27))
+    'a\\\\x00\\\\x1b'
+    """
+    shown = "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in str(text))
+    return html.escape(shown, quote=True)
+
+
+def shortened(text: object, width: int = _SHORTENED) -> str:
+    """The text with its middle left out where it is longer than `width`, and its length told; not yet escaped.
+
+    >>> shortened("1" * 100, 20)
+    '11111111…11111111 (100 characters)'
+    """
+    whole = str(text)
+    if len(whole) <= width:
+        return whole
+    keep = max(4, (width - 4) // 2)
+    return f"{whole[:keep]}…{whole[-keep:]} ({len(whole)} characters)"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
+    """A table. `head` and `caption` are text, the cells of `rows` are HTML already.
+
+    >>> print(table(["n"], [["<b>3</b>"]]))
+    <table><thead><tr><th scope="col" style="text-align: left">n</th></tr></thead><tbody>
+    <tr><td style="text-align: left"><b>3</b></td></tr>
+    </tbody></table>
+    """
+    above = f"<caption>{escape(caption)}</caption>" if caption else ""
+    names = "".join(f'<th scope="col" {_LEFT}>{escape(name)}</th>' for name in head)
+    names = f"<thead><tr>{names}</tr></thead>" if names else ""
+    lines = ["<tr>" + "".join(f"<td {_LEFT}>{cell}</td>" for cell in row) + "</tr>" for row in rows]
+    return "\n".join([f"<table>{above}{names}<tbody>", *lines, "</tbody></table>"])
+
+
+def definitions(rows: Iterable[tuple[str, str]], caption: str = "") -> str:
+    """A table of two columns: a word, which is text, and what it stands for, which is HTML already."""
+    above = f"<caption>{escape(caption)}</caption>" if caption else ""
+    lines = [
+        f'<tr><th scope="row" style="text-align: left; vertical-align: top">{escape(word)}</th>'
+        f"<td {_LEFT}>{what}</td></tr>"
+        for word, what in rows
+    ]
+    return "\n".join([f"<table>{above}<tbody>", *lines, "</tbody></table>"])
+
+
+def details(summary: str, inside: str) -> str:
+    """What is unfolded by a click; `summary` is text, `inside` is HTML already."""
+    return f"<details><summary>{escape(summary)}</summary>\n{inside}\n</details>"
+
+
+def listed(entries: Iterable[str]) -> str:
+    """A list whose entries are HTML already."""
+    return "\n".join(["<ul>", *(f"<li>{entry}</li>" for entry in entries), "</ul>"])
+
+
+def verdict(word: object) -> str:
+    """A word such as *proved*, with its mark and its colour; other words as they are.
+
+    >>> verdict("note")
+    '<span class="verdict">note</span>'
+    """
+    text = str(word)
+    if text not in _WORDS:
+        return f'<span class="verdict">{escape(text)}</span>'
+    mark, colour = _WORDS[text]
+    style = f"color: color-mix(in srgb, currentColor 35%, {colour}); white-space: nowrap"
+    return f'<span class="verdict {text}" style="{style}"><span aria-hidden="true">{mark}</span> {text}</span>'
+
+
+def titled(title: str, inside: str, more: str = "") -> str:
+    """A piece of a notebook: a title, which is text, perhaps with more beside it, and HTML below."""
+    beside = f" — {escape(more)}" if more else ""
+    return f"<div><p><strong>{escape(title)}</strong>{beside}</p>\n{inside}\n</div>"

@@ -1,0 +1,48 @@
+"""Degrees of iterates from the record that `kahanmaps degrees --json` wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from kahanmaps.algebra.text import parse_number
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.degrees import DegreeGrowth
+
+_MOST_TERMS = 10_000
+_LARGEST = 10**15
+
+
+def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGrowth]:
+    """The name of the system, and the degrees, in the JSON object that `kahanmaps degrees --json` writes.
+
+    The recurrence is looked for anew. Raises InputError for anything else.
+
+    >>> record = {"command": "degrees", "system": "top", "degrees": [1, 3, 9, 19, 33, 51, 73, 99], "eps": "generic"}
+    >>> name, growth = degrees_of_record({**record, "ended": "terms", "message": "8 terms", "seed": 0, "lines": []})
+    >>> name, growth.recurrence.closed_form
+    ('top', '2*n^2 + 1')
+    """
+    if not isinstance(record, Mapping) or record.get("command") != "degrees":
+        raise InputError(f"{where}: found something else, expected an object written by 'kahanmaps degrees --json'")
+    try:
+        degrees = record["degrees"]
+        if not isinstance(degrees, list) or not 1 <= len(degrees) <= _MOST_TERMS:
+            raise InputError("no list of degrees")
+        for d in degrees:
+            if isinstance(d, bool) or not isinstance(d, int) or not 0 <= d <= _LARGEST:
+                raise InputError(f"found {str(d)[:40]!r}, expected a degree")
+        if not any(degrees):
+            raise InputError("all degrees are 0")
+        growth = DegreeGrowth(
+            tuple(degrees),
+            None if record["eps"] == "generic" else parse_number(record["eps"]),
+            str(record["ended"]),
+            str(record["message"]),
+            int(record["seed"]),
+            tuple(int(line["prime"]) for line in record["lines"]),
+            tuple(int(line["eps_residue"]) for line in record["lines"]),
+        )
+        return str(record["system"]), growth
+    except (KeyError, TypeError, ValueError, AttributeError, InputError) as error:
+        raise InputError(f"{where}: found degrees that cannot be read ({error}), expected those of degrees") from error

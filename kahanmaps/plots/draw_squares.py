@@ -1,0 +1,218 @@
+"""Draws the square of two maps, or the lattice of their iterates: closed where they commute, open where they do not.
+
+Arrows of f start from points reached by g first, arrows of g from points reached by f first; a ring marks where g ends,
+a dot where f does. Where the maps commute every ring holds its dot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from flint import arb
+
+from kahanmaps.errors import InputError
+from kahanmaps.plots.figures import drawing, label_of, new_figure, plain
+from kahanmaps.plots.plane_cubics import Floats
+from kahanmaps.plots.squares import Lattice, Squares
+from kahanmaps.plots.style import COLOURS, Style
+from kahanmaps.plots.windows import outside, window_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_F, _G, _GAP = COLOURS[1], COLOURS[5], COLOURS[0]
+_LARGEST = 1e150  # what can be squared
+_SEEN = 0.06  # of the width of a panel: a gap below it is shown magnified
+
+
+def draw_squares(
+    found: Sequence[Squares], style: Style, axes: tuple[int, int] | None = None, captions: Sequence[str] = ()
+) -> Figure:
+    """One panel for each pair of maps, in two coordinates: those given, or those in which the squares are widest.
+
+    `captions` stand above the panels, in place of the names of the maps. Raises InputError for numbers that are none of
+    variables, and for a start beyond the range of what can be drawn.
+    """
+    dim = found[0].pair.f.dim
+    if not all(np.isfinite(_table(squares.g_after_f)[0, 0]).all() for squares in found):
+        raise InputError(f"found a start with coordinates beyond {_LARGEST:.0e}: it cannot be drawn")
+    chosen = widest_axes(found) if axes is None else axes
+    if len(chosen) != 2 or not all(0 <= k < dim for k in chosen):
+        raise InputError(f"found the variables {chosen}, expected two numbers from 0 to {dim - 1}")
+    with drawing(style):
+        letter = style.font_size * 2.54 / 72
+        side = style.width / max(len(found), 1.25) - 4.2 * letter
+        figure = new_figure(style, (side + 8.5 * letter) / style.width)
+        for k, panel in enumerate(figure.subplots(1, len(found), squeeze=False)[0]):
+            caption = captions[k] if k < len(captions) else ""
+            _draw(panel, found[k], chosen, caption)
+        _legend(figure)
+    return figure
+
+
+def widest_axes(found: Sequence[Squares]) -> tuple[int, int]:
+    """The two coordinates in which the thinnest of the squares is thickest, and a gap is seen if there is one."""
+    dim = found[0].pair.f.dim
+    if dim == 1:
+        return 0, 0
+
+    def score(pair: tuple[int, int]) -> float:
+        widths = []
+        for squares in found:
+            table = _table(squares.g_after_f)
+            x, fx, gx = table[0, 0], table[-1, 0], table[0, -1]
+            sides = np.stack([fx - x, gx - x])
+            size = np.nanmax(np.abs(sides), initial=0.0)
+            if np.isnan(sides).any() or size == 0:
+                continue
+            widths.append(np.linalg.svd(sides[:, pair] / size, compute_uv=False)[-1])
+            if squares.closes is False:
+                gaps = np.abs(table - _table(squares.f_after_g))
+                widths.append(np.nanmax(gaps[..., pair], initial=0.0) / np.nanmax(gaps, initial=0.0))
+        return float(min(widths, default=0.0))
+
+    return max(combinations(range(dim), 2), key=score)
+
+
+def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str) -> None:
+    one, other = _table(squares.g_after_f)[..., chosen], _table(squares.f_after_g)[..., chosen]
+    every = np.concatenate([one.reshape(-1, 2), other.reshape(-1, 2)])
+    every = every[np.isfinite(every).all(axis=1)]
+    window = np.array(window_of(every, one[0, 0][None]))
+    if squares.steps == 1:  # five points, all of which are wanted
+        window = np.array([every.min(axis=0), every.max(axis=0)]).T
+        window[:, 1] += np.where(window[:, 0] < window[:, 1], 0, np.maximum(1e-9, np.abs(window[:, 1])))
+    window = window + (0.32 if squares.steps == 1 else 0.08) * np.diff(window, axis=1) * np.array([-1, 1])
+    axes.set_box_aspect(1)
+    axes.set_xlim(*window[0])
+    axes.set_ylim(*window[1])
+    axes.locator_params(nbins=5)
+    axes.set_xlabel(label_of(squares.pair.f.variables[chosen[0]]))
+    axes.set_ylabel(label_of(squares.pair.f.variables[chosen[1]]))
+    f, g = map(_in_formula, squares.pair.names)
+    axes.set_title(f"{plain(caption) if caption else f'$f = {f}$,  $g = {g}$'}\n{squares.verdict}")
+    _draw_lattices(axes, one, other)
+    if beyond := outside(every, tuple(map(tuple, window))):
+        text = f"{beyond} of {len(every)} points outside"
+        axes.text(0.98, 0.02, text, fontsize="xx-small", ha="right", va="bottom", transform=axes.transAxes, zorder=6)
+    gap = (other[-1, -1] - one[-1, -1]) / np.diff(window, axis=1)[:, 0]
+    small = bool(np.hypot(*gap) < _SEEN)
+    if squares.steps == 1:
+        _label_corners(axes, one, other, squares.closes, small)
+    else:
+        _label(axes, one[0, 0], "$x$", np.nanmean(every, axis=0))
+    if squares.closes is False and small and np.any(gap != 0):
+        _magnify(axes, one, other, every, window)
+
+
+def _draw_lattices(axes: Axes, one: Floats, other: Floats) -> None:
+    """Arrows, rings where steps of g end, dots where steps of f end, and dotted lines across the gaps."""
+    steps = len(one) - 1
+    width, size = (1.1, 5.5) if steps == 1 else (0.8, 4.0) if steps <= 4 else (0.5, 2.6)
+    for i in range(steps + 1):
+        for j in range(steps + 1):
+            if j < steps:
+                _arrow(axes, one[i, j], one[i, j + 1], _G, width)
+            if i < steps:
+                _arrow(axes, other[i, j], other[i + 1, j], _F, width)
+            if not np.array_equal(one[i, j], other[i, j], equal_nan=True):
+                ends = np.stack([one[i, j], other[i, j]])
+                axes.plot(ends[:, 0], ends[:, 1], color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
+    ring: dict[str, Any] = {"linestyle": "none", "marker": "o", "zorder": 3}
+    rings, dots = one.reshape(-1, 2), other.reshape(-1, 2)
+    axes.plot(*rings.T, color=_G, markersize=size, markerfacecolor="white", markeredgewidth=0.8, **ring)
+    axes.plot(*dots.T, color=_F, markersize=0.5 * size, markeredgewidth=0, **{**ring, "zorder": 4})
+
+
+def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floats) -> None:
+    """The last corners once more, as large as it takes to see that they are two; in the emptiest corner."""
+    lengths = np.diff(window, axis=1)[:, 0]
+    inside = (every - window[:, 0]) / lengths
+    places = [(x, y) for x in (0.04, 0.64) for y in (0.04, 0.64)]
+    x, y = max(places, key=lambda place: np.hypot(*(inside - np.array(place) - 0.16).T).min())
+    inset = axes.inset_axes((x, y, 0.32, 0.32), zorder=7)
+    ends = np.stack([one[-1, -1], other[-1, -1]])
+    half = 1.1 * (np.abs(ends[1] - ends[0]) / lengths).max() * lengths
+    inset.set_xlim(ends[:, 0].mean() - half[0], ends[:, 0].mean() + half[0])
+    inset.set_ylim(ends[:, 1].mean() - half[1], ends[:, 1].mean() + half[1])
+    inset.set_xticks([])
+    inset.set_yticks([])
+    inset.set_title(rf"$\times {lengths[0] * 0.32 / (2 * half[0]):.2g}$", fontsize="x-small", pad=2)
+    _draw_lattices(inset, one[-2:, -2:], other[-2:, -2:])
+    inset.plot(*ends.T, color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
+
+
+def _label_corners(axes: Axes, one: Floats, other: Floats, closes: bool | None, small: bool) -> None:
+    corners = [(one[0, 0], "$x$"), (one[1, 0], r"$\Phi_f x$"), (one[0, 1], r"$\Phi_g x$")]
+    if closes or (closes is False and small):
+        sign = "=" if closes else r"\neq"
+        corners.append((one[1, 1], rf"$\Phi_g\Phi_f x {sign} \Phi_f\Phi_g x$"))
+    else:
+        corners += [(one[1, 1], r"$\Phi_g\Phi_f x$"), (other[1, 1], r"$\Phi_f\Phi_g x$")]
+    middle = np.nanmean(np.stack([point for point, _ in corners]), axis=0)
+    for point, text in corners:
+        _label(axes, point, text, middle)
+
+
+def _label(axes: Axes, point: Floats, text: str, middle: Floats) -> None:
+    """A text beside a point, away from the middle of them all; long ones above or below, so as to stay inside."""
+    if not np.isfinite(point).all():
+        return
+    from matplotlib.patheffects import withStroke
+
+    away = (point - middle) / np.array([np.diff(axes.get_xlim())[0], np.diff(axes.get_ylim())[0]])
+    away = away / (np.hypot(*away) or 1)
+    long = text.count("Phi") > 1
+    aligned = "center" if abs(away[0]) < 0.4 else "left" if (away[0] > 0) != long else "right"
+    raised = "center" if abs(away[1]) < 0.4 and not long else "bottom" if away[1] >= 0 else "top"
+    axes.annotate(
+        text,
+        (float(point[0]), float(point[1])),
+        xytext=(0.0 if long else 7 * away[0], (9 if away[1] >= 0 else -9) if long else 7 * away[1]),
+        textcoords="offset points",
+        horizontalalignment=aligned,
+        verticalalignment=raised,
+        path_effects=[withStroke(linewidth=2, foreground="white")],
+        zorder=5,
+    )
+
+
+def _arrow(axes: Axes, start: Floats, end: Floats, colour: str, width: float) -> None:
+    if not np.isfinite([*start, *end]).all() or np.array_equal(start, end):
+        return
+    from matplotlib.patches import FancyArrowPatch
+
+    how: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "linewidth": width, "mutation_scale": 4 + 5 * width}
+    axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), shrinkA=2, shrinkB=2.5, zorder=2, **how))
+
+
+def _legend(figure: Figure) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=_F, marker="o", markersize=3, label=r"$\Phi_f$"),
+        Line2D([], [], color=_G, marker="o", markersize=5.5, markerfacecolor="white", label=r"$\Phi_g$"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+
+
+def _table(lattice: Lattice) -> Floats:
+    """The points as machine numbers, nan where there is none or it is too large for them."""
+    dim = next(len(point) for row in lattice for point in row if point is not None)
+    missing = (float("nan"),) * dim
+    found = np.array(
+        [
+            [missing if point is None else [float(arb(entry).mid()) for entry in point] for point in row]
+            for row in lattice
+        ]
+    )
+    return np.where(np.abs(found) < _LARGEST, found, np.nan)
+
+
+def _in_formula(name: str) -> str:
+    name, _, signs = name.partition("_") if name.startswith("f_") else (name, "", "")
+    return f"{name}_{{{signs}}}" if signs else name.replace("grad ", r"\nabla ")

@@ -1,0 +1,187 @@
+"""Functions whose drift is shown: integrals of the Kahan map with eps in them, and H of the differential equation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.text import format_polynomial, is_name, parse_rational_function
+from kahanmaps.errors import InputError, SingularStep
+from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
+from kahanmaps.invariants.phase_functions import PhaseFunction
+from kahanmaps.maps.float_ensemble import FloatEnsemble
+from kahanmaps.maps.float_numbers import FloatArray, to_float, to_floats
+from kahanmaps.plots.figures import label_of, plain
+from kahanmaps.plots.point_functions import PointFunction
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+
+_LONGEST = 30
+
+
+class WatchedFunction(Protocol):
+    """A function of a point with eps inserted; `label` is its name in a picture."""
+
+    @property
+    def name(self) -> str:
+        """What the user calls it."""
+        ...
+
+    @property
+    def label(self) -> str:
+        """What a picture calls it."""
+        ...
+
+    def at(self, start: Sequence[fmpq]) -> fmpq | None:
+        """The exact value at a rational point, None where it has none."""
+        ...
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """The values at points (count, dim) in doubles, NaN where there is none."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """A rational function of the variables and eps."""
+
+    name: str
+    function: RationalFunction
+    eps: fmpq
+
+    @property
+    def label(self) -> str:
+        return label_of(self.name) if is_name(self.name) else plain(self.name)
+
+    def at(self, start: Sequence[fmpq]) -> fmpq | None:
+        value: fmpq | None = self.function.value(QQ, [*start, self.eps])
+        return value
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        return PointFunction(self.name, self.function, to_float(self.eps))(points)
+
+
+class OfTheImage:
+    """An integral in which the image of the point under the Kahan map occurs: modified H, or one of the commutant."""
+
+    def __init__(self, function: PhaseFunction, eps: fmpq, label: str) -> None:
+        if not isinstance(function, ModifiedHamiltonian | CommutantIntegral):
+            raise InputError(f"found {function.name}, expected the modified H or an integral of the commutant")
+        self.name = function.name
+        self.label = label
+        self._function, self._eps = function, eps
+        hamiltonian = function.hamiltonian
+        self._hamiltonian = hamiltonian
+        if isinstance(function, ModifiedHamiltonian):
+            self._H = _in_doubles(hamiltonian, hamiltonian.H)
+            self._gradient = [_in_doubles(hamiltonian, slope) for slope in hamiltonian.gradient]
+        else:
+            matrix = hamiltonian.J * function.matrix
+            self._matrix = to_floats(matrix.entries()).reshape(hamiltonian.dim, hamiltonian.dim)
+
+    def at(self, start: Sequence[fmpq]) -> fmpq | None:
+        """The exact value, None where the Kahan map has none."""
+        try:
+            value: fmpq | None = self._function.value(QQ, self._eps, start)
+        except SingularStep:
+            return None
+        return value
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """The values, from one step of the Kahan map for all points together."""
+        values = np.full(len(points), np.nan)
+        good = np.isfinite(points).all(axis=1)
+        if not good.any():
+            return values
+        x = points[good]
+        ensemble = FloatEnsemble(self._hamiltonian.system, self._eps, x, kernel="numpy")
+        ensemble.advance(1)
+        image = np.where((ensemble.failed_at >= 0)[:, None], np.nan, ensemble.x)
+        with np.errstate(all="ignore"):
+            if isinstance(self._function, ModifiedHamiltonian):
+                slopes = np.stack([slope(x) for slope in self._gradient], axis=1)
+                found = self._H(x) + ((image - x) * slopes).sum(axis=1) / 3.0
+            else:
+                found = ((x @ self._matrix) * image).sum(axis=1) / to_float(self._eps)
+        found[~np.isfinite(found)] = np.nan
+        values[good] = found
+        return values
+
+
+def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
+    """What the Kahan map of a system is known to conserve, by name, and H of the differential equation.
+
+    The integrals that the file claims; the modified H of a cubic Hamiltonian; for a member of the family the integrals
+    of the commutant; and last the plain H, which the Kahan map does not conserve. `eps` is exact, half the time step.
+
+    >>> from kahanmaps.systems.catalog import load
+    >>> list(functions_of(load("paper_m2"), fmpq(1, 9)))
+    ['I1', 'I2', 'modified H', 'H~_1', 'H']
+    """
+    found: dict[str, WatchedFunction] = {
+        name: Expression(name, function, eps) for name, function in file.integrals.items()
+    }
+    hamiltonian = file.hamiltonian
+    if hamiltonian is not None and eps != 0:
+        found["modified H"] = OfTheImage(ModifiedHamiltonian(hamiltonian), eps, r"$\tilde H$")
+        if file.member is not None and hamiltonian.is_homogeneous and hamiltonian.is_standard:
+            for power in range(1, hamiltonian.dim // 2):
+                integral = CommutantIntegral(hamiltonian, file.member.A, power)
+                found[integral.name] = OfTheImage(integral, eps, rf"$\tilde H_{{{power}}}$")
+    if hamiltonian is not None and "H" not in found:
+        found["H"] = Expression("H", _as_function(hamiltonian, hamiltonian.H), eps)
+    return found
+
+
+def known_functions(file: SystemFile, eps: fmpq) -> list[WatchedFunction]:
+    """A choice of these without repetition: the claims of the file, or where there are none what follows; and H.
+
+    Raises InputError where nothing is known.
+    """
+    every = functions_of(file, eps)
+    chosen = list(file.integrals) or [name for name in every if name != "H"]
+    if "H" in every:
+        chosen.append("H")
+    if not chosen:
+        raise InputError(
+            f"found no known integral of {file.name}, expected one: give --integral NAME=EXPR, an expression in the "
+            "variables and eps"
+        )
+    return [every[name] for name in dict.fromkeys(chosen)]
+
+
+def asked_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, str]]) -> list[WatchedFunction]:
+    """The functions that (name, text) pairs ask for: "known", one of `functions_of` by name, or an expression.
+
+    Expressions may contain eps. Raises InputError for text that cannot be read, for a name that comes twice, and where
+    nothing is known.
+    """
+    every = functions_of(file, eps)
+    found: list[WatchedFunction] = []
+    for name, text in requests:
+        if text == "known" and not name:
+            found += known_functions(file, eps)
+        elif text in every and name in ("", text):
+            found.append(every[text])
+        else:
+            function = parse_rational_function(text, (*file.variables, "eps"), file.parameters)
+            found.append(Expression(name or text[:_LONGEST], function, eps))
+    names = [function.name for function in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"found two functions of the name {name}: write --integral NAME=EXPR")
+    return found
+
+
+def _as_function(hamiltonian: CubicHamiltonian, polynomial: fmpq_mpoly) -> RationalFunction:
+    return parse_rational_function(format_polynomial(polynomial), (*hamiltonian.variables, "eps"))
+
+
+def _in_doubles(hamiltonian: CubicHamiltonian, polynomial: fmpq_mpoly) -> PointFunction:
+    return PointFunction("", _as_function(hamiltonian, polynomial))

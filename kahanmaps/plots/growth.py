@@ -1,0 +1,242 @@
+"""How complexity grows, as pictures: degrees of iterates, and heights of exact orbits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kahanmaps.algebra.text import format_number
+from kahanmaps.errors import InputError
+from kahanmaps.invariants.heights import Growth
+from kahanmaps.laboratory.degrees import DegreeGrowth
+from kahanmaps.laboratory.height_survey import HeightSurvey
+from kahanmaps.laboratory.recurrences import GrowthClass
+from kahanmaps.plots.figures import drawing, new_figure, plain
+from kahanmaps.plots.height_curves import HeightCurve, fit_of, height_curves
+from kahanmaps.plots.legends import legend_above, legend_height
+from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
+from kahanmaps.plots.zero_band import log_scale_with_zero
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SCALES = ("linear", "log", "loglog")
+_MOST_SYSTEMS = len(COLOURS)
+_LONGEST_FORMULA = 24
+_ASPECT = 0.62  # of the axes
+
+
+def draw_degrees(
+    growths: Mapping[str, DegreeGrowth], style: Style | None = None, *, scale: str | None = None
+) -> Figure:
+    """Degrees d_n of the iterates against n, for one or more systems by their names.
+
+    Marks are the measured degrees. A solid line is the recurrence that they satisfy; dots join degrees for which none
+    could be checked, and what the legend says of their growth is estimated. `scale` is "linear", "log" (exponential
+    growth is a straight line) or "loglog" (a power is a straight line, from n = 1 on); by default "log" where some
+    growth is exponential or looks so, else "linear". On a logarithmic scale a degree 0 lies in a band marked 0.
+    Raises InputError for no system or more than 7, and for a scale of another name.
+
+    >>> from kahanmaps.laboratory.degrees import degree_growth
+    >>> from kahanmaps.systems.catalog import load
+    >>> figure = draw_degrees({"Euler top": degree_growth(load("euler_top").system)})
+    >>> figure.legends[0].get_texts()[0].get_text()
+    'Euler top: $d_n = 2n^{2} + 1$, $\\\\lambda = 1$'
+    """
+    if not 1 <= len(growths) <= _MOST_SYSTEMS:
+        raise InputError(f"found {len(growths)} systems, expected 1 to {_MOST_SYSTEMS} in one picture")
+    style = style or Style()
+    scale = _scale(scale, "log" if any(map(_is_exponential, growths.values())) else "linear")
+    labels = [_degree_label(name, growth) for name, growth in growths.items()]
+    with drawing(style):
+        figure = new_figure(style, _ASPECT + legend_height(labels, style, title=True, most=1))
+        axes = figure.subplots()
+        _step_axis(axes, scale, max(len(growth.degrees) for growth in growths.values()))
+        values = [d for growth in growths.values() for d in growth.degrees]
+        zero = _degree_axis(axes, values, scale)
+        for k, (label, growth) in enumerate(zip(labels, growths.values(), strict=True)):
+            _draw_degrees_of(axes, growth, label, k, zero, scale == "loglog")
+        axes.set_xlabel("iterate $n$")
+        axes.set_ylabel("degree $d_n$")
+        legend_above(figure, *axes.get_legend_handles_labels(), style, r"$\lambda$: dynamical degree", most=1)
+    return figure
+
+
+def draw_heights(
+    survey: HeightSurvey | Sequence[HeightCurve], style: Style | None = None, *, scale: str | None = None
+) -> Figure:
+    """Heights of exact orbits against the step, with the growth that was fitted, a colour for each eps.
+
+    Marks are heights in bits; lines are the fits of `kahanmaps.invariants.heights`: c n^2, c n (each with its lower
+    terms) or a factor in each step; orbits whose growth is bounded, logarithmic or undecided have none. `scale` is
+    "linear", "log" or "loglog" (from step 1 on); by default "log" where some growth is exponential, "loglog" where it
+    is quadratic or linear and there are 8 steps or more, else "linear". Raises InputError where there is no orbit, for
+    more than 7 values of eps, and for a scale of another name.
+    """
+    curves = height_curves(survey) if isinstance(survey, HeightSurvey) else tuple(survey)
+    if not curves:
+        raise InputError("found no orbit, expected at least one")
+    every_eps = list(dict.fromkeys(curve.eps for curve in curves))
+    if len(every_eps) > len(COLOURS):
+        raise InputError(f"found {len(every_eps)} values of eps, expected at most {len(COLOURS)} in one picture")
+    kinds = {curve.kind for curve in curves}
+    longest = max(curve.steps[-1] for curve in curves)
+    grows = kinds & {Growth.QUADRATIC, Growth.LINEAR} and longest >= 8
+    scale = _scale(scale, "log" if Growth.EXPONENTIAL in kinds else "loglog" if grows else "linear")
+    style = style or Style()
+    with drawing(style):
+        figure = new_figure(style, _ASPECT + legend_height(list(map(str, every_eps)), style, most=1))
+        axes = figure.subplots()
+        _step_axis(axes, scale, longest)
+        if scale != "linear":
+            axes.set_yscale("log")
+        for k, eps in enumerate(every_eps):
+            _draw_heights_of(axes, [curve for curve in curves if curve.eps == eps], k, scale == "loglog")
+        if scale == "linear":
+            axes.set_ylim(bottom=0)
+        axes.set_xlabel("step $n$")
+        axes.set_ylabel("height $h_n$ (bits)")
+        legend_above(figure, *axes.get_legend_handles_labels(), style, most=1)
+    return figure
+
+
+def _scale(asked: str | None, default: str) -> str:
+    if asked is not None and asked not in SCALES:
+        raise InputError(f"found the scale {asked[:40]!r}, expected {', '.join(SCALES[:-1])} or {SCALES[-1]}")
+    return asked or default
+
+
+def _is_exponential(growth: DegreeGrowth) -> bool:
+    return growth.growth is GrowthClass.EXPONENTIAL or growth.looks_exponential
+
+
+def _step_axis(axes: Axes, scale: str, longest: int) -> None:
+    """The horizontal axis: whole numbers, or their logarithms from 1 on."""
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
+
+    if scale != "loglog":
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+        return
+    axes.set_xscale("log")
+    if longest <= 2000:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if longest <= 200 else (1,)))
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _degree_axis(axes: Axes, values: Sequence[int], scale: str) -> float:
+    """Set the vertical axis; the height at which a degree 0 is drawn."""
+    if scale == "linear":
+        axes.set_ylim(0, 1.05 * max(values))
+        return 0.0
+    positive = [value for value in values if value > 0]
+    zero = log_scale_with_zero(axes, min(positive), max(positive), len(positive) < len(values))
+    return 1.0 if zero is None else zero
+
+
+def _draw_degrees_of(axes: Axes, growth: DegreeGrowth, label: str, k: int, zero: float, from_one: bool) -> None:
+    first = 1 if from_one else 0
+    steps = np.arange(first, len(growth.degrees))
+    heights = np.array([float(d) if d else zero for d in growth.degrees[first:]])
+    line = LINES[0] if growth.recurrence is not None else ":"
+    n, d = _between(growth, first) if zero or 0 not in growth.degrees else (steps, heights)
+    axes.plot(n, d, color=COLOURS[k], linestyle=line, linewidth=0.8, zorder=2)
+    axes.plot(steps, heights, color=COLOURS[k], linestyle="none", marker=MARKS[k], markersize=4, clip_on=False)
+    # The legend shows both: a line with a mark.
+    axes.plot([], [], color=COLOURS[k], linestyle=line, linewidth=0.8, marker=MARKS[k], markersize=4, label=label)
+
+
+def _between(growth: DegreeGrowth, first: int) -> tuple[Any, Any]:
+    """The curve through the degrees: smooth where it is one polynomial, else straight from point to point."""
+    found = growth.recurrence
+    if found is not None and found.closed_form and ";" not in found.closed_form and found.preperiod == 0:
+        few = range(found.power + 1)
+        polynomial = np.polynomial.Polynomial.fit(list(few), [found.predict(n) for n in few], found.power)
+        n = np.linspace(first, len(growth.degrees) - 1, 200)
+        return n, polynomial(n)
+    steps = np.arange(first, len(growth.degrees))
+    return steps, np.array([float(d) if d else np.nan for d in growth.degrees[first:]])
+
+
+def _degree_label(name: str, growth: DegreeGrowth) -> str:
+    """A line of the legend: the name, what d_n is, the dynamical degree and what is estimated."""
+    name = plain(name)
+    rate = growth.dynamical_degree
+    if growth.growth is GrowthClass.ZERO:
+        return f"{name}: constant from $n = {growth.degrees.index(0)}$ on" if 0 in growth.degrees else f"{name}: zero"
+    if growth.recurrence is None:
+        if growth.looks_exponential:
+            return rf"{name}: $\lambda \approx {float(growth.estimate or 0):.4g}$ (estimated)"
+        quotient = rf", $d_n/d_{{n-1}} = {float(growth.estimate):.4g}$ at the end" if growth.estimate else ""
+        return f"{name}: no recurrence found{quotient}"
+    parts = []
+    formula = growth.recurrence.closed_form
+    if formula and len(formula) <= _LONGEST_FORMULA and ";" not in formula:
+        parts.append(f"$d_n = {_as_formula(formula)}$")
+    elif growth.growth is not GrowthClass.EXPONENTIAL:
+        parts.append(f"{growth.growth}")
+    if rate is not None:
+        whole = rate.minimal_polynomial.degree() == 1
+        number = rate.digits if whole else rf"{float(rate.digits):.5f}\ldots"
+        parts.append(rf"$\lambda = {number}$")
+    return f"{name}: {', '.join(parts) or str(growth.growth)}"
+
+
+def _as_formula(text: str) -> str:
+    """2*n^2 + 1 for matplotlib."""
+    pieces = text.replace("*", "").split("^")
+    return pieces[0] + "".join(
+        "^{" + piece.split(" ")[0] + "}" + "".join(f" {rest}" for rest in piece.split(" ")[1:]) for piece in pieces[1:]
+    )
+
+
+def _draw_heights_of(axes: Axes, curves: Sequence[HeightCurve], k: int, from_one: bool) -> None:
+    first = 1 if from_one else 0
+    size = 3.2 if len(curves) <= 3 and max(len(curve.steps) for curve in curves) <= 80 else 2
+    for curve in curves:
+        chosen = curve.steps >= first
+        axes.plot(
+            curve.steps[chosen],
+            curve.bits[chosen],
+            color=COLOURS[k],
+            linestyle="none",
+            marker=MARKS[k],
+            **_hollow(size),
+        )
+        fit = fit_of(curve)
+        if fit is not None:
+            n = np.geomspace(1, max(1, curve.steps[-1]), 200) if from_one else np.linspace(0, curve.steps[-1], 200)
+            axes.plot(n, fit(n), color=COLOURS[k], linestyle=LINES[k], linewidth=0.7, zorder=1.5)
+    key = {"color": COLOURS[k], "marker": MARKS[k], "linestyle": LINES[k], "linewidth": 0.7, **_hollow(3.2)}
+    axes.plot([], [], label=_height_label(curves), **key)
+
+
+def _hollow(size: float) -> dict[str, Any]:
+    """Marks through which the line of the fit is seen."""
+    return {"markersize": size, "markerfacecolor": "none", "markeredgewidth": 0.5}
+
+
+def _height_label(curves: Sequence[HeightCurve]) -> str:
+    """A line of the legend: eps, the time step, and what kinds of growth were found."""
+    eps = curves[0].eps
+    head = rf"$\varepsilon = {format_number(eps)}$, $2\varepsilon = {format_number(2 * eps)}$"
+    kinds = list(dict.fromkeys(curve.kind for curve in curves))
+    if len(kinds) > 1:
+        counts = ", ".join(f"{sum(curve.kind is kind for curve in curves)} {kind}" for kind in kinds)
+        return f"{head}: {counts}"
+    constants = [c for c in (curve.constant for curve in curves) if c is not None]
+    ratios = [r for r in (curve.ratio for curve in curves) if r is not None]
+    if kinds[0] in (Growth.QUADRATIC, Growth.LINEAR) and constants:
+        power = "n^2" if kinds[0] is Growth.QUADRATIC else "n"
+        return rf"{head}: $c\,{power}$, $c$ = {_range_of(constants)}"
+    if kinds[0] is Growth.EXPONENTIAL and ratios:
+        return f"{head}: exponential, factor {_range_of(ratios)}"
+    return f"{head}: {kinds[0]}"
+
+
+def _range_of(values: Sequence[float]) -> str:
+    low, high = f"{min(values):.3g}", f"{max(values):.3g}"
+    return low if low == high else f"{low} to {high}"

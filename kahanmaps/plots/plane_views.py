@@ -1,0 +1,144 @@
+"""Which part of a plane is drawn: a window around most of the dots, or all of the projective plane as a disc."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kahanmaps.plots.invariant_curves import InvariantPlane
+from kahanmaps.plots.plane_cubics import Floats
+from kahanmaps.plots.symmetric_planes import THREE_LINES
+from kahanmaps.plots.windows import outside, window_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Cloud = tuple[Floats, Floats]
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A rectangle of the plane: its centre, half its width and height; and how many dots lie outside it."""
+
+    centre: tuple[float, float]
+    half: tuple[float, float]
+    outside: int
+
+    @classmethod
+    def around(cls, clouds: Sequence[Cloud]) -> Rectangle:
+        """Where most dots are, all starts among them."""
+        points, starts = (
+            np.concatenate(rows) for rows in zip(*((_rows(c), _rows(c)[:1]) for c in clouds), strict=True)
+        )
+        return cls.of(clouds, window_of(points, starts))
+
+    @classmethod
+    def of(cls, clouds: Sequence[Cloud], ranges: Sequence[tuple[float, float]]) -> Rectangle:
+        """The rectangle with these ranges of the two coordinates."""
+        (left, right), (low, high) = ranges
+        beyond = outside(np.concatenate([_rows(cloud) for cloud in clouds]), tuple(ranges))
+        return cls(((left + right) / 2, (low + high) / 2), ((right - left) / 2, (high - low) / 2), beyond)
+
+    @property
+    def stretch(self) -> float:
+        """How much longer a unit upwards appears than one to the right, inverted: what normals are scaled by."""
+        return self.half[1] / self.half[0]
+
+    def prepare(self, axes: Axes, names: tuple[str, str]) -> None:
+        """Limits and labels of the axes, which become a square."""
+        axes.set_box_aspect(1)
+        axes.set_xlim(self.centre[0] - self.half[0], self.centre[0] + self.half[0])
+        axes.set_ylim(self.centre[1] - self.half[1], self.centre[1] + self.half[1])
+        axes.set_xlabel(names[0])
+        axes.set_ylabel(names[1])
+        axes.locator_params(nbins=5)
+
+    def place(self, x: Floats, y: Floats) -> Cloud:
+        """Where points are drawn."""
+        return x, y
+
+    def arc(self, rows: Floats, length: float) -> Cloud:
+        """Where an arc of a PlaneCubic is drawn; what is far outside, at the end of its ray, for viewers' sake."""
+        furthest = 50 * (max(self.half) + max(map(abs, self.centre)))
+        radius = np.hypot(rows[:, 0], rows[:, 1])
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            distance = np.where(rows[:, 2] > 0, radius * length / rows[:, 2], np.inf)
+        shrunk = np.minimum(distance, furthest) / np.where(radius > 0, radius, 1)
+        return rows[:, 0] * shrunk, rows[:, 1] * shrunk
+
+
+@dataclass(frozen=True)
+class Disc:
+    """The projective plane as half a sphere seen from above, infinity as its rim; `length` is that of 45 degrees."""
+
+    length: float
+    stretch: float = 1.0
+
+    @classmethod
+    def of(cls, plane: InvariantPlane, column: str = "uv") -> Disc:
+        """The disc on whose circle of radius 1/sqrt(2) the map goes to infinity; by the dots, if there is none."""
+        cubic = plane.orbits[0].cubic
+        if cubic is not None and plane.shape != "0":
+            return cls(cubic.length)
+        sizes = np.concatenate([np.hypot(x, y) for x, y in clouds_of(plane, column)])
+        return cls(float(np.median(sizes)) or 1.0)
+
+    def prepare(self, axes: Axes, names: tuple[str, str]) -> None:
+        """The rim, and no axes."""
+        from matplotlib.patches import Circle
+
+        axes.set_aspect("equal")
+        axes.set_xlim(-1.03, 1.03)
+        axes.set_ylim(-1.03, 1.03)
+        axes.add_patch(Circle((0, 0), 1, fill=False, linewidth=0.6, zorder=1))
+        axes.set_frame_on(False)
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.set_xlabel(f"({names[0]} : {names[1]} : 1)")
+
+    def place(self, x: Floats, y: Floats) -> Cloud:
+        """Where points are drawn."""
+        x, y = x / self.length, y / self.length
+        radius = np.hypot(np.hypot(x, y), 1)
+        return x / radius, y / radius
+
+    def arc(self, rows: Floats, length: float) -> Cloud:
+        """Where an arc of a PlaneCubic is drawn."""
+        scaled = rows * np.array([length, length, self.length])
+        scaled = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+        return scaled[:, 0], scaled[:, 1]
+
+
+def _rows(cloud: Cloud) -> Floats:
+    return np.stack(cloud, axis=1)
+
+
+def clouds_of(plane: InvariantPlane, column: str = "uv") -> list[Cloud]:
+    """The dots of every orbit: (u, v), or in a complex plane the real and imaginary parts of the column "u" or "v"."""
+    if plane.is_real:
+        return [(orbit.u, orbit.v) for orbit in plane.orbits]
+    values = [orbit.u if column == "u" else orbit.v for orbit in plane.orbits]
+    return [(value.real, value.imag) for value in values]
+
+
+def view_of(plane: InvariantPlane, column: str = "uv") -> Rectangle:
+    """What is shown of a plane: where most dots are and, unless it is far away, the origin.
+
+    The origin is in the middle, and scales are equal along u and v, where the cubic has its threefold symmetry.
+    """
+    clouds = clouds_of(plane, column)
+    symmetric = plane.shape == THREE_LINES
+    found = Rectangle.around(clouds)
+    ranges = []
+    for middle, half in zip(found.centre, found.half, strict=True):
+        low, high = middle - half, middle + half
+        if abs(middle) <= 3 * half:
+            low, high = min(low, -0.1 * half), max(high, 0.1 * half)
+        ranges.append((low, high))
+    if symmetric and all(low <= 0 <= high for low, high in ranges):
+        reach = max(max(abs(low), abs(high)) for low, high in ranges)
+        ranges = [(-reach, reach), (-reach, reach)]
+    return Rectangle.of(clouds, ranges)

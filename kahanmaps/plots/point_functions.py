@@ -1,0 +1,130 @@
+"""Functions of points in machine numbers, many points at a time: coordinates, integrals, whatever a picture shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.latex import latex_polynomial
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate
+from kahanmaps.algebra.text import is_name, parse_rational_function
+from kahanmaps.errors import InputError
+from kahanmaps.maps.float_numbers import FloatArray, to_float
+from kahanmaps.plots.figures import label_of, plain
+
+_SHORT = 60  # characters of a formula that fits along an axis
+
+
+class _Arrays:
+    """Arrays of doubles, as far as evaluating a polynomial needs a field."""
+
+    zero = 0.0
+    one = 1.0
+
+    @staticmethod
+    def convert(value: Any) -> float:
+        return to_float(rational(value))
+
+    @staticmethod
+    def working() -> AbstractContextManager[None]:
+        return nullcontext()
+
+
+@dataclass(frozen=True, eq=False)
+class PointFunction:
+    """A rational function of the variables and eps (in this order), in doubles.
+
+    `name` is what the user calls it, `eps` the paper's epsilon (half the time step) that is inserted.
+
+    >>> radius = point_function("x^2 + y^2", ["x", "y"])
+    >>> radius(np.array([[3.0, 4.0], [np.nan, 0.0]]))
+    array([25., nan])
+    """
+
+    name: str
+    function: RationalFunction
+    eps: float = 0.0
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """The values at points (..., dim): an array (...), NaN at poles and where the value is no finite number."""
+        variable = self.variable
+        if variable is not None:
+            return np.array(points[..., variable], dtype=np.float64)
+        above, below = self.parts(points)
+        with np.errstate(all="ignore"):
+            values = above / below
+        return np.where(np.isfinite(values), values, np.nan)
+
+    def parts(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Numerator and denominator at points (..., dim)."""
+        with np.errstate(all="ignore"):
+            return self._value(self.function.numerator, points), self._value(self.function.denominator, points)
+
+    @property
+    def variable(self) -> int | None:
+        """Which variable it is, None where it is none."""
+        if not self.function.denominator.is_one():
+            return None
+        for index, generator in enumerate(self.function.numerator.context().gens()[:-1]):
+            if self.function.numerator == generator:
+                return index
+        return None
+
+    def used(self) -> frozenset[int]:
+        """Which variables occur in it (eps does not count)."""
+        found = set()
+        for polynomial in (self.function.numerator, self.function.denominator):
+            degrees = polynomial.degrees()[:-1]
+            found |= {index for index, degree in enumerate(degrees) if int(degree) > 0}
+        return frozenset(found)
+
+    @property
+    def label(self) -> str:
+        """The name for a picture, as a formula where it is short."""
+        if is_name(self.name):
+            return label_of(self.name)
+        if not self.function.denominator.is_one():  # fractions in a line of text are too small to read
+            return plain(self.name)
+        formula = latex_polynomial(self.function.numerator)
+        return f"${formula}$" if len(formula) <= _SHORT and "mathrm" not in formula else plain(self.name)
+
+    def _value(self, polynomial: fmpq_mpoly, points: FloatArray) -> FloatArray:
+        coordinates = [*np.moveaxis(points, -1, 0), self.eps]
+        value = np.asarray(evaluate(polynomial, _Arrays, coordinates), dtype=np.float64)
+        filled: FloatArray = np.array(np.broadcast_to(value, points.shape[:-1]))
+        filled[np.isnan(points).any(axis=-1)] = np.nan  # constants too: where there is no point there is no value
+        return filled
+
+
+def point_function(
+    text: str,
+    variables: Sequence[str],
+    eps: fmpq | None = None,
+    parameters: Mapping[str, fmpq] | None = None,
+    named: Mapping[str, RationalFunction] | None = None,
+) -> PointFunction:
+    """The function that `text` is: one of `named`, or an expression in the variables, eps and the parameters.
+
+    `named` are rational functions of the variables and eps, in this order. Without `eps` (exact, half the time step),
+    expressions with eps are refused. Raises InputError for text that cannot be read.
+
+    >>> point_function("(x - eps)/y", ["x", "y"], fmpq(1, 2))(np.array([2.5, 4.0]))
+    array(0.5)
+    """
+    names = (*variables, "eps")
+    function = (named or {}).get(text)
+    if function is None:
+        if is_name(text) and text not in (*names, *(parameters or {})):
+            integrals = f"; integrals are named {', '.join(named)}" if named else ""
+            raise InputError(f"found the name {text}, known are {', '.join((*names, *(parameters or {})))}{integrals}")
+        function = parse_rational_function(text, names, dict(parameters or {}))
+    uses_eps = any(int(part.degrees()[-1]) > 0 for part in (function.numerator, function.denominator))
+    if uses_eps and eps is None:
+        raise InputError(f"{text}: found eps in it, and no value of eps: give --eps")
+    return PointFunction(text, function, 0.0 if eps is None else to_float(eps))

@@ -1,0 +1,112 @@
+"""A phase portrait as numbers: orbits projected to two or three axes, with a colour for each point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from kahanmaps.errors import InputError
+from kahanmaps.maps.float_numbers import FloatArray
+from kahanmaps.plots.level_sets import LevelCurves
+from kahanmaps.plots.point_functions import PointFunction
+from kahanmaps.plots.trajectories import Trajectories
+from kahanmaps.plots.windows import Window, outside, window_of
+
+STEP = "step"
+ORBIT = "orbit"
+
+
+class Colouring(Protocol):
+    """A function that colours points: a PointFunction, or one of `drift_functions`."""
+
+    @property
+    def label(self) -> str:
+        """What the picture calls it."""
+        ...
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """The values at points (count, dim), NaN where there is none."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Portrait:
+    """What a portrait shows.
+
+    `points` (records, orbits, 2 or 3) are the coordinates along the axes, NaN where there is no point; `labels` and
+    `window` are one for each axis. `values` (records, orbits) colour the points by `value_label`; None is by orbit.
+    `left_out` counts the points outside the window, `undefined` those of living orbits where an axis or the colour has
+    a pole. `euler` are points (records, orbits, 2 or 3) of explicit Euler, `levels` curves below the points.
+    """
+
+    points: FloatArray
+    labels: tuple[str, ...]
+    window: Window
+    values: FloatArray | None = None
+    value_label: str = ""
+    left_out: int = 0
+    undefined: int = 0
+    euler: FloatArray | None = None
+    levels: LevelCurves | None = None
+
+
+def portrait_of(
+    found: Trajectories,
+    axes: Sequence[PointFunction | str],
+    *,
+    colour: Colouring | str = ORBIT,
+    window: Window | None = None,
+    euler: Trajectories | None = None,
+) -> Portrait:
+    """Project orbits to two or three axes: functions of the point, or the word "step".
+
+    `colour` is "orbit", "step" or a function of the point; the window is chosen if none is given. Raises InputError for
+    another number of axes.
+
+    >>> from kahanmaps.plots.point_functions import point_function
+    >>> found = Trajectories(("x",), np.array([[[1.0]], [[3.0]]]), np.arange(2))
+    >>> portrait_of(found, ["step", point_function("x", ["x"])]).points[:, 0].tolist()
+    [[0.0, 1.0], [1.0, 3.0]]
+    """
+    if len(axes) not in (2, 3):
+        raise InputError(f"found {len(axes)} axes, expected 2 or 3")
+    points = _projected(found, axes)
+    values, label = None, ""
+    if not isinstance(colour, str):
+        flat = colour(found.points.reshape(-1, found.points.shape[2]))
+        values, label = flat.reshape(found.points.shape[:2]), colour.label
+    elif colour == STEP:
+        values, label = _steps(found), STEP
+    elif colour != ORBIT:
+        raise InputError(f"found the colour {colour!r}, expected orbit, step or a function")
+    there = ~np.isnan(found.points).any(axis=2)
+    shown = ~np.isnan(points).any(axis=2)
+    if values is not None:
+        shown &= ~np.isnan(values)
+    points = np.where(np.asarray(shown)[..., None], points, np.nan)
+    flat = points.reshape(-1, len(axes))
+    chosen = window or window_of(flat, points[0])
+    return Portrait(
+        points,
+        tuple(axis if isinstance(axis, str) else axis.label for axis in axes),
+        chosen,
+        values,
+        label,
+        left_out=outside(flat, chosen),
+        undefined=int(there.sum() - shown.sum()),
+        euler=None if euler is None else _projected(euler, axes),
+    )
+
+
+def _projected(found: Trajectories, axes: Sequence[PointFunction | str]) -> FloatArray:
+    return np.stack([_steps(found) if isinstance(axis, str) else axis(found.points) for axis in axes], axis=-1)
+
+
+def _steps(found: Trajectories) -> FloatArray:
+    steps: FloatArray = np.where(
+        np.isnan(found.points).any(axis=2), np.nan, np.asarray(found.steps, dtype=np.float64)[:, None]
+    )
+    return steps

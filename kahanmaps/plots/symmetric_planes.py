@@ -1,0 +1,105 @@
+"""Coordinates of a plane in which its cubic is as symmetric as it can be, with areas kept.
+
+A real binary cubic without repeated factor is, after a linear change of determinant 1, kappa (u^3 - 3 u v^2), which has
+three real lines at angles of 60 degrees, or kappa (u^3 + 3 u v^2), with one; kappa > 0. Its Hessian determinant is then
+-36 kappa^2 (u^2 + v^2) or 36 kappa^2 (u^2 - v^2). So the Kahan maps of all such planes are, up to scale, just two.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flint import arb
+
+from kahanmaps.maps.planar_block import PlanarBlock
+
+Matrix = tuple[tuple[Any, Any], tuple[Any, Any]]  # of balls, complex ones in a complex plane
+
+COMPLEX = "complex"
+THREE_LINES, ONE_LINE, REPEATED, ZERO = "kappa (u^3 - 3 u v^2)", "kappa (u^3 + 3 u v^2)", "a repeated factor", "0"
+
+
+def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
+    """The shape of the cubic, and the matrix of determinant 1 that takes (u, v) to the symmetric coordinates.
+
+    The coefficients of the block are real balls; a discriminant that may be 0 counts as 0, where the matrix is I.
+
+    >>> block = PlanarBlock(arb(0), arb(1), arb(1), arb(0))
+    >>> shape, matrix = symmetric_coordinates(block)
+    >>> shape, [round(float(entry), 3) + 0 for entry in transformed(block, matrix)]
+    ('kappa (u^3 - 3 u v^2)', [0.31, 0.0, -0.931, 0.0])
+    """
+    one: Matrix = ((arb(1), arb(0)), (arb(0), arb(1)))
+    if all(coefficient.contains(arb(0)) for coefficient in (block.a, block.b, block.c, block.d)):
+        return ZERO, one
+    if block.discriminant.contains(arb(0)):
+        return REPEATED, one
+    if block.discriminant > 0:
+        return THREE_LINES, _three_lines(block)
+    return ONE_LINE, _one_line(block)
+
+
+def transformed(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]:
+    """The coefficients of the cubic in new coordinates, the matrix (of determinant 1) times the old ones."""
+    (f, g), (k, l) = matrix
+    # u = l u' - g v', v = -k u' + f v'
+    a, b, c, d = block.a, block.b, block.c, block.d
+    slope_u, slope_v = 3 * a * l * l - 2 * b * l * k + c * k * k, b * l * l - 2 * c * l * k + 3 * d * k * k
+    other_u, other_v = 3 * a * g * g - 2 * b * g * f + c * f * f, b * g * g - 2 * c * g * f + 3 * d * f * f
+    return block.h(l, -k), -g * slope_u + f * slope_v, l * other_u - k * other_v, block.h(-g, f)
+
+
+def inverse(matrix: Matrix) -> Matrix:
+    """The inverse of a matrix of determinant 1."""
+    (f, g), (k, l) = matrix
+    return (l, -g), (-k, f)
+
+
+def _three_lines(block: PlanarBlock) -> Matrix:
+    """D is negative definite: it is made -(u^2 + v^2) times a number, and the plane is turned."""
+    p, q, r = (-entry for entry in block.D)
+    size = (p * r - q * q / 4).sqrt()
+    stretch = (p / size).sqrt()
+    upright: Matrix = ((stretch, stretch * q / (2 * p)), (arb(0), 1 / stretch))
+    # Now h is the real part of (a - i b/3) (u + i v)^3.
+    a, b, _, _ = transformed(block, upright)
+    # atan2 of a ball across its cut would be all of -pi ... pi, so it is turned away from there.
+    angle = (arb.atan2(-b / 3, -a) + arb.pi() if a < 0 else arb.atan2(b / 3, a)) / 3
+    return _product(((angle.cos(), angle.sin()), (-angle.sin(), angle.cos())), upright)
+
+
+def _one_line(block: PlanarBlock) -> Matrix:
+    """D is a product of two real forms L and M, and h a sum of their cubes, which are scaled alike and turned."""
+    p, q, r = block.D
+    root = (q * q - 4 * p * r).sqrt()
+    t = -(q + root) / 2 if not q < 0 else -(q - root) / 2
+    L, M = (p, -t), (t, -r)
+    left, right = _cubes(block, L, M)
+    det = L[0] * M[1] - L[1] * M[0]
+    ratio = _cube_root(right / left)
+    if det * ratio < 0:
+        L, M, left, det, ratio = M, L, right, -det, 1 / ratio
+    scale = 1 / (det * ratio).sqrt()
+    if left < 0:
+        scale = -scale
+    half = arb(1) / arb(2).sqrt()
+    first = (L[0] * scale, L[1] * scale)
+    second = (M[0] * scale * ratio, M[1] * scale * ratio)
+    return _product(((half, half), (-half, half)), (first, second))
+
+
+def _cubes(block: PlanarBlock, L: tuple[arb, arb], M: tuple[arb, arb]) -> tuple[arb, arb]:
+    """The s and t with h = s L^3 + t M^3."""
+    det = L[0] * M[1] - L[1] * M[0]
+    return block.h(M[1] / det, -M[0] / det), block.h(-L[1] / det, L[0] / det)
+
+
+def _cube_root(number: arb) -> arb:
+    root = abs(number).root(3)
+    return root if number > 0 else -root
+
+
+def _product(left: Matrix, right: Matrix) -> Matrix:
+    (a, b), (c, d) = left
+    (e, f), (g, h) = right
+    return (a * e + b * g, a * f + b * h), (c * e + d * g, c * f + d * h)

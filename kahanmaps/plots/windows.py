@@ -1,0 +1,129 @@
+"""Which part of the plane or of space a picture shows, and from which side, where nobody says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from math import isfinite
+
+import numpy as np
+
+from kahanmaps.errors import InputError
+from kahanmaps.maps.float_numbers import FloatArray
+
+Window = tuple[tuple[float, float], ...]  # low and high along each axis
+
+_SHARE = 10.0  # percent of the points, at either end, that do not say how far the picture reaches
+_REACH = 3.0  # ... unless they are within so many lengths of what the others fill
+_MARGIN = 0.04
+_LARGEST = 1e307  # what matplotlib can still subtract
+_LOOKED_AT = 4000  # points, when axes are chosen
+_VARIABLES = 16
+_CELLS = {1: 400, 2: 24, 3: 10}  # along each axis
+
+
+def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
+    """A window for points (n, d) that a few points far away do not spoil: it need not hold all of them.
+
+    Along each axis, the range of all points; or where some of the outer tenth at either end are farther away than three
+    times the length that the others and the `starts` fill, that length and half of it at either end. NaN is passed
+    over; a range of length 0 is widened.
+
+    >>> window_of(np.array([[0.0], [1.0]]))
+    ((-0.04, 1.04),)
+    >>> far = np.append(np.linspace(0, 1, 101), 1e9)[:, None]
+    >>> window_of(far)[0][1] < 2
+    True
+    """
+    first = points[:0] if starts is None else starts
+    return tuple(_range(column, wanted) for column, wanted in zip(points.T, first.T, strict=True))
+
+
+def _range(column: FloatArray, wanted: FloatArray) -> tuple[float, float]:
+    low, high = main_range(column, wanted)
+    unit = max(abs(low), abs(high), np.finfo(float).tiny)  # in which nothing overflows
+    margin = (high / unit - low / unit) * _MARGIN
+    return (low / unit - margin) * unit, (high / unit + margin) * unit
+
+
+def main_range(values: FloatArray, wanted: FloatArray | None = None) -> tuple[float, float]:
+    """The range of the values as `window_of` chooses it, without a margin; `wanted` are the starts.
+
+    >>> main_range(np.array([1.0, 2.0, np.nan])), main_range(np.array([5.0]))
+    ((1.0, 2.0), (4.5, 5.5))
+    """
+    values = np.clip(values[np.isfinite(values)], -_LARGEST, _LARGEST)
+    if not len(values):
+        return -1.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    unit = max(abs(low), abs(high))
+    if unit == 0:
+        return -1.0, 1.0
+    first, last = _most(values, unit)
+    wanted = values[:0] if wanted is None else np.clip(wanted[np.isfinite(wanted)], -_LARGEST, _LARGEST)
+    if len(wanted):
+        low_start, high_start = _most(wanted, unit)
+        first, last = min(first, low_start), max(last, high_start)
+    low, high = low / unit, high / unit
+    if low < first - _REACH * (last - first) or high > last + _REACH * (last - first):
+        low = max(low, first - (last - first) / 2)
+        high = min(high, last + (last - first) / 2)
+    if high - low < 1e-9 * max(abs(low), abs(high)):  # one value, up to rounding: it stands in the middle
+        low, high = low - max(abs(low), abs(high)) / 10, high + max(abs(low), abs(high)) / 10
+    return low * unit, high * unit
+
+
+def _most(values: FloatArray, unit: float) -> tuple[float, float]:
+    """The range of all but a tenth at either end."""
+    low, high = np.percentile(values, [_SHARE, 100 - _SHARE], method="nearest") / unit
+    return float(low), float(high)
+
+
+def require_window(numbers: Sequence[float], axes: int) -> Window:
+    """Numbers low, high, low, high, ... as a window. Raises InputError unless there are two for each axis, in order."""
+    if len(numbers) != 2 * axes:
+        raise InputError(f"found a window of {len(numbers)} numbers, expected {2 * axes}: low and high for each axis")
+    window = tuple((float(numbers[2 * k]), float(numbers[2 * k + 1])) for k in range(axes))
+    for low, high in window:
+        if not (low < high and isfinite(high - low)):
+            raise InputError(f"found the window {low:g} to {high:g}, expected low < high")
+    return window
+
+
+def outside(points: FloatArray, window: Window) -> int:
+    """How many points (n, d) lie outside the window; NaN does not count."""
+    there = ~np.isnan(points).any(axis=1)
+    inside = there.copy()
+    for column, (low, high) in zip(points.T, window, strict=True):
+        inside &= (column >= low) & (column <= high)
+    return int(there.sum() - inside.sum())
+
+
+def fullest_axes(points: FloatArray, count: int) -> tuple[int, ...]:
+    """The `count` variables, in order, whose plane or space points (n, dim) fill most; of equals the first ones.
+
+    Each variable is scaled to its own window, and the boxes of a grid that hold a point are counted. Of more than 16
+    variables the first 16 that vary are looked at.
+
+    >>> t = np.linspace(0, 6, 200)
+    >>> fullest_axes(np.stack([t, t, 0 * t, np.sin(5 * t)], axis=1), 2)
+    (0, 3)
+    """
+    dim = points.shape[1]
+    if dim <= count:
+        return tuple(range(dim))
+    points = points[~np.isnan(points).any(axis=1)]
+    if not len(points):
+        return tuple(range(count))
+    points = points[np.linspace(0, len(points) - 1, min(len(points), _LOOKED_AT)).astype(int)]
+    cells = _CELLS[count]
+    with np.errstate(all="ignore"):
+        low, high = np.array(window_of(points)).T
+        boxes = np.clip(np.nan_to_num((points - low) / (high - low) * cells), 0, cells - 1).astype(int).T
+    varying = [k for k in range(dim) if boxes[k].min() != boxes[k].max()]
+    candidates = (varying + [k for k in range(dim) if k not in varying])[: max(count, min(_VARIABLES, dim))]
+
+    def filled(choice: tuple[int, ...]) -> int:
+        return len(np.unique(sum(boxes[k] * cells**place for place, k in enumerate(choice))))
+
+    return max(combinations(sorted(candidates), count), key=filled)

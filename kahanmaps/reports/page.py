@@ -1,0 +1,102 @@
+"""A page: a title, what it is about, sections with ids that stay the same, and how to make it again.
+
+The page is one file. It asks nothing of a network, it has no JavaScript, and the same input gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kahanmaps import markup
+from kahanmaps.plots.recipe import Recipe
+from kahanmaps.reports.stylesheet import STYLESHEET
+
+CHARACTERS = 6_000  # of one formula, about; and of one line of text
+_LONGEST_SYSTEM = 200_000
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a page: its id, to be linked to, its title as text, and its HTML."""
+
+    id: str
+    title: str
+    html: str
+
+
+@dataclass(frozen=True)
+class Origin:
+    """How a page was made: the command and the system in `recipe`, and the seed (None where nothing is drawn)."""
+
+    recipe: Recipe
+    seed: int | None = None
+
+
+def page(title: str, lead: str, sections: Sequence[Section], origin: Origin) -> str:
+    """The whole page. `title` is text, `lead` is HTML; sections that are empty are left out."""
+    present = [section for section in (*sections, _remake(origin)) if section.html]
+    links = "".join(f'<li><a href="#{one.id}">{markup.escape(one.title)}</a></li>' for one in present)
+    body = "\n".join(map(_section_html, present))
+    name = markup.escape(title)
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8"/>
+<meta name="viewport" content="width=device-width, initial-scale=1"/>
+<meta name="generator" content="kahanmaps {origin.recipe.version}"/>
+<link rel="icon" href="data:,"/>
+<title>{name}</title>
+<style>{STYLESHEET}</style>
+</head>
+<body>
+<header>
+<h1>{name}</h1>
+<p class="lead">{lead}</p>
+</header>
+<nav aria-label="Sections"><ul>{links}</ul></nav>
+<main>
+{body}
+</main>
+</body>
+</html>
+"""
+
+
+def _section_html(one: Section) -> str:
+    heading = f'<h2 id="{one.id}">{markup.escape(one.title)}</h2>'
+    return f'<section aria-labelledby="{one.id}">\n{heading}\n{one.html}\n</section>'
+
+
+def wide(table: str) -> str:
+    """A table that is scrolled by itself where the page is too narrow for it."""
+    return f'<div class="wide">{table}</div>'
+
+
+def text(words: object) -> str:
+    """Text as HTML; what is far too long for a page loses its middle."""
+    return markup.escape(markup.shortened(words, CHARACTERS))
+
+
+def statements(lines: Sequence[tuple[str, str]]) -> str:
+    """Lines of a word, which is HTML, and what it says, which is HTML."""
+    if not lines:
+        return ""
+    rows = (f"<li><span>{word}</span><div>{what}</div></li>" for word, what in lines)
+    return "\n".join(['<ul class="statements">', *rows, "</ul>"])
+
+
+def _remake(origin: Origin) -> Section:
+    recipe = origin.recipe
+    rows = [("version", f"kahanmaps {markup.escape(recipe.version)}")]
+    if recipe.command:
+        rows.insert(0, ("command", f"<code>{text(recipe.command)}</code>"))
+    if origin.seed is not None:
+        rows.append(("seed", str(origin.seed)))
+    inside = wide(markup.definitions(rows))
+    if recipe.system:
+        shown = markup.escape(markup.shortened(recipe.system, _LONGEST_SYSTEM))
+        inside += "\n" + markup.details(
+            "The system file, to be saved as NAME.toml and given as SYSTEM", f"<pre>{shown}</pre>"
+        )
+    return Section("remake", "How to make this page again", inside)

@@ -1,0 +1,64 @@
+"""The pictures of orbits on a page: a portrait of a system, the invariant curves of a member of the family."""
+
+from __future__ import annotations
+
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.text import format_number
+from kahanmaps.checks.settings import random_starts
+from kahanmaps.reports.pictures import Pictures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from kahanmaps.plots.style import Style
+    from kahanmaps.systems.files import SystemFile
+
+_EPS = fmpq(1, 20)  # where a page is for every eps
+_STEPS = 600
+_ORBITS = 3
+_CURVE_STEPS = 300
+
+
+def portrait_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
+    """Sixteen orbits in the plane of the first two variables (in dimension 1 against the step)."""
+    at = _EPS if eps is None else rational(eps)
+    axes = file.variables[:2] if file.system.dim > 1 else ("step", file.variables[0])
+
+    def drawing(style: Style) -> Figure:
+        from kahanmaps.plots.automatic_starts import automatic_starts
+        from kahanmaps.plots.draw_portrait import draw_portrait
+        from kahanmaps.plots.point_functions import point_function
+        from kahanmaps.plots.portrait import portrait_of
+        from kahanmaps.plots.trajectories import ensemble_for, walked
+
+        starts = automatic_starts(file.system, at)
+        found = walked(ensemble_for(file.system, at, starts, _STEPS), _STEPS)
+        functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
+        return draw_portrait(portrait_of(found, functions), style)
+
+    sentence = f"eps = {format_number(at)}, time step {format_number(2 * at)}, {_STEPS} steps in machine numbers"
+    caption = f"Orbits of the Kahan map in {' and '.join(axes)}: {sentence}."
+    return pictures.draw("portrait", caption, f"Portrait of orbits in {' and '.join(axes)}, {sentence}", drawing)
+
+
+def invariant_curves_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
+    """Three orbits of a member of the family, plane by plane, on the cubic curves that they never leave."""
+    at = _EPS if eps is None else rational(eps)
+
+    def drawing(style: Style) -> Figure:
+        from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
+        from kahanmaps.plots.invariant_curves import find_invariant_curves
+
+        starts = list(islice(random_starts(file.system.dim, 0), _ORBITS))
+        return draw_invariant_curves(find_invariant_curves(file, starts, at, _CURVE_STEPS), style)
+
+    sentence = f"eps = {format_number(at)}, time step {format_number(2 * at)}, {_CURVE_STEPS} steps"
+    caption = f"{_ORBITS} orbits in the planes of the normal form, and the invariant curves through them: {sentence}."
+    return pictures.draw(
+        "invariant-curves", caption, f"Invariant plane cubics with orbits on them, {sentence}", drawing
+    )

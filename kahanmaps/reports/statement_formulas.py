@@ -1,0 +1,76 @@
+"""The statements of an analysis that are formulas, as MathML."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from kahanmaps.algebra.mathml import formula
+from kahanmaps.algebra.text import format_polynomial, parse_polynomial, parse_rational_function
+from kahanmaps.checks.shown import because
+from kahanmaps.errors import KahanmapsError
+from kahanmaps.reports.page import CHARACTERS, text
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.analysis import Analysis
+
+_PARSED = 4_000  # characters of a relation that is read once more, to be set as a formula
+
+
+def formulas_of(found: Analysis) -> dict[str, str]:
+    """HTML for statements, by their text in `found.sections`; those that are not here are shown as text."""
+    return dict(_pairs(found))
+
+
+def _pairs(found: Analysis) -> Iterator[tuple[str, str]]:
+    for one in found.integrals.integrals if found.integrals is not None else ():
+        below = f'<span class="soft">{text(one.origin)}</span>\n{_evidence(because(one.evidence))}'
+        yield f"{one.name} = {one.text}  [{one.origin}]", f"{formula(one.function, one.name, CHARACTERS)}<br/>{below}"
+    for relation in found.relations:
+        html = _relation(relation.text, (*found.file.variables, *relation.names, "eps"))
+        if html:
+            yield f"along orbits {relation.text}", f"along orbits {html}"
+    for density in found.densities.densities if found.densities is not None else ():
+        html = (
+            f"dx/ϕ is invariant, {formula(density.function, 'phi', CHARACTERS)}\n{_evidence(because(density.evidence))}"
+        )
+        yield f"dx/phi is invariant, phi = {density.text}", html
+    if found.degrees is not None and found.degrees.recurrence is not None:
+        closed = found.degrees.recurrence.closed_form
+        html = _closed_form(closed) if closed else ""
+        if html:
+            yield f"d_n = {closed}", html
+    if found.hamiltonian is not None and found.hamiltonian.hamiltonian is not None:
+        hamiltonian = found.hamiltonian.hamiltonian
+        kind = "the standard J" if hamiltonian.is_standard else "a constant skew J"
+        html = f"Hamiltonian with {kind}, {formula(hamiltonian.H, 'H', CHARACTERS)}"
+        yield f"Hamiltonian with {kind}, H = {format_polynomial(hamiltonian.H)}", html
+    for field in found.commuting.nontrivial if found.commuting is not None else ():
+        parts = "<br/>\n".join(formula(g, f"g{k}", CHARACTERS) for k, g in enumerate(field.system.rhs, start=1))
+        words = "commutes with the Kahan maps of g and -g"
+        yield f"{words}, g = ({', '.join(field.rhs)})", f"{words},<br/>\n{parts}"
+
+
+def _evidence(html: str) -> str:
+    return f"<details><summary>evidence</summary>{html}</details>"
+
+
+def _relation(relation: str, names: tuple[str, ...]) -> str:
+    """P = 0 as a formula; empty where it cannot be read as one."""
+    if len(relation) > _PARSED:
+        return ""
+    try:
+        function = parse_rational_function(relation.removesuffix(" = 0"), names)
+    except KahanmapsError:
+        return ""
+    return f'{formula(function)} <math alttext="= 0"><mrow><mo form="infix">=</mo><mn>0</mn></mrow></math>'
+
+
+def _closed_form(closed: str) -> str:
+    """d_n = a polynomial in n; empty where it is something else."""
+    try:
+        shown = formula(parse_polynomial(closed, ["n"]))
+    except KahanmapsError:
+        return ""
+    left = '<math alttext="d_n ="><mrow><msub><mi>d</mi><mi>n</mi></msub><mo form="infix">=</mo></mrow></math>'
+    return f"{left} {shown}"

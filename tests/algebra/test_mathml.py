@@ -1,0 +1,178 @@
+"""Formulas in MathML: what is shown is read back, by a small reader of its own, as the same polynomial."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import pytest
+from flint import fmpq
+from helpers import rationals, some
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.mathml import (
+    equations,
+    formula,
+    mathml_name,
+    mathml_number,
+    mathml_polynomial,
+    mathml_rational_function,
+)
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.errors import InputError
+
+NAMES = ["x1", "x12", "al", "eps", "beta", "my_H"]
+RING = ring(NAMES)
+BY_MATHML = {mathml_name(name): gen for name, gen in zip(NAMES, RING.gens(), strict=True)}
+CORE = {"math", "mrow", "mi", "mn", "mo", "mfrac", "mstyle", "msup", "msub", "span", "br"}
+LONG = parse_polynomial("(x + y + 1)^6", ["x", "y"])
+POWER = parse_polynomial("(x + y)^40", ["x", "y"])
+
+
+def element(html):
+    return ElementTree.fromstring(f"<div>{html}</div>")
+
+
+def read_row(children):
+    """The polynomial that the elements of a sum stand for."""
+    total, sign, term = RING.constant(0), 1, None
+    for child in children:
+        if child.tag == "mo" and child.text in "+−":
+            if term is not None:
+                total = total + sign * term
+            sign, term = (1 if child.text == "+" else -1), None
+        elif child.tag == "mo":
+            assert child.text == "\u2062"  # times
+        else:
+            factor = read_factor(child)
+            term = factor if term is None else term * factor
+    return total if term is None else total + sign * term
+
+
+def read_factor(child):
+    text = ElementTree.tostring(child, encoding="unicode")
+    if text in BY_MATHML:
+        return BY_MATHML[text]
+    if child.tag == "mn":
+        return RING.constant(int(child.text))
+    if child.tag == "mfrac":
+        return RING.constant(fmpq(int(child[0].text), int(child[1].text)))
+    assert child.tag == "msup"
+    assert int(child[1].text) > 1
+    return read_factor(child[0]) ** int(child[1].text)
+
+
+def polynomials():
+    exponents = st.tuples(*[st.integers(0, 12)] * len(NAMES))
+    terms = st.dictionaries(exponents, rationals().filter(bool), max_size=6)
+    return terms.map(lambda found: RING.from_dict(found))
+
+
+@some
+@given(polynomials())
+def test_a_polynomial_is_read_back_equal(polynomial):
+    assert read_row(ElementTree.fromstring(mathml_polynomial(polynomial))) == polynomial
+
+
+@some
+@given(polynomials(), polynomials().filter(lambda polynomial: not polynomial.is_zero()))
+def test_a_rational_function_is_read_back_equal(above, below):
+    function = RationalFunction(above, below)
+    found = ElementTree.fromstring(mathml_rational_function(function))
+    if function.is_polynomial:
+        assert read_row(found) == function.numerator
+        return
+    assert found.tag == "mfrac"
+    assert RationalFunction(read_row(found[0]), read_row(found[1])) == function
+    assert len(list(found.iter("mfrac"))) == 1, "a fraction within the fraction"
+
+
+@some
+@given(polynomials(), polynomials().filter(lambda polynomial: not polynomial.is_zero()))
+def test_the_plain_text_of_a_formula_is_read_back_equal(above, below):
+    function = RationalFunction(above, below)
+    pieces = [math.get("alttext") for math in element(formula(function)).iter("math")]
+    assert parse_rational_function(" ".join(pieces), NAMES) == function
+
+
+@some
+@given(polynomials())
+def test_the_pieces_of_a_formula_are_read_back_as_one_polynomial(polynomial):
+    found = [child for math in element(formula(polynomial)).iter("math") for child in math[0]]
+    assert read_row(found) == polynomial
+
+
+@some
+@given(polynomials(), polynomials().filter(lambda polynomial: not polynomial.is_zero()))
+def test_only_elements_of_mathml_core_are_used(above, below):
+    found = element(formula(RationalFunction(above, below), "I1") + equations(["x"], [above]))
+    assert {one.tag for one in found.iter()} <= {*CORE, "div"}
+
+
+def test_a_short_formula_is_one_piece_and_a_long_one_has_one_for_each_term():
+    x = parse_polynomial("x^2 - 1", ["x"])
+    assert len(list(element(formula(x)).iter("math"))) == 1
+    assert len(list(element(formula(LONG)).iter("math"))) == len(LONG)
+
+
+def test_a_long_quotient_is_written_with_a_slash():
+    short = element(formula(parse_rational_function("x/(1 + y)", ["x", "y"])))
+    assert [one.tag for one in short.iter("mfrac")] == ["mfrac"]
+    long = element(formula(RationalFunction(LONG, parse_polynomial("x*y", ["x", "y"])), "I"))
+    texts = [math.get("alttext") for math in long.iter("math")]
+    assert (texts[:2], texts[-4:]) == (["I =", "("], ["/", "(", "x*y", ")"])
+
+
+def test_what_is_too_long_is_cut_and_its_terms_are_told():
+    cut = element(formula(POWER, characters=60))
+    assert len(list(cut.iter("math"))) < 6
+    assert "".join(cut.itertext()).endswith("+ … (41 terms)")
+    whole = element(formula(POWER, characters=10_000))
+    assert len(list(whole.iter("math"))) == 41
+
+
+def test_a_coefficient_that_is_too_long_is_not_shown():
+    found = element(formula(parse_polynomial("10^100*x", ["x"]), characters=60))
+    assert "".join(found.itertext()) == "(a polynomial of 1 term, not shown)"
+
+
+def test_the_derivative_has_a_prime():
+    found = element(equations(["x1"], [parse_polynomial("x1^2", ["x1"])]))
+    assert next(found.iter("math")).get("alttext") == "x1' ="
+    assert "".join(next(found.iter("msup")).itertext()) == "x1′"
+
+
+@pytest.mark.parametrize(
+    ("name", "mathml"),
+    [
+        ("x", "<mi>x</mi>"),
+        ("m12", "<msub><mi>m</mi><mn>12</mn></msub>"),
+        ("eps", "<mi>ε</mi>"),
+        ("epsilon", "<mi>ϵ</mi>"),
+        ("Omega1", "<msub><mi>Ω</mi><mn>1</mn></msub>"),
+        ("omicron", "<mi>omicron</mi>"),
+        ("x_1", "<mi>x_1</mi>"),
+        ("<b>&", "<mi>&lt;b&gt;&amp;</mi>"),
+    ],
+)
+def test_names(name, mathml):
+    assert mathml_name(name) == mathml
+
+
+@given(st.lists(st.from_regex(r"[A-Za-z_][A-Za-z_0-9]{0,8}", fullmatch=True), min_size=2, max_size=2, unique=True))
+def test_different_names_are_different_in_mathml(names):
+    first, second = names
+    assert mathml_name(first) != mathml_name(second)
+
+
+@pytest.mark.parametrize("wrong", ["", "a\nb", "\x1b[31m"])
+def test_what_cannot_be_printed_is_no_name(wrong):
+    with pytest.raises(InputError, match="expected printable text"):
+        mathml_name(wrong)
+
+
+def test_numbers():
+    assert mathml_number(fmpq(5)) == "<mn>5</mn>"
+    assert mathml_number(fmpq(1, 2)) == "<mfrac><mn>1</mn><mn>2</mn></mfrac>"
+    assert mathml_number(fmpq(-5)) == '<mrow><mo form="prefix">−</mo><mn>5</mn></mrow>'

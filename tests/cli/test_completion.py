@@ -1,0 +1,209 @@
+"""Completion in the shell: what is offered where, at once, and never a traceback."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from cli_helpers import COMMAND, Outcome, environment, shell
+
+from kahanmaps.experiments.registry import task_kinds
+from kahanmaps.systems.catalog import names
+from kahanmaps_cli.main import COMMANDS
+
+HEAVY = ("numpy", "flint", "lark", "rich", "matplotlib")
+
+
+def question(line: str) -> dict[str, str]:
+    """The environment in which bash asks for what may stand at the end of that line."""
+    return {"_KAHANMAPS_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(line.split(" ")) - 1)}
+
+
+@pytest.fixture
+def asked(kahanmaps, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
+    """Ask at the end of a line, in a folder."""
+
+    def ask(line: str, folder: Path | None = None) -> Outcome:
+        with monkeypatch.context() as here:
+            for name, value in question(line).items():
+                here.setenv(name, value)
+            if folder is not None:
+                here.chdir(folder)
+            outcome: Outcome = kahanmaps("")
+        return outcome
+
+    return ask
+
+
+@pytest.fixture
+def offered(asked: Callable[..., Outcome]) -> Callable[..., list[str]]:
+    """What is offered for the last word of a line."""
+
+    def offer(line: str, folder: Path | None = None) -> list[str]:
+        outcome = asked(line, folder)
+        assert outcome.err == ""
+        return [item.partition(",")[2] for item in outcome.out.splitlines() if item]
+
+    return offer
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "my-top.toml").write_text('variables = ["x"]\n[system]\nrhs = ["a*x"]\n[parameters]\nalpha = 1\n')
+    (tmp_path / "broken.toml").write_text("[[[")
+    (tmp_path / "notes.txt").touch()
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "other.toml").touch()
+    return tmp_path
+
+
+def test_commands_are_offered(offered):
+    assert offered("kahanmaps ") == list(COMMANDS)
+    assert offered("kahanmaps check-i") == ["check-integrals"]
+
+
+def test_subcommands_are_offered(offered):
+    assert offered("kahanmaps family s") == ["show", "space"]
+
+
+def test_options_are_offered(offered):
+    assert offered("kahanmaps orbit euler_top --arith") == ["--arithmetic"]
+
+
+def test_choices_are_offered(offered):
+    assert offered("kahanmaps orbit euler_top --format c") == ["csv"]
+    assert offered("kahanmaps --color ") == ["auto", "always", "never"]
+
+
+def test_systems_of_the_catalogue_are_offered(offered, tmp_path):
+    assert offered("kahanmaps analyze ", tmp_path) == list(names())
+    assert offered("kahanmaps check-commute euler_top lore", tmp_path) == ["lorenz"]
+
+
+def test_system_files_and_folders_are_offered_and_no_other_file(offered, folder):
+    assert offered("kahanmaps orbit m", folder) == ["mine/", "my-top.toml"]
+    assert offered("kahanmaps orbit n", folder) == [name for name in names() if name.startswith("n")]
+
+
+def test_files_in_a_folder_are_offered(offered, folder):
+    assert offered("kahanmaps orbit mine/", folder) == ["mine/other.toml"]
+
+
+def test_parameters_of_the_system_are_offered(offered, folder):
+    assert offered("kahanmaps orbit euler_top -p ") == ["a1=", "a2=", "a3="]
+    assert offered("kahanmaps systems lotka_volterra -p ") == ["a=", "b=", "c=", "d="]
+    assert offered("kahanmaps orbit my-top.toml --parameter al", folder) == ["alpha="]
+
+
+def test_one_more_symbol_of_the_system_is_offered(offered):
+    assert offered("kahanmaps find-integrals euler_top --symbolic a1,a") == ["a1,a2", "a1,a3"]
+
+
+def test_kinds_of_tasks_are_offered(offered):
+    assert offered("kahanmaps batch tasks ") == list(task_kinds())
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "kahanmaps orbit broken.toml -p ",
+        "kahanmaps orbit nowhere.toml -p ",
+        "kahanmaps orbit nowhere/x",
+        "kahanmaps orbit euler_top --eps x --steps",
+        "kahanmaps orbit 'unfinished",
+        "kahanmaps nonsense --st",
+        "kahanmaps orbit ~nobody/",
+    ],
+)
+def test_nothing_is_said_where_the_line_is_wrong(asked, folder, line):
+    assert asked(line, folder).err == ""
+
+
+def test_nothing_is_said_where_a_command_cannot_be_loaded(asked, monkeypatch):
+    monkeypatch.setitem(COMMANDS, "orbit", ("no_such_module", ""))
+    outcome = asked("kahanmaps orbit --")
+    assert (outcome.out, outcome.err) == ("", "")
+
+
+def test_nothing_that_computes_is_loaded():
+    code = (
+        "import sys\nfrom kahanmaps_cli.main import main\nmain([])\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
+    )
+    env = environment(**question("kahanmaps ensemble euler_top -p "))
+    done = subprocess.run([COMMAND[0], "-c", code], env=env, capture_output=True, text=True, timeout=60)
+    assert done.stdout.split() == ["plain,a1=", "plain,a2=", "plain,a3="]
+    assert done.stderr == "[]\n"
+
+
+@pytest.mark.slow  # a clock on a busy machine
+def test_the_answer_is_there_at_once():
+    best = 9.0
+    for _ in range(5):
+        start = time.perf_counter()
+        subprocess.run(COMMAND, env=environment(**question("kahanmaps orbit eul")), capture_output=True, check=True)
+        best = min(best, time.perf_counter() - start)
+    assert best < 0.3
+
+
+# The scripts
+
+
+@pytest.mark.parametrize("name", ["bash", "zsh", "fish"])
+def test_a_script_is_printed_for_each_shell(kahanmaps, name):
+    script = kahanmaps("completion", name).out
+    assert "_KAHANMAPS_COMPLETE" in script
+    assert f"{name}_complete" in script
+
+
+def test_the_shell_is_that_of_the_environment(kahanmaps, monkeypatch):
+    monkeypatch.setenv("SHELL", "/usr/bin/fish")
+    assert kahanmaps("completion") == kahanmaps("completion fish")
+
+
+@pytest.mark.parametrize("value", ["/bin/dash", ""])
+def test_another_shell_is_told_which_ones_there_are(kahanmaps, monkeypatch, value):
+    monkeypatch.setenv("SHELL", value)
+    outcome = kahanmaps("completion")
+    assert outcome.status == 2
+    assert "expected one of bash, zsh, fish: name it as SHELL" in outcome.err
+
+
+def test_the_help_says_which_line_goes_to_which_file(kahanmaps):
+    shown = kahanmaps("completion --help").out
+    for piece in ("~/.bashrc", "~/.zshrc", "config.fish", 'eval "$(kahanmaps completion bash)"'):
+        assert piece in shown
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
+def test_bash_completes_with_the_script(tmp_path):
+    # The script calls `kahanmaps` through env, so it has to be a program.
+    program = tmp_path / "kahanmaps"
+    program.write_text(f'#!/bin/sh\nexec {shlex.join(COMMAND)} "$@"\n')
+    program.chmod(0o755)
+    script = """
+    eval "$(kahanmaps completion bash)"
+    try() {
+        COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); COMPREPLY=()
+        _kahanmaps_completion kahanmaps
+        echo "${COMPREPLY[@]}"
+    }
+    complete -p kahanmaps
+    try kahanmaps orbit eul
+    try kahanmaps orbit euler_top -p ""
+    try kahanmaps orbit euler_top -p a1 = 2 --ste
+    """
+    outcome = shell(script, tmp_path, PATH=f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    assert outcome.out.splitlines() == [
+        "complete -o nosort -F _kahanmaps_completion kahanmaps",
+        "euler_top",
+        "a1= a2= a3=",
+        "--steps",
+    ]
+    assert outcome.err == ""

@@ -1,0 +1,115 @@
+"""Help: examples first and as they stand, lines that fit 80 columns, commands under headings."""
+
+from __future__ import annotations
+
+import click
+import pytest
+from cli_helpers import shell
+from command_tree import all_commands, all_examples, examples_in, words_of
+
+from kahanmaps_cli.main import COMMANDS, SECTIONS, cli
+
+# What runs in a fraction of a second, and needs no file.
+QUICK = [
+    "kahanmaps systems",
+    "kahanmaps systems lagrange_top --latex",
+    "kahanmaps orbit lotka_volterra --start 1,2 --eps 1/10 --steps 5",
+    "kahanmaps check-integrals --vars x,y --rhs y --rhs=-x --integral x^2+y^2",
+    "kahanmaps check-commute --vars x,y --rhs y --rhs=-x harmonic",
+    "kahanmaps family show paper_m3",
+    "kahanmaps family space paper_m3",
+    "kahanmaps family associated paper_m3",
+    "kahanmaps batch tasks",
+    "kahanmaps batch tasks check-commute",
+    "kahanmaps completion bash",
+    "kahanmaps version --json",
+]
+SLOW = [
+    example
+    for example in all_examples()
+    if example not in QUICK
+    and not any(
+        name in example for name in (".toml", ".csv", ".db", ".npy", ".npz", "|", ">", "eval", "plot", "report")
+    )
+]
+COMMANDS_AND_GROUPS = [words for words, _ in all_commands()]
+
+
+def parsed(words: list[str]) -> None:
+    """Let click read the options of an example, and run nothing."""
+    command: click.Command = cli
+    context = click.Context(cli)
+    name = "kahanmaps"
+    while isinstance(command, click.Group) and words:
+        found = command.get_command(context, words[0])
+        assert found is not None, words[0]
+        name, command, words = words[0], found, words[1:]
+    try:
+        command.make_context(name, list(words), parent=context)
+    except click.BadParameter as error:
+        if not error.message.endswith("does not exist."):  # a file that an example before this one makes
+            raise
+
+
+@pytest.mark.parametrize("words", COMMANDS_AND_GROUPS, ids=lambda words: words or "kahanmaps")
+def test_help_fits_80_columns(kahanmaps, monkeypatch, words):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert [line for line in kahanmaps(words, "--help").out.splitlines() if len(line) > 80] == []
+
+
+@pytest.mark.parametrize("words", COMMANDS_AND_GROUPS, ids=lambda words: words or "kahanmaps")
+def test_examples_come_right_after_the_first_sentence(words):
+    help_text = dict(all_commands())[words].help or ""
+    _, second, *_ = [*help_text.split("\n\n"), "", ""]
+    assert examples_in(second)
+
+
+@pytest.mark.parametrize("words", COMMANDS_AND_GROUPS, ids=lambda words: words or "kahanmaps")
+def test_the_first_paragraph_is_one_sentence_or_question(words):
+    first = " ".join((dict(all_commands())[words].help or "").split("\n\n")[0].split())
+    assert first[-1] in ".?"
+    assert ". " not in first.replace("e.g. ", "")
+
+
+@pytest.mark.parametrize("example", all_examples())
+def test_the_options_of_an_example_are_understood(example):
+    parsed(words_of(example))
+
+
+def test_an_example_with_a_wrong_option_would_be_noticed():
+    with pytest.raises(click.UsageError):
+        parsed(words_of("kahanmaps orbit euler_top --strat 1,2,3  # no such option"))
+
+
+def test_an_example_goes_on_behind_a_backslash():
+    assert examples_in("  kahanmaps orbit x \\\n      --eps 1\n") == ["kahanmaps orbit x --eps 1"]
+
+
+@pytest.mark.parametrize("example", QUICK)
+def test_an_example_that_needs_no_file_runs(kahanmaps, example):
+    assert example in all_examples()
+    assert kahanmaps(example.removeprefix("kahanmaps")).status == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("example", SLOW)
+def test_every_other_example_that_needs_no_file_runs(tmp_path, example):
+    expected = 1 if "henon_heiles    #" in example else 0  # the one that is there because it fails
+    outcome = shell(example, tmp_path)
+    assert outcome.status == expected, outcome.err
+
+
+def test_every_command_stands_under_one_heading():
+    names = [name for commands in SECTIONS.values() for name in commands]
+    assert len(names) == len(set(names)) == len(COMMANDS)
+
+
+def test_the_headings_are_in_the_help(kahanmaps):
+    lines = kahanmaps("--help").out.splitlines()
+    assert [f"{heading}:" for heading in SECTIONS if f"{heading}:" not in lines] == []
+
+
+def test_the_lines_of_the_list_of_commands_are_not_broken(kahanmaps, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    lines = kahanmaps("--help").out.splitlines()
+    assert [line for _, line in COMMANDS.values() if not any(shown.endswith(line) for shown in lines)] == []

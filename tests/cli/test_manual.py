@@ -1,0 +1,67 @@
+"""The manual page: everything the commands say, current, the same everywhere, and clean roff."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from command_tree import all_commands, options_of
+
+PAGE = Path(__file__).parent.parent.parent / "docs" / "man" / "kahanmaps.1"
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    """The page as text, with nothing of roff in it that is not a request at the beginning of a line."""
+    return PAGE.read_text()
+
+
+def test_the_page_in_the_repository_is_current(kahanmaps, page):
+    assert kahanmaps("manual").out == page, "kahanmaps manual > docs/man/kahanmaps.1"
+
+
+def test_the_page_does_not_depend_on_the_terminal(kahanmaps, monkeypatch, page):
+    monkeypatch.setenv("COLUMNS", "40")
+    assert kahanmaps("manual").out == page
+
+
+def test_every_command_is_in_it(page):
+    headings = [line.removeprefix(".SS ").replace("\\-", "-") for line in page.splitlines() if line.startswith(".SS ")]
+    assert [words for words, _ in all_commands() if words and f"kahanmaps {words}" not in headings] == []
+
+
+def test_every_option_is_in_it(page):
+    terms = set(re.findall(r"\\fB(.*?)\\fR", page.replace("\\-", "-")))
+    told = {name for term in terms for name in term.split(", ")}
+    wanted = {option.opts[0] for _, command in all_commands() for option in options_of(command)}
+    assert wanted - told == set()
+
+
+@pytest.mark.parametrize("heading", ["NAME", "SYNOPSIS", "DESCRIPTION", "EXIT STATUS", "ENVIRONMENT", "FILES"])
+def test_the_sections_that_readers_expect_are_there(page, heading):
+    assert f"\n.SH {heading}\n" in page
+
+
+def test_old_names_of_options_are_not_in_it(page):
+    section = page.partition(".SS kahanmaps heights")[2].partition(".SS ")[0]
+    assert r"\-\-random" in section
+    assert r"\-\-starts" not in section
+
+
+@pytest.mark.skipif(shutil.which("groff") is None, reason="no groff here")
+def test_groff_has_nothing_to_complain_about(page):
+    done = subprocess.run(
+        ["groff", "-man", "-ww", "-Tutf8"], input=page.encode(), capture_output=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.skipif(shutil.which("mandoc") is None, reason="no mandoc here")
+def test_mandoc_finds_no_error():
+    done = subprocess.run(
+        ["mandoc", "-Tlint", "-Werror", str(PAGE)], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.stdout == ""

@@ -1,0 +1,126 @@
+"""On a terminal lines are broken at words, whatever its width; in a pipe they stay whole."""
+
+from __future__ import annotations
+
+import re
+import shlex
+
+import pytest
+from cli_helpers import terminal
+
+from kahanmaps_cli.terminal import wrapped
+
+COMMANDS = [
+    "orbit euler_top --start 1,2,3 --eps 1/10 --steps 6",
+    "orbit paper_m3 --start 1,2,3,4,5,6 --eps 1/10 --steps 3 --integral known",
+    "orbit paper_m2 --start 1,2,3,4 --eps 1/10 --at 1000000000000 --arithmetic mod:2305843009213693951",
+    "period paper_m2 --start 1,2,3,4 --eps 1/10",
+    "ensemble lotka_volterra --random 5 --eps 1/10 --steps 10",
+    "check-integrals paper_m2",
+    "check-commute euler_top lorenz -v",
+    "degrees weierstrass",
+    "heights weierstrass --eps 1/10",
+    "find-integrals euler_top",
+    "find-density lotka_volterra",
+    "find-symmetry weierstrass",
+    "find-commuting --vars x,y --rhs x^2 --rhs 'y^2 + x*y'",
+    "singularities weierstrass --eps 1/10",
+    "cycles weierstrass -p 31",
+    "lyapunov lotka_volterra --eps 1/100 --random 3 --steps 50",
+    "verify --m 1 --section 4",
+    "family show paper_m3",
+    "family space paper_m2",
+    "systems",
+    "systems lagrange_top",
+    "batch tasks",
+    "version",
+]
+
+
+def shown(command: str, columns: int) -> list[str]:
+    """The lines on a terminal of that width."""
+    out = terminal(*shlex.split(command), columns=columns).out
+    return re.sub(r"\x1b\[[0-9;]*m", "", out).splitlines()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("columns", [40, 60, 80, 120])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_line_is_longer_than_the_terminal(command, columns):
+    assert [line for line in shown(command, columns) if len(line) > columns] == []
+
+
+@pytest.mark.parametrize("command", ["cycles weierstrass -p 31", "family show paper_m2", "systems"])
+def test_no_line_is_longer_than_forty_columns(command):
+    assert max(map(len, shown(command, 40))) <= 40
+
+
+@pytest.mark.parametrize("columns", [40, 80])
+@pytest.mark.parametrize("command", ["cycles weierstrass -p 31", "systems lagrange_top"])
+def test_words_stay_whole(kahanmaps, command, columns):
+    assert " ".join(shown(command, columns)).split() == kahanmaps(command).out.split()
+
+
+def test_what_stands_beside_a_label_is_indented():
+    lines = shown("cycles weierstrass -p 31", 80)
+    start = next(k for k, line in enumerate(lines) if line.startswith("integrable bound"))
+    assert lines[start + 1].startswith("            ")
+
+
+def test_the_columns_of_an_orbit_fit_the_width():
+    table = shown("orbit euler_top --start 1,2,3 --eps 1/10 --steps 6", 50)
+    assert {len(line) for line in table if line.strip()[:1].isdigit()} == {48}
+
+
+def test_a_point_of_many_coordinates_takes_a_line_for_each():
+    lines = shown("orbit paper_m3 --start 1,2,3,4,5,6 --eps 1/10 --steps 1", 50)
+    assert "step 0" in lines
+    assert "  x6 = 6" in lines
+
+
+def test_the_report_of_analyze_has_headings_and_coloured_verdicts():
+    out = terminal("analyze", "--vars", "x,y", "--rhs", "y", "--rhs=-x", columns=60).out
+    assert "\n\x1b[1mintegrals\x1b[0m\n" in out
+    assert "\x1b[32mproved\x1b[0m" in out
+
+
+# The lines themselves
+
+
+def test_a_formula_is_broken_before_a_sign():
+    assert wrapped("x^2 + y^2 - 2*x*y + 17", 12) == ["x^2 + y^2", "- 2*x*y + 17"]
+
+
+def test_the_sign_of_a_number_is_no_place_to_break():
+    assert wrapped("aaaa -5 + bbbb", 8) == ["aaaa -5", "+ bbbb"]
+
+
+def test_lines_hang_below_the_text_and_not_below_the_label():
+    assert wrapped("one two three", 12, "label  ", "       ") == ["label  one", "       two", "       three"]
+
+
+def test_a_number_longer_than_a_line_is_shortened_and_its_length_told():
+    (*_, last) = lines = wrapped("1" * 100, 40)
+    assert lines[0].startswith("1" * 11 + "...")
+    assert last.endswith("(100 chars)")
+
+
+def test_a_number_that_fits_is_left_alone():
+    assert wrapped("1" * 40, 40) == ["1" * 40]
+
+
+def test_a_long_product_is_folded_after_its_signs():
+    assert wrapped("aaaa*bbbb*cccc*dddd", 10) == ["aaaa*bbbb*", "cccc*dddd"]
+
+
+def test_a_word_without_a_sign_is_folded_where_the_line_ends():
+    assert "".join(wrapped("x" * 100, 30)) == "x" * 100
+
+
+def test_two_blanks_stay_two_within_a_line_and_start_none():
+    assert wrapped("a  b", 10) == ["a  b"]
+    assert wrapped("aaaaaaaa  bbbbbbbb", 9) == ["aaaaaaaa", "bbbbbbbb"]
+
+
+def test_nothing_is_one_empty_line():
+    assert wrapped("", 40) == [""]

@@ -1,0 +1,122 @@
+"""One name for one thing: options that several commands share have one spelling, one metavar and one meaning."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import click
+import pytest
+from command_tree import all_commands, names_of, options_of
+
+from kahanmaps_cli.colour_option import is_colour_option
+
+LEAVES = [(words, command) for words, command in all_commands() if not isinstance(command, click.Group)]
+# Others tell how the command uses them: what --steps counts, what --seconds bounds.
+SAME_WORDS = [
+    "--json",
+    "--eps",
+    "--time-step",
+    "--vars",
+    "--rhs",
+    "--symbolic",
+    "--backward",
+    "--starts",
+    "--random",
+    "--box",
+    "--db",
+    "--m",
+    "--eigenvalues",
+    "--chi",
+    "--color",
+]
+
+
+def by_name() -> dict[str, list[tuple[str, click.Option]]]:
+    """Every long option with the commands that have it."""
+    found: dict[str, list[tuple[str, click.Option]]] = defaultdict(list)
+    for words, command in LEAVES:
+        for option in options_of(command):
+            for name in names_of(option):
+                found[name].append((words, option))
+    return found
+
+
+def own(words: str) -> bool:
+    """Whether a command is older than pictures and pages, which have words of their own for a few things."""
+    return words.split()[0] not in ("plot", "report", "convert", "schema")
+
+
+@pytest.mark.parametrize("name", SAME_WORDS)
+def test_an_option_that_means_the_same_says_the_same(name):
+    told = {str(option.help).removesuffix(" Repeatable.") for words, option in by_name()[name] if own(words)}
+    if name == "--random":  # of heights as well, which has no --starts FILE
+        told.discard("N starts drawn at random (default 3).")
+    assert len(told) == 1
+
+
+def test_an_option_has_the_same_metavar_everywhere():
+    found = {
+        name: {option.metavar or option.type.name for words, option in options if own(words) and not option.is_flag}
+        for name, options in by_name().items()
+    }
+    exceptions = {"-o", "--output", "--integral", "--experiment", "-e"}
+    assert {name: several for name, several in found.items() if len(several) > 1 and name not in exceptions} == {}
+
+
+def test_an_option_takes_a_value_everywhere_or_nowhere():
+    flags = {name: {option.is_flag for words, option in options if own(words)} for name, options in by_name().items()}
+    assert {name for name, several in flags.items() if len(several) > 1} <= {"--jsonl"}
+
+
+@pytest.mark.parametrize("pair", [("-q", "--quiet"), ("-o", "--output"), ("-p", "--parameter"), ("-v", "--verbose")])
+def test_a_short_option_and_its_long_name_go_together(pair):
+    options = by_name()
+    assert [words for words, _ in options[pair[0]]] == [words for words, _ in options[pair[1]]]
+
+
+def test_whoever_takes_eps_takes_the_time_step():
+    options = by_name()
+    with_eps = {words for words, _ in options["--eps"] if own(words)}
+    assert with_eps == {words for words, _ in options["--time-step"] if own(words)}
+
+
+def test_whoever_takes_right_hand_sides_takes_parameters():
+    options = by_name()
+    assert {words for words, _ in options["--rhs"]} <= {words for words, _ in options["-p"]}
+
+
+def test_every_command_takes_the_option_for_colours():
+    assert [words for words, command in LEAVES if own(words) and not any(map(is_colour_option, command.params))] == []
+
+
+@pytest.mark.parametrize("words", [words for words, _ in by_name()["--seed"] if own(words)])
+def test_a_negative_seed_is_refused_by_every_command(kahanmaps, words):
+    outcome = kahanmaps(words, "--seed -1")
+    assert outcome.status == 2
+    assert "found '-1', expected an integer, 0 or more" in outcome.err
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "x"])
+@pytest.mark.parametrize("words", [words for words, _ in by_name()["--seconds"] if own(words)])
+def test_a_time_that_is_none_is_refused_by_every_command(kahanmaps, words, value):
+    outcome = kahanmaps(words, f"--seconds {value}")
+    assert outcome.status == 2
+    assert f"found '{value}', expected a number of seconds above 0" in outcome.err
+
+
+def test_the_old_name_of_an_option_still_works(kahanmaps):
+    new = kahanmaps("heights weierstrass --eps 1/10 --random 1 --steps 20")
+    assert kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20") == new
+
+
+def test_the_old_name_of_an_option_is_not_shown(kahanmaps):
+    assert "--starts" not in kahanmaps("heights --help").out
+
+
+def test_cycles_take_time_steps_as_well(kahanmaps):
+    assert kahanmaps("cycles weierstrass -p 31 --time-step 1/5") == kahanmaps("cycles weierstrass -p 31 --eps 1/10")
+
+
+def test_family_show_takes_an_inline_system(kahanmaps):
+    inline = "--vars x1,x2,x3,x4 --rhs x3^2 --rhs x4^2 --rhs x1^2 --rhs x2^2"
+    assert "found, not declared" in kahanmaps("family show", inline).out

@@ -1,0 +1,71 @@
+"""kahanmaps plot commute: both outcomes, missing points, wrong use."""
+
+from __future__ import annotations
+
+import pytest
+
+PAIR = "plot commute paper_m2 --start 1/2,-1/3,0,1 --eps 1/50"
+
+
+def test_the_associated_maps_close_and_the_control_does_not(kahanmaps, tmp_path):
+    outcome = kahanmaps(PAIR, "-o", tmp_path / "square.pdf")
+    assert outcome.status == 0
+    assert "f_++ and f_+-: closes exactly" in outcome.err
+    assert "J grad H_0 and J grad H_1: gap 0.00281" in outcome.err
+    assert (tmp_path / "square.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_terminal_says_so_as_well(kahanmaps):
+    outcome = kahanmaps(PAIR, "-q --steps 3")
+    assert outcome.status == 0
+    assert "closes exactly" in outcome.out
+    assert "gap" in outcome.out
+
+
+def test_two_systems_are_one_panel(kahanmaps, tmp_path):
+    words = "plot commute euler_top zhukovski_volterra_1 --start 1,1/2,-1 --eps 1/10 -o"
+    outcome = kahanmaps(words, tmp_path / "open.svg")
+    assert outcome.status == 0
+    assert "f = euler_top, g = zhukovski_volterra_1: gap" in outcome.err
+
+
+def test_a_system_commutes_with_itself_but_not_at_another_step(kahanmaps, tmp_path):
+    words = "plot commute lorenz lorenz --start 1,2,3 --eps 1/100"
+    assert "closes exactly" in kahanmaps(words, "-o", tmp_path / "a.png").err
+    assert ": gap " in kahanmaps(words, "--eps2 1/50 --axes x,z -o", tmp_path / "b.png").err
+
+
+def test_an_inline_system_is_the_first(kahanmaps, tmp_path):
+    words = "plot commute --vars x,y,z --rhs=y*z --rhs=-2*z*x --rhs=x*y euler_top --start 1,2,3 --eps 1/10 -o"
+    outcome = kahanmaps(words, tmp_path / "a.png")
+    assert "f = inline, g = euler_top: closes exactly" in outcome.err
+
+
+def test_missing_points_are_told_with_status_3(kahanmaps, tmp_path):
+    words = "plot commute --vars x,y --rhs=-6*x*y --rhs '3*y^2 - 3*x^2' --start 3/5,4/5 --eps 1/6 -o"
+    outcome = kahanmaps(words, tmp_path / "a.png")
+    assert outcome.status == 3
+    assert "points are missing: Phi_f: the map has no value at a point on the way" in outcome.err
+    assert (tmp_path / "a.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("lorenz --start 1,2,3 --eps 1/10", "one system commutes with itself"),
+        ("lorenz paper_m2 --start 1,2,3 --eps 1/10", "expected the same dimension"),
+        ("paper_m2 --start 1,2,3 --eps 1/10", "found a point with 3 coordinates, expected 4"),
+        ("paper_m2 --start 1,2,3,4 --eps 1/10 --steps 13", "found 13 steps, expected 1 to 12"),
+        ("paper_m2 --start 1,2,3,4 --eps 1/10 --eps2 1/20", "--eps2 needs a second system"),
+        ("paper_m2 --start 1,2,3,4 --eps 1/10 --axes x1", "expected two of the variables"),
+        ("lorenz lorenz --start 1,2,3 --eps 1/10 --eps2 0", "eps2 = 0"),
+        ("paper_m2 --start 1,2,3,4", "missing --eps E"),
+        ("- - --start 1,2,3,4 --eps 1/10", "found - twice"),
+        ("paper_m2 --start 1e200,2,3,4 --eps 1/10", "it cannot be drawn"),
+    ],
+)
+def test_wrong_use_is_told(kahanmaps, words, message):
+    outcome = kahanmaps(f"plot commute {words}")
+    assert outcome.status == 2
+    assert message in outcome.err
+    assert outcome.out == ""

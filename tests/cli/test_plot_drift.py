@@ -1,0 +1,83 @@
+"""kahanmaps plot drift."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+
+def test_all_methods_are_drawn(kahanmaps):
+    done = kahanmaps("plot drift weierstrass --eps 1/20 --start 1/4,1/8 --steps 300")
+    assert done.status == 0
+    assert "time step 2eps = 1/10" in done.out
+    for text in ("Kahan", "RK4", "implicit midpoint", "modified_H"):
+        assert text in done.out
+    assert done.err == "start 1/4,1/8, eps = 1/20 (time step 2 eps = 1/10)\n"
+
+
+def test_a_member_of_the_family_is_drawn_in_normal_form_too(kahanmaps):
+    done = kahanmaps("plot drift paper_m2 --eps 1/20 --steps 100")
+    assert (done.status, "Kahan, normal form" in done.out) == (0, True)
+
+
+def test_methods_and_functions_are_as_asked_for(kahanmaps):
+    done = kahanmaps("plot drift euler_top --eps 1/20 --steps 50 --method rk4 --integral F1 --integral 'E=x1^2+eps'")
+    assert done.status == 0
+    assert "RK4" in done.out
+    assert "Kahan" not in done.out
+
+
+def test_the_time_step_is_twice_eps(kahanmaps, tmp_path):
+    first, second = tmp_path / "a.svg", tmp_path / "b.svg"
+    for target, eps in ((first, "--eps 1/20"), (second, "--time-step 1/10")):
+        kahanmaps(f"plot drift harmonic {eps} --steps 50 -q -o", target)
+    assert first.read_text().split("</metadata>")[1] == second.read_text().split("</metadata>")[1]
+
+
+def test_the_same_seed_is_the_same_start(kahanmaps):
+    told = [kahanmaps(f"plot drift harmonic --eps 1/20 --steps 5 --seed {seed}").err for seed in (1, 1, 2)]
+    assert told[0] == told[1] != told[2]
+
+
+def test_an_orbit_that_ends_early_is_told_and_drawn(kahanmaps):
+    done = kahanmaps("plot drift --vars x --rhs x^2 --eps 1/20 --start 1 --steps 100 --integral I=x")
+    assert done.status == 3
+    assert "RK4 (ended at step " in done.out
+    assert "RK4 ended early: step " in done.err
+    assert re.search(r"I along RK4: errors above \S+ are an arrow at the top", done.err)
+
+
+def test_an_absolute_error_is_told(kahanmaps):
+    done = kahanmaps("plot drift --vars x,y --rhs y --rhs=-x --eps 1/20 --start 1,0 --steps 9 --integral I=y")
+    assert "absolute error of I" in done.out
+    assert "I: absolute errors, for it is 0 at the start" in done.err
+
+
+def test_a_picture_carries_its_recipe(kahanmaps, tmp_path):
+    target = tmp_path / "d.pdf"
+    kahanmaps("plot drift harmonic --eps 1/20 --steps 50 -q -o", target)
+    assert (
+        kahanmaps("plot recipe", target).out == f"kahanmaps plot drift harmonic --eps 1/20 --steps 50 -q -o {target}\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        ("plot drift", "missing --eps"),
+        ("plot drift --eps 1/10", "missing SYSTEM"),
+        ("plot drift lotka_volterra --eps 1/10", "found no known integral of lotka_volterra"),
+        ("plot drift harmonic --eps 0", "found eps = 0"),
+        ("plot drift harmonic --eps 1/10 --steps 0", "found 0 steps"),
+        ("plot drift harmonic --eps 1/10 --start 1", "found a start with 1 coordinate, expected 2"),
+        ("plot drift harmonic --eps 1/10 --integral 'E=x+'", "expected a number"),
+        ("plot drift harmonic --eps 1/10 --integral E=1/x --start 0,1", "take another start"),
+        ("plot drift harmonic --eps 1/10 --method normal-form", "there is none"),
+        ("plot drift harmonic --eps 1/10 -o nosuch/x.pdf", "found no folder"),
+    ],
+)
+def test_wrong_use_is_refused(kahanmaps, command, expected):
+    done = kahanmaps(command)
+    assert (done.status, done.out) == (2, "")
+    assert expected in done.err

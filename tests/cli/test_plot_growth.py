@@ -1,0 +1,132 @@
+"""kahanmaps plot degrees, and kahanmaps plot heights."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+
+@pytest.fixture
+def piped(monkeypatch):
+    """Put text on standard input."""
+    return lambda text: monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(text.encode())))
+
+
+def test_degrees_are_drawn_in_the_terminal(kahanmaps):
+    done = kahanmaps("plot degrees euler_top")
+    assert done.status == 0
+    assert "euler_top: dn = 2n^2 + 1, lambda = 1" in done.out
+
+
+def test_several_systems_are_one_picture(kahanmaps, tmp_path):
+    target = tmp_path / "d.svg"
+    done = kahanmaps("plot degrees euler_top lotka_volterra --size 8.6x7 -o", target)
+    assert done.status == 0
+    assert done.err.startswith(f"{target}: 8.6 x 7.0 cm")
+    assert target.read_bytes().startswith(b"<?xml")
+
+
+def test_an_inline_system_is_drawn(kahanmaps):
+    done = kahanmaps("plot degrees --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)'")
+    assert (done.status, "inline: lambda = 2" in done.out) == (0, True)
+
+
+def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, piped):
+    first, second = tmp_path / "a.png", tmp_path / "b.png"
+    record = kahanmaps("degrees euler_top --json").out
+    assert kahanmaps("plot degrees euler_top -q -o", first).status == 0
+    (tmp_path / "record.json").write_text(record)
+    assert kahanmaps("plot degrees -q --from", tmp_path / "record.json", "-o", second).status == 0
+    piped(record)
+    assert "euler_top" in kahanmaps("plot degrees --from -").out
+    # The metadata tell the two commands; the pixels are the same.
+    import matplotlib.image as image
+
+    assert (image.imread(first) == image.imread(second)).all()
+
+
+def test_two_records_of_one_name_are_told_apart(kahanmaps, tmp_path):
+    (tmp_path / "r.json").write_text(kahanmaps("degrees euler_top --json").out)
+    done = kahanmaps("plot degrees --from", tmp_path / "r.json", "--from", tmp_path / "r.json")
+    assert "euler_top (2): " in done.out
+
+
+def test_a_system_that_is_stopped_early_is_told_and_drawn(kahanmaps):
+    done = kahanmaps("plot degrees euler_top henon_heiles --max-degree 300")
+    assert done.status == 3
+    assert "henon_heiles: lambda ~ 2.312 (estimated)" in done.out
+    assert "henon_heiles: stopped early: the degree of iterate 7 is above 300" in done.err
+    assert "euler_top: stopped" not in done.err
+
+
+def test_terms_that_were_asked_for_are_no_early_end(kahanmaps):
+    assert kahanmaps("plot degrees henon_heiles --terms 3").status == 0
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        ("plot degrees", "missing SYSTEM"),
+        ("plot degrees nosuch", "nosuch"),
+        ("plot degrees euler_top --vars x --rhs x", "not both"),
+        ("plot degrees euler_top lotka_volterra -p a=1", "-p is for one system"),
+        ("plot degrees euler_top -o x.jpg", "expected .pdf, .svg or .png"),
+        ("plot degrees --from nosuch.json", "cannot read nosuch.json"),
+        ("plot degrees euler_top --eps 0", "found eps = 0"),
+        ("plot heights", "missing SYSTEM"),
+        ("plot heights euler_top --from x.json", "not both"),
+        ("plot heights euler_top --starts 2 --start 1,2,3", "not both"),
+        ("plot heights euler_top --max-digits 0", "expected at least 1"),
+        ("plot heights euler_top --steps=-1", "steps"),
+    ],
+)
+def test_wrong_use_is_refused(kahanmaps, command, expected):
+    done = kahanmaps(command)
+    assert (done.status, done.out) == (2, "")
+    assert expected in done.err
+
+
+@pytest.mark.parametrize("command", ["degrees", "heights"])
+@pytest.mark.parametrize("text", ["", "[", "{}", "[1, 2]", '{"command": "orbit"}', "[" * 100_000])
+def test_a_file_that_is_no_record_is_refused(kahanmaps, tmp_path, command, text):
+    (tmp_path / "r.json").write_text(text)
+    done = kahanmaps(f"plot {command} --from", tmp_path / "r.json")
+    assert done.status == 2
+    assert "expected an object written by" in done.err
+
+
+def test_heights_are_drawn_in_the_terminal(kahanmaps):
+    done = kahanmaps("plot heights weierstrass --eps 1/10 --starts 1 --steps 20")
+    assert done.status == 0
+    assert "eps = 1/10, 2eps = 1/5: c n^2, c = " in done.out
+
+
+def test_heights_of_a_record_are_drawn(kahanmaps, tmp_path):
+    record = kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20 --json").out
+    (tmp_path / "r.json").write_text(record)
+    done = kahanmaps("plot heights --from", tmp_path / "r.json", "-o", tmp_path / "h.pdf")
+    assert (done.status, (tmp_path / "h.pdf").read_bytes()[:4]) == (0, b"%PDF")
+
+
+def test_a_record_of_a_survey_that_was_not_whole_is_told(kahanmaps, tmp_path):
+    record = kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20 --json").json
+    (tmp_path / "r.json").write_text(json.dumps({**record, "whole": False}))
+    done = kahanmaps("plot heights --from", tmp_path / "r.json")
+    assert (done.status, "stopped early" in done.err) == (3, True)
+
+
+def test_orbits_that_reach_the_digit_budget_are_told(kahanmaps):
+    done = kahanmaps("plot heights lotka_volterra --eps 1/10 --starts 2 --max-digits 500")
+    assert done.status == 0
+    assert "2 of 2 orbits ended where the numbers exceed --max-digits 500" in done.err
+
+
+def test_an_orbit_through_a_singular_point_is_told(kahanmaps):
+    # 1 - eps f'(x) = 1 - 2 eps x is 0 at the start.
+    done = kahanmaps("plot heights --vars x --rhs x^2 --eps 1/2 --start 1")
+    assert done.status == 3
+    assert "1 of 1 orbits ended early, at a singular point" in done.err

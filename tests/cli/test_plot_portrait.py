@@ -1,0 +1,281 @@
+"""kahanmaps plot portrait: what is drawn from which words, what is said, exit statuses, stored orbits, wrong use."""
+
+from __future__ import annotations
+
+import signal
+
+import numpy as np
+import pytest
+
+from kahanmaps.maps.fast import FloatOrbit
+from kahanmaps.plots import draw_portrait as drawing
+from kahanmaps.plots.recipe import read_recipe
+from kahanmaps.systems.catalog import load
+from kahanmaps_cli.pictures.stored import read_orbits
+from kahanmaps_cli.progress import Progress
+
+LV = "plot portrait lotka_volterra --eps 1/20 --start 1,2 --steps 30"
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """What was drawn last, as the numbers that were handed to the drawing functions."""
+    seen = []
+    for name in ("draw_portrait", "draw_density"):
+        draw = getattr(drawing, name)
+
+        def spy(found, style, draw=draw, **how):
+            seen.append((found, how))
+            return draw(found, style, **how)
+
+        monkeypatch.setattr(drawing, name, spy)
+    return seen
+
+
+def test_a_portrait_is_drawn_in_the_terminal_unless_a_file_is_named(kahanmaps):
+    outcome = kahanmaps(LV)
+    assert outcome.status == 0
+    assert any("\N{BRAILLE PATTERN BLANK}" < mark <= "\N{BRAILLE PATTERN DOTS-12345678}" for mark in outcome.out)
+    assert outcome.err == "lotka_volterra: 1 orbit, 30 steps, eps = 1/20 (time step 2 eps = 1/10)\n"
+
+
+def test_a_file_carries_its_recipe(kahanmaps, tmp_path):
+    assert kahanmaps(LV + " -q -o", tmp_path / "lv.svg").status == 0
+    recipe = read_recipe(str(tmp_path / "lv.svg"))
+    assert recipe.command.startswith(f"kahanmaps {LV}")
+    assert 'rhs = ["x*(a - b*y)"' in recipe.system
+
+
+def test_starts_are_chosen_where_none_are_given(kahanmaps, drawn):
+    outcome = kahanmaps("plot portrait lotka_volterra --eps 1/20 --steps 20")
+    assert outcome.err.startswith("lotka_volterra: 16 orbits from chosen starts, 20 steps")
+    assert drawn[0][0].points.shape == (21, 16, 2)
+
+
+def test_the_points_are_those_of_the_float_orbit(kahanmaps, drawn, tmp_path):
+    kahanmaps(LV)
+    kahanmaps(
+        "orbit lotka_volterra --eps 1/20 --start 1,2 --steps 30 --arithmetic float --kernel numpy -o",
+        tmp_path / "o.npy",
+    )
+    np.testing.assert_allclose(drawn[0][0].points[:, 0], np.load(tmp_path / "o.npy"), rtol=1e-13)
+
+
+def test_backward_steps_by_the_inverse(kahanmaps, drawn):
+    kahanmaps("plot portrait lotka_volterra --eps 1/20 --start 1,2 --start 1,3 --steps 1 --backward")
+    # the exact image of (1, 2) is (191/211, 420/211); back from there
+    kahanmaps("plot portrait lotka_volterra --eps 1/20 --start 191/211,420/211 --steps 1 --backward")
+    np.testing.assert_allclose(drawn[1][0].points[1, 0], [1, 2], rtol=1e-14)
+
+
+def test_starts_come_from_a_file_or_at_random(kahanmaps, drawn, tmp_path):
+    (tmp_path / "starts.csv").write_text("y,x\n2,1\n3,1\n")
+    kahanmaps("plot portrait lotka_volterra --eps 1/20 --steps 0 --starts", tmp_path / "starts.csv")
+    kahanmaps("plot portrait harmonic --eps 1/20 --steps 0 --random 5 --box 2 --seed 3")
+    assert drawn[0][0].points[0].tolist() == [[1, 2], [1, 3]]
+    assert drawn[1][0].points.shape == (1, 5, 2)
+
+
+def test_of_more_than_two_variables_the_axes_are_chosen_and_said(kahanmaps, drawn):
+    outcome = kahanmaps("plot portrait euler_top --eps 1/10 --start 1,1/2,1/3 --steps 50")
+    assert "axes x1, x2" in outcome.err or "axes x1, x3" in outcome.err or "axes x2, x3" in outcome.err
+    assert len(drawn[0][0].labels) == 2
+
+
+def test_axes_are_drawn_in_the_order_they_are_named_in(kahanmaps, drawn):
+    kahanmaps(LV + " --axes y,x*y")
+    kahanmaps("plot portrait euler_top --eps 1/10 --start 1,1/2,1/3 --steps 5 --3d")
+    assert drawn[0][0].points[0, 0].tolist() == [2, 2]
+    assert len(drawn[1][0].labels) == 3
+
+
+def test_one_variable_is_drawn_over_the_step(kahanmaps, drawn):
+    kahanmaps("plot portrait riccati --eps 1/10 --start 0 --steps 3")
+    assert drawn[0][0].labels == ("step", "$x$")
+
+
+@pytest.mark.parametrize("word", ["--colour-by", "--color-by"])
+def test_points_are_coloured_by_an_integral(kahanmaps, drawn, word):
+    kahanmaps(f"plot portrait weierstrass --eps 1/10 --start=-1/2,0 --steps 40 {word} modified_H")
+    values = drawn[0][0].values
+    np.testing.assert_allclose(values, values[0, 0], atol=1e-13)  # conserved, up to rounding
+    assert drawn[0][0].value_label == "modified_H"
+
+
+def test_level_curves_go_through_the_starts_or_where_they_are_wanted(kahanmaps, drawn):
+    command = "plot portrait weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --window=-2,2,-2,2 --levels modified_H"
+    kahanmaps(command)
+    outcome = kahanmaps(command + " --levels-at=-1/2,1000")
+    through, at = (found.levels for found, _ in drawn)
+    assert len(through.levels) == 1
+    assert at.levels == (-0.5, 1000.0)
+    assert "1 of 2 levels of modified_H have no curve in the window" in outcome.err
+
+
+def test_points_outside_are_counted_on_standard_error_and_in_the_picture(kahanmaps, drawn):
+    outcome = kahanmaps("plot portrait --vars x,y --rhs x --rhs y --eps 1/4 --start 1,1 --steps 40")
+    assert "points lie outside the window" in outcome.err
+    assert drawn[0][1]["note"] == f"{drawn[0][0].left_out} points outside"
+
+
+def test_nothing_is_said_when_quiet(kahanmaps):
+    assert kahanmaps(LV + " -q").err == ""
+
+
+def test_an_orbit_that_ends_early_is_drawn_and_the_status_is_3(kahanmaps, tmp_path):
+    outcome = kahanmaps(
+        "plot portrait --vars x --rhs x^2 --eps 1 --start 1/2 --start 3 --steps 5 -o", tmp_path / "a.png"
+    )
+    assert outcome.status == 3
+    assert "1 of 2 orbits ended early: met a singular matrix I - eps f'" in outcome.err
+    assert (tmp_path / "a.png").exists()
+
+
+def test_a_density_counts_every_point(kahanmaps, drawn):
+    outcome = kahanmaps("plot portrait lotka_volterra --eps 1/20 --start 1,2 --start 1,3 --steps 400 --density")
+    assert outcome.status == 0
+    assert drawn[0][0].points == drawn[0][0].counts.sum() + drawn[0][0].outside == 802
+
+
+def test_an_interrupted_density_is_a_picture_of_what_was_counted(kahanmaps, drawn, monkeypatch, tmp_path):
+    def press(self, sentence):
+        monkeypatch.setattr(Progress, "__call__", lambda self, sentence: None)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Progress, "__call__", press)
+    outcome = kahanmaps(
+        "plot portrait harmonic --eps 1/20 --random 100 --steps 15000 --density -o", tmp_path / "part.png"
+    )
+    assert outcome.status == 130
+    assert "interrupted after step" in outcome.err
+    assert 0 < drawn[0][0].points < 100 * 15001
+    assert (tmp_path / "part.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [
+        ("o.npy", "--arithmetic float --kernel numpy"),
+        ("o.npz", "--arithmetic float --kernel numpy"),
+        ("exact.npz", ""),
+        ("o.jsonl", "--integral x*y"),
+        ("o.csv", "--integral x*y --format csv"),
+        ("balls.jsonl", "--arithmetic ball:100"),
+    ],
+)
+def test_stored_orbits_are_drawn_like_walked_ones(kahanmaps, drawn, tmp_path, name, how):
+    path = tmp_path / name
+    kahanmaps(f"orbit lotka_volterra --eps 1/20 --start 1,2 --steps 8 -q {how} -o", path)
+    assert kahanmaps("plot portrait --from", path).status == 0
+    orbit = FloatOrbit(load("lotka_volterra", {}).system, "1/20", [1, 2], 8)
+    np.testing.assert_allclose(drawn[0][0].points[:, 0], [x for _, x in orbit], rtol=1e-13)
+
+
+def test_points_are_coloured_by_an_integral_that_a_theorem_gives(kahanmaps, drawn):
+    words = "plot portrait weierstrass --eps 1/10 --start=-1/2,0 --steps 40 --colour-by"
+    kahanmaps(f"{words} 'modified H'")
+    kahanmaps(f"{words} H")  # of the flow, which the map does not conserve
+    kept, moved = (np.ptp(found.values) for found, _ in drawn)
+    assert kept < 1e-13
+    assert moved > 1e-4
+
+
+def test_a_stored_ensemble_takes_its_names_from_the_system(kahanmaps, drawn, tmp_path):
+    path = tmp_path / "e.npy"
+    kahanmaps("ensemble weierstrass --random 3 --box 1/4 --eps 1/10 --steps 30 --every 1 -q -o", path)
+    assert kahanmaps("plot portrait weierstrass --eps 1/10 --colour-by modified_H --from", path).status == 0
+    assert drawn[0][0].labels == ("$x$", "$y$")
+    assert kahanmaps("plot portrait --density --from", path).status == 0
+    assert drawn[1][0].points == 3 * 31
+
+
+def test_the_steps_of_a_file_are_kept_and_those_of_npy_are_records(kahanmaps, drawn, tmp_path):
+    for name in ("a.npz", "a.npy"):
+        kahanmaps(
+            "orbit riccati --eps 1/20 --start 0 --steps 8 --every 4 --arithmetic float --kernel numpy -q -o",
+            tmp_path / name,
+        )
+    assert "number of the record" not in kahanmaps("plot portrait --from", tmp_path / "a.npz").err
+    assert "number of the record" in kahanmaps("plot portrait --from", tmp_path / "a.npy").err
+    assert [found.points[:, 0, 0].tolist() for found, _ in drawn] == [[0, 4, 8], [0, 1, 2]]
+
+
+def test_a_stored_orbit_that_ended_early_has_status_3(kahanmaps, tmp_path):
+    kahanmaps("orbit lotka_volterra --eps 1/20 --start 1,2 --steps 50 --max-digits 99 -q -o", tmp_path / "a.jsonl")
+    outcome = kahanmaps("plot portrait --from", tmp_path / "a.jsonl")
+    assert outcome.status == 3
+    assert "1 of 1 orbit ended early: step 6 has numbers of" in outcome.err
+
+
+def test_exact_numbers_of_any_length_are_read(tmp_path):
+    header = '# {"variables": ["x"]}\nstep,x\n'
+    (tmp_path / "long.csv").write_text(f"{header}0,1{'0' * 9000}/3{'0' * 9000}\n")
+    assert read_orbits(str(tmp_path / "long.csv"), None).points.tolist() == [[[1 / 3]]]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.txt", "1,2", "found .txt, expected a file of kahanmaps orbit or ensemble"),
+        ("a.npy", "nothing", "found no .npy file that can be read"),
+        ("a.npz", "nothing", "found no .npz file that can be read"),
+        ("a.csv", "x,y\n1,2\n", "found no orbit that kahanmaps wrote"),
+        ("a.csv", '# {"variables": ["x"]}\nstep,x\n', "found no point in it"),
+        ("a.csv", '# {"variables": ["x"]}\nstep,x\n0,1e999\n', "expected one in the range of machine floats"),
+        ("a.csv", '# {"variables": ["x"]}\nstep,x\n0,1/0\n', "found no orbit that kahanmaps wrote"),
+        ("a.jsonl", "{}", "found no orbit that kahanmaps wrote (no 'record' in it)"),
+        ("a.jsonl", "", "found no orbit that kahanmaps wrote"),
+        ("a.jsonl", "[1, 2]", "found no orbit that kahanmaps wrote"),
+    ],
+)
+def test_files_that_hold_no_orbit_are_refused(kahanmaps, tmp_path, name, content, message):
+    (tmp_path / name).write_text(content)
+    outcome = kahanmaps("plot portrait --from", tmp_path / name)
+    assert outcome.status == 2
+    assert message in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("lotka_volterra", "missing --eps"),
+        ("lotka_volterra --eps 0", "found eps = 0"),
+        ("lotka_volterra --eps 1/20 --start 1", "found a start with 1 coordinates, expected 2: x, y"),
+        ("lotka_volterra --eps 1/20 --start 1,1 --random 3", "give --start or --random, not both"),
+        ("lotka_volterra --eps 1/20 --box 3", "--box and --seed are for --random N"),
+        ("lotka_volterra --eps 1/20 --steps -1", "found --steps -1"),
+        ("lotka_volterra --eps 1/20 --start 1,2 --steps 1000000000", "take fewer, or a density"),
+        ("lotka_volterra --eps 1/20 --axes x", "found --axes x, expected two or three"),
+        ("lotka_volterra --eps 1/20 --axes x,z", "found the name z, known are x, y, eps, a, b, c, d"),
+        ("lotka_volterra --eps 1/20 --axes x,y+", "expected"),
+        ("lotka_volterra --eps 1/20 --axes x,y --3d", "give --axes A,B,C or --3d, not both"),
+        ("lotka_volterra --eps 1/20 --start 1,2 --3d", "found 2 variables, expected at least 3"),
+        ("lotka_volterra --eps 1/20 --start 1,2 --window 0,1,2", "found a window of 3 numbers, expected 4"),
+        ("lotka_volterra --eps 1/20 --levels-at 1", "add --levels F"),
+        ("lotka_volterra --eps 1/20 --start 1,2 --axes x,x+y --levels x", "in the plane of two variables"),
+        ("euler_top --eps 1/20 --start 1,2,3 --axes x1,x2 --levels x3", "found x3 in it"),
+        ("lotka_volterra --eps 1/20 --density --lines", "it does not go with --lines"),
+        ("lotka_volterra --eps 1/20 --density --colour-by step", "it does not go with --colour-by"),
+        ("riccati --eps 1/20 --start 0 --density", "it takes two axes, and step is not one"),
+        ("- --eps 1/20 --starts -", "found - twice"),
+        ("lotka_volterra --eps 1/20 -o picture.gif", "found the ending .gif"),
+    ],
+)
+def test_wrong_use_is_refused_in_a_sentence(kahanmaps, words, message):
+    outcome = kahanmaps(f"plot portrait {words}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert message in outcome.err
+
+
+def test_walking_and_stored_orbits_do_not_mix(kahanmaps, tmp_path):
+    np.save(tmp_path / "o.npy", np.ones((3, 2)))
+    outcome = kahanmaps("plot portrait --steps 5 --from", tmp_path / "o.npy")
+    assert outcome.status == 2
+    assert "it does not go with --steps" in outcome.err
+
+
+def test_a_file_of_another_system_is_refused(kahanmaps, tmp_path):
+    np.save(tmp_path / "o.npy", np.ones((3, 2)))
+    outcome = kahanmaps("plot portrait euler_top --from", tmp_path / "o.npy")
+    assert outcome.status == 2
+    assert "found points of dimension 2, expected 3" in outcome.err

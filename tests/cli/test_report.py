@@ -1,0 +1,99 @@
+"""kahanmaps report: pages of an analysis, of verify, of checks and of a batch; what is refused; exit statuses."""
+
+from __future__ import annotations
+
+import pytest
+from cli_helpers import shell, terminal
+from page_helpers import require_sound
+from small_databases import ok, planned
+
+SMALL = "report --vars x,y --rhs 'x*y' --rhs=-x^2 --no-pictures"
+
+
+def test_a_page_on_standard_output_is_all_there_is(kahanmaps):
+    outcome = kahanmaps(SMALL)
+    page = require_sound(outcome.out)
+    assert (outcome.status, outcome.err) == (0, "")
+    assert "kahanmaps report --vars x,y --rhs 'x*y' '--rhs=-x^2' --no-pictures" in page.text
+
+
+def test_a_file_is_written_and_told(kahanmaps, tmp_path):
+    path = tmp_path / "page.html"
+    outcome = kahanmaps(SMALL, "-o", path)
+    assert (outcome.status, outcome.out) == (0, "")
+    assert outcome.err == f"{path}: {path.stat().st_size} bytes\n"
+    assert kahanmaps(SMALL, "-q -o", path).err == ""
+    require_sound(path.read_text())
+
+
+def test_the_same_command_gives_the_same_bytes(kahanmaps):
+    assert kahanmaps(SMALL).out == kahanmaps(SMALL).out
+
+
+def test_a_title_parameters_and_eps_are_taken_over(kahanmaps):
+    page = require_sound(kahanmaps("report lotka_volterra -p a=2 --eps 1/10 --no-pictures --title 'My map'").out)
+    assert page.headings[0] == (1, "My map")
+    assert "a = 2" in page.text
+    assert "eps = 1/10 (time step 2 eps = 1/5)" in page.text
+
+
+def test_the_paper_for_a_member_drawn_and_given(kahanmaps, pair):
+    drawn = kahanmaps("report --from verify --m 1 --section 6 --no-pictures")
+    assert drawn.status == 0
+    assert "section-6" in require_sound(drawn.out).ids
+    given = kahanmaps("report", pair, "--from verify --section 6 --no-pictures")
+    assert "pair, every eps" in require_sound(given.out).text
+
+
+def test_the_checks_that_apply(kahanmaps):
+    outcome = kahanmaps("report euler_top --from checks --no-pictures")
+    page = require_sound(outcome.out)
+    assert outcome.status == 0
+    assert {"check-integrals", "check-measure"} <= set(page.ids)
+    assert "check-poisson does not apply" in page.text
+
+
+def test_a_refuted_claim_gives_status_1_and_a_page_all_the_same(tmp_path):
+    (tmp_path / "a.toml").write_text('variables = ["x"]\n[system]\nrhs = ["x^2"]\n[integrals]\nI = "x"\n')
+    outcome = shell("kahanmaps report a.toml --from checks --no-pictures", tmp_path)
+    assert outcome.status == 1
+    assert "✗ refuted" in require_sound(outcome.out).text
+
+
+def test_a_batch(kahanmaps, tmp_path):
+    path = planned(tmp_path / "a.db", 1, 2, records=[ok(1, 7, "proved")])
+    outcome = kahanmaps("report --no-pictures --db", path)
+    assert outcome.status == 0
+    assert "1 of 2 tasks done" in require_sound(outcome.out).text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ("", "missing SYSTEM"),
+        ("nothing_of_this_name", "nothing_of_this_name"),
+        ("euler_top --from nonsense", "'nonsense'"),
+        ("euler_top --m 2", "--m is for --from verify or checks"),
+        ("euler_top --from verify --m 2", "give a system or say which member to draw (--m)"),
+        ("euler_top --from verify", "expected one of kind [family]"),
+        ("euler_top --from checks --symbolic a1", "--symbolic is for --from analyze"),
+        ("euler_top --db a.db", "found --db and SYSTEM"),
+        ("--db a.db --eps 1", "found --db and --eps"),
+        ("euler_top --by m", "--by is for --db"),
+        ("--db does-not-exist.db", "does-not-exist.db"),
+        ("euler_top --eps 0", "eps = 0"),
+        ("euler_top -o no/such/folder/a.html", "expected an existing one"),
+        ("euler_top -o .", "found a folder"),
+        ("--from checks --vars x --rhs x", "no check applies"),
+    ],
+)
+def test_wrong_use_is_told_and_has_status_2(kahanmaps, arguments, says):
+    outcome = kahanmaps(f"report {arguments}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert says in outcome.err
+
+
+def test_a_terminal_is_no_place_for_a_page():
+    outcome = terminal("report", "euler_top")
+    assert outcome.status == 2
+    assert "give -o FILE.html" in outcome.err

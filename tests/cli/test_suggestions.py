@@ -1,0 +1,74 @@
+"""Whatever is misspelt on the command line, something close to it is suggested; and nothing that is far from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+ORBIT = "--start 1,2,3 --eps 1/10 --steps 1"
+
+
+@pytest.mark.parametrize(
+    ("command", "meant"),
+    [
+        ("family nwe", "Did you mean new?"),
+        ("family asociated", "Did you mean associated?"),
+        ("batch staus", "Did you mean status"),
+        (f"orbit euler_top {ORBIT} --arithmtic exact", "--arithmetic"),
+        (f"orbit euler_top {ORBIT} --format cvs", "Did you mean csv?"),
+        (f"orbit euler_top {ORBIT} --method normalform", "Did you mean normal-form?"),
+        ("find-commuting three_wave --shape liner", "Did you mean linear?"),
+        ("--color allways systems", "Did you mean always?"),
+        ("analyze kirchhoff_case -p a1=1 -p b13=2", "did you mean b3 or b1?"),
+        ("batch tasks hieghts", "did you mean heights?"),
+        ("euler_top", "kahanmaps analyze euler_top"),
+        ("my.toml", "kahanmaps analyze my.toml"),
+    ],
+)
+def test_what_was_meant_is_suggested(kahanmaps, command, meant):
+    outcome = kahanmaps(command)
+    assert outcome.status == 2
+    assert meant in outcome.err
+
+
+@pytest.mark.parametrize(
+    "command", ["family xyzzy", f"orbit euler_top {ORBIT} --format xyzzy", "find-commuting three_wave --shape xyzzy"]
+)
+def test_nothing_is_suggested_for_what_is_like_nothing(kahanmaps, command):
+    outcome = kahanmaps(command)
+    assert outcome.status == 2
+    assert "Did you mean" not in outcome.err
+
+
+def test_an_unknown_parameter_is_told_with_those_that_there_are(kahanmaps):
+    assert "unknown parameter 'a4', this system has: a1, a2, a3" in kahanmaps("systems euler_top -p a4=1").err
+
+
+@pytest.mark.parametrize("command", ["check-measure {}", "systems {}", "check-commute euler_top {}", "family show {}"])
+def test_files_named_like_one_that_is_not_there_are_suggested(kahanmaps, tmp_path, command):
+    (tmp_path / "my_system.toml").touch()
+    (tmp_path / "other.toml").touch()
+    outcome = kahanmaps(command.format(tmp_path / "my_sytem.toml"))
+    assert outcome.status == 2
+    assert f"No such file or directory, did you mean {tmp_path / 'my_system.toml'}?" in outcome.err
+
+
+def test_a_folder_that_is_not_there_is_told(kahanmaps, tmp_path):
+    outcome = kahanmaps("systems", tmp_path / "nowhere" / "a.toml")
+    assert f"there is no folder {tmp_path / 'nowhere'}" in outcome.err
+
+
+def test_no_file_is_suggested_where_none_is_close(kahanmaps, tmp_path):
+    (tmp_path / "zebra.toml").touch()
+    assert "did you mean" not in kahanmaps("systems", tmp_path / "my.toml").err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [f"orbit euler_top {ORBIT} -o", "ensemble euler_top --random 2 --eps 1/10 --steps 1 -o", "family new --m 1 -o"],
+)
+def test_a_file_in_a_folder_that_is_not_there_cannot_be_made(kahanmaps, tmp_path, command):
+    outcome = kahanmaps(command, Path(tmp_path / "nowhere" / "x.npy"), *(["--arithmetic float"] * ("orbit" in command)))
+    assert outcome.status == 2
+    assert f"there is no folder {tmp_path / 'nowhere'}: make it first, or check the name" in outcome.err

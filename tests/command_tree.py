@@ -1,0 +1,57 @@
+"""All commands of the command line, and the examples in their help."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator
+
+import click
+
+from kahanmaps_cli.main import WELCOME, cli
+from kahanmaps_cli.options import Renamed
+
+
+def all_commands() -> list[tuple[str, click.Command]]:
+    """Every command and subcommand with the words that call it, without `kahanmaps`; the group itself first."""
+    return list(_below("", cli))
+
+
+def _below(words: str, command: click.Command) -> Iterator[tuple[str, click.Command]]:
+    yield words, command
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        for name in command.list_commands(context):
+            found = command.get_command(context, name)
+            assert found is not None
+            yield from _below(f"{words} {name}".strip(), found)
+
+
+def names_of(option: click.Option) -> list[str]:
+    """The names of an option that its help shows."""
+    return option.opts[:1] if isinstance(option, Renamed) else list(option.opts)
+
+
+def options_of(command: click.Command) -> list[click.Option]:
+    """The options that its help shows."""
+    return [option for option in command.params if isinstance(option, click.Option) and not option.hidden]
+
+
+def examples_in(text: str) -> list[str]:
+    """The lines that begin with `kahanmaps`, those that end with a backslash joined with the next."""
+    joined = re.sub(r"\\\n\s*", "", text)
+    return [line.strip() for line in joined.splitlines() if re.match(r"\s+kahanmaps( |$)", line)]
+
+
+def all_examples() -> list[str]:
+    """Every example in the help of every command, and in the first steps."""
+    texts = [command.help or "" for _, command in all_commands()]
+    found = [example for text in [*texts, WELCOME] for example in examples_in(text)]
+    return list(dict.fromkeys(example for example in found if "--help" not in example))
+
+
+def words_of(example: str) -> list[str]:
+    """What an example hands to kahanmaps: without comments, redirections and what comes behind a pipe."""
+    words = shlex.split(example, comments=True)
+    end = next((k for k, word in enumerate(words) if word in ("|", ">")), len(words))
+    return words[1:end]

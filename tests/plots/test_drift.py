@@ -1,0 +1,268 @@
+"""Drift: errors against exact ones, bins that hide nothing, honest zeros and ends, and the picture of them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.errors import InputError
+from kahanmaps.family.structure import structure_of
+from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
+from kahanmaps.maps.fast import FloatOrbit
+from kahanmaps.plots.draw_drift import clipped_from, draw_drift
+from kahanmaps.plots.drift import BINS, _Bins, _edges, small_start, survey_drift
+from kahanmaps.plots.drift_functions import OfTheImage, asked_functions, functions_of, known_functions
+from kahanmaps.plots.figures import picture_bytes
+from kahanmaps.plots.style import Style
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+EPS = fmpq(1, 20)
+CIRCLE = SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]), "circle")
+SQUARE = SystemFile.from_system(QuadraticSystem.from_text(["x"], ["x^2"]), "square")
+
+
+def survey(file, start, steps, requests, methods=("generic",), eps=EPS, **how):
+    return survey_drift(file.system, eps, start, steps, asked_functions(file, eps, requests), methods, **how)
+
+
+def only(found):
+    [curve] = found.curves
+    return curve
+
+
+# Functions
+
+
+def test_integrals_with_the_image_in_them_have_their_exact_values():
+    file = load("paper_m2")
+    start = [fmpq(1, 3), fmpq(-1, 5), fmpq(2, 7), fmpq(1, 2)]
+    points = np.array([[float(entry.p) / float(entry.q) for entry in start]] * 3)
+    points[1] = np.nan
+    hamiltonian, member = file.hamiltonian, file.member
+    for integral in (ModifiedHamiltonian(hamiltonian), CommutantIntegral(hamiltonian, member.A, 1)):
+        function = OfTheImage(integral, EPS, "I")
+        value = integral.value(QQ, EPS, start)
+        assert function.at(start) == value
+        found = function(points)
+        assert np.isnan(found).tolist() == [False, True, False]
+        assert found[0] == pytest.approx(int(value.p) / int(value.q), rel=1e-12)
+
+
+def test_a_hamiltonian_system_without_claims_has_its_modified_hamiltonian():
+    x, y = ring(["x", "y"]).gens()
+    file = SystemFile.from_hamiltonian(CubicHamiltonian((x**2 + y**2) / 2 + x**3 / 3, standard_structure(2)), "w")
+    assert [function.name for function in known_functions(file, EPS)] == ["modified H", "H"]
+    found = survey_drift(file.system, EPS, ["1/4", "1/8"], 100, known_functions(file, EPS), ("generic",))
+    assert [bool(curve.errors.max() < 1e-12) for curve in found.curves] == [True, False]
+
+
+def test_known_functions_are_claims_and_then_H():
+    assert [function.name for function in known_functions(load("paper_m2"), EPS)] == ["I1", "I2", "H"]
+    assert list(functions_of(load("paper_m2"), EPS)) == ["I1", "I2", "modified H", "H~_1", "H"]
+
+
+def test_a_system_of_which_nothing_is_known_says_so():
+    with pytest.raises(InputError, match=r"found no known integral of circle.*--integral NAME=EXPR"):
+        known_functions(CIRCLE, EPS)
+
+
+def test_expressions_may_contain_eps():
+    [function] = asked_functions(CIRCLE, EPS, [("E", "x^2 + eps*y")])
+    assert function(np.array([[2.0, 20.0]])).tolist() == [5.0]
+
+
+@pytest.mark.parametrize("requests", [[("", "x"), ("", "x")], [("E", "x"), ("E", "y")]])
+def test_two_functions_of_one_name_are_refused(requests):
+    with pytest.raises(InputError, match="found two functions of the name"):
+        asked_functions(CIRCLE, EPS, requests)
+
+
+# Errors
+
+
+def test_errors_are_relative_distances_from_the_start():
+    found = survey(CIRCLE, [2, 0], 50, [("E", "x")])
+    x = np.array([x[0] for _, x in FloatOrbit(CIRCLE.system, EPS, [2, 0], 50)])
+    assert only(found).steps.tolist() == list(range(1, 51))
+    assert only(found).errors.tolist() == (abs(x[1:] - 2) / 2).tolist()
+    assert found.relative == {"E": True}
+
+
+def test_errors_are_absolute_where_the_function_is_0_at_the_start():
+    found = survey(CIRCLE, [2, 0], 50, [("E", "y")])
+    y = np.array([x[1] for _, x in FloatOrbit(CIRCLE.system, EPS, [2, 0], 50)])
+    assert only(found).errors.tolist() == abs(y[1:]).tolist()
+    assert found.relative == {"E": False}
+
+
+def test_whether_it_is_0_is_decided_exactly():
+    # 1/10 + 1/5 - 3/10 is 0, and 5.6e-17 in doubles.
+    assert survey(CIRCLE, ["1/10", "1/5"], 5, [("E", "x + y - 3/10")]).relative == {"E": False}
+
+
+def test_an_integral_of_the_map_stays_and_another_function_does_not():
+    found = survey(load("euler_top"), ["1/2", 1, "1/3"], 1000, [("", "F1"), ("E", "x1^2 + x2^2 + x3^2")])
+    kept, moved = (curve.errors.max() for curve in found.curves)
+    assert kept < 1e-13
+    assert moved > 1e-3
+
+
+def test_the_methods_conserve_different_things():
+    found = survey(load("weierstrass"), ["1/4", "1/8"], 1000, [("", "known")], ("generic", "rk4", "midpoint"))
+    largest = {(curve.function, curve.method): curve.errors.max() for curve in found.curves}
+    assert largest["modified_H", "generic"] < 1e-10 < 1e-5 < largest["modified_H", "rk4"]
+    assert largest["H", "generic"] > 1e-5
+
+
+def test_normal_form_and_elimination_are_both_drawn():
+    file = load("paper_m2")
+    form = structure_of(file.system, file.hamiltonian, file.member).form
+    found = survey(file, ["1/50", "1/70", "-1/90", "1/80"], 200, [("", "I1")], ("generic", "normal-form"), form=form)
+    assert [curve.method for curve in found.curves] == ["generic", "normal-form"]
+    assert all(curve.errors.max() < 1e-10 for curve in found.curves)
+
+
+def test_an_orbit_that_ends_early_is_no_whole_one():
+    found = survey(SQUARE, [10], 100, [("E", "x")], ("rk4", "midpoint"), eps=fmpq(1, 2))
+    assert {method: end.is_whole for method, end in found.ends.items()} == {"rk4": False, "midpoint": False}
+    assert [len(curve.steps) for curve in found.curves][1] == 0
+
+
+def test_points_without_a_value_are_counted():
+    file = SystemFile.from_system(QuadraticSystem.from_text(["x"], ["1"]), "shift")
+    found = survey(file, [0], 10, [("E", "1/(x - 1)")], eps=fmpq(1, 2))  # x_n = n
+    assert only(found).undefined == 1
+    assert only(found).steps.tolist() == list(range(2, 11))
+
+
+@pytest.mark.parametrize(
+    ("start", "steps", "eps", "methods"),
+    [
+        ([1], 10, "1/2", ("generic",)),
+        ([1, 2], 0, "1/2", ("generic",)),
+        ([1, 2], 10**10, "1/2", ("generic",)),
+        ([1, 2], 10, 0, ("generic",)),
+        ([1, 2], 10, "1/2", ("euler",)),
+        ([1, 2], 10, "1/2", ("normal-form",)),
+    ],
+)
+def test_wrong_values_are_refused(start, steps, eps, methods):
+    with pytest.raises(InputError, match=r"expected|needs"):
+        survey_drift(CIRCLE.system, eps, start, steps, asked_functions(CIRCLE, EPS, [("E", "x")]), methods)
+
+
+def test_a_pole_at_the_start_is_refused():
+    with pytest.raises(InputError, match="E has no value in machine numbers at the start"):
+        survey(CIRCLE, [1, 0], 10, [("E", "1/(x - 1)")])
+
+
+# Bins
+
+
+@pytest.mark.parametrize("linear", [False, True])
+@pytest.mark.parametrize("portion", [1, 7, 1000, 5000])
+def test_the_largest_of_every_bin_is_kept_however_errors_come(linear, portion):
+    errors = np.random.default_rng(1).random(3000)
+    bins = _Bins(_edges(3000, linear))
+    for first in range(0, 3000, portion):
+        bins.add(first + 1, errors[first : first + portion])
+    curve = bins.curve("generic", "E")
+    edges = _edges(3000, linear)
+    expected = [errors[low:high].max() for low, high in pairwise(edges)]
+    assert curve.errors.tolist() == expected
+    assert errors[curve.steps - 1].tolist() == expected
+
+
+@pytest.mark.parametrize("linear", [False, True])
+@pytest.mark.parametrize("steps", [1, 2, BINS, BINS + 1, 10**6, 10**9])
+def test_bins_cover_all_steps_and_are_few(steps, linear):
+    edges = _edges(steps, linear)
+    assert (edges[0], edges[-1]) == (0, steps)
+    assert (np.diff(edges) > 0).all()
+    assert len(edges) <= BINS + 2
+
+
+def test_a_random_start_is_the_same_for_the_same_seed():
+    first, second, other = (small_start(CIRCLE.system, EPS, seed) for seed in (0, 0, 1))
+    assert first == second != other
+
+
+def test_a_random_start_is_small_enough_for_rk4():
+    found = survey(load("paper_m2"), small_start(load("paper_m2").system, EPS), 1000, [("", "I1")], ("rk4",))
+    assert found.ends["rk4"].is_whole
+
+
+# The picture
+
+
+def drawn(found, **how):
+    return draw_drift(found, Style(width=12), **how)
+
+
+def lines(axes):
+    return {line.get_color(): line for line in axes.lines if len(line.get_xdata()) > 1}
+
+
+def test_there_is_a_panel_for_each_function_and_a_line_for_each_method():
+    found = survey(load("weierstrass"), ["1/4", "1/8"], 300, [("", "known")], ("generic", "rk4", "midpoint"))
+    figure = drawn(found)
+    assert [axes.get_ylabel() for axes in figure.axes] == ["relative error of modified_H", "relative error of $H$"]
+    assert [len(lines(axes)) for axes in figure.axes] == [3, 3]
+    assert len({line.get_linestyle() for line in figure.axes[0].lines}) == 3
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["Kahan", "RK4", "implicit midpoint"]
+    assert figure.legends[0].get_title().get_text() == r"time step $2\varepsilon = 1/10$"
+
+
+def test_an_exact_0_is_in_the_band_and_not_left_out():
+    found = survey(CIRCLE, [1, 0], 20, [("E", "0*x + 1 + 0*y")])
+    [axes] = drawn(found).axes
+    heights = axes.lines[0].get_ydata()
+    assert len(heights) == 20
+    assert [text.get_text() for text in axes.texts] == ["0"]
+    assert (heights >= axes.get_ylim()[0]).all()
+    assert len(axes.patches) == 1
+
+
+def test_there_is_no_band_without_an_exact_0():
+    [axes] = drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")])).axes
+    assert (len(axes.texts), len(axes.patches)) == (0, 0)
+
+
+def test_what_blows_up_is_an_arrow_and_flattens_nothing():
+    found = survey(SQUARE, ["1/10"], 2000, [("E", "x")], ("generic", "rk4"))
+    [axes] = drawn(found).axes
+    limit = clipped_from(found, "E")
+    assert any(line.get_marker() == "^" and line.get_ydata().tolist() == [limit] for line in axes.lines)
+    assert axes.get_ylim()[1] < 10 * limit < found.curves[1].errors.max()
+    assert any("ended at step" in text.get_text() for text in axes.figure.legends[0].get_texts())
+
+
+def test_an_orbit_that_ends_early_has_a_cross():
+    found = survey(SQUARE, ["1"], 30, [("E", "1/x")], ("generic", "midpoint"))
+    [axes] = drawn(found).axes
+    assert [line.get_marker() for line in axes.lines].count("x") == 1
+
+
+@pytest.mark.parametrize(("scale", "expected"), [("loglog", "log"), ("semilog", "linear")])
+def test_the_axis_of_steps_is_as_asked_for(scale, expected):
+    assert drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")]), scale=scale).axes[0].get_xscale() == expected
+
+
+def test_another_scale_is_refused():
+    with pytest.raises(InputError, match="expected loglog or semilog"):
+        drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")]), scale="polar")
+
+
+def test_the_same_survey_is_the_same_bytes():
+    first, second = (
+        picture_bytes(drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")])), "svg", Style(width=12)) for _ in range(2)
+    )
+    assert first == second

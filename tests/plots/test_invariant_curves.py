@@ -1,0 +1,308 @@
+"""Invariant curves: planes and orbits agree with the exact map, dots lie on their curves, and wrong ones do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flint import fmpq_poly
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.errors import HypothesisError, InputError
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves, panels_of
+from kahanmaps.plots.figures import picture_bytes
+from kahanmaps.plots.invariant_curves import MAX_POINTS, find_invariant_curves
+from kahanmaps.plots.plane_views import Disc, Rectangle, view_of
+from kahanmaps.plots.style import Style
+from kahanmaps.plots.symmetric_planes import ONE_LINE, THREE_LINES, ZERO
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+STYLE = Style(width=12)
+START = {2: ["1/3", "1/5"], 4: ["1/2", "-1/3", 0, 1], 6: [1, 0, "1/2", 0, "1/3", 1]}
+# Dots and coefficients are right to 2^-53; the defect is relative to the terms of the equation, about ten of them.
+ROUNDING = 1e-14
+
+
+def member_file(name):
+    members = {
+        "m = 1": lambda: SystemFile.from_system(monkey_saddle()),
+        "m = 2": lambda: load("paper_m2"),
+        "m = 3": lambda: load("paper_m3"),
+        "real quadratic roots": lambda: SystemFile.from_member(draw_with_chi(fmpq_poly([-2, 0, 1]), seed=3)),
+        "one real root of three": lambda: load("paper_m3_irreducible"),
+        "a sign": lambda: signed(),
+        "hidden": lambda: SystemFile.from_system(load("paper_m2").system),
+        "hidden, another J": lambda: another_structure(),
+    }
+    return members[name]()
+
+
+def monkey_saddle():
+    return QuadraticSystem.from_text(["x", "y"], ["-6*x*y", "3*y^2 - 3*x^2"])  # H = x^3 - 3 x y^2
+
+
+def signed():
+    member = draw_with_eigenvalues([1, -2], seed=7)
+    return SystemFile.from_member(replace(member, signs=(1, -1)))
+
+
+def another_structure():
+    hamiltonian = load("paper_m2").hamiltonian
+    return SystemFile.from_hamiltonian(CubicHamiltonian(hamiltonian.H, 3 * standard_structure(4)))
+
+
+MEMBERS = [
+    "m = 1",
+    "m = 2",
+    "m = 3",
+    "real quadratic roots",
+    "one real root of three",
+    "a sign",
+    "hidden",
+    "hidden, another J",
+]
+
+
+@pytest.fixture(scope="module")
+def curves():
+    cache = {}
+
+    def of(name):
+        if name not in cache:
+            file = member_file(name)
+            cache[name] = find_invariant_curves(file, [START[file.system.dim]], "1/20", 60)
+        return cache[name]
+
+    return of
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+def test_all_dots_lie_on_the_curve_of_their_plane(curves, name):
+    for plane in curves(name).planes:
+        for orbit in plane.orbits:
+            if orbit.cubic is not None:
+                assert orbit.cubic.defect(orbit.u, orbit.v) < ROUNDING
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+def test_dots_of_another_eps_do_not_lie_on_it(curves, name):
+    file = member_file(name)
+    other = find_invariant_curves(file, [START[file.system.dim]], "1/21", 60)
+    for plane, wrong in zip(curves(name).planes, other.planes, strict=True):
+        if plane.is_real and plane.shape != ZERO:
+            assert plane.orbits[0].cubic.defect(wrong.orbits[0].u, wrong.orbits[0].v) > 1e-4
+
+
+def test_dots_of_one_plane_do_not_lie_on_the_curve_of_another(curves):
+    first, second = curves("m = 2").planes
+    assert first.orbits[0].cubic.defect(second.orbits[0].u, second.orbits[0].v) > 0.01
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+def test_the_planes_together_are_the_exact_orbit(curves, name):
+    file, found = member_file(name), curves(name)
+    phi, point = KahanMap(file.system, "1/20"), START[file.system.dim]
+    for k in range(8):
+        # The planes are added up in doubles: a few roundings of numbers as large as the orbit's.
+        assert found.originals[0][k] == pytest.approx(rounded(phi.point(point)), rel=1e-10, abs=1e-10)
+        point = phi.step(point)
+
+
+def rounded(point):
+    return [int(entry.p) / int(entry.q) for entry in point]
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+def test_the_coordinates_are_the_forms_at_the_points(curves, name):
+    found = curves(name)
+    for plane in found.planes:
+        assert found.originals[0][:5] @ plane.u_form == pytest.approx(plane.orbits[0].u[:5], rel=1e-9)
+        assert found.originals[0][:5] @ plane.v_form == pytest.approx(plane.orbits[0].v[:5], rel=1e-9)
+
+
+def test_the_curve_is_the_conserved_quantity_of_the_catalogue(curves):
+    # paper_m2 claims I1 and I2 = h_i/(1 + eps^2 D_i): at the start they are the levels, up to 1/chi'(root) = -1, 1
+    file, found = load("paper_m2"), curves("m = 2")
+    levels = sorted(abs(p.orbits[0].cubic.above / p.orbits[0].cubic.below) for p in found.planes)
+    point = [QQ.convert(entry) for entry in (*START[4], "1/20")]
+    claimed = [f.numerator(*point) / f.denominator(*point) for f in file.integrals.values()]
+    assert levels == pytest.approx(sorted(map(abs, rounded(claimed))))
+
+
+def test_roots_are_named_exactly_where_they_are_rational(curves):
+    assert [plane.root_text for plane in curves("m = 3").planes] == ["1", "2", "3"]
+    assert [plane.root_text for plane in curves("real quadratic roots").planes] == ["-1.4142", "1.4142"]
+    # t^3 + t^2 - 1, by PARI/GP 2.15: polroots
+    assert [plane.root_text for plane in curves("one real root of three").planes] == ["0.75488", "-0.87744 +- 0.74486i"]
+
+
+def test_a_complex_plane_has_dots_but_no_curve(curves):
+    real, pair = curves("one real root of three").planes
+    assert real.orbits[0].cubic is not None
+    assert pair.orbits[0].cubic is None
+    assert np.iscomplexobj(pair.orbits[0].u)
+
+
+def test_a_sign_turns_one_plane_around():
+    member = draw_with_eigenvalues([1, -2], seed=7)
+    plus = find_invariant_curves(SystemFile.from_member(member), [START[4]], "1/10", 3)
+    other = find_invariant_curves(SystemFile.from_member(replace(member, signs=(1, -1))), [START[4]], "1/10", 3)
+    # The first factor is t + 2 with sign +: same plane, same orbit; the other one has h -> -h.
+    assert [plane.root_text for plane in plus.planes] == ["-2", "1"]
+    same, turned = other.planes
+    assert same.orbits[0].u == pytest.approx(plus.planes[0].orbits[0].u)
+    assert abs(turned.orbits[0].u[1] - plus.planes[1].orbits[0].u[1]) > 1e-6
+
+
+def test_a_circle_of_poles_is_met_at_the_first_step():
+    # 1 + eps^2 D = 1 - 36 eps^2 (x^2 + y^2) is 0 at (3/5, 4/5) for eps = 1/6
+    found = find_invariant_curves(SystemFile.from_system(monkey_saddle()), [["3/5", "4/5"]], "1/6", 5)
+    assert found.poles == (1,)
+    assert len(found.planes[0].orbits[0].u) == 1
+
+
+def test_one_pole_ends_the_orbit_in_all_planes():
+    rhs = ["-6*x*z", "0", "3*z^2 - 3*x^2", "-y^2"]
+    system = QuadraticSystem.from_text(["x", "y", "z", "w"], rhs)
+    found = find_invariant_curves(SystemFile.from_system(system), [["3/5", 1, "4/5", 1]], "1/6", 5)
+    assert {len(plane.orbits[0].u) for plane in found.planes} == {1}
+
+
+def test_a_plane_at_rest_is_said_to_be_one():
+    system = QuadraticSystem.from_text(["x", "y", "z", "w"], ["0", "0", "-x^2", "0"])
+    found = find_invariant_curves(SystemFile.from_system(system), [[1, 3, 1, 1]], "1/6", 5)
+    assert ZERO in [plane.shape for plane in found.planes]
+
+
+@pytest.mark.parametrize(
+    ("starts", "steps", "message"),
+    [
+        ([], 5, "found 0 starts"),
+        ([START[4]] * 8, 5, "found 8 starts"),
+        ([START[4]], -1, "found -1 steps"),
+        ([START[4]], MAX_POINTS, "expected 0 or more steps and at most 1000000 points"),
+        ([[1, 2]], 5, "found a point with 2 coordinates, expected 4"),
+        ([[10**200, 0, 0, 0]], 5, "scale the start"),
+    ],
+)
+def test_wrong_sizes_are_refused(starts, steps, message):
+    with pytest.raises(InputError, match=message):
+        find_invariant_curves(load("paper_m2"), starts, "1/20", steps)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"), [("euler_top", "x' is not J grad H"), ("planar_cubic_hamiltonian", "not a homogeneous cubic")]
+)
+def test_a_system_that_is_no_member_is_told_so(name, reason):
+    with pytest.raises(HypothesisError, match=reason):
+        find_invariant_curves(load(name), [[1] * load(name).system.dim], "1/20", 5)
+
+
+def test_a_repeated_root_is_told():
+    with pytest.raises(HypothesisError, match="chi has a repeated root"):
+        find_invariant_curves(SystemFile.from_member(draw_with_eigenvalues([1, 1], seed=7)), [START[4]], "1/20", 5)
+
+
+def test_each_plane_is_a_panel_and_a_complex_one_is_two(curves):
+    assert [(place, column) for place, _, column in panels_of(curves("one real root of three"))] == [
+        ("1", "uv"),
+        ("2", "u"),
+        ("2", "v"),
+    ]
+
+
+def test_dots_of_one_step_have_one_colour_in_all_panels(curves):
+    figure = draw_invariant_curves(curves("m = 3"), STYLE, original=(0, 1))
+    clouds = [axes.collections[0] for axes in figure.axes[:4]]
+    for cloud in clouds:
+        assert np.array_equal(cloud.get_array(), np.arange(61))
+        assert cloud.norm is clouds[0].norm
+
+
+def test_the_dots_drawn_are_the_orbit(curves):
+    found = curves("m = 2")
+    figure = draw_invariant_curves(found, STYLE)
+    orbit = found.planes[1].orbits[0]
+    assert np.array_equal(figure.axes[1].collections[0].get_offsets(), np.stack([orbit.u, orbit.v], axis=1))
+
+
+def test_the_lines_drawn_lie_on_the_curve(curves):
+    found = curves("m = 2")
+    axes = draw_invariant_curves(found, STYLE).axes[0]
+    lines = [line for line in axes.lines if line.get_marker() == "None"]
+    u, v = (np.concatenate([line.get_data()[k] for line in lines]) for k in (0, 1))
+    window = view_of(found.planes[0])
+    inside = np.hypot(u, v) < 10 * max(window.half)  # what is farther is cut off where it is not seen
+    assert inside.any()
+    assert found.planes[0].orbits[0].cubic.defect(u[inside], v[inside]) < 1e-7
+
+
+def test_panels_are_named_by_root_and_coordinates(curves):
+    figure = draw_invariant_curves(curves("one real root of three"), STYLE)
+    assert figure.axes[0].get_title() == r"$\lambda_{1} = 0.75488$"
+    assert figure.axes[1].get_title() == r"$\lambda_{2,3} = -0.87744 \pm  0.74486\,\mathrm{i}$"
+    assert [axes.get_xlabel() for axes in figure.axes[:2]] == ["$u_{1}$", r"$\mathrm{Re}\,u_{2}$"]
+
+
+def test_a_pole_is_said_in_the_picture():
+    found = find_invariant_curves(SystemFile.from_system(monkey_saddle()), [["3/5", "4/5"], [1, 3]], "1/6", 5)
+    figure = draw_invariant_curves(found, STYLE, labels=("one", "two"))
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["one (a pole at step 1)", "two"]
+
+
+def test_the_disc_shows_every_dot(curves):
+    found = curves("m = 3")
+    for axes in draw_invariant_curves(found, STYLE, projective=True).axes[:3]:
+        assert np.linalg.norm(axes.collections[0].get_offsets(), axis=1).max() <= 1
+
+
+def test_dots_and_curve_agree_in_the_disc(curves):
+    plane = curves("m = 2").planes[0]
+    orbit, disc = plane.orbits[0], Disc.of(plane)
+    x, y = disc.place(orbit.u, orbit.v)
+    arcs = [np.stack(disc.arc(rows, orbit.cubic.length), axis=1) for rows in orbit.cubic.arcs()]
+    vertices = np.concatenate(arcs)
+    # neighbouring vertices are at most 0.02 apart
+    assert max(np.linalg.norm(vertices - point, axis=1).min() for point in np.stack([x, y], axis=1)) < 0.02
+
+
+def test_the_window_counts_what_it_leaves_out(curves):
+    plane = curves("m = 2").planes[0]
+    view, orbit = view_of(plane), plane.orbits[0]
+    (cx, cy), (hx, hy) = view.centre, view.half
+    assert view.outside == np.sum((abs(orbit.u - cx) > hx) | (abs(orbit.v - cy) > hy))
+    assert view.outside < 0.25 * len(orbit.u)
+
+
+def test_a_threefold_curve_is_drawn_with_equal_scales(curves):
+    shapes = {plane.shape: view_of(plane) for plane in curves("m = 2").planes}
+    assert shapes[THREE_LINES].half[0] == shapes[THREE_LINES].half[1]
+    assert shapes[ONE_LINE].half[0] != shapes[ONE_LINE].half[1]
+
+
+def test_one_dot_has_a_window():
+    view = Rectangle.around([(np.array([3.0]), np.array([0.0]))])
+    assert view.outside == 0
+    assert all(half > 0 for half in view.half)
+
+
+def test_the_flow_is_dashed(curves):
+    axes = draw_invariant_curves(curves("m = 2"), STYLE, flow=True).axes[0]
+    assert any(line.is_dashed() for line in axes.lines)
+    assert not any(line.is_dashed() for line in draw_invariant_curves(curves("m = 2"), STYLE).axes[0].lines)
+
+
+def test_wrong_variables_are_refused(curves):
+    with pytest.raises(InputError, match="two numbers from 0 to 3"):
+        draw_invariant_curves(curves("m = 2"), STYLE, original=(0, 4))
+
+
+def test_the_same_picture_is_the_same_bytes(curves):
+    first, second = (picture_bytes(draw_invariant_curves(curves("m = 2"), STYLE), "svg", STYLE) for _ in range(2))
+    assert first == second

@@ -1,0 +1,94 @@
+"""Level curves: their vertices lie on the level, poles make no curves, orbits of the map lie on those of integrals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from flint import fmpq
+
+from kahanmaps.errors import InputError
+from kahanmaps.plots.level_sets import level_curves, levels_through
+from kahanmaps.plots.point_functions import point_function
+from kahanmaps.plots.trajectories import ensemble_for, walked
+from kahanmaps.systems.catalog import load
+
+SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
+STARTS = np.array([[-0.5, 0.0], [-0.3, 0.4]])
+
+
+@pytest.fixture(scope="module")
+def weierstrass():
+    file = load("weierstrass", {})
+    points = walked(ensemble_for(file.system, "1/5", STARTS, 200), 200).points
+    return file, points
+
+
+def distances(points, curves):
+    """From each point to the nearest vertex."""
+    vertices = np.concatenate([piece for pieces in curves.pieces for piece in pieces])
+    return np.array([np.hypot(*(vertices - x).T).min() for x in points.reshape(-1, 2)])
+
+
+def test_the_integral_has_its_level_at_every_vertex(weierstrass):
+    file, _ = weierstrass
+    function = point_function("modified_H", file.variables, fmpq(1, 5), named=file.integrals)
+    curves = level_curves(function, (0, 1), 2, levels_through(function, STARTS), ((-1.5, 1.0), (-2.0, 2.0)))
+    assert curves.missing == 0
+    for level, pieces in zip(curves.levels, curves.pieces, strict=True):
+        for piece in pieces:
+            # Newton's method ends at the rounding of polynomials with values of order 1 and gradients not below 0.1
+            np.testing.assert_allclose(function(piece), level, atol=1e-12)
+
+
+def test_the_orbits_lie_on_the_curves_through_their_starts(weierstrass):
+    file, points = weierstrass
+    window = ((-1.5, 1.0), (-2.0, 2.0))
+    kept = point_function("modified_H", file.variables, fmpq(1, 5), named=file.integrals)
+    curves = level_curves(kept, (0, 1), 2, levels_through(kept, STARTS), window)
+    # vertices are at most a mesh of 4/300 apart along the curve
+    assert distances(points, curves).max() < 0.5 * 4 / 300 * 1.5
+
+
+def test_the_energy_of_the_flow_is_seen_not_to_be_conserved(weierstrass):
+    file, points = weierstrass
+    energy = point_function("-2*x^3 + y^2/2 + 2*x", file.variables)
+    curves = level_curves(energy, (0, 1), 2, levels_through(energy, STARTS), ((-1.5, 1.0), (-2.0, 2.0)))
+    assert distances(points, curves).max() > 2 * 4 / 300
+
+
+def test_a_pole_is_no_curve():
+    # 1/x changes its sign across x = 0, where it is never 1: contours of its values would run along the pole
+    curves = level_curves(point_function("1/x", ["x", "y"]), (0, 1), 2, [1.0], SQUARE)
+    vertices = np.concatenate(curves.pieces[0])
+    np.testing.assert_allclose(vertices[:, 0], 1.0)
+
+
+def test_a_level_that_is_not_taken_is_missing():
+    curves = level_curves(point_function("x^2 + y^2", ["x", "y"]), (0, 1), 2, [-1.0, 1.0], SQUARE)
+    assert curves.missing == 1
+
+
+def test_levels_through_starts_are_each_once_and_poles_none():
+    function = point_function("x/y", ["x", "y"])
+    assert levels_through(function, np.array([[2.0, 1.0], [4.0, 2.0], [1.0, 0.0], [-1.0, 1.0]])) == (-1.0, 2.0)
+
+
+def test_the_plane_may_be_one_of_many_variables():
+    curves = level_curves(point_function("z - x", ["x", "y", "z"]), (2, 0), 3, [1.0], SQUARE)
+    z, x = np.concatenate(curves.pieces[0]).T
+    np.testing.assert_allclose(z - x, 1.0)
+
+
+def test_a_function_of_other_variables_is_refused():
+    with pytest.raises(InputError, match="found y in it, expected a function of x and z alone"):
+        level_curves(point_function("x + y", ["x", "y", "z"]), (0, 2), 3, [1.0], SQUARE)
+
+
+def test_too_many_levels_are_refused():
+    with pytest.raises(InputError, match="found 201 levels"):
+        level_curves(point_function("x", ["x", "y"]), (0, 1), 2, range(201), SQUARE)
+
+
+def test_values_beyond_the_range_of_doubles_leave_gaps_and_no_warning():
+    curves = level_curves(point_function("x^64 + y", ["x", "y"]), (0, 1), 2, [0.5], ((-1e6, 1e6), (-1, 1)))
+    assert curves.missing == 0

@@ -1,0 +1,174 @@
+"""Plane cubics: all of the real curve is found, every vertex lies on it; symmetric coordinates are what they claim."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from flint import arb, ctx
+
+from kahanmaps.maps.planar_block import PlanarBlock
+from kahanmaps.plots.plane_cubics import PlaneCubic
+from kahanmaps.plots.symmetric_planes import (
+    ONE_LINE,
+    REPEATED,
+    THREE_LINES,
+    ZERO,
+    inverse,
+    symmetric_coordinates,
+    transformed,
+)
+
+FORMS = {
+    "three lines": (1.0, 0.0, -3.0, 0.0),
+    "one line": (1.0, 0.0, 3.0, 0.0),
+    "a double line": (0.0, 1.0, 0.0, 0.0),
+    "a cube": (1.0, 0.0, 0.0, 0.0),
+    "any": (1.0, 2.0, 3.0, 4.0),
+}
+# Where two roots s meet, rounding moves them by the square root of 2^-52, though along the curve: across it, by less.
+ACROSS = 1e-6
+
+
+def vertices(cubic):
+    """The finite vertices, as u and v."""
+    rows = np.concatenate(cubic.arcs())
+    rows = rows[rows[:, 2] > 1e-9]
+    return cubic.length * rows[:, 0] / rows[:, 2], cubic.length * rows[:, 1] / rows[:, 2]
+
+
+def distance(cubic, u, v):
+    """The largest distance of points from the curve, to first order, relative to how far out they are."""
+    (a, b, c, d), (p, q, r) = cubic.h, cubic.D
+    D = cubic.eps**2 * (p * u * u + q * u * v + r * v * v)
+    value = cubic.below * (a * u**3 + b * u * u * v + c * u * v * v + d * v**3) - cubic.above * (1 + D)
+    return float(np.max(np.abs(value) / np.hypot(*cubic.gradient(u, v)) / (cubic.length + np.hypot(u, v))))
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("level", [1e-3, 0.0962, 0.3, 50.0, 1e6, -0.1])
+def test_every_vertex_lies_on_the_curve(form, level):
+    cubic = PlaneCubic(FORMS[form], 0.5, level, 1.0)
+    assert distance(cubic, *vertices(cubic)) < ACROSS
+
+
+def test_at_a_tiny_level_the_curve_is_close_to_the_lines_of_h():
+    u, v = vertices(PlaneCubic(FORMS["three lines"], 0.5, -1e-13, 1.0))
+    to_lines = [abs(u), abs(u - np.sqrt(3) * v) / 2, abs(u + np.sqrt(3) * v) / 2]
+    # around the origin u (u^2 - 3 v^2) = -1e-13 stays away from them by about the cube root of the level
+    assert np.min(to_lines, axis=0).max() < 1e-4
+
+
+def test_the_vertices_of_another_level_do_not():
+    cubic = PlaneCubic(FORMS["any"], 0.5, 0.1, 1.0)
+    assert distance(PlaneCubic(FORMS["any"], 0.5, 0.11, 1.0), *vertices(cubic)) > 1e-3
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_line_through_the_origin_meets_the_curve_as_often_as_the_equation_has_roots(form):
+    # an independent count: the real roots of s^3 + p s - q for lines between those that were followed
+    cubic = PlaneCubic(FORMS[form], 0.5, 0.2, 1.0)
+    arcs = cubic.arcs()
+    for angle in np.linspace(0.0123, np.pi - 0.01, 40):
+        x, y = np.cos(angle), np.sin(angle)
+        a, b, c, d = cubic.h
+        p, q, r = cubic.D
+        D, h = p * x * x + q * x * y + r * y * y, a * x**3 + b * x * x * y + c * x * y * y + d * y**3
+        roots = np.roots([1, 0, cubic.eps**2 * D, -h / cubic.above])
+        expected = sum(abs(root.imag) < 1e-9 for root in roots)
+        crossings = 0
+        for arc in arcs:
+            side = arc[:, 0] * y - arc[:, 1] * x
+            crossings += int(np.sum(side[1:] * side[:-1] < 0))
+        assert crossings == expected
+
+
+def test_neighbouring_vertices_are_close_together():
+    for arc in PlaneCubic(FORMS["three lines"], 0.5, 1e-6, 1.0).arcs():
+        assert all(abs(before @ after) > np.cos(0.03) for before, after in pairwise(arc))
+
+
+def test_arcs_end_at_infinity_or_at_each_other():
+    ends = []
+    for arc in PlaneCubic(FORMS["three lines"], 0.5, 0.3, 1.0).arcs():
+        ends += [row for row in (arc[0], arc[-1]) if row[2] > 1e-12]
+    for end in ends:
+        assert sum(np.linalg.norm(end - other) < 1e-6 for other in ends) == 2
+
+
+def test_the_level_zero_is_the_lines_of_h():
+    arcs = PlaneCubic(FORMS["three lines"], 0.5, 0.0, 1.0).arcs()
+    # u (u^2 - 3 v^2) = 0: the directions 30, 90 and 150 degrees
+    assert sorted(round(float(np.degrees(np.arctan2(arc[-1][1], arc[-1][0]))) % 180) for arc in arcs) == [30, 90, 150]
+
+
+def test_a_start_that_goes_to_infinity_has_the_conic_as_its_curve():
+    cubic = PlaneCubic(FORMS["three lines"], 0.5, 1.0, 0.0)
+    u, v = vertices(cubic)
+    assert np.hypot(u, v) == pytest.approx(1 / 3)  # 1 - 36 eps^2 (u^2 + v^2) = 0
+
+
+def test_where_all_curves_meet_there_is_none():
+    assert PlaneCubic(FORMS["three lines"], 0.5, 0.0, 0.0).arcs() == []
+
+
+def test_the_flow_moves_on_the_level_of_h():
+    cubic = PlaneCubic(FORMS["one line"], 0.5, 0.2, 1.0)
+    rows = np.concatenate(cubic.flow_arcs(1.0, 0.5))
+    rows = rows[rows[:, 2] > 1e-6]
+    u, v = cubic.length * rows[:, 0] / rows[:, 2], cubic.length * rows[:, 1] / rows[:, 2]
+    assert u**3 + 3 * u * v * v == pytest.approx(1.75)
+
+
+def test_the_gradient_is_the_derivative():
+    cubic = PlaneCubic(FORMS["any"], 0.5, 0.2, 0.7)
+
+    def value(u, v):
+        a, b, c, d = cubic.h
+        p, q, r = cubic.D
+        D = p * u * u + q * u * v + r * v * v
+        return cubic.below * (a * u**3 + b * u * u * v + c * u * v * v + d * v**3) - cubic.above * (1 + 0.25 * D)
+
+    step = 1e-5
+    along = [(value(0.3 + step, 0.4) - value(0.3 - step, 0.4)), (value(0.3, 0.4 + step) - value(0.3, 0.4 - step))]
+    # central differences of a cubic: error step^2 times the third derivative
+    assert cubic.gradient(0.3, 0.4) == pytest.approx([entry / (2 * step) for entry in along], rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "shape", "sign"),
+    [
+        ((0, 1, 1, 0), THREE_LINES, -3),
+        ((2, -3, -5, 1), THREE_LINES, -3),
+        ((-1, 0, 3, 0), THREE_LINES, -3),  # the angle is at the cut of atan2
+        ((1, 0, 0, 1), ONE_LINE, 3),
+        ((1, 2, 3, 4), ONE_LINE, 3),
+        ((-5, 1, 0, 7), ONE_LINE, 3),
+        ((0, 0, 1, 1), REPEATED, None),
+        ((0, 0, 0, 0), ZERO, None),
+    ],
+)
+def test_the_cubic_becomes_symmetric_and_areas_are_kept(coefficients, shape, sign):
+    with ctx.workprec(256):
+        block = PlanarBlock(*map(arb, coefficients))
+        found, matrix = symmetric_coordinates(block)
+        (f, g), (k, l) = matrix
+        a, b, c, d = transformed(block, matrix)
+        assert found == shape
+        assert float(f * l - g * k) == pytest.approx(1)
+        if sign is not None:
+            assert a > 0
+            assert [float(b), float(c / a), float(d)] == pytest.approx([0, sign, 0], abs=1e-60)
+
+
+def test_a_point_has_the_same_value_in_both_coordinates():
+    with ctx.workprec(256):
+        block = PlanarBlock(*map(arb, (2, -3, -5, 1)))
+        _, matrix = symmetric_coordinates(block)
+        new = PlanarBlock(*transformed(block, matrix))
+        (f, g), (k, l) = matrix
+        u, v = arb(3), arb(-7)
+        assert float(new.h(f * u + g * v, k * u + l * v)) == pytest.approx(float(block.h(u, v)))
+        (f, g), (k, l) = inverse(matrix)
+        assert float(block.h(f * u + g * v, k * u + l * v)) == pytest.approx(float(new.h(u, v)))

@@ -1,0 +1,215 @@
+"""Portraits: the numbers that are shown, and what is in the figure that shows them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection, PathCollection
+
+from kahanmaps.errors import InputError
+from kahanmaps.plots.density import density_of
+from kahanmaps.plots.draw_portrait import cells_for, draw_density, draw_portrait
+from kahanmaps.plots.figures import RASTERISE_ABOVE, picture_bytes
+from kahanmaps.plots.level_sets import level_curves
+from kahanmaps.plots.point_functions import point_function
+from kahanmaps.plots.portrait import portrait_of
+from kahanmaps.plots.style import COLOURS, Style
+from kahanmaps.plots.trajectories import MAX_POINTS, Trajectories, ensemble_for, euler_orbits, require_points, walked
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+STYLE = Style(width=8.6, font_size=8)
+AXES = [point_function(name, ["x", "y"]) for name in "xy"]
+LOTKA_VOLTERRA = load("lotka_volterra", {}).system
+
+
+def orbits(count, steps=20):
+    starts = np.stack([np.ones(count), 1.5 + np.arange(count) / count], axis=1)
+    return walked(ensemble_for(LOTKA_VOLTERRA, "1/20", starts, steps), steps)
+
+
+def lines_with(figure, length):
+    return [line for line in figure.axes[0].lines if len(line.get_xdata()) == length]
+
+
+def test_all_points_of_all_orbits_are_there():
+    shown = portrait_of(orbits(3), AXES)
+    assert shown.points.shape == (21, 3, 2)
+    assert (shown.left_out, shown.undefined, shown.labels) == (0, 0, ("$x$", "$y$"))
+
+
+def test_an_axis_may_be_the_step():
+    shown = portrait_of(orbits(2), ["step", AXES[0]])
+    assert shown.points[:, 1, 0].tolist() == list(range(21))
+    assert shown.labels == ("step", "$x$")
+
+
+def test_points_at_a_pole_of_an_axis_or_of_the_colour_are_left_out_and_counted():
+    found = Trajectories(("x", "y"), np.array([[[1.0, 0.0]], [[2.0, 1.0]], [[0.0, 1.0]]]), np.arange(3))
+    shown = portrait_of(found, [point_function("1/x", "xy"), AXES[1]], colour=point_function("1/y", "xy"))
+    assert shown.undefined == 2
+    assert np.isnan(shown.points[:, 0, 0]).tolist() == [True, False, True]
+
+
+def test_orbits_that_ended_are_not_called_undefined():
+    found = walked(ensemble_for(QuadraticSystem.from_text(["x"], ["x^2"]), "1", np.array([[0.5], [3.0]]), 2), 2)
+    # (x~ - x)/2 = x x~ has a pole at x = 1/2
+    assert found.ended == {"met a singular matrix I - eps f'": 1}
+    assert portrait_of(found, ["step", point_function("x", "x")]).undefined == 0
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_two_or_three_axes_are_wanted(count):
+    with pytest.raises(InputError, match=f"found {count} axes"):
+        portrait_of(orbits(1), AXES[:1] * count)
+
+
+def test_explicit_euler_is_what_its_formula_says_and_spirals_outward():
+    found = euler_orbits(LOTKA_VOLTERRA, "1/20", np.array([[1.0, 2.0]]), 100)
+    x, y = 1.0, 2.0
+    x, y = x + 0.1 * x * (1 - y), y + 0.1 * y * (x - 1)
+    np.testing.assert_allclose(found.points[1, 0], [x, y])
+    energy = found.points.sum(axis=2) - np.log(found.points).sum(axis=2)
+    assert energy[-1, 0] > energy[0, 0] + 0.1
+
+
+def test_kahans_orbit_of_the_same_start_does_not_spiral():
+    points = walked(ensemble_for(LOTKA_VOLTERRA, "1/20", np.array([[1.0, 2.0]]), 2000), 2000).points
+    energy = points.sum(axis=2) - np.log(points).sum(axis=2)
+    assert np.ptp(energy) < 0.005  # O(eps^2), for ever
+
+
+def test_more_points_than_can_be_drawn_are_refused():
+    with pytest.raises(InputError, match="take fewer, or a density"):
+        require_points(MAX_POINTS + 1, 1, 2)
+
+
+@pytest.mark.parametrize("count", [1, 3, 7])
+def test_up_to_seven_orbits_have_a_colour_each(count):
+    figure = draw_portrait(portrait_of(orbits(count, 100), AXES), STYLE)
+    assert [line.get_color() for line in lines_with(figure, 101)] == list(COLOURS[:count])
+
+
+def test_more_orbits_are_one_cloud_with_a_colour_for_each():
+    figure = draw_portrait(portrait_of(orbits(8), AXES), STYLE)
+    (cloud,) = (c for c in figure.axes[0].collections if isinstance(c, PathCollection))
+    assert len(cloud.get_offsets()) == 8 * 21
+    assert len(np.unique(cloud.get_array())) == 8
+
+
+def test_the_widest_orbits_are_drawn_first():
+    figure = draw_portrait(portrait_of(orbits(8), AXES), STYLE)
+    # the starts are farther and farther from the equilibrium
+    assert figure.axes[0].collections[0].get_array().tolist() == [k for k in range(7, -1, -1) for _ in range(21)]
+
+
+def test_lines_join_the_points_of_each_orbit():
+    shown = portrait_of(orbits(8), AXES)
+    (lines,) = draw_portrait(shown, STYLE, lines=True).axes[0].collections
+    assert isinstance(lines, LineCollection)
+    assert len(lines.get_segments()) == 8 * 20
+
+
+def test_millions_of_points_are_not_joined():
+    found = Trajectories(("x", "y"), np.zeros((1_000_001, 1, 2)), np.arange(1_000_001))
+    with pytest.raises(InputError, match="draw dots"):
+        draw_portrait(portrait_of(found, AXES), STYLE, lines=True)
+
+
+def test_no_line_goes_through_a_missing_point():
+    points = np.array([[[0.0, 0.0]], [[1.0, 1.0]], [[np.nan, np.nan]], [[3.0, 0.0]]])
+    found = Trajectories(("x", "y"), points, np.arange(4))
+    shown = portrait_of(found, AXES, colour="step")
+    assert len(draw_portrait(shown, STYLE, lines=True).axes[0].collections[0].get_segments()) == 1
+
+
+def test_a_colour_has_a_bar_with_its_name():
+    figure = draw_portrait(portrait_of(orbits(2), AXES, colour=point_function("x*y", "xy")), STYLE)
+    assert [axes.get_ylabel() for axes in figure.axes] == ["$y$", "$x y$"]
+
+
+def test_colours_beyond_the_bar_are_said_by_its_ends():
+    values = np.append(np.linspace(0, 1, 50), 1e6)
+    found = Trajectories(("x", "y"), np.stack([0 * values, values], axis=1)[:, None], np.arange(51))
+    figure = draw_portrait(portrait_of(found, ["step", AXES[0]], colour=AXES[1]), STYLE)
+    assert figure.axes[0].collections[0].colorbar.extend == "max"
+
+
+def test_points_outside_the_window_do_not_spoil_the_colours():
+    values = np.append(np.linspace(0, 1, 50), [1e6] * 20)
+    found = Trajectories(("x", "y"), np.stack([values, values], axis=1)[:, None], np.arange(70))
+    shown = portrait_of(found, AXES, colour=AXES[0], window=((0, 2), (0, 2)))
+    assert draw_portrait(shown, STYLE).axes[0].collections[0].norm.vmax == 1
+
+
+def test_level_curves_lie_below_the_points():
+    shown = portrait_of(orbits(2, 100), AXES)
+    curves = level_curves(point_function("x*y", "xy"), (0, 1), 2, [1.0, 2.0], shown.window)
+    figure = draw_portrait(replace(shown, levels=curves), STYLE)
+    (levels,) = figure.axes[0].collections
+    assert len(levels.get_segments()) == 2
+    assert all(levels.get_zorder() < line.get_zorder() for line in figure.axes[0].lines)
+
+
+def test_the_limits_are_those_of_the_window():
+    shown = portrait_of(orbits(2), AXES, window=((0.0, 1.0), (2.0, 3.0)))
+    axes = draw_portrait(shown, STYLE).axes[0]
+    assert (axes.get_xlim(), axes.get_ylim()) == ((0, 1), (2, 3))
+    assert shown.left_out > 0
+
+
+def test_points_outside_the_window_are_not_drawn_in_space():
+    top = load("euler_top", {}).system
+    found = walked(ensemble_for(top, "1/10", np.array([[1.0, 0.5, 0.2]]), 100), 100)
+    axes = [point_function(name, top.variables) for name in top.variables]
+    shown = portrait_of(found, axes, window=((0, 2), (-2, 2), (-2, 2)))
+    (line, *_) = draw_portrait(shown, STYLE).axes[0].lines
+    x = np.asarray(line.get_data_3d()[0], dtype=float)
+    assert np.isnan(x).sum() == shown.left_out
+    assert np.nanmin(x) >= 0
+
+
+@pytest.mark.parametrize("count", [2, 12])
+def test_many_points_are_an_image_however_few_each_orbit_has(count):
+    steps = RASTERISE_ABOVE // count
+    figure = draw_portrait(portrait_of(orbits(count, steps), AXES), STYLE)
+    drawn = lines_with(figure, steps + 1) if count == 2 else figure.axes[0].collections
+    assert all(artist.get_rasterized() for artist in drawn)
+
+
+@pytest.mark.parametrize("kind", ["pdf", "png"])
+def test_the_same_portrait_is_the_same_bytes(kind):
+    first, second = (picture_bytes(draw_portrait(portrait_of(orbits(3), AXES), STYLE), kind, STYLE) for _ in "ab")
+    assert first == second
+
+
+@pytest.mark.parametrize("value", [0.0, 1e300, 1e-300])
+def test_a_single_point_is_drawn_whatever_its_size(value):
+    found = Trajectories(("x", "y"), np.full((1, 1, 2), value), np.arange(1))
+    figure = draw_portrait(portrait_of(found, AXES), STYLE)
+    assert picture_bytes(figure, "png", STYLE)
+
+
+def test_no_points_at_all_are_an_empty_picture():
+    found = Trajectories(("x", "y"), np.full((2, 1, 2), np.nan), np.arange(2))
+    assert picture_bytes(draw_portrait(portrait_of(found, AXES, colour="step"), STYLE), "png", STYLE)
+
+
+def test_empty_cells_of_a_density_are_white():
+    found = density_of([np.array([[0.1, 0.1]])], AXES, ((0, 1), (0, 1)), (2, 2))
+    (image,) = draw_density(found, STYLE).axes[0].images
+    assert image.get_array().mask.tolist() == [[False, True], [True, True]]
+
+
+def test_the_lowest_row_of_a_density_is_below():
+    found = density_of([np.array([[0.1, 0.1]])], AXES, ((0, 1), (0, 1)), (2, 2))
+    image = draw_density(found, STYLE).axes[0].images[0]
+    assert image.origin == "lower"
+    assert image.get_extent() == [0, 1, 0, 1]
+
+
+def test_a_larger_picture_has_more_cells():
+    small, large = cells_for(Style(width=8.6)), cells_for(Style(width=17))
+    assert small < large

@@ -1,0 +1,214 @@
+"""Squares of two maps: exact points, both outcomes, missing points; and what the picture shows of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flint import fmpq
+
+from kahanmaps.errors import InputError
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_chi
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.plots import squares as module
+from kahanmaps.plots.draw_squares import draw_squares, widest_axes
+from kahanmaps.plots.figures import picture_bytes
+from kahanmaps.plots.squares import Pair, pair_of_systems, pairs_of_member, squares
+from kahanmaps.plots.style import Style
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+STYLE = Style(width=12)
+START = ["1/2", "-1/3", 0, 1]
+
+
+@pytest.fixture(scope="module")
+def both():
+    """Two associated maps, and the control."""
+    return [squares(pair, START, "1/50", 2) for pair in pairs_of_member(load("paper_m2"))]
+
+
+def plane_pair(f, g):
+    return Pair(QuadraticSystem.from_text(["x", "y"], f), QuadraticSystem.from_text(["x", "y"], g), ("f", "g"))
+
+
+def test_associated_maps_close_exactly(both):
+    assert both[0].closes is True
+    assert both[0].verdict == "closes exactly"
+    assert both[0].g_after_f == both[0].f_after_g
+
+
+def test_the_maps_of_the_control_leave_a_gap(both):
+    assert both[1].closes is False
+    assert both[1].verdict == f"gap {both[1].gap:.3g}"
+    assert both[1].gap > 1e-4
+
+
+def test_one_changed_coefficient_opens_the_square(both):
+    f, g = both[0].pair.f, both[0].pair.g
+    rhs = [str(p) for p in g.rhs]
+    wrong = QuadraticSystem.from_text(g.variables, [rhs[0] + " + 1/1000*x1^2", *rhs[1:]])
+    assert squares(Pair(f, wrong, ("f", "g")), START, "1/50").closes is False
+
+
+def test_the_points_are_those_of_the_maps(both):
+    phi, psi = (KahanMap(system, "1/50") for system in (both[0].pair.f, both[0].pair.g))
+    x = phi.point(START)
+    assert both[0].g_after_f[1][2] == psi.step(psi.step(phi.step(x)))
+    assert both[0].f_after_g[2][1] == phi.step(phi.step(psi.step(x)))
+
+
+def test_a_gap_by_hand():
+    # f = (x^2, 0), g = (y^2, 0), eps = 1/10: x~ = x/(1 - x/5) and x + y^2/5 at (1, 2): 41/20 or 9/5 /(1 - 9/25) = 45/16
+    found = squares(plane_pair(["x^2", "0"], ["y^2", "0"]), [1, 2], "1/10")
+    assert found.g_after_f[1][1] == (fmpq(41, 20), fmpq(2))
+    assert found.f_after_g[1][1] == (fmpq(45, 16), fmpq(2))
+    assert found.gap == pytest.approx(45 / 16 - 41 / 20)
+
+
+def test_a_gap_too_small_for_machine_numbers_is_a_gap():
+    found = squares(plane_pair(["x^2", "0"], ["1/10^30*y^2", "0"]), [1, 2], "1/10")
+    assert found.closes is False
+    assert 0 < found.gap < 1e-29
+
+
+def test_a_singular_point_is_told_and_leaves_nothing_to_compare():
+    # x~ = x/(1 - 2 eps x) has a pole at x = 5 for eps = 1/10
+    found = squares(plane_pair(["x^2", "0"], ["0", "y^2"]), [5, 2], "1/10")
+    assert found.closes is None
+    assert found.verdict == "no fourth corner"
+    assert found.stopped == "Phi_f: the map has no value at a point on the way"
+
+
+def test_what_is_there_is_compared_where_points_are_missing():
+    # from x = 5/3 the second step of f has no value: x~ = 5/2, then 5 at step 2, and none at step 3
+    found = squares(plane_pair(["x^2", "0"], ["0", "y^2"]), ["5/3", "1/7"], "1/10", 3)
+    assert found.g_after_f[3][0] is None
+    assert found.closes is True
+    assert found.stopped
+
+
+def test_numbers_that_grow_too_long_are_left_out(monkeypatch):
+    monkeypatch.setattr(module, "MAX_BITS", 40)
+    found = squares(pairs_of_member(load("paper_m2"))[0], START, "1/50", 2)
+    assert "more than 40 bits" in found.stopped
+
+
+@pytest.mark.parametrize("steps", [0, 13])
+def test_wrong_numbers_of_steps_are_refused(steps):
+    with pytest.raises(InputError, match="expected 1 to 12"):
+        squares(plane_pair(["x^2", "0"], ["0", "y^2"]), [1, 2], "1/10", steps)
+
+
+def test_the_chosen_signs_are_drawn_and_their_neighbour():
+    member = replace(draw_with_eigenvalues([1, 2, 3], seed=1), signs=(1, -1, 1))
+    pair, control = pairs_of_member(SystemFile.from_member(member))
+    assert pair.names == ("f_+-+", "f_+--")
+    assert pair.f == member.chosen.system
+    assert control.names == ("J grad H_0", "J grad H_1")
+
+
+def test_an_irreducible_chi_leaves_a_map_and_its_inverse():
+    member = draw_with_chi(parse_chi("t^2 - 2"), seed=3)
+    pair, _ = pairs_of_member(SystemFile.from_member(member))
+    found = squares(pair, START, "1/50")
+    assert found.g_after_f[1][1] == found.g_after_f[0][0]
+
+
+def test_a_hidden_member_is_found():
+    file = load("paper_m2")
+    pair, _ = pairs_of_member(SystemFile.from_system(file.system))
+    assert squares(pair, START, "1/50").closes is True
+
+
+def test_in_the_plane_the_control_is_twice_the_system():
+    file = SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], ["-6*x*y", "3*y^2 - 3*x^2"]))
+    pair, control = pairs_of_member(file)
+    assert squares(pair, [1, "1/2"], "1/10").closes is True
+    assert squares(control, [1, "1/2"], "1/10").closes is False
+
+
+def test_one_system_that_is_no_member_is_refused():
+    with pytest.raises(InputError, match="give a second system"):
+        pairs_of_member(load("lorenz"))
+
+
+def test_systems_of_different_dimension_are_refused():
+    with pytest.raises(InputError, match="expected the same dimension"):
+        pair_of_systems(load("lorenz"), load("paper_m2"), "1/10")
+
+
+def test_another_step_is_another_map():
+    file = load("lorenz")
+    same = squares(pair_of_systems(file, file, "1/100"), [1, 2, 3], "1/100")
+    other = squares(pair_of_systems(file, file, "1/100", "1/50"), [1, 2, 3], "1/100")
+    assert (same.closes, other.closes) == (True, False)
+    assert other.g_after_f[0][1] == KahanMap(file.system, "1/50").step([1, 2, 3])
+
+
+def test_a_step_of_zero_is_refused():
+    with pytest.raises(InputError, match="eps2 = 0"):
+        pair_of_systems(load("lorenz"), load("lorenz"), "1/100", 0)
+
+
+def test_axes_in_which_nothing_moves_are_not_chosen():
+    names = ["a", "x", "b", "y"]
+    f = QuadraticSystem.from_text(names, ["0", "1", "0", "x"])
+    g = QuadraticSystem.from_text(names, ["0", "0", "0", "1"])
+    assert widest_axes([squares(Pair(f, g, ("f", "g")), [1, 1, 1, 1], "1/10")]) == (1, 3)
+
+
+def test_each_pair_is_a_panel_with_its_outcome(both):
+    figure = draw_squares(both, STYLE)
+    titles = [axes.get_title() for axes in figure.axes]
+    assert titles == [
+        "$f = f_{++}$,  $g = f_{+-}$\ncloses exactly",
+        r"$f = J \nabla H_0$,  $g = J \nabla H_1$" + f"\ngap {both[1].gap:.3g}",
+    ]
+
+
+def test_rings_hold_their_dots_exactly_where_the_maps_commute(both):
+    for panel, found in zip(draw_squares(both, STYLE).axes, both, strict=True):
+        rings, dots = (np.array(line.get_data()) for line in panel.lines if line.get_marker() == "o")
+        assert np.array_equal(rings, dots) is (found.closes is True)
+        assert rings.shape == (2, 9)
+
+
+def test_a_small_gap_is_shown_magnified(both):
+    closed, open_ = draw_squares(both, STYLE).axes
+    assert len(closed.child_axes) == 0
+    assert len(open_.child_axes) == 1
+    assert open_.child_axes[0].get_title().startswith(r"$\times")
+
+
+def test_a_square_has_four_arrows_and_named_corners():
+    found = [squares(pair, START, "1/50") for pair in pairs_of_member(load("paper_m2"))]
+    closed, open_ = draw_squares(found, STYLE).axes
+    assert len(closed.patches) == 4
+    names = {text.get_text() for text in closed.texts}
+    assert names == {"$x$", r"$\Phi_f x$", r"$\Phi_g x$", r"$\Phi_g\Phi_f x = \Phi_f\Phi_g x$"}
+    assert r"$\Phi_g\Phi_f x \neq \Phi_f\Phi_g x$" in {text.get_text() for text in open_.texts}
+
+
+def test_missing_points_leave_a_picture():
+    found = squares(plane_pair(["x^2", "0"], ["0", "y^2"]), [5, 2], "1/10")
+    (axes,) = draw_squares([found], STYLE).axes
+    assert axes.get_title().endswith("no fourth corner")
+    assert len(axes.patches) == 1
+
+
+def test_wrong_axes_are_refused(both):
+    with pytest.raises(InputError, match="two numbers from 0 to 3"):
+        draw_squares(both, STYLE, axes=(0, 7))
+
+
+def test_a_start_that_cannot_be_drawn_is_refused():
+    with pytest.raises(InputError, match="cannot be drawn"):
+        draw_squares([squares(plane_pair(["x", "0"], ["0", "y"]), [10**200, 1], "1/10")], STYLE)
+
+
+def test_the_same_picture_is_the_same_bytes(both):
+    first, second = (picture_bytes(draw_squares(both, STYLE), "svg", STYLE) for _ in range(2))
+    assert first == second

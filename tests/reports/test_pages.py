@@ -1,0 +1,223 @@
+"""Pages: what stands in them, that they fetch nothing, that they are the same every time, and hostile names."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from page_helpers import Page, require_sound
+from small_databases import ok, planned
+
+import kahanmaps as km
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.analysis import Analysis
+from kahanmaps.paper.examiner import VerifyOptions
+from kahanmaps.reports.report import report_html, write_report
+
+EVIL = "<script>alert(1)</script>"
+
+
+@pytest.fixture(scope="module")
+def volterra():
+    return km.analyze(km.load("lotka_volterra"))
+
+
+@pytest.fixture(scope="module")
+def drawn(volterra):
+    """The page with its pictures."""
+    return report_html(volterra, command="kahanmaps report lotka_volterra")
+
+
+@pytest.fixture(scope="module")
+def paper():
+    member = km.SystemFile.from_member(km.draw_with_eigenvalues([1, -2], seed=7), "pair")
+    return member, km.verify(member, options=VerifyOptions(sections=(5, 8)))
+
+
+def test_a_page_that_is_not_sound_is_seen():
+    for broken in (
+        "<p>",
+        '<!DOCTYPE html><html lang="en"><h1>a</h1><img src="http://a.b/c.png"/></html>',
+        '<!DOCTYPE html><html lang="en"><h1>a</h1><a href="#nowhere">b</a></html>',
+        '<!DOCTYPE html><html lang="en"><h1>a</h1><h3>b</h3></html>',
+        '<!DOCTYPE html><html lang="en"><h1>a</h1><math><mi>x</mi></math></html>',
+        '<!DOCTYPE html><html lang="en"><h1>a</h1><script>1</script></html>',
+    ):
+        with pytest.raises(AssertionError):
+            require_sound(broken)
+
+
+def test_the_page_of_an_analysis_has_the_verdict_first_and_every_section(drawn, volterra):
+    page = require_sound(drawn)
+    titles = [title for level, title in page.headings if level == 2]
+    assert titles[:3] == ["Verdict", "The system", "What the catalogue says"]
+    assert titles[-1] == "How to make this page again"
+    assert volterra.conclusion.sentence in page.text
+    for name, lines in volterra.sections:
+        assert name[0].upper() + name[1:] in titles
+        for line in lines:
+            assert line.status in page.text
+
+
+def test_formulas_are_formulas_and_their_plain_text_is_exact(volterra):
+    page = require_sound(report_html(volterra, pictures=False))
+    assert "x' =" in page.alttexts
+    assert "y' =" in page.alttexts
+    assert "x*y - y" in page.alttexts
+    assert page.alttexts[page.alttexts.index("phi =") + 1] == volterra.densities.densities[0].text
+
+
+def test_integrals_relations_and_closed_forms_are_set_as_formulas():
+    page = require_sound(report_html(km.analyze(km.load("euler_top")), pictures=False))
+    assert "I1 =" in page.alttexts
+    assert "(-1 + eps^2*x2^2)/(1 + 2*eps^2*x1^2)" in page.alttexts
+    assert "d_n =" in page.alttexts
+    assert "2*n^2 + 1" in page.alttexts
+    assert "= 0" in page.alttexts
+
+
+def test_pictures_are_inside_with_a_title_each(drawn):
+    page = Page(drawn)
+    assert {"degrees", "heights", "portrait"} <= set(page.ids)
+    assert page.tags.count("svg") == page.tags.count("figure") == 3
+    for figure in drawn.split("<figure")[1:]:
+        assert "<title>" in figure.split("</figure>")[0]
+    assert 'role="img"' in drawn
+
+
+@pytest.mark.slow
+def test_the_same_results_give_the_same_bytes(drawn, volterra):
+    assert report_html(volterra, command="kahanmaps report lotka_volterra") == drawn
+
+
+def test_the_page_says_how_it_was_made(drawn, volterra):
+    page = Page(drawn)
+    assert "kahanmaps report lotka_volterra" in page.text
+    assert f"kahanmaps {km.__version__}" in page.text
+    system = km.parse_system(page.text[page.text.index('name = "lotka_volterra"') :].strip(), "page")
+    assert system == volterra.file
+
+
+def test_without_pictures_there_are_none_and_no_word_of_it(volterra):
+    page = require_sound(report_html(volterra, pictures=False))
+    assert "svg" not in page.tags
+    assert "matplotlib" not in page.text
+
+
+def test_without_matplotlib_the_page_says_what_to_install(volterra, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    page = require_sound(report_html(volterra))
+    assert "svg" not in page.tags
+    assert "pip install 'kahanmaps[plot]'" in page.text
+
+
+@pytest.mark.slow
+def test_a_picture_that_cannot_be_drawn_is_told_with_the_reason(volterra, monkeypatch):
+    def refuse(*_):
+        raise InputError("found a bad day")
+
+    monkeypatch.setattr("kahanmaps.plots.automatic_starts.automatic_starts", refuse)
+    page = require_sound(report_html(volterra))
+    assert "not drawn, for found a bad day" in page.text
+    assert page.tags.count("svg") == 2
+
+
+def test_names_and_titles_are_text(volterra):
+    file = km.SystemFile.from_system(volterra.file.system, EVIL)
+    page = require_sound(
+        report_html(Analysis(file, None, 1.0, 0, skipped=[EVIL]), title=EVIL, command=EVIL, pictures=False)
+    )
+    assert page.text.count(EVIL) >= 4
+
+
+@pytest.mark.parametrize("pictures", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_degenerate_systems_have_pages(pictures):
+    for rhs in ("0", "x", "1", "x^2"):
+        found = km.analyze(km.SystemFile.from_system(km.QuadraticSystem.from_text(["x"], [rhs])), seconds=2)
+        require_sound(report_html(found, pictures=pictures))
+
+
+def test_the_paper_is_laid_out_by_section_with_its_evidence_folded(paper):
+    file, report = paper
+    page = require_sound(report_html(report, file=file, pictures=False))
+    assert {"section-5", "section-8"} <= set(page.ids)
+    assert page.tags.count("details") >= len(report.findings)
+    for finding in report.findings:
+        assert f"claim-{finding.place['key']}" in page.ids
+        assert finding.evidence.summary[:60] in page.text
+    assert "misprint" in page.text
+
+
+@pytest.mark.slow
+def test_the_invariant_curves_of_a_member_are_drawn(paper):
+    file, report = paper
+    assert 'id="invariant-curves"' in report_html(report, file=file)
+
+
+def test_a_refuted_claim_stands_open_and_a_control_does_not():
+    file = km.parse_system('variables = ["x"]\n[system]\nrhs = ["x^2"]\n[integrals]\nI = "x"', "wrong")
+    html = report_html(km.check_integrals(file), file=file, pictures=False)
+    assert html.count('open="open"') == 1
+    pair = km.SystemFile.from_member(km.draw_with_eigenvalues([1, -2], seed=7))
+    html = report_html(km.check_commute(pair), file=pair, pictures=False)
+    assert "as expected" in Page(html).text
+    assert 'open="open"' not in html
+
+
+def test_several_checks_are_one_page():
+    top = km.load("euler_top")
+    reports = [km.check_integrals(top), km.check_measure(top)]
+    page = require_sound(report_html(reports, file=top, pictures=False, left_out=["check-poisson does not apply"]))
+    assert {"check-integrals", "check-measure", "notes"} <= set(page.ids)
+    assert "check-poisson does not apply" in page.text
+
+
+def test_reports_need_no_system():
+    report = km.verify_universal(1, options=VerifyOptions(sections=(6,)))
+    page = require_sound(report_html(report))
+    assert "system" not in page.ids
+
+
+def test_a_batch_has_its_tables(tmp_path):
+    path = planned(tmp_path / "a.db", 1, 2, 3, records=[ok(1, 7, "proved"), ok(2, 9, "refuted")])
+    with km.Store.open(path, readonly=True) as store:
+        page = require_sound(report_html(store))
+        assert "2 of 3 tasks done" in page.text
+        assert "✓ proved" in page.text
+        assert report_html(store) == page.html
+
+
+def test_numbers_of_a_batch_that_are_asked_for_are_drawn(tmp_path):
+    path = planned(tmp_path / "a.db", 1, 2, 3, records=[ok(k, k) for k in (1, 2, 3)])
+    with km.Store.open(path, readonly=True) as store:
+        page = require_sound(report_html(store, by=["experiment", "seed"], values=["value"]))
+        assert {"counts", "distributions-figure"} <= set(page.ids)
+        with pytest.raises(InputError):
+            report_html(store, values=["nothing"])
+
+
+def test_an_empty_batch_has_a_page(tmp_path):
+    with km.Store.open(tmp_path / "a.db", create=True) as store:
+        assert "no results yet" in require_sound(report_html(store)).text
+
+
+@pytest.mark.parametrize("wrong", [[], "text", [1], 7.0])
+def test_other_things_are_refused(wrong):
+    with pytest.raises((InputError, TypeError), match=r"expected an Analysis|not iterable"):
+        report_html(wrong)
+
+
+def test_a_page_is_written_whole_or_not_at_all(tmp_path, monkeypatch, volterra):
+    path = tmp_path / "page.html"
+    write_report(path, volterra, pictures=False)
+    before = path.read_bytes()
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("os.replace", killed)
+    with pytest.raises(KeyboardInterrupt):
+        write_report(path, volterra, pictures=False, title="another")
+    assert path.read_bytes() == before
+    assert [one.name for one in tmp_path.iterdir()] == ["page.html"]

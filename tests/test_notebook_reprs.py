@@ -1,0 +1,302 @@
+"""What notebooks show: well-formed, bounded in size, true, and with nothing in it that a name brought along."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import pytest
+from flint import fmpq_mat
+from small_databases import ok, planned
+
+import kahanmaps as km
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.laboratory.analysis import Analysis
+from kahanmaps.maps.orbits import FIRST_POINTS
+
+EVIL = '<script>alert("x")</script>\x1b[31m'
+LARGEST = 100_000  # characters of any representation
+
+
+def html_of(thing):
+    """The representation as a tree; well-formed and bounded, or the test fails."""
+    html = thing._repr_html_()
+    assert len(html) < LARGEST
+    tree = ElementTree.fromstring(f"<div>{html}</div>")
+    assert "script" not in {one.tag for one in tree.iter()}
+    assert not {one.get("style", "") for one in tree.iter() if "background" in one.get("style", "")}
+    return tree
+
+
+def text_of(thing):
+    return "".join(html_of(thing).itertext())
+
+
+def latex_of(thing):
+    latex = thing._repr_latex_()
+    assert latex.startswith("$")
+    assert latex.endswith("$")
+    assert latex.count("{") == latex.count("}")
+    assert latex.count(r"\begin") == latex.count(r"\end")
+    assert len(latex) < LARGEST
+    return latex
+
+
+@pytest.fixture(scope="module")
+def top():
+    return km.load("euler_top")
+
+
+@pytest.fixture(scope="module")
+def member():
+    return km.draw_with_eigenvalues([1, -2], seed=7)
+
+
+@pytest.fixture(scope="module")
+def huge():
+    """Dense, of dimension 20, with numbers of 200 digits."""
+    names = [f"x{k}" for k in range(20)]
+    number = "7" * 200
+    return km.QuadraticSystem.from_text(names, [f"{number}*({' + '.join(names)})^2"] * 20)
+
+
+# -- systems
+
+
+def test_a_system_is_shown_as_its_equations(top):
+    assert latex_of(top.system) == (
+        r"$\displaystyle \begin{aligned} \dot{x_1} &= x_2 x_3 \\ \dot{x_2} &= -2 x_1 x_3 \\ "
+        r"\dot{x_3} &= x_1 x_2 \end{aligned}$"
+    )
+
+
+def test_a_huge_system_is_cut_and_what_is_missing_is_told(huge):
+    assert "(210 terms, not shown)" in latex_of(huge.scaled("7" * 400))
+    assert "(20 equations)" in latex_of(huge)
+    assert "(20 equations)" in text_of(km.SystemFile.from_system(huge))
+    assert len(latex_of(km.KahanMap(huge, "1/10"))) < 10_000
+
+
+def test_a_hamiltonian_shows_its_cubic_and_j(member):
+    assert latex_of(member.hamiltonians[0]).startswith(r"$\displaystyle \begin{aligned} H &= ")
+    skew = km.CubicHamiltonian(parse_polynomial("x^3", ["x", "y"]), fmpq_mat([[0, 2], [-2, 0]]))
+    assert r"\begin{pmatrix} 0 & 2 \\ -2 & 0 \end{pmatrix}" in latex_of(skew)
+    large = km.CubicHamiltonian(ring([f"x{k}" for k in range(20)]).constant(0), fmpq_mat(20, 20))
+    assert "20 by 20" in latex_of(large)
+
+
+def test_a_file_shows_equations_parameters_and_integrals(top):
+    text = text_of(top)
+    assert "Euler top" in text
+    assert "a1 = 1, a2 = -2, a3 = 1" in text
+    alttexts = [one.get("alttext") for one in html_of(top).iter("math")]
+    assert "(1 - eps^2*x2^2)/(1 + 2*eps^2*x3^2)" in alttexts
+
+
+def test_a_name_cannot_bring_elements_along(top):
+    assert EVIL.replace("\x1b", "\\x1b") in text_of(km.SystemFile.from_system(top.system, EVIL))
+
+
+def test_the_zero_system_and_the_smallest_are_shown():
+    zero = km.QuadraticSystem.from_text(["x"], ["0"])
+    assert r"\dot{x} &= 0" in latex_of(zero)
+    assert r"\frac{\widetilde{x} - x}{2 \varepsilon} &= 0" in latex_of(km.KahanMap(zero, 1))
+
+
+# -- the family
+
+
+def test_members_associated_systems_and_the_normal_form_are_shown(member):
+    assert "member of the commuting family, m = 2" in text_of(member)
+    assert text_of(member.associate([1, -1])).startswith("associated system +-")
+    assert "chi(t)" in text_of(km.normal_form(member))
+
+
+def test_a_large_member_is_bounded():
+    large = km.draw_with_eigenvalues(range(1, 9), seed=1)
+    assert "a matrix with 16 rows and 16 columns" in text_of(large)
+    assert html_of(next(large.associated())) is not None
+    assert html_of(km.normal_form(large)) is not None
+
+
+# -- maps and orbits
+
+
+def test_a_map_shows_the_equation_that_defines_it_and_says_the_time_step():
+    system = km.QuadraticSystem.from_text(["x", "y"], ["x*y - 3*x", "x^2 + 1/2"])
+    assert latex_of(km.KahanMap(system, "1/10")) == (
+        r"$\displaystyle \begin{aligned} "
+        r"\frac{\widetilde{x} - x}{2 \varepsilon} &= \frac{1}{2} (x \widetilde{y} + \widetilde{x} y) "
+        r"- \frac{3}{2} (x + \widetilde{x}) \\ "
+        r"\frac{\widetilde{y} - y}{2 \varepsilon} &= x \widetilde{x} + \frac{1}{2} \\ "
+        r"\varepsilon &= \text{1/10},\quad \text{time step } 2 \varepsilon = \text{1/5} \end{aligned}$"
+    )
+
+
+def test_the_equation_shown_is_the_one_that_the_map_solves():
+    system = km.QuadraticSystem.from_text(["x", "y"], ["x*y - 3*x", "x^2 + 1/2"])
+    phi = km.KahanMap(system, "1/10")
+    x, y = phi.point(["1/3", "2/5"])
+    X, Y = phi.step((x, y))
+    step = 2 * phi.eps
+    assert (X - x) / step == (x * Y + X * y) / 2 - 3 * (x + X) / 2
+    assert (Y - y) / step == x * X + km.QQ.convert("1/2")
+
+
+def test_a_map_over_another_field_says_so(top):
+    assert "GF(101)" in latex_of(km.KahanMap(top.system, "1/10", km.GF(101)))
+    assert "RR" in latex_of(km.KahanMap(top.system, "1/10", km.RR(64)))
+
+
+def test_an_orbit_that_was_not_walked_is_not_walked_for_its_picture(top, monkeypatch):
+    orbit = km.Orbit(km.KahanMap(top.system, "1/10"), [1, 2, 3], 10**9)
+    monkeypatch.setattr(km.Orbit, "_images", lambda _: pytest.fail("a step was computed"))
+    assert "not walked yet" in text_of(orbit)
+
+
+def test_an_orbit_shows_its_first_points_the_last_one_and_its_end(top):
+    orbit = km.Orbit(km.KahanMap(top.system, "1/10"), ["1/2", "1/3", 1], 12)
+    points = list(orbit)
+    rows = [["".join(cell.itertext()) for cell in row] for row in html_of(orbit).iter("tr")]
+    assert rows[0] == ["step", "x1", "x2", "x3", "digits"]
+    assert [row[0] for row in rows[1:]] == ["0", "1", "2", "…", "12"]
+    assert rows[1][1:4] == points[0].text
+    assert text_of(orbit).strip().endswith("✓ completed: 12 steps")
+
+
+def test_an_orbit_half_walked_says_how_far(top):
+    orbit = km.Orbit(km.KahanMap(top.system, "1/10"), ["1/2", "1/3", 1], 12)
+    for point in orbit:
+        if point.step == 5:
+            break
+    assert "walked to step 5, not to its end" in text_of(orbit)
+    assert len(orbit.first) == FIRST_POINTS
+
+
+def test_an_orbit_walked_twice_remembers_the_second_walk(top):
+    orbit = km.Orbit(km.KahanMap(top.system, "1/10"), ["1/2", "1/3", 1], 2)
+    assert [list(orbit), list(orbit)][1][0] is orbit.first[0]
+    assert [point.step for point in orbit.first] == [0, 1, 2]
+
+
+def test_a_singular_orbit_and_one_over_budget_are_shown():
+    singular = km.Orbit(km.KahanMap(km.QuadraticSystem.from_text(["x"], ["x^2"]), "1/2"), [1], 5)
+    list(singular)
+    assert "singular" in text_of(singular)
+    heights = km.Orbit(km.KahanMap(km.load("henon_heiles").system, "1/10"), ["1/2", "1/3", 1, 1], 50, max_digits=9000)
+    list(heights)
+    assert "(long)" in text_of(heights)
+    assert "budget" in text_of(heights)
+
+
+def test_orbits_over_other_fields_are_shown(top):
+    for field in (km.GF(101), km.RR(64)):
+        orbit = km.Orbit(km.KahanMap(top.system, "1/10", field), [1, 2, 3], 4)
+        list(orbit)
+        assert "4 steps" in text_of(orbit)
+
+
+# -- checks
+
+
+def test_a_verdict_is_a_word_with_a_mark():
+    assert [text_of(verdict) for verdict in Verdict] == ["✓ proved", "✗ refuted", "≈ supported", "? undecided"]
+
+
+def test_a_report_shows_each_claim_with_its_verdict_and_its_witness(top):
+    file = km.parse_system('variables = ["x"]\n[system]\nrhs = ["x^2"]\n[integrals]\nI = "x"', "wrong")
+    text = text_of(km.check_integrals(file))
+    assert "✗ refuted" in text
+    assert "I(x~) = " in text
+    assert "✓ proved" in text_of(km.check_integrals(top))
+
+
+def test_a_control_that_is_refuted_is_as_expected(member):
+    text = text_of(km.check_commute(km.SystemFile.from_member(member)))
+    assert "✗ refuted (as expected)" in text
+    assert "1 control" in text
+
+
+def test_the_report_of_verify_is_shown_by_sections():
+    member = km.SystemFile.from_member(km.draw_with_eigenvalues([1, -2], seed=1))
+    text = text_of(km.verify(member, options=km.VerifyOptions(sections=(5, 8))))
+    assert "Section 8. " in text
+    assert "misprint" in text
+
+
+def test_hostile_and_huge_findings_are_escaped_and_cut():
+    long = "9" * 10**6
+    witness = Witness((long,) * 50, long, (EVIL,), (long,), EVIL, EVIL, EVIL, {EVIL: (long,)})
+    evidence = Evidence(EVIL, long, {"hypotheses": [long] * 99, "theorem": EVIL})
+    place = {"misprint": EVIL, "broken": long, "section": 3, "section_title": EVIL}
+    finding = Finding(EVIL + long, Verdict.REFUTED, evidence, (evidence,) * 99, witness, long, EVIL, place=place)
+    html_of(finding)
+    html_of(Report(EVIL, (finding,) * 1000, {"system": EVIL, "eps": long, "time_step": long}, [EVIL] * 100))
+
+
+def test_an_empty_report_is_undecided():
+    assert "undecided (no claims)" in text_of(Report("check", ()))
+
+
+# -- the laboratory
+
+
+@pytest.fixture(scope="module")
+def analysis():
+    return km.analyze(km.load("lotka_volterra"), seconds=16)
+
+
+def test_an_analysis_shows_the_verdict_before_the_statements(analysis):
+    text = text_of(analysis)
+    assert text.index("not integrable") < text.index("dx/phi is invariant")
+    assert "the time step is 2 eps" in text
+
+
+@pytest.mark.parametrize(
+    "part", ["integrals", "densities", "degrees", "heights", "symmetries", "commuting", "hamiltonian"]
+)
+def test_each_part_of_an_analysis_is_shown(analysis, part):
+    assert text_of(getattr(analysis, part)).strip()
+
+
+def test_singularities_are_shown(analysis):
+    for run in analysis.singularities:
+        assert "not confined" in text_of(run)
+
+
+def test_an_analysis_of_nothing_is_shown():
+    zero = km.SystemFile.from_system(km.QuadraticSystem.from_text(["x"], ["0"]), EVIL)
+    empty = Analysis(zero, None, 1.0, 0, skipped=[EVIL])
+    assert "linear: The system is linear" in text_of(empty)
+    assert html_of(km.analyze(zero, seconds=2)) is not None
+
+
+def test_integrals_are_shown_as_formulas(top):
+    found = km.find_integrals(top, seconds=10)
+    alttexts = [one.get("alttext") for one in html_of(found).iter("math")]
+    assert "I1 =" in alttexts
+    assert "2 found; orbits show 2 (measured)" in text_of(found)
+
+
+def test_many_commuting_systems_are_counted_not_all_shown():
+    found = km.commuting_systems(km.draw_with_eigenvalues([1, 2, 3, 4], seed=1).chosen.system, seconds=10)
+    assert len(found.solutions) > 8
+    assert f"… and {len(found.solutions) - 5} more" in text_of(found)
+
+
+def test_darboux_polynomials_a_census_and_a_period_are_shown(member):
+    assert "cofactor" in text_of(km.darboux_polynomials(km.load("lotka_volterra"), 1))
+    assert "GF(31)" in text_of(km.cycle_census(km.load("lotka_volterra").system, "1/10", 31))
+    period = km.orbit_period(km.normal_form(member), "1/10", ["1/2", "-1/5", 0, 1], 10007)
+    assert "period" in text_of(period)
+
+
+# -- batches
+
+
+def test_a_store_shows_its_experiments_and_says_when_it_is_closed(tmp_path):
+    with km.Store.open(planned(tmp_path / "a.db", 1, 2, records=[ok(1, verdict="proved")]), readonly=True) as store:
+        assert "missing" in text_of(store)
+        assert "1 ✓ proved" in text_of(store)
+    assert "has been closed" in text_of(store)

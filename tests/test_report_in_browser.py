@@ -1,0 +1,125 @@
+"""Pages in a browser: nothing is fetched, nothing complained of, MathML is laid out, and the same text without scripts.
+
+Chromium runs without a window. Its log of the network tells what a page asks for, the printed page what is readable.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+import kahanmaps as km
+from kahanmaps.algebra.mathml import formula
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.reports.report import report_html
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="needs chromium, chromium-browser or google-chrome")
+
+# Pages that do what a report must not do.
+FETCHING = '<!DOCTYPE html><html lang="en"><body><img src="http://localhost:9/x.png"/></body></html>'
+COMPLAINING = '<!DOCTYPE html><html lang="en"><body><script>undefined_name()</script></body></html>'
+
+
+def browse(page, *options):
+    """Open a page in a browser of its own; what it writes."""
+    profile = page.parent / "profile"
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}", *options]
+    command += ["--enable-logging=stderr", "--v=0", "--disable-background-networking", page.as_uri()]
+    return subprocess.run(command, capture_output=True, timeout=100)
+
+
+def requests(log):
+    """The addresses that a page asked for, of those that need a network."""
+    return sorted(
+        set(re.findall(r'"url":"((?:https?|wss?)://localhost[^"]*|https?://[^"]*\.(?:png|css|js|svg|woff2?))"', log))
+    )
+
+
+def dumped(tmp_path, html):
+    """The page after loading, what was asked of the network, and what was said on the console."""
+    page, log = tmp_path / "page.html", tmp_path / "net.json"
+    page.write_text(html)
+    done = browse(page, "--dump-dom", f"--log-net-log={log}")
+    console = [line for line in done.stderr.decode().splitlines() if "CONSOLE" in line]
+    return done.stdout.decode(), requests(log.read_text()), console
+
+
+def framed(tmp_path, html, attribute=""):
+    """The picture of a page in a frame; with the attribute sandbox the frame runs no scripts."""
+    page, frame, png = (tmp_path / name for name in ("page.html", "frame.html", "frame.png"))
+    page.write_text(html)
+    frame.write_text(f'<body><iframe {attribute} src="page.html" style="width: 700px; height: 2500px"></iframe></body>')
+    browse(frame, f"--screenshot={png}", "--window-size=800,2600", "--allow-file-access-from-files")
+    return png.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def html():
+    system = km.QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2 + y"])
+    return report_html(km.analyze(km.SystemFile.from_system(system, "small"), seconds=5))
+
+
+def test_nothing_is_fetched_and_nothing_complained_of(tmp_path, html):
+    dom, asked, console = dumped(tmp_path, html)
+    assert "How to make this page again" in dom
+    assert (asked, console) == ([], [])
+
+
+@pytest.mark.slow
+def test_a_page_that_fetches_or_complains_is_seen(tmp_path):
+    assert dumped(tmp_path, FETCHING)[1] == ["http://localhost:9/x.png"]
+    assert "undefined_name" in dumped(tmp_path, COMPLAINING)[2][0]
+
+
+@pytest.mark.slow
+def test_the_page_is_the_same_without_scripts(tmp_path, html):
+    assert framed(tmp_path, html) == framed(tmp_path, html, "sandbox")
+    writing = "<!DOCTYPE html><html lang='en'><body><script>document.write('A')</script></body></html>"
+    assert framed(tmp_path, writing) != framed(tmp_path, writing, "sandbox")
+
+
+@pytest.mark.slow
+def test_formulas_are_laid_out(tmp_path):
+    """A fraction is higher than a line of text, and narrower than its parts one after the other."""
+    fraction = formula(parse_rational_function("123456789*x/(987654321 + x)", ["x"]))
+    script = (
+        "const [a, b] = ['math', '#t'].map(which => document.querySelector(which).getBoundingClientRect());"
+        "document.title = JSON.stringify([a.width, a.height, b.width, b.height]);"
+    )
+    inside = f'{fraction}<br/><span id="t">123456789987654321</span><script>{script}</script>'
+    page = tmp_path / "page.html"
+    page.write_text(f'<!DOCTYPE html><html lang="en"><title></title><body>{inside}</body></html>')
+    title = re.search("<title>(.*?)</title>", browse(page, "--dump-dom").stdout.decode())[1]
+    width, height, line_width, line_height = json.loads(title)
+    assert width < 0.8 * line_width
+    assert height > 1.5 * line_height
+
+
+@pytest.mark.slow
+def test_what_is_printed_has_the_verdict_and_what_is_folded_on_the_screen(tmp_path, html):
+    if shutil.which("pdftotext") is None:
+        pytest.skip("needs pdftotext")
+    page, pdf = tmp_path / "page.html", tmp_path / "page.pdf"
+    page.write_text(html)
+    browse(page, f"--print-to-pdf={pdf}", "--no-pdf-header-footer")
+    text = subprocess.run(["pdftotext", pdf, "-"], capture_output=True, check=True).stdout.decode()
+    assert "Verdict" in text
+    assert "in the sense of complexity" in text
+    assert "[system]" in text, "the system file, folded on the screen"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scheme", "is_dark"), [(0, True), (1, False)])
+def test_the_page_is_light_or_dark_as_its_reader_is_and_not_blank(tmp_path, html, scheme, is_dark):
+    image = pytest.importorskip("matplotlib.image")
+    page, png = tmp_path / "page.html", tmp_path / "page.png"
+    page.write_text(html)
+    browse(page, f"--screenshot={png}", "--window-size=800,1200", f"--blink-settings=preferredColorScheme={scheme}")
+    grey = image.imread(png)[:, :, :3].mean(axis=2)
+    assert (grey[5, 5] < 0.2) == is_dark
+    assert (abs(grey - grey[5, 5]) > 0.3).mean() > 0.01, "no letters"
