@@ -30,7 +30,7 @@ print("c_i along an orbit, from three points at a time:")
 orbit = [point.x for point in km.Orbit(km.KahanMap(clebsch.system, eps), ["1/2", 1, "-1/3", 1, "1/2", "1/4"], 6)]
 for k in range(3):
     rows = [[x[clebsch.variables.index(p)] ** 2 for p in ("p1", "p2", "p3")] for x in orbit[k : k + 3]]
-    c = fmpq_mat(3, 3, sum(rows, [])).solve(fmpq_mat(3, 1, [1, 1, 1]))
+    c = fmpq_mat(rows).solve(fmpq_mat(3, 1, [1, 1, 1]))
     print("  ", ", ".join(str(c[i, 0]) for i in range(3)))
 
 names = [*clebsch.variables, "eps"]

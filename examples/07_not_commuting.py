@@ -5,6 +5,7 @@ maps do not: the corners of the square x -> Phi_0 -> Phi_1 miss each other, by a
 For two associated systems the square closes exactly, at every eps.
 """
 
+from itertools import pairwise
 from math import log2
 
 import kahanmaps as km
@@ -34,5 +35,5 @@ steps = ["1/1000", "1/2000", "1/4000", "1/8000"]
 gaps = [float(gap(f_0, f_1, eps)) for eps in steps]
 for eps, size in zip(steps, gaps, strict=True):
     print(f"H_0 and H_1, eps = {eps}: gap {size:.3g}")
-orders = [log2(a / b) for a, b in zip(gaps, gaps[1:], strict=False)]
+orders = [log2(a / b) for a, b in pairwise(gaps)]
 print("halving eps divides the gap by 2 to the power", ", ".join(f"{order:.2f}" for order in orders))
