@@ -9,7 +9,7 @@ export PYTHON
 
 python := .venv/bin/python
 
-.PHONY: help demo test test-slow check lint types format bench docs docs-links clean demo-venv dev-venv
+.PHONY: help demo test test-slow check lint types format bench docs docs-links pictures clean demo-venv dev-venv
 
 help:  ## list the tasks
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
@@ -47,6 +47,11 @@ docs: dev-venv  ## the documentation as pages, in docs/_build/html
 	@$(python) -m sphinx -b html -q -n -W --keep-going -d docs/_build/trees docs docs/_build/html
 	@$(python) docs/_ext/check_pages.py docs/_build/html
 	@echo "docs/_build/html/index.html"
+
+pictures: dev-venv  ## the pictures of the documentation again, by the commands they carry
+	@cd docs/pictures && PATH="$$PWD/../../.venv/bin:$$PATH" && for picture in *.png *.svg; do \
+	    eval "$$(kahanmaps plot recipe $$picture)" || exit; \
+	done
 
 docs-links: dev-venv  ## do the links of the documentation to other sites work? Needs the network
 	@$(python) -m sphinx -b linkcheck -q -d docs/_build/trees-links docs docs/_build/links

@@ -43,12 +43,6 @@ def complete_system(context: click.Context, incomplete: str) -> list[str]:
 
 
 @_silently
-def complete_catalogue(context: click.Context, incomplete: str) -> list[str]:
-    """Names of the catalogue."""
-    return _catalogue_names(incomplete)
-
-
-@_silently
 def complete_toml(context: click.Context, incomplete: str) -> list[str]:
     """TOML files."""
     return toml_files(incomplete)

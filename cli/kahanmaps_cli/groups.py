@@ -1,4 +1,4 @@
-"""Groups of commands that know what a misspelt name may have meant."""
+"""What a misspelt name may have meant: groups that suggest commands, and errors of click in the words of the others."""
 
 from __future__ import annotations
 
@@ -31,12 +31,18 @@ def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
     return get_close_matches(written, known, n=3, cutoff=cutoff)
 
 
-def with_hint(error: click.ClickException) -> click.ClickException:
-    """The error; where a value is none of the choices its message says which one is like it."""
-    if isinstance(error, click.BadParameter) and error.param is not None and isinstance(error.param.type, click.Choice):
-        found = re.match(r"'([^']*)' is not one of ", error.message)
-        close = close_to(found[1].lower(), [str(choice) for choice in error.param.type.choices]) if found else []
-        if close:
-            message = f"{error.message} Did you mean {' or '.join(close)}?"
-            return click.BadParameter(message, error.ctx, error.param, error.param_hint)
-    return error
+def in_our_words(error: click.ClickException) -> click.ClickException:
+    """The error with what was found and what was expected, and where a choice is misspelt with one that is like it."""
+    if not isinstance(error, click.BadParameter) or error.param is None:
+        return error
+    message = error.message
+    if found := re.fullmatch(r"'(.*)' is not a valid (integer|float)\.", message, re.DOTALL):
+        message = f"found {found[1]!r}, expected {'an integer' if found[2] == 'integer' else 'a number'}"
+    elif found := re.fullmatch(r"(\S+) is not in the range (.*)\.", message):
+        message = f"found {found[1]}, expected {found[2].replace('<=x<=', ' to ').replace('x>=', 'at least ')}"
+    elif isinstance(error.param.type, click.Choice) and (found := re.match(r"'([^']*)' is not one of ", message)):
+        close = close_to(found[1].lower(), [str(choice) for choice in error.param.type.choices])
+        message += f" Did you mean {' or '.join(close)}?" if close else ""
+    if message == error.message:
+        return error
+    return click.BadParameter(message, error.ctx, error.param, error.param_hint)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kahanmaps_cli.colour_option import colour_option, with_colour_option
-from kahanmaps_cli.groups import SuggestingGroup, with_hint
+from kahanmaps_cli.groups import SuggestingGroup, in_our_words
 from kahanmaps_cli.progress import say
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def _run(argv: Sequence[str] | None) -> int:
         return stop.exit_code
     except click.ClickException as error:
         with suppress(OSError):
-            with_hint(error).show(sys.stderr)
+            in_our_words(error).show(sys.stderr)
         return WRONG_USE
     except (click.Abort, KeyboardInterrupt):
         say("interrupted")

@@ -137,7 +137,9 @@ class Steps(OptionType):
             piece = piece.strip()
             if not (piece.isascii() and piece.isdigit()) or len(piece) > 40:
                 self.fail(
-                    f"found {_shorten(piece)}, expected step numbers 0, 1, 2, ... separated by commas", param, ctx
+                    f"found {_shorten(piece)}, expected step numbers of at most 40 digits, separated by commas",
+                    param,
+                    ctx,
                 )
             steps.append(int(piece))
         return sorted(set(steps))

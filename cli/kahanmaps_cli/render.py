@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.terminal import COLOURS, NARROW, NUMBER_WIDTH, columns, console, tell
-from kahanmaps_cli.terminal import on_terminal as on_terminal
-from kahanmaps_cli.terminal import shorten as shorten
+from kahanmaps_cli.terminal import COLOURS, NARROW, NUMBER_WIDTH, columns, console, on_terminal, shorten, tell
 
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Evidence, Finding, Report, Witness

@@ -75,7 +75,6 @@ def console() -> Console:
         highlight=False,
         force_terminal=coloured,
         color_system="standard" if coloured else None,
-        no_color=False,
         width=columns(),
     )
 
@@ -94,14 +93,13 @@ def tell(text: str, hang: int = _LABEL, style: str = "") -> None:
     Verdicts are coloured, lines that start with # are headings. `hang` is the column of what stands beside a label.
     """
     for line in text.split("\n"):
-        cells = line.split("\t")
+        cells = (printable(line) if on_terminal() else line).split("\t")
         shown = _laid_out(cells, hang) if on_terminal() else line
         if style or line.startswith("# "):
             shown = "\n".join(paint(piece, style or "bold") if piece else "" for piece in shown.split("\n"))
         for cell in cells[:2]:
-            verdict, *rest = cell.split(" (")
-            if verdict in COLOURS and not rest and not style:
-                shown = shown.replace(verdict, paint(verdict, COLOURS[verdict]), 1)
+            if cell in COLOURS and not style:
+                shown = shown.replace(cell, paint(cell, COLOURS[cell]), 1)
         click.echo(shown, color=is_coloured())
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of
@@ -14,10 +16,7 @@ def reading_order(polynomial: fmpq_mpoly) -> list[tuple[tuple[int, ...], fmpq]]:
     >>> reading_order(parse_polynomial("eps*x^2 - 1/2", ["x", "eps"]))
     [((0, 0), -1/2), ((2, 1), 1)]
     """
-    names = names_of(polynomial)
-    at = names.index("eps") if "eps" in names else None
-    terms = [(tuple(int(exponent) for exponent in monomial), value) for monomial, value in polynomial.terms()]
-    return terms if at is None else sorted(terms, key=lambda term: term[0][at])
+    return list(_terms(polynomial))
 
 
 def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
@@ -29,7 +28,7 @@ def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
     """
     kept: dict[tuple[int, ...], fmpq] = {}
     names, left = names_of(polynomial), characters
-    for monomial, value in reading_order(polynomial):
+    for monomial, value in _terms(polynomial):
         # The length of a number without writing it: a coefficient of a million digits takes seconds.
         left -= int((value.p.bit_length() + value.q.bit_length()) * 0.30103) + 3
         left -= sum(len(name) + 2 for name, exponent in zip(names, monomial, strict=True) if exponent)
@@ -37,3 +36,15 @@ def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
             break
         kept[monomial] = value
     return polynomial if len(kept) == len(polynomial) else polynomial.context().from_dict(kept)
+
+
+def _terms(polynomial: fmpq_mpoly) -> Iterator[tuple[tuple[int, ...], fmpq]]:
+    """The terms in reading order, one by one: of a hundred thousand, often only the first few are wanted."""
+    names = names_of(polynomial)
+    order: Sequence[int] = range(len(polynomial))
+    if "eps" in names:
+        at = names.index("eps")
+        powers = [int(monomial[at]) for monomial in polynomial.monoms()]
+        order = sorted(order, key=powers.__getitem__)
+    for k in order:
+        yield tuple(int(exponent) for exponent in polynomial.monomial(k)), polynomial.coefficient(k)

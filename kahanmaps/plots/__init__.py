@@ -4,4 +4,9 @@ style             sizes in centimetres, fonts, colours that the colour-blind and
 figures           an empty figure in a style; a figure as a file (PDF, SVG, PNG) or as SVG inside a page
 recipe            how a picture was made: written into its file, read from it
 terminal          a figure as characters, for a terminal
+legends           a legend above the axes
+zero_band         a logarithmic axis on which an exact zero has a place
+growth            degrees of iterates, heights of exact orbits (height_curves, degree_records: read from records)
+drift             how far integrals drift along float orbits (drift_functions: which ones; draw_drift: drawn)
+batch             results of a batch: counts, distributions, one number against another
 """

@@ -17,13 +17,15 @@ from kahanmaps.plots.figures import RASTERISE_ABOVE, drawing, label_of, new_figu
 from kahanmaps.plots.invariant_curves import InvariantCurves, InvariantPlane
 from kahanmaps.plots.plane_cubics import Floats, PlaneCubic
 from kahanmaps.plots.plane_views import Disc, Rectangle, clouds_of, view_of
-from kahanmaps.plots.style import COLOUR_MAP, COLOURS, MARKS, Style
+from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOUR_MAP, COLOURS, MARKS, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _CURVE, _FLOW = "#9a9a9a", "#444444"
+_CROWDED = 0.06  # of the width of a panel: a number would cover the one before
+_POINT = CENTIMETRES_PER_INCH / 72  # in centimetres
 _NUMBERED = 4  # steps whose dots have their number beside them
 
 
@@ -47,6 +49,7 @@ def draw_invariant_curves(
     panels = panels_of(found)
     count = len(panels) + (original is not None)
     columns = count if count <= 3 else 2 if count == 4 else 3 if count <= 9 else 4
+    columns = min(columns, max(1, int(style.width / (12 * style.font_size * _POINT))))  # or letters fill the panels
     rows = ceil(count / columns)
     with drawing(style):
         from matplotlib.colors import Normalize
@@ -84,7 +87,7 @@ def panels_of(found: InvariantCurves) -> list[tuple[str, InvariantPlane, str]]:
 
 def _aspect(style: Style, rows: int, columns: int, projective: bool) -> float:
     """Height over width such that the panels are squares, with room for letters and a colour bar."""
-    width, letter = style.width, style.font_size * 2.54 / 72
+    width, letter = style.width, style.font_size * _POINT
     side = max(1.0, width / max(columns, 1.25) - (0.5 if projective else 4.2) * letter)
     return float((rows * (side + (4.0 if projective else 5.2) * letter) + 4.6 * letter) / width)
 
@@ -107,8 +110,11 @@ class _Pen:
         if not self.by_step:
             return
         for k in range(min(_NUMBERED, count)):
-            aside = np.array([0.7, 0.7]) if normals is None else normals[k] * (-1) ** k  # on alternate sides
+            aside = np.array([0.7, 0.7]) if normals is None else normals[k]
             axes.plot(x[k], y[k], "o", markersize=4.2, fillstyle="none", color="black", markeredgewidth=0.5, zorder=3)
+            across, up = np.abs(x[:k] - x[k]) / np.ptp(axes.get_xlim()), np.abs(y[:k] - y[k]) / np.ptp(axes.get_ylim())
+            if np.any(np.hypot(across, up) < _CROWDED):
+                continue
             axes.annotate(
                 str(k),
                 (x[k], y[k]),
@@ -153,7 +159,7 @@ def _draw_plane(
     else:
         name = f"{column}_{{{place}}}"
         names = rf"$\mathrm{{Re}}\,{name}$", rf"$\mathrm{{Im}}\,{name}$"
-        root = plane.root_text.replace("+-", r"\pm ").replace("i", r"\,\mathrm{i}")
+        root = f"{plane.root.real:.3g}" * (plane.root.real != 0) + rf" \pm {plane.root.imag:.3g}\,\mathrm{{i}}"
         axes.set_title(rf"$\lambda_{{{place},{int(place) + 1}}} = {root}$")
     view.prepare(axes, names)
     for orbit in plane.orbits:

@@ -86,7 +86,8 @@ def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str) -
     if squares.steps == 1:  # five points, all of which are wanted
         window = np.array([every.min(axis=0), every.max(axis=0)]).T
         window[:, 1] += np.where(window[:, 0] < window[:, 1], 0, np.maximum(1e-9, np.abs(window[:, 1])))
-    window = window + (0.32 if squares.steps == 1 else 0.08) * np.diff(window, axis=1) * np.array([-1, 1])
+    margins = np.array([[0.42], [0.36]]) if squares.steps == 1 else 0.12  # room for the names of corners
+    window = window + margins * np.diff(window, axis=1) * np.array([-1, 1])
     axes.set_box_aspect(1)
     axes.set_xlim(*window[0])
     axes.set_ylim(*window[1])
@@ -132,6 +133,11 @@ def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floa
     """The last corners once more, as large as it takes to see that they are two; in the emptiest corner."""
     lengths = np.diff(window, axis=1)[:, 0]
     inside = (every - window[:, 0]) / lengths
+    if len(one) == 2:  # the name of the last corner is there as well
+        corner = (one[-1, -1] - window[:, 0]) / lengths
+        inwards, down = -np.sign(corner - 0.5)
+        beside = [corner + np.array([0.2 * k * inwards, -0.1 * down]) for k in range(4)]
+        inside = np.concatenate([inside, np.array(beside)])
     places = [(x, y) for x in (0.04, 0.64) for y in (0.04, 0.64)]
     x, y = max(places, key=lambda place: np.hypot(*(inside - np.array(place) - 0.16).T).min())
     inset = axes.inset_axes((x, y, 0.32, 0.32), zorder=7)
@@ -141,7 +147,18 @@ def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floa
     inset.set_ylim(ends[:, 1].mean() - half[1], ends[:, 1].mean() + half[1])
     inset.set_xticks([])
     inset.set_yticks([])
-    inset.set_title(rf"$\times {lengths[0] * 0.32 / (2 * half[0]):.2g}$", fontsize="x-small", pad=2)
+    from matplotlib.patheffects import withStroke
+
+    how: dict[str, Any] = {"fontsize": "x-small", "path_effects": [withStroke(linewidth=1.5, foreground="white")]}
+    inset.text(
+        0.04,
+        0.96,
+        rf"$\times {lengths[0] * 0.32 / (2 * half[0]):.2g}$",
+        va="top",
+        transform=inset.transAxes,
+        zorder=8,
+        **how,
+    )
     _draw_lattices(inset, one[-2:, -2:], other[-2:, -2:])
     inset.plot(*ends.T, color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
 

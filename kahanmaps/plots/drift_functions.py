@@ -129,11 +129,12 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     }
     hamiltonian = file.hamiltonian
     if hamiltonian is not None and eps != 0:
-        found["modified H"] = OfTheImage(ModifiedHamiltonian(hamiltonian), eps, r"$\tilde H$")
+        found["modified H"] = OfTheImage(ModifiedHamiltonian(hamiltonian), eps, "modified $H$")
         if file.member is not None and hamiltonian.is_homogeneous and hamiltonian.is_standard:
+            letter = "H" if all(sign > 0 for sign in file.member.signs) else "K"  # as in check-integrals
             for power in range(1, hamiltonian.dim // 2):
-                integral = CommutantIntegral(hamiltonian, file.member.A, power)
-                found[integral.name] = OfTheImage(integral, eps, rf"$\tilde H_{{{power}}}$")
+                integral = CommutantIntegral(hamiltonian, file.member.A, power, letter)
+                found[integral.name] = OfTheImage(integral, eps, rf"$\tilde{{{letter}}}_{{{power}}}$")
     if hamiltonian is not None and "H" not in found:
         found["H"] = Expression("H", _as_function(hamiltonian, hamiltonian.H), eps)
     return found

@@ -61,7 +61,10 @@ def draw_degrees(
             _draw_degrees_of(axes, growth, label, k, zero, scale == "loglog")
         axes.set_xlabel("iterate $n$")
         axes.set_ylabel("degree $d_n$")
-        legend_above(figure, *axes.get_legend_handles_labels(), style, r"$\lambda$: dynamical degree", most=1)
+        title = r"$\lambda$: dynamical degree"
+        if any(growth.eps is not None for growth in growths.values()):
+            title += r"; the time step is $2\varepsilon$"
+        legend_above(figure, *axes.get_legend_handles_labels(), style, title, most=1)
     return figure
 
 
@@ -117,10 +120,13 @@ def _step_axis(axes: Axes, scale: str, longest: int) -> None:
     """The horizontal axis: whole numbers, or their logarithms from 1 on."""
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
+    if longest <= 1:
+        axes.set_xlim(-0.5, 1.5)
     if scale != "loglog":
         axes.xaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
         return
     axes.set_xscale("log")
+    axes.set_xlim(0.9, 1.1 * max(longest, 2))
     if longest <= 2000:
         axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if longest <= 200 else (1,)))
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
@@ -164,6 +170,8 @@ def _between(growth: DegreeGrowth, first: int) -> tuple[Any, Any]:
 def _degree_label(name: str, growth: DegreeGrowth) -> str:
     """A line of the legend: the name, what d_n is, the dynamical degree and what is estimated."""
     name = plain(name)
+    if growth.eps is not None:
+        name += rf", $\varepsilon = {format_number(growth.eps)}$"
     rate = growth.dynamical_degree
     if growth.growth is GrowthClass.ZERO:
         return f"{name}: constant from $n = {growth.degrees.index(0)}$ on" if 0 in growth.degrees else f"{name}: zero"

@@ -6,9 +6,8 @@ the origin in the direction t write (u, v) = (cos t, sin t)/s. Then
 
     s^3 + eps^2 D(t) s = below h(t)/above,
 
-which has one or three real roots s, 0 at infinity. Their number changes only where
-4 eps^6 D^3 above^2 + 27 below^2 h^2, a form of degree 6, is 0; between two such directions the roots are smooth functions
-of t.
+which has one or three real roots s, 0 at infinity. Their number changes only in the directions in which the form
+4 eps^6 D^3 above^2 + 27 below^2 h^2, of degree 6, is 0; in between the roots are smooth functions of t.
 """
 
 from __future__ import annotations

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 Cloud = tuple[Floats, Floats]
 
+_SHARE = 0.85  # of the dots: orbits come close to infinity again and again
+_MARGIN = 0.08  # of the width, on either side, for the numbers beside the dots
+
 
 @dataclass(frozen=True)
 class Rectangle:
@@ -33,7 +36,9 @@ class Rectangle:
         points, starts = (
             np.concatenate(rows) for rows in zip(*((_rows(c), _rows(c)[:1]) for c in clouds), strict=True)
         )
-        return cls.of(clouds, window_of(points, starts))
+        sizes = np.hypot(*points.T)
+        most = np.quantile(sizes, _SHARE, method="higher")
+        return cls.of(clouds, window_of(points[sizes <= most] if sizes.max() > 2 * most else points, starts))
 
     @classmethod
     def of(cls, clouds: Sequence[Cloud], ranges: Sequence[tuple[float, float]]) -> Rectangle:
@@ -141,4 +146,5 @@ def view_of(plane: InvariantPlane, column: str = "uv") -> Rectangle:
     if symmetric and all(low <= 0 <= high for low, high in ranges):
         reach = max(max(abs(low), abs(high)) for low, high in ranges)
         ranges = [(-reach, reach), (-reach, reach)]
+    ranges = [(low - _MARGIN * (high - low), high + _MARGIN * (high - low)) for low, high in ranges]
     return Rectangle.of(clouds, ranges)

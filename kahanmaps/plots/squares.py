@@ -98,7 +98,7 @@ def squares(
     'closes exactly'
     >>> h = QuadraticSystem.from_text(["x", "y"], ["y^2", "0"])
     >>> squares(Pair(f, h, ("f", "h")), [1, 2], "1/10").verdict
-    'gap 0.2'
+    'gap 0.762'
     """
     if not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")

@@ -7,6 +7,7 @@ terminal, though coarsely.
 from __future__ import annotations
 
 import re
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -36,7 +37,7 @@ def draw_in_characters(figure: Figure, columns: int, rows: int, style: Style) ->
     """The figure in `rows` rows of `columns` cells.
 
     The figure is changed (size and line widths): draw what goes into a file before, or make it anew. Raises InputError
-    for fewer than 20 columns or 8 rows.
+    for fewer than 20 columns or 8 rows, and for too few to hold this figure; it may be tried again with more.
     """
     if columns < 20 or rows < 8:
         raise InputError(f"found {columns} columns and {rows} rows, expected at least 20 and 8 for a picture")
@@ -49,7 +50,7 @@ def draw_in_characters(figure: Figure, columns: int, rows: int, style: Style) ->
         figure.set_size_inches(2 * columns / 72, 4 * rows / 72)
         _coarsen(figure)
         canvas = FigureCanvasAgg(figure)
-        canvas.draw()
+        _lay_out(canvas, columns, rows)
         texts = [placed for text in _visible(figure, Text) for placed in _placed(text, columns, rows)]
         figure.set_layout_engine("none")
         for text in figure.findobj(Text):
@@ -62,6 +63,19 @@ def draw_in_characters(figure: Figure, columns: int, rows: int, style: Style) ->
             if 0 <= row < rows and 0 <= column + k < columns:
                 cells[row][column + k] = Cell(character, None)
     return cells
+
+
+def _lay_out(canvas: Any, columns: int, rows: int) -> None:
+    """Draw once, so that everything has its place. Raises InputError where there is too little room."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message="constrained_layout not applied", category=UserWarning)
+        try:
+            canvas.draw()
+        except UserWarning as warning:
+            raise InputError(
+                f"found {columns} columns and {rows} rows, expected more for this picture: make the terminal larger, "
+                "or write a file with -o"
+            ) from warning
 
 
 def _visible(figure: Figure, kind: Any) -> list[Any]:
@@ -82,10 +96,12 @@ def _off_scale(figure: Figure) -> set[int]:
         if hasattr(axes, "zaxis"):
             continue
         for axis in (axes.xaxis, axes.yaxis):
-            low, high = sorted(axis.get_view_interval())
+            scale = axis.get_transform()  # on a logarithmic scale what is near to 0 is far away
+            low, high = sorted(scale.transform(np.asarray(axis.get_view_interval(), dtype=float)))
             slack = 1e-9 * (high - low)
             for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks()):
-                if not low - slack <= tick.get_loc() <= high + slack:
+                at = scale.transform(np.array([float(tick.get_loc())]))[0]
+                if not low - slack <= at <= high + slack:
                     off |= {id(tick.label1), id(tick.label2)}
     return off
 
@@ -175,19 +191,22 @@ def _put_labels_above(figure: Figure) -> None:
 
 def _close_up(legend: Any) -> None:
     """Lines of a legend one below the other: it was laid out for letters of another size."""
-    from matplotlib.offsetbox import DrawingArea, VPacker
+    from matplotlib.lines import Line2D
+    from matplotlib.offsetbox import DrawingArea, HPacker, VPacker
     from matplotlib.patches import Rectangle
 
     for column in legend.findobj(VPacker):
         column.sep = 0
+    for row in legend.findobj(HPacker):
+        row.sep = 4
     for area in legend.findobj(DrawingArea):
-        area.height, area.ydescent = 2.5, 0
+        area.width, area.height, area.ydescent = 8, 2.5, 0
     for handle in legend.legend_handles:
         if isinstance(handle, Rectangle):
-            handle.set_y(0)
-            handle.set_height(2.5)
-        elif hasattr(handle, "set_ydata"):
-            handle.set_ydata([1.25] * len(handle.get_ydata()))
+            handle.set_bounds(0, 0, 8, 2.5)
+        elif isinstance(handle, Line2D):
+            count = np.size(handle.get_xdata(orig=True))
+            handle.set_data(np.linspace(0, 8, count) if count > 1 else [4], [1.25] * count)
 
 
 def _braille(pixels: Any, columns: int, rows: int) -> list[list[Cell]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -44,12 +45,16 @@ def claims_page(
         (f'<a href="#{section_id}">{text(name)}</a>', text(counts(findings))) for section_id, name, findings in groups
     ]
     conclusion = f'<p class="conclusion">{markup.verdict(verdict)}<br/>{text(counts(every))}</p>'
+    ids: Counter[str] = Counter()
     notes = [text(note) for report in reports for note in report.notes] + [text(sentence) for sentence in left_out]
     sections = [
         Section("verdict", "Verdict", f"{conclusion}\n{_EXPLAINED}\n{wide(markup.table(['part', 'claims'], rows))}"),
         Section("system", "The system", "" if file is None else system_html(file)),
         Section("orbits", "Orbits", "" if file is None else _orbits(file, reports[0], pictures)),
-        *(Section(section_id, name, "\n".join(map(_claim, findings))) for section_id, name, findings in groups),
+        *(
+            Section(section_id, name, "\n".join(_claim(finding, ids) for finding in findings))
+            for section_id, name, findings in groups
+        ),
         Section("notes", "Notes", markup.listed(notes) if notes else ""),
         Section("sources", "Source", f"<p>{text(source(_PAPER))}</p>" if reports[0].check == "verify" else ""),
         Section("pictures", "Pictures", f"<p>{text(pictures.note)}</p>" if pictures.note else ""),
@@ -67,10 +72,13 @@ def _groups(reports: Sequence[Report]) -> list[tuple[str, str, list[Finding]]]:
     return [(f"check-{_slug(r.check)}", f"Check: {r.check}", list(r.findings)) for r in reports]
 
 
-def _claim(finding: Finding) -> str:
-    """One line with its verdict, to be unfolded; what is refuted and should not be stands open."""
+def _claim(finding: Finding, ids: Counter[str]) -> str:
+    """One line with its verdict, to be unfolded; what is refuted and should not be stands open.
+
+    `ids` counts those that are on the page: a control has the key of its claim, once for each hypothesis it breaks.
+    """
     key = finding.place.get("key")
-    mark = f' id="claim-{_slug(str(key))}"' if key else ""
+    mark = f' id="{_new_id(f"claim-{_slug(str(key))}", ids)}"' if key else ""
     place = finding.place.get("place")
     words = finding.claim.removeprefix(f"{place}: ")
     above = f"<strong>{text(place)}</strong> " if place else ""
@@ -88,6 +96,11 @@ def _orbits(file: SystemFile, report: Report, pictures: Pictures) -> str:
     if file.member is not None:
         return invariant_curves_figure(file, given, pictures)
     return portrait_figure(file, given, pictures)
+
+
+def _new_id(name: str, ids: Counter[str]) -> str:
+    ids[name] += 1
+    return name if ids[name] == 1 else f"{name}-{ids[name]}"
 
 
 def _slug(words: str) -> str:

@@ -195,7 +195,7 @@ def test_a_check_whose_orbit_nobody_asked_for_may_cut_it_short(kahanmaps):
         (f"orbit {TOP}", "give --steps N or --at N1,N2,..., one of the two"),
         (f"orbit {TOP} --steps 1 --at 1", "give --steps N or --at N1,N2,..., one of the two"),
         (f"orbit {TOP} --steps -1", "found --steps -1, expected 0 or more"),
-        (f"orbit {TOP} --steps 1e3", "'1e3' is not a valid integer"),
+        (f"orbit {TOP} --steps 1e3", "found '1e3', expected an integer"),
         (f"orbit {TOP} --at 1,b", "found 'b', expected step numbers"),
         (f"orbit {TOP} --at ''", "found '', expected step numbers"),
         (f"orbit {TOP} --at ٣", "expected step numbers"),

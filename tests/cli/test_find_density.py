@@ -114,7 +114,7 @@ def test_a_map_that_is_periodic_at_this_eps_is_told(kahanmaps):
         ("euler_top --symbolic eps --eps 1", "give --eps as a number, or eps among --symbolic"),
         ("euler_top --eps 0", "found eps = 0"),
         ("euler_top --seconds 0", "found '0'"),
-        ("euler_top --max-degree -1", "-1 is not in the range"),
+        ("euler_top --max-degree -1", "found -1, expected 0 to 20"),
         ("euler_top --toml --latex", "give one of --toml, --latex and --json"),
         ("--vars x,y --rhs x/a --rhs x -p a=1 --symbolic a", "a division by something with variables in it"),
         ("", "missing SYSTEM"),

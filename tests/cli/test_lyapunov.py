@@ -65,8 +65,11 @@ def test_a_clock_that_stops_is_status_three(kahanmaps):
     [
         ("lorenz", "missing --eps"),
         ("lorenz --eps 0", "eps = 0"),
-        ("lorenz --eps 1/10 --steps 1", "found 1 steps"),
-        ("lorenz --eps 1/10 --transient -1", "found 10000 steps after -1"),
+        ("lorenz --eps 1/10 --steps 1", "found --steps 1 and"),
+        (
+            "lorenz --eps 1/10 --transient -1",
+            "found --steps 10000 and --transient -1, expected 2 to 1000000000 and 0 to 1000000000",
+        ),
         ("lorenz --eps 1/10 --random 0", "found '0', expected an integer, 1 or more"),
         ("lorenz --eps 1/10 --seed -1", "found '-1', expected an integer, 0 or more"),
         ("lorenz --eps 1/10 --box 0", "--box 0"),

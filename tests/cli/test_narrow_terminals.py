@@ -8,6 +8,8 @@ import shlex
 import pytest
 from cli_helpers import terminal
 
+from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.render import ending
 from kahanmaps_cli.terminal import wrapped
 
 COMMANDS = [
@@ -82,6 +84,19 @@ def test_the_report_of_analyze_has_headings_and_coloured_verdicts():
     out = terminal("analyze", "--vars", "x,y", "--rhs", "y", "--rhs=-x", columns=60).out
     assert "\n\x1b[1mintegrals\x1b[0m\n" in out
     assert "\x1b[32mproved\x1b[0m" in out
+
+
+def test_a_line_of_progress_is_cut_to_the_terminal(monkeypatch, capsys, slow_clock):
+    monkeypatch.setattr("kahanmaps_cli.progress._width", lambda: 30)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with Progress() as progress:
+        progress("x" * 100)
+        assert capsys.readouterr().err == "\r" + "x" * 29
+
+
+def test_how_an_orbit_ended_is_said_once():
+    assert ending("interrupted", "interrupted after step 3") == "interrupted after step 3"
+    assert ending("completed", "3 steps") == "completed: 3 steps"
 
 
 # The lines themselves

@@ -72,3 +72,18 @@ def test_a_file_in_a_folder_that_is_not_there_cannot_be_made(kahanmaps, tmp_path
     outcome = kahanmaps(command, Path(tmp_path / "nowhere" / "x.npy"), *(["--arithmetic float"] * ("orbit" in command)))
     assert outcome.status == 2
     assert f"there is no folder {tmp_path / 'nowhere'}: make it first, or check the name" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (f"orbit euler_top {ORBIT}5.5", "found '15.5', expected an integer"),
+        ("batch run x.toml --jobs 0", "found 0, expected 1 to 1024"),
+        ("batch run x.toml --max-tasks 0", "found 0, expected at least 1"),
+        ("lyapunov lorenz --eps 1/10 --steps 1", "found --steps 1 and --transient 0, expected 2 to"),
+    ],
+)
+def test_numbers_are_refused_with_what_was_found_and_expected(kahanmaps, command, words):
+    outcome = kahanmaps(command)
+    assert outcome.status == 2
+    assert words in outcome.err

@@ -11,7 +11,7 @@ from flint import fmpq
 
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
-from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
+from kahanmaps.laboratory.degrees import DegreeGrowth
 from kahanmaps.laboratory.height_survey import height_survey
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.growth import draw_degrees, draw_heights
@@ -21,6 +21,7 @@ from kahanmaps.systems.catalog import load
 
 SQUARES = tuple(2 * n * n + 1 for n in range(12))  # of the Kahan map of the Euler top
 POWERS = tuple(2**n for n in range(10))
+TENTH = fmpq(1, 10)
 NEITHER = (1, 3, 7, 17, 39, 93, 215, 495, 1137, 2615, 6007, 13797)  # of Henon and Heiles
 
 
@@ -58,6 +59,13 @@ def test_the_curve_is_the_closed_form():
 def test_the_legend_says_formula_and_dynamical_degree():
     figure = draw_degrees({"top": growth(SQUARES), "lv": growth(POWERS)})
     assert labels(figure) == [r"top: $d_n = 2n^{2} + 1$, $\lambda = 1$", r"lv: $\lambda = 2$"]
+
+
+def test_an_eps_is_told_with_what_the_time_step_is():
+    figure = draw_degrees({"lv": replace(growth(POWERS), eps=TENTH), "top": growth(SQUARES)})
+    assert labels(figure)[0] == r"lv, $\varepsilon = 1/10$: $\lambda = 2$"
+    assert figure.legends[0].get_title().get_text().endswith(r"; the time step is $2\varepsilon$")
+    assert "varepsilon" not in labels(figure)[1]
 
 
 def test_what_is_estimated_is_said_and_dotted():
@@ -158,9 +166,6 @@ def test_a_record_has_fewer_heights_and_the_same_constants(survey):
         assert math.isclose(ours.constant, theirs.constant, rel_tol=1e-5)
 
 
-TENTH = fmpq(1, 10)
-
-
 def curve(kind, bits, constant=None, ratio=None, eps=TENTH):
     return HeightCurve(eps, np.arange(len(bits)), np.array(bits, dtype=float), kind, constant, ratio, "completed")
 
@@ -217,9 +222,3 @@ def test_a_wrong_record_is_refused(survey, change):
 def test_another_record_is_refused(record):
     with pytest.raises(InputError, match="expected an object written by 'kahanmaps heights --json'"):
         curves_of_record(record)
-
-
-def test_a_measured_system_is_drawn_as_it_is():
-    found = degree_growth(load("euler_top").system)
-    again = replace(found)
-    assert labels(draw_degrees({"a": found})) == labels(draw_degrees({"a": again}))

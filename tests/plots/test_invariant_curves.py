@@ -246,7 +246,7 @@ def test_the_lines_drawn_lie_on_the_curve(curves):
 def test_panels_are_named_by_root_and_coordinates(curves):
     figure = draw_invariant_curves(curves("one real root of three"), STYLE)
     assert figure.axes[0].get_title() == r"$\lambda_{1} = 0.75488$"
-    assert figure.axes[1].get_title() == r"$\lambda_{2,3} = -0.87744 \pm  0.74486\,\mathrm{i}$"
+    assert figure.axes[1].get_title() == r"$\lambda_{2,3} = -0.877 \pm 0.745\,\mathrm{i}$"
     assert [axes.get_xlabel() for axes in figure.axes[:2]] == ["$u_{1}$", r"$\mathrm{Re}\,u_{2}$"]
 
 

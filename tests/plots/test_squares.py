@@ -180,7 +180,7 @@ def test_a_small_gap_is_shown_magnified(both):
     closed, open_ = draw_squares(both, STYLE).axes
     assert len(closed.child_axes) == 0
     assert len(open_.child_axes) == 1
-    assert open_.child_axes[0].get_title().startswith(r"$\times")
+    assert open_.child_axes[0].texts[0].get_text().startswith(r"$\times")
 
 
 def test_a_square_has_four_arrows_and_named_corners():

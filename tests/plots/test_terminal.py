@@ -93,3 +93,26 @@ def test_entries_of_a_legend_stand_in_rows_of_their_own():
     found = [next(k for k, row in enumerate(rows) if name in row) for name in ("first", "second", "third")]
     assert len(set(found)) == 3
     assert found[2] - found[0] <= 3
+
+
+def test_a_picture_that_does_not_fit_is_refused_and_may_be_tried_with_more_rows():
+    with drawing(STYLE):
+        figure = new_figure(STYLE)
+        for axes in figure.subplots(5, 1):
+            axes.set_ylabel("y")
+            axes.set_xlabel("x")
+    with pytest.raises(InputError, match="expected more for this picture"):
+        draw_in_characters(figure, 60, 10, STYLE)
+    assert len(draw_in_characters(figure, 60, 60, STYLE)) == 60
+
+
+def test_powers_of_ten_below_a_logarithmic_axis_are_not_written():
+    with drawing(STYLE):
+        figure = new_figure(STYLE)
+        axes = figure.subplots()
+        axes.semilogy([0, 1], [1e-16, 1e-7])
+        axes.set_ylim(1e-16, 1e-7)
+        axes.set_yticks([1e-25, 1e-16, 1e-7], ["below", "least", "most"])
+        axes.set_ylim(1e-16, 1e-7)
+    text = "\n".join(lines(figure))
+    assert ("least" in text, "most" in text, "below" in text) == (True, True, False)

@@ -91,7 +91,9 @@ def _require_sense(options: dict[str, Any], steps: int, transient: int) -> None:
     if options["starts"] is not None and any(options[name] is not None for name in ("count", "box", "seed")):
         raise click.UsageError("--random, --box and --seed draw starts: they do not go with --starts FILE")
     if not 2 <= steps <= _MAX_STEPS or not 0 <= transient <= _MAX_STEPS:
-        raise click.UsageError(f"found {steps} steps after {transient}, expected 2 to {_MAX_STEPS} after 0 or more")
+        raise click.UsageError(
+            f"found --steps {steps} and --transient {transient}, expected 2 to {_MAX_STEPS} and 0 to {_MAX_STEPS}"
+        )
 
 
 def _print(file: SystemFile, eps: Any, found: Lyapunov) -> None:

@@ -49,6 +49,8 @@ def command(database: str | None, db: str | None, **options: Any) -> int:
     missing and so on. A box holds the middle half of the numbers, with the
     median; whiskers hold nine tenths, dots are the least and the largest. Names
     are those of 'kahanmaps batch summary'. A batch that is running may be drawn.
+
+    Exit status: 0 done, 2 wrong use, or there is no task to draw.
     """
     from kahanmaps.errors import InputError
     from kahanmaps.experiments.store import Store

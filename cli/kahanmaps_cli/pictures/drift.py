@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from kahanmaps.plots.drift_functions import WatchedFunction
     from kahanmaps.systems.files import SystemFile
 
+_WIDE = 24.0  # centimetres: in a terminal panels stand side by side, for its lines are few
 _LONGEST = 160  # characters of a start that is told
 _SHOWN = 3  # known integrals, unless more are asked for
 
@@ -69,7 +71,10 @@ def command(system: str | None, **options: Any) -> int:
     eps = the_eps(options["eps"], options["time_step"])
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     survey = _surveyed(file, eps, options)
-    deliver(draw_drift(survey, style_from(options), scale=options["scale"]), options, file)
+    style = style_from(options)
+    if options["size"] is None and options["output"] == "-" and options["kind"] in (None, "text"):
+        style = replace(style, width=_WIDE, height=0.56 * _WIDE)
+    deliver(draw_drift(survey, style, scale=options["scale"]), options, file)
     early = [method for method, end in survey.ends.items() if not end.is_whole]
     if not options["quiet"]:
         _tell(survey, early)

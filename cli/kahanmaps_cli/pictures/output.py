@@ -135,6 +135,7 @@ def _command() -> str:
 
 
 def _draw_in_terminal(figure: Figure, style: Style, path: str) -> None:
+    from kahanmaps.errors import InputError
     from kahanmaps.plots.figures import write_whole
     from kahanmaps.plots.terminal import draw_in_characters
 
@@ -142,7 +143,10 @@ def _draw_in_terminal(figure: Figure, style: Style, path: str) -> None:
     columns = max(20, window.columns - 1)
     width, height = figure.get_size_inches()
     rows = max(8, min(window.lines - 2, round(columns / 2 * height / width), _MOST_ROWS))
-    cells = draw_in_characters(figure, columns, rows, style)
+    try:
+        cells = draw_in_characters(figure, columns, rows, style)
+    except InputError:  # several panels do not fit into a small window, and there they are scrolled
+        cells = draw_in_characters(figure, columns, _MOST_ROWS, style)
     if path == "-" and sys.stdout.isatty():
         _print_in_colour(cells)
         return
