@@ -19,6 +19,7 @@ FLOORS = {
     "sources": 0,
     "version": 0,
     "markup": 0,
+    "whole_files": 0,
     "algebra": 1,
     "systems": 2,
     "family": 2,

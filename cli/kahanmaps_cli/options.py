@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _stack(*decorators: Callable[[F], F]) -> Callable[[F], F]:
+def stack(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     def apply(function: F) -> F:
         for decorator in reversed(decorators):
             function = decorator(function)
@@ -63,7 +63,7 @@ def _parameter_option(kind: NameValue, help_text: str) -> Callable[[F], F]:
 
 
 def _inline_options(parameter: Callable[[F], F]) -> Callable[[F], F]:
-    return _stack(
+    return stack(
         click.option("--vars", "variables", metavar="X,Y,...", help="Inline system: its variables."),
         click.option("--rhs", multiple=True, metavar="EXPR", help="Inline system: one right-hand side a variable."),
         parameter,
@@ -74,10 +74,10 @@ parameter_option: Callable[[F], F] = _parameter_option(NameValue(), "Set a param
 
 inline_options: Callable[[F], F] = _inline_options(parameter_option)
 
-system_options: Callable[[F], F] = _stack(system_argument, inline_options)
+system_options: Callable[[F], F] = stack(system_argument, inline_options)
 
 # For commands about one prime, where -p 101 is natural: values without a name come under the name "".
-system_or_prime_options: Callable[[F], F] = _stack(
+system_or_prime_options: Callable[[F], F] = stack(
     system_argument,
     _inline_options(
         _parameter_option(
@@ -89,12 +89,12 @@ system_or_prime_options: Callable[[F], F] = _stack(
 _EPS_HELP = "The paper's epsilon, exact; the time step is 2 eps."
 _TIME_STEP_HELP = "The time step h = 2 eps, instead of --eps."
 
-eps_options: Callable[[F], F] = _stack(
+eps_options: Callable[[F], F] = stack(
     click.option("--eps", type=ExactNumber(), metavar="E", help=_EPS_HELP),
     click.option("--time-step", type=ExactNumber(), metavar="H", help=_TIME_STEP_HELP),
 )
 
-several_eps_options: Callable[[F], F] = _stack(
+several_eps_options: Callable[[F], F] = stack(
     click.option("--eps", type=ExactNumber(), multiple=True, metavar="E", help=f"{_EPS_HELP} Repeatable."),
     click.option("--time-step", type=ExactNumber(), multiple=True, metavar="H", help=f"{_TIME_STEP_HELP} Repeatable."),
 )
@@ -105,13 +105,13 @@ json_option: Callable[[F], F] = click.option(
 quiet_option: Callable[[F], F] = click.option(
     "-q", "--quiet", is_flag=True, help="No progress and no talk on standard error."
 )
-output_options: Callable[[F], F] = _stack(json_option, quiet_option)
+output_options: Callable[[F], F] = stack(json_option, quiet_option)
 
 seed_option: Callable[[F], F] = click.option(
     "--seed", type=Whole(), metavar="S", default=0, show_default=True, help="Seed of everything drawn at random."
 )
 
-random_starts_options: Callable[[F], F] = _stack(
+random_starts_options: Callable[[F], F] = stack(
     click.option(
         "--starts",
         type=click.Path(),
@@ -147,7 +147,7 @@ def error_bits_option(help_text: str) -> Callable[[F], F]:
     return click.option("--error-bits", type=int, metavar="BITS", default=100, show_default=True, help=help_text)
 
 
-evidence_options: Callable[[F], F] = _stack(
+evidence_options: Callable[[F], F] = stack(
     seed_option,
     error_bits_option("Random points until the probability of error is below 2^-BITS."),
 )
@@ -156,7 +156,7 @@ verbose_option: Callable[[F], F] = click.option(
     "-v", "--verbose", is_flag=True, help="On a terminal: all evidence (a pipe always gets it)."
 )
 
-check_options: Callable[[F], F] = _stack(
+check_options: Callable[[F], F] = stack(
     eps_options,
     click.option(
         "--start", type=PointText(), metavar="X", help="Start of the exact orbit that is tried (default: a random one)."

@@ -122,7 +122,7 @@ def matrix(entries: fmpq_mat, left: str = "", most: int = 8) -> str:
 
 
 def _left(name: str) -> str:
-    if not name.endswith("'"):
+    if name == "'" or not name.endswith("'"):
         return mathml_name(name)
     return f"<msup>{mathml_name(name[:-1])}{_PRIME}</msup>"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kahanmaps import markup
@@ -15,7 +16,19 @@ if TYPE_CHECKING:
 
 _CLAIMS = 30  # in a notebook
 _TEXT = 400
-_NUMBER = 60
+
+
+@dataclass(frozen=True)
+class Room:
+    """How much of a claim is shown: characters of a sentence, a formula and a number, and how many of a list."""
+
+    text: int
+    formula: int
+    number: int
+    entries: int
+
+
+NOTEBOOK = Room(_TEXT, 1_200, 60, 8)
 
 
 class ShownAsWord:
@@ -41,31 +54,34 @@ def finding_html(finding: Finding) -> str:
     return markup.titled(markup.shortened(finding.claim, _TEXT), markup.definitions(rows))
 
 
-def evidence_rows(finding: Finding) -> list[tuple[str, str]]:
+def evidence_rows(finding: Finding, room: Room = NOTEBOOK) -> list[tuple[str, str]]:
     """What stands below a claim: formula, evidence, witness, source; each row a word and HTML."""
     rows = []
     if finding.formula and finding.formula not in finding.claim:
-        rows.append(("formula", f"<code>{_text(finding.formula, 1200)}</code>"))
-    rows.append(("because", because(finding.evidence)))
-    rows += [("also", _text(evidence.summary)) for evidence in finding.also[:6]]
+        rows.append(("formula", f"<code>{_text(finding.formula, room.formula)}</code>"))
+    rows.append(("because", because(finding.evidence, room)))
+    rows += [("also", _text(evidence.summary, room.text)) for evidence in finding.also[: room.entries]]
+    if len(finding.also) > room.entries:
+        rows.append(("also", f"… and {len(finding.also) - room.entries} more"))
     if finding.witness is not None:
-        rows.append(("witness", _witness(finding.witness)))
+        rows.append(("witness", _witness(finding.witness, room)))
     if finding.place.get("misprint"):
-        rows.append(("misprint", _text(str(finding.place["misprint"]))))
+        rows.append(("misprint", _text(str(finding.place["misprint"]), room.text)))
     if finding.place.get("broken"):
-        rows.append(("broken", _text(str(finding.place["broken"]))))
+        rows.append(("broken", _text(str(finding.place["broken"]), room.text)))
     if finding.source:
-        rows.append(("source", _text(finding.source)))
+        rows.append(("source", _text(finding.source, room.text)))
     return rows
 
 
-def because(evidence: Evidence) -> str:
+def because(evidence: Evidence, room: Room = NOTEBOOK) -> str:
     """What decided a claim: a sentence, and the hypotheses that were verified."""
     hypotheses: Sequence[str] = evidence.data.get("hypotheses") or ()
     if not hypotheses:
-        return _text(evidence.summary)
-    more = f"; and {len(hypotheses) - 8} more" if len(hypotheses) > 8 else ""
-    return _text(f"{evidence.data['theorem']} applies: {'; '.join(hypotheses[:8])}{more}", 1200)
+        return _text(evidence.summary, room.text)
+    shown = "; ".join(hypotheses[: room.entries])
+    more = f"; and {len(hypotheses) - room.entries} more" if len(hypotheses) > room.entries else ""
+    return _text(f"{evidence.data['theorem']} applies: {shown}{more}", room.formula)
 
 
 def counts(findings: Iterable[Finding]) -> str:
@@ -87,13 +103,27 @@ def eps_sentence(report: Report) -> str:
         return ""
     if context["eps"] == "every":
         return eps_words()
-    return eps_words(context["eps"], context["time_step"])
+    second = f", second map at eps2 = {markup.shortened(context['eps2'])}" if "eps2" in context else ""
+    return eps_words(context["eps"], context["time_step"]) + second
+
+
+def ending_sentence(report: Report) -> str:
+    """That an orbit which was asked for ended early, and how; empty where none did."""
+    if not report.ended_early:
+        return ""
+    return (
+        f"The orbit that was asked for ended early: {report.context.get('orbit', {}).get('message', 'no reason told')}."
+    )
+
+
+def systems_sentence(report: Report) -> str:
+    """The names of the systems that the report is about."""
+    return ", ".join(str(report.context[key]) for key in ("system", "other") if key in report.context)
 
 
 def report_html(report: Report) -> str:
     """The findings of a check as a table; of many claims the number in each section, and those that are not proved."""
-    systems = [str(report.context[key]) for key in ("system", "other") if key in report.context]
-    title = f"{report.check}: {', '.join(systems)}"
+    title = f"{report.check}: {systems_sentence(report)}"
     pieces = [f"<p>{markup.verdict(report.verdict)} ({_text(counts(report.findings))})</p>"]
     chosen = list(report.findings)
     if len(chosen) > _CLAIMS:
@@ -107,7 +137,8 @@ def report_html(report: Report) -> str:
         pieces.append(markup.table(["verdict", "claim", "because"], rows))
     if len(chosen) > _CLAIMS:
         pieces.append(f"<p>… and {len(chosen) - _CLAIMS} more claims</p>")
-    pieces += [f"<p>{_text(note)}</p>" for note in report.notes[:5]]
+    notes = [*filter(None, [ending_sentence(report)]), *report.notes[:5]]
+    pieces += [f"<p>{_text(note)}</p>" for note in notes]
     return markup.titled(markup.shortened(title, 200), "\n".join(pieces), eps_sentence(report))
 
 
@@ -127,21 +158,18 @@ def sections_table(findings: Iterable[Finding]) -> str:
     return markup.table(["section", "claims"], rows)
 
 
-def _witness(witness: Witness) -> str:
+def _witness(witness: Witness, room: Room = NOTEBOOK) -> str:
+    def numbers(values: Sequence[str]) -> str:
+        shown = ", ".join(markup.shortened(value, room.number) for value in values[: room.entries])
+        return f"{shown}, … ({len(values)} numbers)" if len(values) > room.entries else shown
+
     where = "" if witness.field == "QQ" else f" over {witness.field}"
-    lines = [f"x = ({_numbers(witness.point)}), eps = {_short(witness.eps)}{where}"]
-    lines += [f"{name} = ({_numbers(vector)})" for name, vector in list(witness.vectors.items())[:4]]
-    lines += [f"{witness.left_label} = {_numbers(witness.left)}", f"{witness.right_label} = {_numbers(witness.right)}"]
-    return "<br/>".join(markup.escape(markup.shortened(line, 800)) for line in lines)
-
-
-def _numbers(values: Sequence[str]) -> str:
-    shown = ", ".join(_short(value) for value in values[:8])
-    return f"{shown}, … ({len(values)} numbers)" if len(values) > 8 else shown
-
-
-def _short(number: str) -> str:
-    return markup.shortened(number, _NUMBER)
+    lines = [f"x = ({numbers(witness.point)}), eps = {markup.shortened(witness.eps, room.number)}{where}"]
+    lines += [f"{name} = ({numbers(vector)})" for name, vector in list(witness.vectors.items())[: room.entries]]
+    if len(witness.vectors) > room.entries:
+        lines.append(f"… and {len(witness.vectors) - room.entries} more vectors")
+    lines += [f"{witness.left_label} = {numbers(witness.left)}", f"{witness.right_label} = {numbers(witness.right)}"]
+    return "<br/>".join(markup.escape(markup.shortened(line, room.formula)) for line in lines)
 
 
 def _text(text: str, width: int = _TEXT) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kahanmaps.errors import counted
 from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
 from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.commuting import CommutingField

@@ -9,12 +9,13 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from flint import fmpq, fmpq_mat, fmpq_mpoly
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.languages.names import Naming
 
 LINE = 100  # characters of a line of an expression, after which it is broken
+_DIGITS = 4000
 _TERMS_TOGETHER = 100  # a sum of more terms is bracketed in parts: parsers recurse
 
 
@@ -93,6 +94,16 @@ def plain_number(value: fmpq) -> str:
     '-1/3'
     """
     return str(value)
+
+
+def python_integer(value: fmpz) -> str:
+    """An integer for a Python that reads up to 4300 decimal digits, hexadecimal ones of any length.
+
+    >>> python_integer(fmpz(-7)), python_integer(fmpz(10)**5000)[:6]
+    ('-7', '0x31e2')
+    """
+    text = str(value)
+    return text if len(text) <= _DIGITS else hex(int(value))
 
 
 def fill(template: str, values: Mapping[str, str]) -> str:

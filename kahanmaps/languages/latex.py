@@ -74,7 +74,7 @@ def _display(part: str, formulas: Formulas) -> list[str]:
 def _integrals(formulas: Formulas) -> list[tuple[str, str]]:
     rows: list[tuple[str, str]] = []
     for name, function in formulas.integrals.items():
-        rows += _quotient(latex_name(name or "I"), function)
+        rows += _quotient(_label(name or "I"), function)
     for k in range(len(formulas.forms)):
         power = "" if k == 0 else r" A^{\mathsf T}" if k == 1 else rf" (A^{{\mathsf T}})^{{{k}}}"
         form = rf"\tfrac{{1}}{{\varepsilon}} {_X}^{{\mathsf T}} J{power} {_Y}"
@@ -89,6 +89,20 @@ def _integrals(formulas: Formulas) -> list[tuple[str, str]]:
             entries = r" \\ ".join(" & ".join(str(entry) for entry in row) for row in matrix.tolist())
             rows.append((letter, rf"\begin{{pmatrix}} {entries} \end{{pmatrix}}"))
     return rows
+
+
+def _label(name: str) -> str:
+    r"""The name of an integral, any printable text: as text where TeX's marks for it are none of math mode.
+
+    Letters that are not ASCII are told by their numbers, for not every TeX has them.
+
+    >>> print(_label("F1"), _label("a_b"), _label("H~ é"))
+    F_1 \mathrm{a\_b} \text{H\textasciitilde{} [U+00E9]}
+    """
+    shown = "".join(mark if mark.isascii() else f"[U+{ord(mark):04X}]" for mark in name)
+    label = latex_name(shown)
+    is_text = shown != name or any(mark in name for mark in "\\^~ ")
+    return label.replace(r"\mathrm{", r"\text{", 1) if is_text else label
 
 
 def _quotient(left: str, function: RationalFunction) -> list[tuple[str, str]]:

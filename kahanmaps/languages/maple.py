@@ -13,6 +13,8 @@ _RESERVED = words(
     "implies in intersect local minus mod module next not od option options or proc quit read return save stop",
     "subset then to try union until use uses while xor",
     "Matrix Vector LinearAlgebra convert list op",
+    # Names that stand for a procedure inside itself, and those of the environment.
+    "args nargs procname thisproc thismodule Normalizer Testzero Order Rounding UseHardwareFloats printlevel",
 )
 
 

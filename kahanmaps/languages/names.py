@@ -48,7 +48,8 @@ class Naming:
         pieces = [piece for word in words for piece in re.split(r"[^A-Za-z0-9]+", word) if piece]
         if self.underscores:
             return "_".join(pieces)
-        return pieces[0] + "".join(piece[0].upper() + piece[1:] for piece in pieces[1:])
+        first, *others = pieces  # a small letter first: Sin and Integral would make a name of Mathematica
+        return first[0].lower() + first[1:] + "".join(piece[0].upper() + piece[1:] for piece in others)
 
     def safe(self, names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
         """Every name with the one to use for it: itself where that is possible, always different ones.

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kahanmaps.languages.language import Language, listed, plain_number
+from flint import fmpq
+
+from kahanmaps.languages.language import Language, listed, python_integer
 from kahanmaps.languages.names import PYTHON_KEYWORDS, Naming, words
 
 _RESERVED = PYTHON_KEYWORDS | words(
-    "I e i pi oo infinity NaN QQ ZZ RR CC SR beta gamma zeta psi matrix vector identity_matrix Integer"
+    "I e i pi oo infinity NaN QQ ZZ RR CC SR beta gamma zeta psi matrix vector identity_matrix Integer",
+    "ZeroDivisionError",
 )
 
 
@@ -20,13 +23,18 @@ def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
     return f"{', '.join(variables)}{',' * (len(variables) == 1)} = vector(point)\n    "
 
 
+def _number(value: fmpq) -> str:
+    above = python_integer(value.p)
+    return above if value.q == 1 else f"{above}/{python_integer(value.q)}"
+
+
 # Where a singular matrix leaves equations that can be solved, solve_right gives one solution: hence is_singular.
 SAGE = Language(
     key="sage",
     title="SageMath",
     naming=Naming(lambda name: name in _RESERVED),
     comment=lambda line: f"# {line}".rstrip(),
-    number=plain_number,
+    number=_number,
     vector=lambda entries: f"vector([{listed(entries, '        ')}])",
     matrix=lambda rows: "matrix([" + ",\n        ".join(f"[{listed(row, '         ')}]" for row in rows) + "])",
     arguments=_arguments,

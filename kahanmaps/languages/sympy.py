@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flint import fmpq, fmpz
+from flint import fmpq
 
-from kahanmaps.languages.language import Language, listed
+from kahanmaps.languages.language import Language, listed, python_integer
 from kahanmaps.languages.names import PYTHON_KEYWORDS, Naming, words
 
 # Names that sympify reads as something else than a symbol, and those that the file imports.
@@ -15,7 +15,6 @@ _RESERVED = PYTHON_KEYWORDS | words(
     "LC LM LT jn Ne Or QQ RR Si ZZ And Not Xor Chi Max Min Mod Poly abs sin cos tan cot exp log det",
     "Matrix Rational Symbol eye sympify map list",
 )
-_DIGITS = 4000  # Python reads integers of up to 4300 decimal digits, hexadecimal ones of any length
 
 
 def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
@@ -28,15 +27,10 @@ def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
     return "".join(f"{line}\n    " for line in lines)
 
 
-def _integer(value: fmpz) -> str:
-    text = str(value)
-    return text if len(text) <= _DIGITS else hex(int(value))
-
-
 def _number(value: fmpq) -> str:
     if value.q == 1:
-        return _integer(value.p)
-    return f"Rational({_integer(value.p)}, {_integer(value.q)})"
+        return python_integer(value.p)
+    return f"Rational({python_integer(value.p)}, {python_integer(value.q)})"
 
 
 SYMPY = Language(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Iterable, Sequence
 
@@ -84,7 +85,8 @@ def header(formulas: Formulas, command: str, width: int = 100) -> list[str]:
         shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
         keep = line is made or line.startswith("  ")  # a command is to be copied as a whole
         wrapped += [shown] if keep else textwrap.wrap(shown, width, subsequent_indent="  ", break_long_words=False)
-    return wrapped
+    # Python takes "coding: x" in one of the first two lines of a file for the name of its encoding.
+    return [re.sub("coding(?=[:=])", "coding ", line) if k < 2 else line for k, line in enumerate(wrapped)]
 
 
 class _Writer:

@@ -60,9 +60,11 @@ def _image(name: str) -> str:
 def _polarised(system: QuadraticSystem, k: int) -> str:
     """The right-hand side Q(x, x~) + B (x + x~)/2 + c of one component."""
     names = [(latex_name(name), _image(name)) for name in system.variables]
+    polynomial = system.rhs[k]
     terms: list[tuple[fmpq, str]] = []
-    for monomial, value in system.rhs[k].terms():
-        where = [j for j, exponent in enumerate(monomial) for _ in range(int(exponent))]
+    for at in range(min(len(polynomial), _TERMS)):
+        value = polynomial.coefficient(at)
+        where = [j for j, exponent in enumerate(polynomial.monomial(at)) for _ in range(int(exponent))]
         if len(where) == 2 and where[0] == where[1]:
             terms.append((value, " ".join(names[where[0]])))
         elif len(where) == 2:
@@ -73,12 +75,12 @@ def _polarised(system: QuadraticSystem, k: int) -> str:
         else:
             terms.append((value, ""))
     text = ""
-    for value, factors in terms[:_TERMS]:
+    for value, factors in terms:
         number = latex_number(abs(value)) if abs(value) != 1 or not factors else ""
         number = number if len(number) < 200 else r"\text{(a long number)}"
         sign = "-" if value < 0 else "+" if text else ""
         text += f" {sign} {number} {factors}"
-    more = rf" + \cdots\ \text{{({len(terms)} terms)}}" if len(terms) > _TERMS else ""
+    more = rf" + \cdots\ \text{{({len(polynomial)} terms)}}" if len(polynomial) > _TERMS else ""
     return " ".join(text.split()) + more or "0"
 
 

@@ -12,12 +12,10 @@ A drawing function is `draw_...(values, style) -> Figure`; it makes its figure b
 from __future__ import annotations
 
 import io
-import os
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
@@ -25,6 +23,7 @@ from kahanmaps.algebra.latex import latex_name
 from kahanmaps.errors import InputError
 from kahanmaps.plots.recipe import Recipe
 from kahanmaps.plots.style import Style
+from kahanmaps.whole_files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -123,31 +122,6 @@ def picture_bytes(figure: Figure, kind: str, style: Style, recipe: Recipe | None
 def write_picture(figure: Figure, path: str, kind: str, style: Style, recipe: Recipe | None = None) -> None:
     """Write the figure to a file, whole or not at all."""
     write_whole(Path(path), picture_bytes(figure, kind, style, recipe))
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file beside its place and put it there when it is complete; what stood there stays until then."""
-    if path.exists() and not path.is_file():  # /dev/stdout and its relatives take bytes, but cannot be replaced
-        path.write_bytes(content)
-        return
-    target = path.resolve()
-    mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
-    with NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as part:
-        try:
-            part.write(content)
-            part.flush()
-            os.chmod(part.name, mode)
-            os.replace(part.name, target)
-        except BaseException:
-            with suppress(OSError):
-                os.unlink(part.name)
-            raise
-
-
-def _umask() -> int:
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask
 
 
 def svg_text(figure: Figure, name: str, style: Style, alt: str) -> str:

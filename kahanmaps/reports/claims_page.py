@@ -9,9 +9,17 @@ from typing import TYPE_CHECKING
 
 from kahanmaps import markup
 from kahanmaps.checks.claims import combined
-from kahanmaps.checks.shown import counts, eps_sentence, evidence_rows, sections_of, verdict_html
+from kahanmaps.checks.shown import (
+    counts,
+    ending_sentence,
+    eps_sentence,
+    evidence_rows,
+    sections_of,
+    systems_sentence,
+    verdict_html,
+)
 from kahanmaps.reports.analysis_page import system_html
-from kahanmaps.reports.page import Origin, Section, page, text, wide
+from kahanmaps.reports.page import ROOM, Origin, Section, page, text, wide
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.reports.portraits import invariant_curves_figure, portrait_figure
 from kahanmaps.sources import source
@@ -37,7 +45,7 @@ def claims_page(
     left_out: Sequence[str] = (),
 ) -> str:
     """The page about one or several reports on one system; `left_out` are sentences on checks that do not apply."""
-    lead = ", ".join(text(part) for part in (reports[0].context.get("system", ""), eps_sentence(reports[0])) if part)
+    lead = ", ".join(text(part) for part in (systems_sentence(reports[0]), eps_sentence(reports[0])) if part)
     groups = _groups(reports)
     verdict = combined(report.verdict for report in reports)
     every = [finding for report in reports for finding in report.findings]
@@ -46,7 +54,8 @@ def claims_page(
     ]
     conclusion = f'<p class="conclusion">{markup.verdict(verdict)}<br/>{text(counts(every))}</p>'
     ids: Counter[str] = Counter()
-    notes = [text(note) for report in reports for note in report.notes] + [text(sentence) for sentence in left_out]
+    told = [note for report in reports for note in (ending_sentence(report), *report.notes)]
+    notes = [text(note) for note in (*told, *left_out) if note]
     sections = [
         Section("verdict", "Verdict", f"{conclusion}\n{_EXPLAINED}\n{wide(markup.table(['part', 'claims'], rows))}"),
         Section("system", "The system", "" if file is None else system_html(file)),
@@ -86,7 +95,7 @@ def _claim(finding: Finding, ids: Counter[str]) -> str:
     summary = f"{verdict_html(finding)} {above}{text(words)}"
     return (
         f'<details class="claim"{mark}{is_open}><summary>{summary}</summary>\n'
-        f"{wide(markup.definitions(evidence_rows(finding)))}\n</details>"
+        f"{wide(markup.definitions(evidence_rows(finding, ROOM)))}\n</details>"
     )
 
 

@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kahanmaps import markup
+from kahanmaps.checks.shown import Room
 from kahanmaps.plots.recipe import Recipe
 from kahanmaps.reports.stylesheet import STYLESHEET
 
 CHARACTERS = 6_000  # of one formula, about; and of one line of text
+ROOM = Room(CHARACTERS, CHARACTERS, CHARACTERS, 100)  # a reader can check a witness that is whole
 _LONGEST_SYSTEM = 200_000
 
 

@@ -10,7 +10,6 @@ from kahanmaps.checks.claims import Report
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.store import Store
 from kahanmaps.laboratory.analysis import Analysis
-from kahanmaps.plots.figures import write_whole
 from kahanmaps.plots.recipe import Recipe
 from kahanmaps.reports.analysis_page import analysis_page
 from kahanmaps.reports.batch_page import batch_page
@@ -18,6 +17,7 @@ from kahanmaps.reports.claims_page import claims_page
 from kahanmaps.reports.page import Origin
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.systems.files import SystemFile
+from kahanmaps.whole_files import write_whole
 
 
 def report_html(
@@ -58,6 +58,7 @@ def report_html(
     ('<!DOCTYPE html>', 3)
     """
     drawn = Pictures(pictures)
+    title = (title or "").strip()
     if isinstance(found, Analysis):
         origin = Origin(Recipe(command, found.file.to_toml()), found.seed)
         return analysis_page(found, title or _title(found.file), origin, drawn)

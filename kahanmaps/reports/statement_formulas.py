@@ -9,10 +9,11 @@ from kahanmaps.algebra.mathml import formula
 from kahanmaps.algebra.text import format_polynomial, parse_polynomial, parse_rational_function
 from kahanmaps.checks.shown import because
 from kahanmaps.errors import KahanmapsError
-from kahanmaps.reports.page import CHARACTERS, text
+from kahanmaps.reports.page import CHARACTERS, ROOM, text
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
+    from kahanmaps.laboratory.sparse_relations import SparseRelation
 
 _PARSED = 4_000  # characters of a relation that is read once more, to be set as a formula
 
@@ -24,16 +25,15 @@ def formulas_of(found: Analysis) -> dict[str, str]:
 
 def _pairs(found: Analysis) -> Iterator[tuple[str, str]]:
     for one in found.integrals.integrals if found.integrals is not None else ():
-        below = f'<span class="soft">{text(one.origin)}</span>\n{_evidence(because(one.evidence))}'
+        below = f'<span class="soft">{text(one.origin)}</span>\n{_evidence(because(one.evidence, ROOM))}'
         yield f"{one.name} = {one.text}  [{one.origin}]", f"{formula(one.function, one.name, CHARACTERS)}<br/>{below}"
     for relation in found.relations:
-        html = _relation(relation.text, (*found.file.variables, *relation.names, "eps"))
+        html = _relation(relation, (*relation.names, *found.file.variables, "eps"))
         if html:
             yield f"along orbits {relation.text}", f"along orbits {html}"
     for density in found.densities.densities if found.densities is not None else ():
-        html = (
-            f"dx/ϕ is invariant, {formula(density.function, 'phi', CHARACTERS)}\n{_evidence(because(density.evidence))}"
-        )
+        below = _evidence(because(density.evidence, ROOM))
+        html = f"dx/ϕ is invariant, {formula(density.function, 'phi', CHARACTERS)}\n{below}"
         yield f"dx/phi is invariant, phi = {density.text}", html
     if found.degrees is not None and found.degrees.recurrence is not None:
         closed = found.degrees.recurrence.closed_form
@@ -55,15 +55,22 @@ def _evidence(html: str) -> str:
     return f"<details><summary>evidence</summary>{html}</details>"
 
 
-def _relation(relation: str, names: tuple[str, ...]) -> str:
-    """P = 0 as a formula; empty where it cannot be read as one."""
-    if len(relation) > _PARSED:
+def _relation(relation: SparseRelation, names: tuple[str, ...]) -> str:
+    """P = 0 as a formula, term by term in the order of its text; empty where it cannot be read as one."""
+    if len(relation.text) > _PARSED:
         return ""
-    try:
-        function = parse_rational_function(relation.removesuffix(" = 0"), names)
-    except KahanmapsError:
-        return ""
-    return f'{formula(function)} <math alttext="= 0"><mrow><mo form="infix">=</mo><mn>0</mn></mrow></math>'
+    pieces: list[str] = []
+    for monomial, coefficient in relation.terms:
+        try:
+            term = formula(parse_rational_function(f"{coefficient.removeprefix('-')}*{monomial}", names))
+        except KahanmapsError:
+            return ""
+        if coefficient.startswith("-"):
+            term = f'<math alttext="-"><mo form="{"infix" if pieces else "prefix"}">−</mo></math>\u00a0{term}'
+        elif pieces:
+            term = f'<math alttext="+"><mo form="infix">+</mo></math>\u00a0{term}'
+        pieces.append(term)
+    return f'{" ".join(pieces)} <math alttext="= 0"><mrow><mo form="infix">=</mo><mn>0</mn></mrow></math>'
 
 
 def _closed_form(closed: str) -> str:

@@ -79,7 +79,7 @@ def test_terms_that_were_asked_for_are_no_early_end(kahanmaps):
         ("plot degrees euler_top --eps 0", "found eps = 0"),
         ("plot heights", "missing SYSTEM"),
         ("plot heights euler_top --from x.json", "not both"),
-        ("plot heights euler_top --starts 2 --start 1,2,3", "not both"),
+        ("plot heights euler_top --random 2 --start 1,2,3", "not both"),
         ("plot heights euler_top --max-digits 0", "expected at least 1"),
         ("plot heights euler_top --steps=-1", "steps"),
     ],
@@ -100,7 +100,7 @@ def test_a_file_that_is_no_record_is_refused(kahanmaps, tmp_path, command, text)
 
 
 def test_heights_are_drawn_in_the_terminal(kahanmaps):
-    done = kahanmaps("plot heights weierstrass --eps 1/10 --starts 1 --steps 20")
+    done = kahanmaps("plot heights weierstrass --eps 1/10 --random 1 --steps 20")
     assert done.status == 0
     assert "eps = 1/10, 2eps = 1/5: c n^2, c = " in done.out
 
@@ -120,7 +120,7 @@ def test_a_record_of_a_survey_that_was_not_whole_is_told(kahanmaps, tmp_path):
 
 
 def test_orbits_that_reach_the_digit_budget_are_told(kahanmaps):
-    done = kahanmaps("plot heights lotka_volterra --eps 1/10 --starts 2 --max-digits 500")
+    done = kahanmaps("plot heights lotka_volterra --eps 1/10 --random 2 --max-digits 500")
     assert done.status == 0
     assert "2 of 2 orbits ended where the numbers exceed --max-digits 500" in done.err
 

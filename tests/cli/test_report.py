@@ -85,12 +85,23 @@ def test_a_batch(kahanmaps, tmp_path):
         ("euler_top -o no/such/folder/a.html", "expected an existing one"),
         ("euler_top -o .", "found a folder"),
         ("--from checks --vars x --rhs x", "no check applies"),
+        ("--from verify --m 1 -p a=1", "a member that is drawn has no parameters"),
+        ("--from verify -p a=1", "a member that is drawn has no parameters"),
+        ("--from checks --m 1 -p a=1", "a member that is drawn has no parameters"),
     ],
 )
 def test_wrong_use_is_told_and_has_status_2(kahanmaps, arguments, says):
     outcome = kahanmaps(f"report {arguments}")
     assert (outcome.status, outcome.out) == (2, "")
     assert says in outcome.err
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(kahanmaps, tmp_path, monkeypatch):
+    monkeypatch.setattr("os.access", lambda *_: False)
+    monkeypatch.setattr("kahanmaps.laboratory.analysis.analyze", lambda *_, **__: pytest.fail("it was analysed"))
+    outcome = kahanmaps(SMALL, "-o", tmp_path / "a.html")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "no permission" in outcome.err
 
 
 def test_a_terminal_is_no_place_for_a_page():

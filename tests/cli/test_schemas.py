@@ -58,6 +58,7 @@ CASES = [
     "degrees euler_top --json -q",
     "degrees henon_heiles --max-degree 50 --json -q",  # ended early
     "degrees weierstrass --eps 1/10 --terms 3 --json -q",
+    "degrees weierstrass --terms 0 --json -q",
     "heights weierstrass --steps 20 --starts 1 --json -q",
     "heights henon_heiles --starts 1 --max-digits 200 --json -q",
     "find-integrals weierstrass --json -q",
@@ -258,6 +259,7 @@ def _at(data: Any, place: tuple[str | int, ...]) -> Any:
         ("time_step", "02"),
         ("convention", "eps is the time step"),
         ("seed", "0"),
+        ("seed", -1),
         ("document", {"name": "x"}),
         ("check", "comute"),
         ("claims", []),
@@ -296,8 +298,34 @@ def test_a_wrong_line_of_an_orbit_is_refused(record: dict[str, Any], change: dic
     assert mistakes("orbit", END) == mistakes("orbit", POINT) == []
 
 
-def test_a_proved_claim_with_a_witness_is_refused(lines: Callable[[str], list[Any]]) -> None:
+@pytest.mark.parametrize(
+    "change", [{"verdict": word} for word in ("proved", "supported", "undecided")] + [{"witness": None}]
+)
+def test_a_claim_has_a_witness_exactly_if_it_is_refuted(
+    lines: Callable[[str], list[Any]], change: dict[str, Any]
+) -> None:
     [report] = lines("check-commute euler_top lorenz --json")
-    assert report["claims"][0]["witness"] is not None
-    report["claims"][0]["verdict"] = "proved"
+    assert mistakes("check", report) == []
+    report["claims"][0] |= change
     assert mistakes("check", report)
+
+
+def test_a_report_of_a_proof_with_a_claim_that_is_not_proved_is_refused(lines: Callable[[str], list[Any]]) -> None:
+    [report] = lines("check-measure euler_top --json")
+    report["claims"][0]["verdict"] = "undecided"
+    assert mistakes("check", report)
+    assert mistakes("check", {**report, "verdict": "undecided", "holds": None}) == []
+
+
+@pytest.mark.parametrize("degrees", [[], [2, 4], [1, -1]])
+def test_degrees_that_do_not_start_with_1_are_refused(lines: Callable[[str], list[Any]], degrees: list[int]) -> None:
+    [report] = lines("degrees weierstrass --terms 1 --json -q")
+    assert mistakes("degrees", report) == []
+    assert mistakes("degrees", {**report, "degrees": degrees})
+
+
+@pytest.mark.parametrize("matrix", [[], [[]], [["1/0"]], ["1"]])
+def test_what_is_no_matrix_is_refused(lines: Callable[[str], list[Any]], matrix: list[Any]) -> None:
+    [report] = lines("family space --matrix 1,0;0,1 --json")
+    assert mistakes("family-space", report) == []
+    assert mistakes("family-space", {**report, "A": matrix})

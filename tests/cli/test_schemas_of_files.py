@@ -44,11 +44,15 @@ BAD_FILES = [
     'variables = ["x"]',
     '[system]\nrhs = ["x"]',
     'variables = ["1x"]\n[system]\nrhs = ["x"]',
+    'variables = ["eps"]\n[system]\nrhs = ["1"]',
     'variables = []\n[system]\nrhs = ["x"]',
     'variables = ["x"]\n[system]\nrhs = "x"',
     'variables = ["x"]\n[system]\nrsh = ["x"]',
     'variables = ["x"]\n[system]\nrhs = ["x"]\n[parameters]\neps = 1',
     'variables = ["x"]\n[system]\nrhs = ["x"]\n[parameters]\na = [1]',
+    'variables = ["x"]\n[system]\nrhs = [" "]',
+    'variables = ["x"]\n[system]\nrhs = ["x"]\n[parameters]\na = ""',
+    'variables = ["x"]\n[system]\nrhs = ["x"]\n[parameters]\na = "1+1"',
     'variables = ["x", "y"]\n[hamiltonian]\nH = "x"\nJ = "Standard"',
     '[family]\nA = [["1"]]',
     '[family]\nA = [["1", "0"], ["0", "1"]]\nH = "x1^3"\nsigns = [0]',
@@ -63,6 +67,13 @@ def test_what_the_schema_refuses_in_a_system_file_is_refused_by_the_reader_as_we
     assert mistakes("system-file", tomllib.loads(text))
     with pytest.raises(SystemFileError):
         parse_system(text)
+
+
+@pytest.mark.parametrize("number", ['"+5."', '" .5e-3 "', '"-6/4"', "1e5", "-0.5", "7"])
+def test_every_way_to_write_a_number_satisfies_the_schema(number: str) -> None:
+    text = f'variables = ["x"]\n[system]\nrhs = ["a*x"]\n[parameters]\na = {number}'
+    parse_system(text)
+    assert mistakes("system-file", tomllib.loads(text)) == []
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").rglob("*.toml")), ids=lambda path: path.stem)

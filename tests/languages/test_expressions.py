@@ -93,6 +93,11 @@ def test_fractions_are_exact_literals(language):
     assert third in convert(file, language, ["system"])
 
 
+def test_sage_gets_long_integers_in_the_base_that_every_python_reads():
+    long, file = 10**4999, km.parse_system(f'variables = ["x"]\n[system]\nrhs = ["7*x/1{"0" * 4999}"]', "long")
+    assert f"7/{hex(long)}*x" in convert(file, "sage", ["system"])
+
+
 def test_a_large_closed_form_is_refused_with_what_to_do_instead():
     with pytest.raises(km.InputError, match=r"too large.*ask for 'map' instead"):
         convert(km.load("paper_m3"), "pari", ["map-formulas"])

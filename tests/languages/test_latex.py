@@ -87,3 +87,14 @@ def test_matrices_of_more_than_ten_columns_are_announced():
     file = km.SystemFile.from_system(km.QuadraticSystem.from_text(names, names))
     assert "\\setcounter{MaxMatrixCols}{12}" in convert(file, "latex")
     assert "MaxMatrixCols" not in DOCUMENTS["euler_top"]
+
+
+def test_names_of_integrals_are_set_as_text_where_math_mode_has_no_such_marks():
+    names = ["H~", "H^2", "a b", "a\\\\b", "ε", "a_b"]
+    claims = "\n".join(f'"{name}" = "{k}"' for k, name in enumerate(names, 2))
+    text = f'variables = ["x"]\n[system]\nrhs = ["1"]\n[integrals]\n{claims}'
+    document = convert(km.parse_system(text, "names"), "latex", ["integrals"])
+    assert mistakes(document) == []
+    math = re.findall(r"\\mathrm\{[^}]*\} &=", document)
+    assert math == [r"\mathrm{a\_b} &="]
+    assert document.isascii()

@@ -29,10 +29,13 @@ RENAMED = [
     (PARI, "m12", "m12"),
     (MAPLE, "D", "v_D"),
     (MAPLE, "local", "v_local"),
+    (MAPLE, "args", "v_args"),
+    (MAPLE, "Order", "v_Order"),
     (MATHEMATICA, "a_1", "a1"),
     (MATHEMATICA, "E", "vE"),
     (MATHEMATICA, "_", "v"),
     (SAGE, "I", "v_I"),
+    (SAGE, "ZeroDivisionError", "v_ZeroDivisionError"),
     (JULIA, "end", "v_end"),
     (JULIA, "im", "v_im"),
 ]
@@ -86,6 +89,24 @@ def test_nothing_in_a_name_ends_the_comment_or_the_line(language):
     assert all(line.startswith(mark) for line in top)
     if language == "mathematica":
         assert all(line.count("(*") == line.count("*)") == 1 for line in top)
+
+
+@pytest.mark.parametrize("language", ["sympy", "sage"])
+@pytest.mark.parametrize("where", ["name", "title"])
+def test_python_takes_no_word_of_a_title_for_an_encoding(language, where):
+    name, title = {"name": ("coding: x", "t"), "title": ("n", f"{'long ' * 19}coding=x")}[where]
+    document = f'name = "{name}"\nvariables = ["x"]\n[catalog]\ntitle = "{title}"\n[system]\nrhs = ["x/3"]'
+    text = convert(km.parse_system(document), language, command="kahanmaps convert -p coding=3")
+    assert "coding :" in text or "coding =" in text
+    assert "-p coding=3" in text
+    compile(text.replace("^", "**").encode(), "file", "exec")
+
+
+def test_functions_of_mathematica_start_with_a_small_letter():
+    text = 'variables = ["x"]\n[system]\nrhs = ["1"]\n[integrals]\n"" = "1/7"'
+    shown = convert(km.parse_system(text, "nameless"), "mathematica", name="Sin")
+    assert "sinIntegral[{x_}, eps_] :=" in shown
+    assert "SinIntegral" not in shown
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import stat
 import xml.etree.ElementTree as ElementTree
 from itertools import pairwise
 
@@ -13,7 +11,6 @@ import numpy as np
 import pytest
 
 from kahanmaps.errors import InputError
-from kahanmaps.plots import figures
 from kahanmaps.plots.figures import (
     FORMATS,
     RASTERISE_ABOVE,
@@ -24,7 +21,6 @@ from kahanmaps.plots.figures import (
     picture_bytes,
     points,
     svg_text,
-    write_whole,
 )
 from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
 
@@ -100,39 +96,6 @@ def test_the_format_is_that_of_the_ending_or_the_one_asked_for(path, asked, foun
 def test_other_endings_are_refused(path):
     with pytest.raises(InputError, match=r"expected \.pdf, \.svg or \.png"):
         format_of(path, None)
-
-
-def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
-    target = tmp_path / "x.svg"
-    target.write_bytes(b"before")
-    monkeypatch.setattr(figures.os, "replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
-    with pytest.raises(KeyboardInterrupt):
-        write_whole(target, b"after")
-    assert target.read_bytes() == b"before"
-    assert list(tmp_path.iterdir()) == [target]
-
-
-def test_a_new_file_has_the_permissions_of_the_user(tmp_path):
-    before = os.umask(0o027)
-    try:
-        write_whole(tmp_path / "x", b"")
-    finally:
-        os.umask(before)
-    assert stat.S_IMODE((tmp_path / "x").stat().st_mode) == 0o640
-
-
-def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path):
-    (tmp_path / "x").write_bytes(b"")
-    (tmp_path / "x").chmod(0o600)
-    write_whole(tmp_path / "x", b"new")
-    assert stat.S_IMODE((tmp_path / "x").stat().st_mode) == 0o600
-
-
-def test_a_link_stays_a_link(tmp_path):
-    (tmp_path / "link").symlink_to(tmp_path / "target")
-    write_whole(tmp_path / "link", b"new")
-    assert (tmp_path / "link").is_symlink()
-    assert (tmp_path / "target").read_bytes() == b"new"
 
 
 def test_pictures_on_one_page_have_different_ids_and_every_reference_is_met():

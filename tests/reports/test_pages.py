@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 
 import pytest
@@ -9,10 +10,13 @@ from page_helpers import Page, require_sound
 from small_databases import ok, planned
 
 import kahanmaps as km
+from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
+from kahanmaps.laboratory.sparse_relations import SparseRelation
 from kahanmaps.paper.examiner import VerifyOptions
 from kahanmaps.reports.report import report_html, write_report
+from kahanmaps.reports.statement_formulas import formulas_of
 
 EVIL = "<script>alert(1)</script>"
 
@@ -163,6 +167,65 @@ def test_a_refuted_claim_stands_open_and_a_control_does_not():
     html = report_html(km.check_commute(pair), file=pair, pictures=False)
     assert "as expected" in Page(html).text
     assert 'open="open"' not in html
+
+
+def test_a_page_of_controls_has_every_id_once(paper):
+    file, _ = paper
+    report = km.verify(file, options=VerifyOptions(sections=(6,), controls=True))
+    keys = [finding.place["key"] for finding in report.findings if "key" in finding.place]
+    assert len(keys) > len(set(keys))
+    page = require_sound(report_html(report, file=file, pictures=False))
+    assert len([one for one in page.ids if one.startswith("claim-")]) == len(keys)
+
+
+def test_a_claim_is_whole_on_a_page_and_what_is_too_long_is_told():
+    numbers = tuple(f"{k}{'7' * 300}" for k in range(1, 13))
+    witness = Witness(numbers, numbers[0], numbers, numbers, "left", "right", vectors=dict.fromkeys("abcdef", numbers))
+    also = tuple(Evidence("exact", f"a further reason, number {k}") for k in range(9))
+    decided = Evidence("theorem", "", {"theorem": "T", "hypotheses": [f"hypothesis {k}" for k in range(20)]})
+    finding = Finding("c", Verdict.REFUTED, decided, also, witness, formula="x" * 7_000)
+    page = require_sound(report_html(Report("commute", (finding,)), pictures=False))
+    for number in numbers:
+        assert page.text.count(number) >= 9
+    for evidence in also:
+        assert evidence.summary in page.text
+    assert "hypothesis 19" in page.text
+    assert "(7000 characters)" in page.text
+
+
+def test_a_second_system_its_eps_and_an_orbit_cut_short_are_told():
+    top = km.load("euler_top")
+    page = require_sound(report_html(km.check_commute(top, top, km.Settings(eps="1/10"), eps2="1/7"), pictures=False))
+    assert "euler_top, euler_top, eps = 1/10 (time step 2 eps = 1/5), second map at eps2 = 1/7" in page.text
+    settings = km.Settings(eps="1/10", start=(1, "1/2"), steps=60, max_digits=200, orbit_is_asked=True)
+    report = km.check_integrals(km.load("planar_cubic_hamiltonian"), settings)
+    assert "The orbit that was asked for ended early" in require_sound(report_html(report, pictures=False)).text
+    assert "ended early" in report._repr_html_()
+    assert "ended early" not in report_html(km.check_integrals(top), pictures=False)
+
+
+@pytest.mark.parametrize("name", ["'", "I'", "]]>", "&amp;", "<img src=x onerror=alert(1)>", "$", "\\", ""])
+def test_any_name_of_an_integral_is_shown(name):
+    x = km.parse_system('variables = ["x"]\n[system]\nrhs = ["x^2"]\n[integrals]\nI = "x"', "wrong")
+    file = km.parse_system(x.to_toml().replace("I = ", f"{json.dumps(name)} = "), "wrong")
+    page = require_sound(report_html(Analysis(file, None, 1.0, 0), pictures=False))
+    assert f"{name or 'I'} =" in page.alttexts
+
+
+def test_relations_are_set_as_they_read_in_the_analysis():
+    file = km.load("planar_cubic_hamiltonian")
+    terms = (("x^2", "1"), ("y^2", "c1"), ("x", "-5/(18*eps^2)"), ("1", "-2"))
+    found = Analysis(file, None, 1.0, 0, relations=(SparseRelation(terms, ("c1",)),))
+    html = formulas_of(found)["along orbits x^2 + c1*y^2 - 5/(18*eps^2)*x - 2 = 0"]
+    alttexts = Page(html).alttexts
+    assert alttexts == ["x^2", "+", "c1*y^2", "-", "(5*x)/(18*eps^2)", "-", "2", "= 0"]
+
+
+def test_a_blank_title_is_none(volterra):
+    assert (
+        require_sound(report_html(volterra, pictures=False, title=" \n")).headings[0][1]
+        == volterra.file.catalog["title"]
+    )
 
 
 def test_several_checks_are_one_page():

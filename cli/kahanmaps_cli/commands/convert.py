@@ -40,16 +40,20 @@ _LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia")
 def command(system: str | None, language: str, output: str | None, quiet: bool, **options: Any) -> None:
     """Write SYSTEM, its Kahan map and what is known of it for another program.
 
-    The output is a file that runs as it stands. eps is an argument of the map: the time step is 2 eps.
-
     \b
       kahanmaps convert euler_top --to pari
       kahanmaps convert euler_top --to sympy --symbolic a1,a2,a3
       kahanmaps convert lagrange_top --to latex -o lagrange_top.tex
       kahanmaps convert weierstrass --to julia --what map-formulas,inverse
+
+    The output is a file that runs as it stands. eps is an argument of the map: the time step is 2 eps.
     """
+    from kahanmaps.errors import InputError
     from kahanmaps.languages.convert import convert
 
+    paths = [Path(text) for text in (system, output) if text is not None]
+    if len(paths) == 2 and all(path.is_file() for path in paths) and paths[0].samefile(paths[1]):
+        raise InputError(f"found -o {output}, which is the file of the system itself, expected another file")
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
@@ -69,7 +73,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
     if output is None or output == "-":
         click.echo(text, nl=False)
         return
-    from kahanmaps.plots.figures import write_whole
+    from kahanmaps.whole_files import write_whole
 
     write_whole(Path(output), text.encode())
     if not quiet:

@@ -346,14 +346,14 @@ def _parse_matrix(text: str) -> fmpq_mat:
 
 def _write(file: SystemFile, output: str | None) -> None:
     from kahanmaps.systems.files import parse_system
+    from kahanmaps.whole_files import write_whole
 
     text = file.to_toml()
     parse_system(text, f"{file.name}, as it would be written")  # nothing is written that could not be read
     if output is None:
         click.echo(text, nl=False)
         return
-    with open(output, "w", encoding="utf-8") as stream:
-        stream.write(text)
+    write_whole(Path(output), text.encode())
 
 
 def _file_name(name: str) -> str:

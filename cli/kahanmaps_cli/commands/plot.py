@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import click
 
+from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.pictures import batch, commute, degrees, drift, heights, invariant_curves, portrait, recipe
 
 
-@click.group("plot")
+@click.group("plot", cls=SuggestingGroup)
 def command() -> None:
     """Pictures as PDF, SVG or PNG for papers, or drawn in the terminal.
 

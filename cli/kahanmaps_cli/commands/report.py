@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ from kahanmaps_cli.options import (
     system_options,
     the_eps,
 )
-from kahanmaps_cli.pictures.output import PictureCommand, _command
+from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
@@ -102,6 +103,9 @@ def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
     drawn = [name for name in _DRAWN if _is_given(context, name)]
     if drawn and (system is not None or options["variables"] or options["rhs"]):
         raise click.UsageError(f"give a system or say which member to draw ({_option_name(drawn[0])}), not both")
+    no_system = system is None and not (options["variables"] or options["rhs"])
+    if no_system and options["parameters"] and (drawn or options["source"] == "verify"):
+        raise click.UsageError("found -p without SYSTEM: a member that is drawn has no parameters")
 
 
 def _is_given(context: click.Context, name: str) -> bool:
@@ -128,12 +132,15 @@ def _require_output(path: str) -> None:
         return
     if Path(path).is_dir():
         raise InputError(f"{path}: found a folder, expected the name of a file")
-    if not Path(path).resolve().parent.is_dir():
-        raise InputError(f"{path}: found no folder {Path(path).resolve().parent}, expected an existing one")
+    folder = Path(path).resolve().parent
+    if not folder.is_dir():
+        raise InputError(f"{path}: found no folder {folder}, expected an existing one")
+    if not os.access(folder if Path(path).is_file() or not Path(path).exists() else path, os.W_OK):
+        raise InputError(f"{path}: found no permission to write there, expected a folder that can be written")
 
 
 def _write(html: str, options: dict[str, Any]) -> None:
-    from kahanmaps.plots.figures import write_whole
+    from kahanmaps.whole_files import write_whole
 
     content = html.encode()
     if options["output"] == "-":
@@ -152,7 +159,7 @@ def _page(system: str | None, options: dict[str, Any], progress: Progress) -> tu
     how: dict[str, Any] = {
         "title": options["title"],
         "pictures": not options["no_pictures"],
-        "command": _command(),
+        "command": command_line(),
     }
     if options["db"] is not None:
         from kahanmaps.experiments.store import Store

@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import eps_options, inline_options, load_system, the_eps
+from kahanmaps_cli.options import (
+    eps_options,
+    inline_options,
+    load_system,
+    seconds_option,
+    seed_option,
+    the_eps,
+)
 from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
 from kahanmaps_cli.pictures.records import read_record
 from kahanmaps_cli.progress import Progress, say
@@ -21,10 +28,10 @@ if TYPE_CHECKING:
 @inline_options
 @click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json (may be repeated).")
 @eps_options
-@click.option("--seconds", type=float, default=10.0, show_default=True, help="Stop each system after about so many.")
+@seconds_option(10.0, "Stop each system after about so many.")
 @click.option("--terms", type=int, help="Measure d_1, ..., d_N (default: until a recurrence is certain enough).")
 @click.option("--max-degree", type=int, default=20_000, show_default=True, help="Work out no larger degree.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything drawn at random.")
+@seed_option
 @click.option("--scale", type=click.Choice(["linear", "log", "loglog"]), help="Chosen by itself unless given.")
 @picture_options
 def command(systems: tuple[str, ...], **options: Any) -> int:

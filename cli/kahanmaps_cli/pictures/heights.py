@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
-from kahanmaps_cli.params import PointText
+from kahanmaps_cli.options import eps_options, load_system, seconds_option, seed_option, system_options, the_eps
+from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
 from kahanmaps_cli.pictures.records import read_record
 from kahanmaps_cli.progress import Progress, say
@@ -24,12 +24,12 @@ _EARLY = ("singular",)
 @system_options
 @click.option("--from", "record", metavar="FILE", help="Written by heights --json, instead of SYSTEM.")
 @eps_options
-@click.option("--starts", type=int, help="Number of random starts (default 3).")
-@click.option("--start", "given", type=PointText(), multiple=True, metavar="X", help="A start; may be repeated.")
+@click.option("--random", "count", type=Whole(1), metavar="N", help="N starts drawn at random (default 3).")
+@click.option("--start", "given", type=PointText(), multiple=True, metavar="X", help="Instead: this start. Repeatable.")
 @click.option("--steps", type=int, default=60, show_default=True, help="Steps of each orbit.")
 @click.option("--max-digits", type=int, default=20_000, show_default=True, help="Digit budget of each orbit.")
-@click.option("--seconds", type=float, default=30.0, show_default=True, help="Begin no orbit after so many seconds.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the random starts.")
+@seconds_option(30.0, "Begin no orbit after so many seconds.")
+@seed_option
 @click.option("--scale", type=click.Choice(["linear", "log", "loglog"]), help="Chosen by itself unless given.")
 @picture_options
 def command(system: str | None, **options: Any) -> int:
@@ -37,7 +37,7 @@ def command(system: str | None, **options: Any) -> int:
 
     \b
       kahanmaps plot heights weierstrass
-      kahanmaps plot heights weierstrass --eps 1/10 --starts 5 -o heights.pdf
+      kahanmaps plot heights weierstrass --eps 1/10 --random 5 -o heights.pdf
       kahanmaps plot heights lotka_volterra --scale log -o heights.svg
       kahanmaps heights weierstrass --json | kahanmaps plot heights --from -
 
@@ -52,8 +52,8 @@ def command(system: str | None, **options: Any) -> int:
     from kahanmaps.plots.height_curves import curves_of_record, height_curves
 
     require_output(options)
-    if options["starts"] is not None and options["given"]:
-        raise click.UsageError("give --start X or --starts N, not both: --starts counts random starts")
+    if options["count"] is not None and options["given"]:
+        raise click.UsageError("give --start X or --random N, not both: --random draws the starts")
     file: SystemFile | None = None
     whole = True
     if options["record"] is not None:
@@ -90,7 +90,7 @@ def _surveyed(file: SystemFile, options: dict[str, Any]) -> HeightSurvey:
         return height_survey(
             file.system,
             the_eps(options["eps"], options["time_step"], required=False),
-            starts=options["given"] or (DEFAULT_STARTS if options["starts"] is None else options["starts"]),
+            starts=options["given"] or (DEFAULT_STARTS if options["count"] is None else options["count"]),
             steps=options["steps"],
             max_digits=options["max_digits"],
             seconds=options["seconds"],

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from kahanmaps_cli.options import _stack
+from kahanmaps_cli.options import stack
 from kahanmaps_cli.params import OptionType
 from kahanmaps_cli.progress import say
 
@@ -51,7 +51,7 @@ class PictureCommand(click.Command):
         return super().parse_args(ctx, args)
 
 
-picture_options: Callable[[F], F] = _stack(
+picture_options: Callable[[F], F] = stack(
     click.option(
         "-o",
         "--output",
@@ -105,8 +105,9 @@ def require_output(options: dict[str, Any]) -> None:
 
 def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = None) -> None:
     """Write the figure to its file, or draw it in the terminal; the options are those of `picture_options`."""
-    from kahanmaps.plots.figures import drawing, format_of, picture_bytes, plain, write_whole
+    from kahanmaps.plots.figures import drawing, format_of, picture_bytes, plain
     from kahanmaps.plots.recipe import Recipe
+    from kahanmaps.whole_files import write_whole
 
     style = style_from(options)
     path, kind = options["output"], options["kind"]
@@ -117,7 +118,7 @@ def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = N
         _draw_in_terminal(figure, style, path)
         return
     kind = format_of(path, kind)
-    content = picture_bytes(figure, kind, style, Recipe(_command(), "" if file is None else file.to_toml()))
+    content = picture_bytes(figure, kind, style, Recipe(command_line(), "" if file is None else file.to_toml()))
     if path == "-":
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
@@ -128,7 +129,8 @@ def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = N
         say(f"{path}: {width:.1f} x {height:.1f} cm, {len(content)} bytes")
 
 
-def _command() -> str:
+def command_line() -> str:
+    """The command that is running, as one would type it; it has to be a PictureCommand."""
     context = click.get_current_context()
     words = context.command_path.split()[1:]  # the first one is the program, whatever it was called
     return shlex.join(["kahanmaps", *words, *context.meta[_ARGUMENTS]])
@@ -136,8 +138,8 @@ def _command() -> str:
 
 def _draw_in_terminal(figure: Figure, style: Style, path: str) -> None:
     from kahanmaps.errors import InputError
-    from kahanmaps.plots.figures import write_whole
     from kahanmaps.plots.terminal import draw_in_characters
+    from kahanmaps.whole_files import write_whole
 
     window = shutil.get_terminal_size()
     columns = max(20, window.columns - 1)

@@ -7,8 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import eps_options, load_system, system_options, the_eps
-from kahanmaps_cli.params import ExactNumber, PointText
+from kahanmaps_cli.options import (
+    backward_option,
+    eps_options,
+    load_system,
+    random_starts_options,
+    system_options,
+    the_eps,
+)
+from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
 from kahanmaps_cli.pictures.portrait_orbits import Orbits
 from kahanmaps_cli.pictures.stored import read_orbits
@@ -29,14 +36,9 @@ _WALKING = ("start", "starts", "count", "box", "seed", "steps", "backward", "eul
 @system_options
 @eps_options
 @click.option("--start", type=PointText(), multiple=True, metavar="X", help="A start, 1/2,-1/3; again for more orbits.")
-@click.option(
-    "--starts", type=click.Path(), metavar="FILE", help="Starts: one a line (text, csv), or .npy; - is stdin."
-)
-@click.option("--random", "count", type=int, metavar="N", help="N random starts.")
-@click.option("--box", type=ExactNumber(), metavar="R", help="... with coordinates from -R to R (default 1).")
-@click.option("--seed", type=int, metavar="S", help="... with this seed (default 0).")
+@random_starts_options
 @click.option("--steps", type=int, metavar="N", help="Steps of each orbit (default 1000; with --density 100000).")
-@click.option("--backward", is_flag=True, help="Step by the inverse map, Phi(., -eps).")
+@backward_option
 @click.option(
     "--from",
     "stored",
