@@ -29,7 +29,7 @@ from kahanmaps.laboratory.modular_points import (
     monomial_values,
     null_space,
 )
-from kahanmaps.laboratory.parametric import ParametricSystem
+from kahanmaps.systems.parametric import ParametricSystem
 
 _SPARE = 8
 _DETERMINANT_BUDGET = 20_000_000

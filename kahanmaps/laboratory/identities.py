@@ -24,8 +24,8 @@ from kahanmaps.checks.preserve import density_identity
 from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep
 from kahanmaps.invariants.integrals import ClaimedIntegral
 from kahanmaps.invariants.measures import ClaimedDensity
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.systems.parametric import ParametricSystem
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _BUDGET = 60_000_000

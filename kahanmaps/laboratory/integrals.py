@@ -30,10 +30,10 @@ from kahanmaps.laboratory.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.identities import integral_verdict
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, rank
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.laboratory.search import Found, may_be_conjugate, repeat, search
 from kahanmaps.laboratory.shown import integrals_html
 from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.parametric import ParametricSystem
 
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
 

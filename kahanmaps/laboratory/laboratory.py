@@ -16,8 +16,8 @@ from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.closed_forms import ClosedForms, Spaces, closed_forms
 from kahanmaps.laboratory.cofactors import Cofactor, cofactor_of_affine, determinant_factors
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.parametric import ParametricSystem
 
 
 class Laboratory:

@@ -11,8 +11,8 @@ from flint import nmod_mat
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import monomials
 from kahanmaps.errors import KahanmapsError, SingularStep
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.systems.parametric import ParametricSystem
 
 Point = tuple[int, ...]
 _TRIES = 60

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from kahanmaps.algebra.text import is_name
 from kahanmaps.errors import InputError
-from kahanmaps.languages.formulas import Formulas, WithSymbols, check_parts
+from kahanmaps.languages.formulas import Formulas, check_parts
 from kahanmaps.languages.julia import JULIA
 from kahanmaps.languages.language import Language
 from kahanmaps.languages.latex import write_latex
@@ -28,7 +28,7 @@ def convert(
     what: Iterable[str] | None = None,
     *,
     name: str = "",
-    parametric: WithSymbols | None = None,
+    symbols: Sequence[str] = (),
     command: str = "",
 ) -> str:
     """A system, its Kahan map and what is known of it as a file that another program runs as it stands, exactly.
@@ -38,8 +38,7 @@ def convert(
         language: one of `LANGUAGES`.
         what: of `PARTS`; None for the system, the map, and integrals and density where they are known.
         name: put before the names of all functions, so that two systems fit into one session; in LaTeX nothing.
-        parametric: the same system with some parameters left as symbols, a `ParametricSystem` of the laboratory; the
-            functions take the symbols as arguments after eps.
+        symbols: parameters that stay symbols (not in a [family] file); the functions take them as arguments after eps.
         command: the command line that makes this file, for the comment on top.
 
     Returns:
@@ -62,7 +61,7 @@ def convert(
         raise InputError(f"found the language {str(language)[:40]!r}, expected one of {', '.join(LANGUAGES)}")
     if name and not (is_name(name) and name[0] != "_"):
         raise InputError(f"found the name {name[:40]!r}, expected a letter, then letters, digits and _")
-    formulas = Formulas.of(file, parametric)
+    formulas = Formulas.of(file, symbols)
     parts = _parts(what, formulas)
     if language == "latex":
         return write_latex(formulas, parts, command)

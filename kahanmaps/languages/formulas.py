@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 from flint import fmpq_mat, fmpq_mpoly
 
@@ -18,21 +17,11 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
 from kahanmaps.errors import InputError
 from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.parametric import ParametricSystem
 
 # The closed form of the map, all components together, before common factors are removed.
 MAX_TERMS = 4_000
 MAX_DIMENSION_OF_FORMULAS = 8
-
-
-class WithSymbols(Protocol):
-    """A system whose parameters may be symbols: right-hand sides in the ring of the variables, then the symbols."""
-
-    @property
-    def variables(self) -> tuple[str, ...]: ...
-    @property
-    def symbols(self) -> tuple[str, ...]: ...
-    @property
-    def rhs(self) -> tuple[fmpq_mpoly, ...]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +41,13 @@ class Formulas:
     H: fmpq_mpoly | None
 
     @classmethod
-    def of(cls, file: SystemFile, parametric: WithSymbols | None = None) -> Formulas:
-        """The formulas of a file; `parametric` is the same system with some of its parameters left as symbols."""
+    def of(cls, file: SystemFile, kept: Sequence[str] = ()) -> Formulas:
+        """The formulas of a file; the parameters `kept` are left as symbols. Raises InputError where that cannot be."""
         hamiltonian = file.hamiltonian
-        if parametric is None or not parametric.symbols:
+        if not kept:
             H = None if hamiltonian is None else hamiltonian.H
             return cls(file, file.variables, (), file.system.rhs, file.integrals, file.density, H)
+        parametric = ParametricSystem.of(file, kept)
         symbols, names = parametric.symbols, (*parametric.variables, *parametric.symbols)
         constants = {name: value for name, value in file.parameters.items() if name not in symbols}
         document = file.document

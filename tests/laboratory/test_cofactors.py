@@ -22,8 +22,8 @@ from kahanmaps.laboratory.cofactors import (
     search_cofactors,
 )
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.systems.catalog import load, names
+from kahanmaps.systems.parametric import ParametricSystem
 
 SMALL_ONES = [name for name in names() if load(name).system.dim <= 4]
 ONE = CofactorProduct((), 0)

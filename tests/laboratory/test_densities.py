@@ -21,9 +21,9 @@ from kahanmaps.laboratory.densities import _space, find_densities
 from kahanmaps.laboratory.identities import density_verdict
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import rank
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.catalog import load, names
+from kahanmaps.systems.parametric import ParametricSystem
 
 # lorenz and kirchhoff_generic: searched as far as dimension and time allow, nothing found
 WITHOUT = ("lorenz", "kirchhoff_generic")

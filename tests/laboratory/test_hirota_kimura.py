@@ -15,8 +15,8 @@ from kahanmaps.laboratory.hirota_kimura import (
 )
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, monomial_values
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.systems.catalog import load, names
+from kahanmaps.systems.parametric import ParametricSystem
 from kahanmaps.systems.structured_facts import relation_functions, relations
 
 # Sets of more than 300 functions are measured by the tests of the catalogue.

@@ -18,8 +18,8 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.identities import integral_verdict
 from kahanmaps.laboratory.integrals import _is_affine_integral, closing_note, find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.systems.catalog import load, names
+from kahanmaps.systems.parametric import ParametricSystem
 
 PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
 LONG = ("henon_heiles", "paper_m2")

@@ -23,9 +23,9 @@ from kahanmaps.laboratory.modular_points import (
     null_space,
     rank,
 )
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.catalog import load
+from kahanmaps.systems.parametric import ParametricSystem
 
 SMALL = 101
 residues = st.integers(0, SMALL - 1)

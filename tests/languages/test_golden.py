@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 import kahanmaps as km
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.languages.convert import PARTS, convert
 from kahanmaps.version import __version__
 
@@ -26,7 +25,7 @@ def weierstrass(language: str) -> str:
 
 def euler_top(language: str) -> str:
     file = km.load("euler_top")
-    return convert(file, language, name="top", parametric=ParametricSystem.of(file, ["a1", "a2"]))
+    return convert(file, language, name="top", symbols=["a1", "a2"])
 
 
 @pytest.mark.parametrize("write", [weierstrass, euler_top])

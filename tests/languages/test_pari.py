@@ -9,7 +9,6 @@ from language_helpers import HAS_GP, ask_gp, converted, gp_prints, questions, sy
 import kahanmaps as km
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import parse_polynomial
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.languages.convert import convert
 
 pytestmark = pytest.mark.skipif(not HAS_GP, reason="gp, the program of PARI, is not installed")
@@ -60,7 +59,7 @@ def test_the_map_of_symbols_is_the_closed_form(tmp_path):
 
 def test_parameters_that_are_left_as_symbols_are_arguments_and_stand_for_themselves(tmp_path):
     file = km.load("euler_top")
-    text = convert(file, "pari", parametric=ParametricSystem.of(file, ["a1", "a2", "a3"]))
+    text = convert(file, "pari", symbols=["a1", "a2", "a3"])
     x, eps = (fmpq(1), fmpq(1, 2), fmpq(-3)), fmpq(1, 7)
     lines = [
         "print(kahan_map([1, 1/2, -3]~, 1/7, 5, 2, -1/3));",
@@ -82,7 +81,7 @@ def test_symbols_get_any_values_afterwards(name, tmp_path):
     symbols = list(SYSTEMS[name].parameters)
     values = {symbol: f"{2 * k + 3}/{k + 2}" for k, symbol in enumerate(symbols)}
     parts, asked = questions(km.load(name, values))
-    text = convert(SYSTEMS[name], "pari", parts, parametric=ParametricSystem.of(SYSTEMS[name], symbols))
+    text = convert(SYSTEMS[name], "pari", parts, symbols=symbols)
     answers = ask_gp(text, asked, tmp_path, more="".join(f", {value}" for value in values.values()))
     assert answers == [question.expected for question in asked]
 

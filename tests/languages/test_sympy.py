@@ -10,7 +10,6 @@ from language_helpers import converted, numbers, question_in_python, run_python,
 
 import kahanmaps as km
 from kahanmaps.algebra.text import parse_polynomial
-from kahanmaps.laboratory.parametric import ParametricSystem
 from kahanmaps.languages.convert import convert
 from kahanmaps.languages.sympy import SYMPY
 
@@ -58,7 +57,7 @@ def printed() -> dict[str, list[str]]:
     weierstrass = convert(km.load("weierstrass"), "sympy", ["integrals"])
     scripts["integers"] = weierstrass + "print(integral_modified_H([1, 2], 3))"
     top = km.load("euler_top")
-    symbolic = convert(top, "sympy", parametric=ParametricSystem.of(top, ["a1", "a3"]))
+    symbolic = convert(top, "sympy", symbols=["a1", "a3"])
     scripts["symbols"] = symbolic + "print(vector_field([1, 2, 3])[0], vector_field([1, 2, 3], 5, 7)[2])"
     many = convert(km.parse_system(MANY_TERMS, "many"), "sympy", ["integrals"])
     scripts["many terms"] = many + "print(integral_big([3, 1, 3, 6], 1))"

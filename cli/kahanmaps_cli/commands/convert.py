@@ -57,17 +57,12 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
-    parametric = None
-    if symbols:
-        from kahanmaps.laboratory.parametric import ParametricSystem
-
-        parametric = ParametricSystem.of(file, symbols)
     text = convert(
         file,
         language,
         parts if options["parts"] else None,
         name=options["name"],
-        parametric=parametric,
+        symbols=symbols,
         command=_command_line(system, language, options),
     )
     if output is None or output == "-":
