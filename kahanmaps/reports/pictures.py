@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from kahanmaps import markup
@@ -32,10 +32,13 @@ class Pictures:
             except InputError as error:
                 self._wanted, self.note = False, f"Pictures are left out: {error}"
 
-    def draw(self, name: str, caption: str, alt: str, drawing: Callable[[Style], Figure]) -> str:
+    def draw(
+        self, name: str, caption: str, alt: str, drawing: Callable[[Style], Figure], remarks: Sequence[str] = ()
+    ) -> str:
         """A <figure> with the picture that `drawing` makes; `name` is its id, `alt` says in words what it shows.
 
-        Empty without pictures; where it cannot be drawn, the reason.
+        `remarks` are read after `drawing` was called, which may have written into them what the picture does not show;
+        they stand below the caption. Empty without pictures; where it cannot be drawn, the reason.
         """
         if not self._wanted:
             return ""
@@ -45,7 +48,8 @@ class Pictures:
             svg = svg_text(figure, name, _STYLE, alt)
         except KahanmapsError as error:
             return f'<p class="soft">{markup.escape(caption)}: not drawn, for {markup.escape(error)}</p>'
-        return f'<figure id="{name}">\n{svg}\n<figcaption>{markup.escape(caption)}</figcaption>\n</figure>'
+        words = "<br/>".join(map(markup.escape, (caption, *remarks)))
+        return f'<figure id="{name}">\n{svg}\n<figcaption>{words}</figcaption>\n</figure>'
 
 
 def _rasterise(figure: Figure) -> None:

@@ -10,6 +10,7 @@ from flint import fmpq
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.settings import random_starts
+from kahanmaps.errors import counted
 from kahanmaps.reports.pictures import Pictures
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ _CURVE_STEPS = 300
 def portrait_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
     """Sixteen orbits in the plane of the first two variables (in dimension 1 against the step)."""
     at = _EPS if eps is None else rational(eps)
+    remarks: list[str] = []
     axes = file.variables[:2] if file.system.dim > 1 else ("step", file.variables[0])
 
     def drawing(style: Style) -> Figure:
@@ -39,26 +41,41 @@ def portrait_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
         starts = automatic_starts(file.system, at)
         found = walked(ensemble_for(file.system, at, starts, _STEPS), _STEPS)
         functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
-        return draw_portrait(portrait_of(found, functions), style)
+        shown = portrait_of(found, functions)
+        remarks.extend(
+            f"{count} of {counted(found.orbits, 'orbit')} ended early: {r}." for r, count in found.ended.items()
+        )
+        if shown.left_out:
+            remarks.append(f"{shown.left_out} of {found.points[..., 0].size} points lie outside the window.")
+        return draw_portrait(shown, style)
 
     sentence = f"eps = {format_number(at)}, time step {format_number(2 * at)}, {_STEPS} steps in machine numbers"
     caption = f"Orbits of the Kahan map in {' and '.join(axes)}: {sentence}."
-    return pictures.draw("portrait", caption, f"Portrait of orbits in {' and '.join(axes)}, {sentence}", drawing)
+    return pictures.draw(
+        "portrait", caption, f"Portrait of orbits in {' and '.join(axes)}, {sentence}", drawing, remarks
+    )
 
 
 def invariant_curves_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
     """Three orbits of a member of the family, plane by plane, on the cubic curves that they never leave."""
     at = _EPS if eps is None else rational(eps)
+    remarks: list[str] = []
 
     def drawing(style: Style) -> Figure:
         from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
         from kahanmaps.plots.invariant_curves import find_invariant_curves
 
         starts = list(islice(random_starts(file.system.dim, 0), _ORBITS))
-        return draw_invariant_curves(find_invariant_curves(file, starts, at, _CURVE_STEPS), style)
+        found = find_invariant_curves(file, starts, at, _CURVE_STEPS)
+        remarks.extend(
+            f"Orbit {k} ends before step {pole}: a pole, or closer to one than 2^-96."
+            for k, pole in enumerate(found.poles, 1)
+            if pole is not None
+        )
+        return draw_invariant_curves(found, style)
 
     sentence = f"eps = {format_number(at)}, time step {format_number(2 * at)}, {_CURVE_STEPS} steps"
     caption = f"{_ORBITS} orbits in the planes of the normal form, and the invariant curves through them: {sentence}."
     return pictures.draw(
-        "invariant-curves", caption, f"Invariant plane cubics with orbits on them, {sentence}", drawing
+        "invariant-curves", caption, f"Invariant plane cubics with orbits on them, {sentence}", drawing, remarks
     )

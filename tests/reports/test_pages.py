@@ -15,6 +15,8 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.sparse_relations import SparseRelation
 from kahanmaps.paper.examiner import VerifyOptions
+from kahanmaps.reports.pictures import Pictures
+from kahanmaps.reports.portraits import portrait_figure
 from kahanmaps.reports.report import report_html, write_report
 from kahanmaps.reports.statement_formulas import formulas_of
 
@@ -114,6 +116,17 @@ def test_without_matplotlib_the_page_says_what_to_install(volterra, monkeypatch)
     page = require_sound(report_html(volterra))
     assert "svg" not in page.tags
     assert "pip install 'kahanmaps[plot]'" in page.text
+
+
+def test_a_portrait_says_which_orbits_ended_and_what_lies_outside():
+    nowhere = km.QuadraticSystem.from_text(["x"], ["x"])  # at eps = 1
+    html = portrait_figure(km.SystemFile.from_system(nowhere), 1, Pictures())
+    assert "16 of 16 orbits ended early: met a singular matrix I - eps f&#x27;." in html
+    riccati = km.QuadraticSystem.from_text(["x"], ["x^2 + 1"])
+    assert "points lie outside the window" in portrait_figure(km.SystemFile.from_system(riccati), "1/20", Pictures())
+    harmonic = portrait_figure(km.load("harmonic"), "1/20", Pictures())
+    assert "ended early" not in harmonic
+    assert "outside" not in harmonic
 
 
 @pytest.mark.slow
