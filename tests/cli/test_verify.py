@@ -411,3 +411,9 @@ def test_json_is_plain_on_a_terminal(kahanmaps):
 
 def test_no_colour_is_used_where_it_is_not_wanted():
     assert "\x1b[3" not in terminal(*shlex.split(QUICK), NO_COLOR="1").out
+
+
+def test_parameters_without_a_system_are_refused(kahanmaps):
+    refused = kahanmaps("verify --m 1 -p a=1")
+    assert refused.status == 2
+    assert "found -p without SYSTEM" in refused.err

@@ -85,6 +85,8 @@ def command(system: str | None, **options: Any) -> int:
             raise click.UsageError(f"found --universal and {clash[0]}, expected --universal with --m only")
     elif system is not None and given:
         raise click.UsageError("give a SYSTEM or say which member to draw (--m, --eigenvalues, ...), not both")
+    if system is None and options["parameters"]:
+        raise click.UsageError("found -p without SYSTEM: a member that is drawn has no parameters")
     with Progress(options["quiet"]) as progress:
         settings = Settings(
             eps=the_eps(options["eps"], options["time_step"], required=False),
