@@ -20,21 +20,35 @@ class SuggestingGroup(click.Group):
 
     def hint(self, written: str, known: list[str]) -> str:
         """A sentence about what may have been meant, after a blank; empty where nothing is like it."""
-        close = close_to(written, known, 0.5)
+        begin = [name for name in known if len(written) > 2 and name.startswith(f"{written}-")]
+        close = begin or close_to(written, known, 0.5)
         return f" Did you mean {' or '.join(close)}?" if close else ""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of commands with their first sentences, which click would cut."""
+        found = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        rows = [(name, below.get_short_help_str(limit=1000)) for name, below in found if below and not below.hidden]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
 
 
 def close_to(written: str, known: list[str], cutoff: float = 0.6) -> list[str]:
-    """Up to three of the known words that are like the one that was written."""
-    from difflib import get_close_matches
+    """Up to three of the known words that are like the one that was written, and nearly as much as the best of them."""
+    from difflib import SequenceMatcher, get_close_matches
 
-    return get_close_matches(written, known, n=3, cutoff=cutoff)
+    close = get_close_matches(written, known, n=3, cutoff=cutoff)
+    ratios = [SequenceMatcher(None, word, written).ratio() for word in close]
+    return [word for word, ratio in zip(close, ratios, strict=True) if ratio > ratios[0] - 0.15]
 
 
 def in_our_words(error: click.ClickException) -> click.ClickException:
     """The error with what was found and what was expected, and where a choice is misspelt with one that is like it."""
     if not isinstance(error, click.BadParameter) or error.param is None:
         return error
+    if isinstance(error, click.MissingParameter):
+        is_told = isinstance(error.param.type, click.Choice) or not isinstance(error.param, click.Option)
+        text = f"{error.format_message().removesuffix('.')}: {getattr(error.param, 'help', '')}"
+        return error if is_told else click.UsageError(text, error.ctx)
     message = error.message
     if found := re.fullmatch(r"'(.*)' is not a valid (integer|float)\.", message, re.DOTALL):
         message = f"found {found[1]!r}, expected {'an integer' if found[2] == 'integer' else 'a number'}"

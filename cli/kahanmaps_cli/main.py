@@ -115,6 +115,8 @@ class LazyGroup(SuggestingGroup):
 
         if written in names() or written.endswith(".toml"):
             return f" To see what the map of {written} preserves: kahanmaps analyze {written}"
+        if written == "help":
+            return " For help: kahanmaps --help, or kahanmaps COMMAND --help."
         return super().hint(written, known)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
@@ -183,8 +185,9 @@ def _run(argv: Sequence[str] | None) -> int:
     except click.exceptions.Exit as stop:
         return stop.exit_code
     except click.ClickException as error:
-        with suppress(OSError):
-            in_our_words(error).show(sys.stderr)
+        shown = io.StringIO()
+        in_our_words(error).show(shown)
+        say(shown.getvalue().removesuffix("\n"))
         return WRONG_USE
     except (click.Abort, KeyboardInterrupt):
         say("interrupted")

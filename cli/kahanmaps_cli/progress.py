@@ -16,9 +16,10 @@ import click
 
 
 def say(message: str) -> None:
-    """Print a message, with nothing in it that a terminal would obey."""
+    """Print a message, with nothing in it that a terminal would obey; a terminal gets lines broken at words."""
+    text = printable(message)
     with suppress(OSError):
-        click.echo(printable(message), err=True)
+        click.echo(_fitted(text) if sys.stderr.isatty() else text, err=True)
 
 
 def printable(text: str) -> str:
@@ -64,6 +65,22 @@ def _width() -> int:
         return max(20, os.get_terminal_size(sys.stderr.fileno()).columns)
     except (OSError, ValueError):
         return 80
+
+
+def _fitted(text: str) -> str:
+    """The text in lines that fit the terminal; but a caret and the line above it stay, or it would point elsewhere."""
+    from kahanmaps_cli.terminal import wrapped
+
+    lines = text.split("\n")
+    found = []
+    for line, below in zip(lines, [*lines[1:], ""], strict=True):
+        if len(line) <= _width() or "^" in (line.strip(), below.strip()):
+            found.append(line)
+        else:
+            words = line.lstrip()
+            margin = " " * (len(line) - len(words))
+            found += wrapped(words, _width(), margin, margin + "  ")
+    return "\n".join(found)
 
 
 def _write(text: str) -> None:

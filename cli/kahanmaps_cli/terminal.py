@@ -113,7 +113,10 @@ def tell_entry(head: str, text: str, style: str = "") -> None:
 
 
 def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
-    """Columns on a terminal, tabs elsewhere; the first `words` columns are texts, the others numbers."""
+    """Columns on a terminal, tabs elsewhere; the first `words` columns are texts, the others numbers.
+
+    A broken number looks like two: where a terminal is too narrow for the numbers, cells stand below each other.
+    """
     if not on_terminal():
         for row in rows:
             click.echo("\t".join(row))
@@ -124,20 +127,33 @@ def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
     screen = console()
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     padding = 1 if sum(widths) + 3 * len(widths) < screen.width else 0
-    # Where a table is too wide words are broken, and numbers only where that is not enough.
+    # Where a table is too wide words are broken.
     least = sum(min(width, _WORD_WIDTH) for width in widths[:words])
     least += sum(widths[words:]) + (1 + 2 * padding) * len(widths) + 1
+    if least > screen.width:
+        _print_cells(rows)
+        return
     table = Table(header_style="bold", padding=(0, padding))
     for k, heading in enumerate(rows[0]):
         table.add_column(
             Text(heading, style=COLOURS.get(heading, "")),
             justify="left" if k < words else "right",
             overflow="fold",
-            no_wrap=k >= words and least <= screen.width,
+            no_wrap=k >= words,
         )
     for row in rows[1:]:
         table.add_row(*(Text(printable(cell)) for cell in row))
     screen.print(table)
+
+
+def _print_cells(rows: Sequence[Sequence[str]]) -> None:
+    """One cell a line behind its heading, and an empty line after each row."""
+    headings, *others = rows
+    width = max(map(len, headings))
+    for row in others:
+        for heading, cell in zip(headings, row, strict=True):
+            click.echo("\n".join(wrapped(printable(cell), columns(), heading.ljust(width) + "  ", " " * 4)))
+        click.echo()
 
 
 def _laid_out(cells: list[str], hang: int) -> str:

@@ -89,9 +89,9 @@ def draw_batch(
             if any(name in group.numbers for group in groups):
                 _draw_numbers(axes, groups, name, scale)
             else:
-                _draw_bars(axes, [_flags(group, name) for group in groups], f"tasks by {plain(name)}")
+                _draw_bars(axes, [_flags(group, name) for group in groups], f"tasks by {plain(name)}", style)
         if not values:
-            _draw_bars(every[0], [_ends(group) for group in groups], "tasks")
+            _draw_bars(every[0], [_ends(group) for group in groups], "tasks", style)
         for k, axes in enumerate(every):
             _name_groups(axes, summary, first=k % columns == 0)
         _legend(figure, list(every), style)
@@ -126,6 +126,8 @@ def draw_pairs(pairs: Pairs, style: Style | None = None, *, scale: str | None = 
             if series is not None:
                 axes.plot([], [], color=COLOURS[k], marker=MARKS[k], linestyle="none", label=_shortened(label))
             marker = MARKS[k] if here.sum() <= 5000 else "o"
+            if finite.sum() <= 500:
+                how["markersize"] = 3.2  # or one mark looks like another
             points(axes, _spread(x[here], pairs.x, k), y[here], marker=marker, **how)
         if pairs.x.categories is not None:
             _name_words(axes, pairs.x, x, y, finite)
@@ -196,7 +198,7 @@ def _flags(group: Group, name: str) -> dict[str, int]:
     return {"true": true, "false": false}
 
 
-def _draw_bars(axes: Axes, counts: Sequence[dict[str, int]], label: str) -> None:
+def _draw_bars(axes: Axes, counts: Sequence[dict[str, int]], label: str, style: Style) -> None:
     from matplotlib.ticker import MaxNLocator
 
     kinds = dict.fromkeys(
@@ -217,7 +219,7 @@ def _draw_bars(axes: Axes, counts: Sequence[dict[str, int]], label: str) -> None
             (3, 0),
             textcoords="offset points",
             va="center",
-            fontsize="x-small",
+            fontsize=style.smallest,
             clip_on=False,
         )
     axes.set_xlim(0, 1.12 * max(float(left.max()), 1.0))

@@ -9,7 +9,7 @@ import numpy as np
 from kahanmaps.algebra.text import format_number
 from kahanmaps.errors import InputError
 from kahanmaps.plots.drift import METHODS, DriftCurve, DriftSurvey
-from kahanmaps.plots.figures import drawing, new_figure
+from kahanmaps.plots.figures import drawing, new_figure, wrapped
 from kahanmaps.plots.legends import legend_above, legend_height
 from kahanmaps.plots.style import COLOURS, LINES, Style
 from kahanmaps.plots.zero_band import log_scale_with_zero
@@ -41,10 +41,15 @@ def draw_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
     with drawing(style):
         labels = _methods(survey)
         panel = 0.62 if count == 1 else 0.85 / columns if columns > 1 else 0.5 if rows == 2 else 0.45
-        figure = new_figure(style, panel * rows + legend_height(labels, style, title=True))
+        aspect = panel * rows + legend_height(labels, style, title=True)
+        figure = new_figure(style, aspect)
+        room = 0.75 / rows * 72 * style.inches(aspect)[1]  # for what stands beside a panel, in points
         panels = figure.subplots(rows, columns, sharex=True, squeeze=False).ravel()
         for axes, name in zip(panels, survey.labels, strict=False):
             _draw_panel(axes, survey, name, scale)
+            kind = "relative" if survey.relative[name] else "absolute"
+            label = f"{kind} error of {survey.labels[name]}"
+            axes.set_ylabel(label if label.endswith("$") else wrapped(label, room, style.font_size, most=2))
         for k, axes in enumerate(panels):
             if k >= count:
                 axes.set_visible(False)
@@ -85,8 +90,6 @@ def _draw_panel(axes: Axes, survey: DriftSurvey, name: str, scale: str) -> None:
         axes.set_xlim(0, survey.steps)
     for curve in curves:
         _draw_curve(axes, curve, zero, limit, survey.ends[curve.method].is_whole)
-    kind = "relative" if survey.relative[name] else "absolute"
-    axes.set_ylabel(f"{kind} error of {survey.labels[name]}")
 
 
 def _draw_curve(axes: Axes, curve: DriftCurve, zero: float | None, limit: float, is_whole: bool) -> None:

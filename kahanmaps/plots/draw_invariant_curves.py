@@ -56,7 +56,7 @@ def draw_invariant_curves(
 
         figure = new_figure(style, _aspect(style, rows, columns, projective))
         steps = max(len(x) for x in found.originals) - 1
-        pen = _Pen(Normalize(0, max(1, steps)), len(found.originals) == 1)
+        pen = _Pen(Normalize(0, max(1, steps)), len(found.originals) == 1, style)
         every = list(figure.subplots(rows, columns, squeeze=False).flat)
         grid = iter(every)
         if original is not None:
@@ -95,8 +95,8 @@ def _aspect(style: Style, rows: int, columns: int, projective: bool) -> float:
 class _Pen:
     """How dots are drawn: by step, where there is one orbit, otherwise by orbit."""
 
-    def __init__(self, scale: Any, by_step: bool) -> None:
-        self.scale, self.by_step = scale, by_step
+    def __init__(self, scale: Any, by_step: bool, style: Style) -> None:
+        self.scale, self.by_step, self.style = scale, by_step, style
 
     def orbit(self, axes: Axes, x: Floats, y: Floats, number: int, normals: Floats | None) -> None:
         from matplotlib.patheffects import withStroke
@@ -118,9 +118,9 @@ class _Pen:
             axes.annotate(
                 str(k),
                 (x[k], y[k]),
-                xytext=(8 * aside[0], 8 * aside[1]),
+                xytext=tuple(8 * aside * _inwards(axes, x[k], y[k], aside)),
                 textcoords="offset points",
-                fontsize="x-small",
+                fontsize=self.style.smallest,
                 horizontalalignment="center",
                 verticalalignment="center",
                 annotation_clip=True,
@@ -132,7 +132,7 @@ class _Pen:
         from matplotlib.cm import ScalarMappable
         from matplotlib.ticker import MaxNLocator
 
-        how: dict[str, Any] = {"location": "bottom", "shrink": 0.6, "aspect": 40, "pad": 0.02}
+        how: dict[str, Any] = {"location": "bottom", "shrink": 0.6, "aspect": 40, "pad": 0.04}
         bar = figure.colorbar(ScalarMappable(self.scale, COLOUR_MAP), ax=figure.axes, **how)
         bar.set_label("step" if pole is None else f"step (a pole at step {pole} ends the orbit)")
         bar.outline.set_linewidth(0.4)
@@ -183,6 +183,13 @@ def _draw_original(axes: Axes, found: InvariantCurves, original: tuple[int, int]
     axes.set_title("the orbit itself")
     for number, (x, y) in enumerate(clouds):
         pen.orbit(axes, x, y, number, None)
+
+
+def _inwards(axes: Axes, x: float, y: float, aside: Floats) -> int:
+    """1, or -1 where a number on that side of a dot would lie on the edge of its panel."""
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    place = (np.array([x, y]) - limits[:, 0]) / (limits[:, 1] - limits[:, 0])
+    return -1 if np.any(np.abs(place + 2 * _CROWDED * aside - 0.5) > 0.5) else 1
 
 
 def _normals(cubic: PlaneCubic, x: Floats, y: Floats, stretch: float) -> Floats:

@@ -119,7 +119,8 @@ def _draw_orbits(axes: Any, shown: FloatArray, lines: bool, colours: list[str], 
         orbit = shown[:, k]
         how: dict[str, Any] = {"color": colours[k % len(colours)], "zorder": 1.5 if below else 2}
         if lines:
-            axes.plot(*orbit.T, linewidth=0.6, rasterized=count > RASTERISE_ABOVE, **how)
+            dashes: Any = (0, (5, 2)) if below else "-"  # in a grey copy the colours tell less
+            axes.plot(*orbit.T, linewidth=0.6, linestyle=dashes, rasterized=count > RASTERISE_ABOVE, **how)
         else:
             few = len(orbit) <= _FEW and not below
             mark = {"markersize": 3.0, "marker": MARKS[k % len(MARKS)]} if few else {}
@@ -210,7 +211,7 @@ def _finish(axes: Any, labels: tuple[str, ...], window: Window) -> None:
 
 def _write_note(axes: Any, note: str, style: Style) -> None:
     if note:
-        axes.set_title(note, loc="right", fontsize=max(3.0, style.font_size - 2), color="#555555", pad=2)
+        axes.set_title(note, loc="right", fontsize=style.smallest, color="#555555", pad=2)
 
 
 def _lighten_grid() -> None:

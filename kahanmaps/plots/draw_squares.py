@@ -14,7 +14,7 @@ import numpy as np
 from flint import arb
 
 from kahanmaps.errors import InputError
-from kahanmaps.plots.figures import drawing, label_of, new_figure, plain
+from kahanmaps.plots.figures import drawing, label_of, new_figure, plain, wrapped
 from kahanmaps.plots.plane_cubics import Floats
 from kahanmaps.plots.squares import Lattice, Squares
 from kahanmaps.plots.style import COLOURS, Style
@@ -46,10 +46,10 @@ def draw_squares(
     with drawing(style):
         letter = style.font_size * 2.54 / 72
         side = style.width / max(len(found), 1.25) - 4.2 * letter
-        figure = new_figure(style, (side + 8.5 * letter) / style.width)
+        figure = new_figure(style, (side + 10 * letter) / style.width)
         for k, panel in enumerate(figure.subplots(1, len(found), squeeze=False)[0]):
             caption = captions[k] if k < len(captions) else ""
-            _draw(panel, found[k], chosen, caption)
+            _draw(panel, found[k], chosen, caption, letter / side, style)
         _legend(figure)
     return figure
 
@@ -78,7 +78,8 @@ def widest_axes(found: Sequence[Squares]) -> tuple[int, int]:
     return max(combinations(range(dim), 2), key=score)
 
 
-def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str) -> None:
+def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str, letter: float, style: Style) -> None:
+    """One panel; `letter` is the size of the letters in units of its side."""
     one, other = _table(squares.g_after_f)[..., chosen], _table(squares.f_after_g)[..., chosen]
     every = np.concatenate([one.reshape(-1, 2), other.reshape(-1, 2)])
     every = every[np.isfinite(every).all(axis=1)]
@@ -86,7 +87,7 @@ def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str) -
     if squares.steps == 1:  # five points, all of which are wanted
         window = np.array([every.min(axis=0), every.max(axis=0)]).T
         window[:, 1] += np.where(window[:, 0] < window[:, 1], 0, np.maximum(1e-9, np.abs(window[:, 1])))
-    margins = np.array([[0.42], [0.36]]) if squares.steps == 1 else 0.12  # room for the names of corners
+    margins = _margins(squares.steps, letter)
     window = window + margins * np.diff(window, axis=1) * np.array([-1, 1])
     axes.set_box_aspect(1)
     axes.set_xlim(*window[0])
@@ -95,19 +96,28 @@ def _draw(axes: Axes, squares: Squares, chosen: tuple[int, int], caption: str) -
     axes.set_xlabel(label_of(squares.pair.f.variables[chosen[0]]))
     axes.set_ylabel(label_of(squares.pair.f.variables[chosen[1]]))
     f, g = map(_in_formula, squares.pair.names)
-    axes.set_title(f"{plain(caption) if caption else f'$f = {f}$,  $g = {g}$'}\n{squares.verdict}")
+    beyond = outside(every, tuple(map(tuple, window)))
+    said = f"\n{beyond} of {len(every)} points outside" if beyond else ""
+    title = plain(wrapped(caption, style.font_size / letter, style.font_size)) if caption else f"$f = {f}$,  $g = {g}$"
+    axes.set_title(f"{title}\n{squares.verdict}{said}")
     _draw_lattices(axes, one, other)
-    if beyond := outside(every, tuple(map(tuple, window))):
-        text = f"{beyond} of {len(every)} points outside"
-        axes.text(0.98, 0.02, text, fontsize="xx-small", ha="right", va="bottom", transform=axes.transAxes, zorder=6)
     gap = (other[-1, -1] - one[-1, -1]) / np.diff(window, axis=1)[:, 0]
     small = bool(np.hypot(*gap) < _SEEN)
     if squares.steps == 1:
-        _label_corners(axes, one, other, squares.closes, small)
+        _label_corners(axes, one, other, squares.closes, small, letter)
     else:
-        _label(axes, one[0, 0], "$x$", np.nanmean(every, axis=0))
+        _label(axes, one[0, 0], "$x$", np.nanmean(every, axis=0), letter)
     if squares.closes is False and small and np.any(gap != 0):
-        _magnify(axes, one, other, every, window)
+        _magnify(axes, one, other, every, window, style)
+
+
+def _margins(steps: int, letter: float) -> Floats:
+    """Of the range of the points, on each side: room for the names of corners, which in small panels are large."""
+    if steps > 1:
+        needed = np.array([[1.3 * letter], [1.7 * letter]])
+        return np.asarray(np.maximum(0.12, needed / (1 - 2 * np.minimum(0.36, needed))))
+    needed = np.minimum(0.36, np.array([[3.2 * letter], [2.5 * letter]]))
+    return np.asarray(np.maximum([[0.42], [0.36]], needed / (1 - 2 * needed)))
 
 
 def _draw_lattices(axes: Axes, one: Floats, other: Floats) -> None:
@@ -129,7 +139,7 @@ def _draw_lattices(axes: Axes, one: Floats, other: Floats) -> None:
     axes.plot(*dots.T, color=_F, markersize=0.5 * size, markeredgewidth=0, **{**ring, "zorder": 4})
 
 
-def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floats) -> None:
+def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floats, style: Style) -> None:
     """The last corners once more, as large as it takes to see that they are two; in the emptiest corner."""
     lengths = np.diff(window, axis=1)[:, 0]
     inside = (every - window[:, 0]) / lengths
@@ -149,11 +159,11 @@ def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floa
     inset.set_yticks([])
     from matplotlib.patheffects import withStroke
 
-    how: dict[str, Any] = {"fontsize": "x-small", "path_effects": [withStroke(linewidth=1.5, foreground="white")]}
+    how: dict[str, Any] = {"fontsize": style.smallest, "path_effects": [withStroke(linewidth=1.5, foreground="white")]}
     inset.text(
         0.04,
         0.96,
-        rf"$\times {lengths[0] * 0.32 / (2 * half[0]):.2g}$",
+        rf"$\times {_in_two_digits(lengths[0] * 0.32 / (2 * half[0]))}$",
         va="top",
         transform=inset.transAxes,
         zorder=8,
@@ -163,7 +173,13 @@ def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floa
     inset.plot(*ends.T, color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
 
 
-def _label_corners(axes: Axes, one: Floats, other: Floats, closes: bool | None, small: bool) -> None:
+def _in_two_digits(number: float) -> str:
+    """A positive number for a formula: 6.1, 180, or with a power of ten."""
+    digits, power = f"{number:.1e}".split("e")
+    return f"{float(f'{number:.2g}'):g}" if abs(int(power)) < 4 else rf"{digits}\cdot10^{{{int(power)}}}"
+
+
+def _label_corners(axes: Axes, one: Floats, other: Floats, closes: bool | None, small: bool, letter: float) -> None:
     corners = [(one[0, 0], "$x$"), (one[1, 0], r"$\Phi_f x$"), (one[0, 1], r"$\Phi_g x$")]
     if closes or (closes is False and small):
         sign = "=" if closes else r"\neq"
@@ -171,25 +187,43 @@ def _label_corners(axes: Axes, one: Floats, other: Floats, closes: bool | None, 
     else:
         corners += [(one[1, 1], r"$\Phi_g\Phi_f x$"), (other[1, 1], r"$\Phi_f\Phi_g x$")]
     middle = np.nanmean(np.stack([point for point, _ in corners]), axis=0)
-    for point, text in corners:
-        _label(axes, point, text, middle)
+    sides = ["", "", "", ""]
+    if len(corners) == 5:  # the names of the last two corners stand side by side
+        sides[3:] = ("right", "left") if one[1, 1, 0] < other[1, 1, 0] else ("left", "right")
+    for (point, text), side in zip(corners, sides, strict=True):
+        _label(axes, point, text, middle, letter, side)
 
 
-def _label(axes: Axes, point: Floats, text: str, middle: Floats) -> None:
-    """A text beside a point, away from the middle of them all; long ones above or below, so as to stay inside."""
+def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, side: str = "") -> None:
+    """A text beside a point, away from the middle of them all; long ones above or below, moved so as to stay inside.
+
+    `side` says how a long one is aligned, to which there is another one beside it.
+    """
     if not np.isfinite(point).all():
         return
     from matplotlib.patheffects import withStroke
 
-    away = (point - middle) / np.array([np.diff(axes.get_xlim())[0], np.diff(axes.get_ylim())[0]])
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    low, length = limits[:, 0], limits[:, 1] - limits[:, 0]
+    away = (point - middle) / length
     away = away / (np.hypot(*away) or 1)
-    long = text.count("Phi") > 1
-    aligned = "center" if abs(away[0]) < 0.4 else "left" if (away[0] > 0) != long else "right"
-    raised = "center" if abs(away[1]) < 0.4 and not long else "bottom" if away[1] >= 0 else "top"
+    x, y = point
+    maps = text.count("Phi")
+    if maps > 1:
+        width = 1.6 * letter * maps
+        aligned = side or "center"
+        before = {"left": 0.0, "center": width / 2, "right": width}[aligned]
+        across = (x - low[0]) / length[0]
+        x = low[0] + length[0] * min(max(across, before + 0.02), max(before, 0.98 - width + before))
+        offset = 0.0, 9.0 if away[1] >= 0 else -9.0
+    else:
+        aligned = "center" if abs(away[0]) < 0.4 else "left" if away[0] > 0 else "right"
+        offset = 7 * away[0], 7 * away[1]
+    raised = "center" if abs(away[1]) < 0.4 and maps < 2 else "bottom" if away[1] >= 0 else "top"
     axes.annotate(
         text,
-        (float(point[0]), float(point[1])),
-        xytext=(0.0 if long else 7 * away[0], (9 if away[1] >= 0 else -9) if long else 7 * away[1]),
+        (float(x), float(y)),
+        xytext=offset,
         textcoords="offset points",
         horizontalalignment=aligned,
         verticalalignment=raised,

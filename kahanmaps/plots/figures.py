@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import io
 import re
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,10 +29,13 @@ from kahanmaps.whole_files import write_whole
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import LayoutEngine
 
 FORMATS = ("pdf", "svg", "png")
 # More points than this are stored as an image of `dpi` dots per inch: as vectors, a million are 15 MB and ten seconds.
 RASTERISE_ABOVE = 20_000
+_SETTLED = 1e-3  # of the width or height: nothing moves by a dot any more
+_LETTER = 0.5  # the width of a letter on average, in its height
 
 
 def require_matplotlib() -> None:
@@ -61,7 +65,28 @@ def new_figure(style: Style, aspect: float = 0.75) -> Figure:
     """An empty figure in the size of the style; `aspect` is height over width where the style has no height."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=style.inches(aspect), layout="constrained")
+    return Figure(figsize=style.inches(aspect), layout=_settled_layout())
+
+
+def _settled_layout() -> LayoutEngine:
+    """The constrained layout of matplotlib, repeated where axes have fixed proportions.
+
+    Such axes are smaller than the place they have, and their titles fit into what is left of it: how much room they
+    need is known only when the place has been cut to size. After one pass titles of two lines were cut off.
+    """
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    class Settled(ConstrainedLayoutEngine):
+        def execute(self, fig: Figure) -> None:
+            is_fixed = any(axes.get_box_aspect() is not None or axes.get_aspect() != "auto" for axes in fig.axes)
+            places: list[Any] = []
+            for _ in range(5 if is_fixed else 1):
+                super().execute(fig)
+                before, places = places, [number for axes in fig.axes for number in axes.get_position().bounds]
+                if before and max(abs(a - b) for a, b in zip(before, places, strict=True)) < _SETTLED:
+                    break
+
+    return Settled()
 
 
 def label_of(name: str) -> str:
@@ -79,6 +104,19 @@ def label_of(name: str) -> str:
 def plain(text: str) -> str:
     """Text of a user in which no dollar sign starts a formula."""
     return text.replace("$", r"\$")
+
+
+def wrapped(text: str, width: float, size: float, most: int = 3) -> str:
+    """Plain text in lines of about `width` points, in letters of `size` points; `most` of them, dots for the rest.
+
+    >>> wrapped("relative error of a_very_very_long_name", width=80, size=8)
+    'relative error of\\na_very_very_long_...'
+    """
+    letters = max(8, int(width / (_LETTER * size)))
+    lines = textwrap.wrap(text, letters, break_long_words=False, break_on_hyphens=False)
+    if len(lines) > most:
+        lines = [*lines[: most - 1], " ".join(lines[most - 1 :])]
+    return "\n".join(line if len(line) <= letters else line[: letters - 3] + "..." for line in lines)
 
 
 def points(axes: Axes, *coordinates: Any, of: int | None = None, **how: Any) -> Any:
@@ -111,8 +149,10 @@ def format_of(path: str, asked: str | None) -> str:
 def picture_bytes(figure: Figure, kind: str, style: Style, recipe: Recipe | None = None) -> bytes:
     """The figure as a PDF, SVG or PNG file, with the recipe in its metadata.
 
-    The same figure gives the same bytes, with the same version of matplotlib: no dates, no random names.
+    The same figure gives the same bytes, with the same version of matplotlib: no dates, no random names. Raises
+    InputError for more dots than fit into memory.
     """
+    style.require_pixels(*figure.get_size_inches())
     held = io.BytesIO()
     with drawing(style):
         figure.savefig(held, format=kind, metadata=(recipe or Recipe()).metadata(kind))

@@ -18,13 +18,15 @@ COLOURS = ("#000000", "#0072B2", "#E69F00", "#009E73", "#56B4E9", "#D55E00", "#C
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 COLOUR_MAP = "cividis"
+_MOST_PIXELS = 1 << 28  # a gigabyte while it is drawn
 
 
 @dataclass(frozen=True)
 class Style:
     """How a picture is set: width and height in centimetres, letters in points, dots per inch of what is rasterised.
 
-    A height of None is left to the kind of picture. Raises InputError for sizes out of the range given with each.
+    A height of None is left to the kind of picture. Raises InputError for sizes out of the range given with each, and
+    for more than 2^28 dots in the picture.
 
     >>> Style(width=25.4, font_size=8).inches(aspect=0.5)
     (10.0, 5.0)
@@ -45,15 +47,36 @@ class Style:
             _require("a height of {} cm", self.height, 2, 200)
         _require("a font size of {} pt", self.font_size, 3, 72)
         _require("{} dots per inch", self.dpi, 30, 2400)
+        self.require_pixels(*self.inches(aspect=0.75))
 
     def inches(self, aspect: float) -> tuple[float, float]:
         """Width and height in inches; `aspect` is height over width where no height is asked for."""
         height = self.width * aspect if self.height is None else self.height
         return self.width / CENTIMETRES_PER_INCH, height / CENTIMETRES_PER_INCH
 
+    def require_pixels(self, width: float, height: float) -> None:
+        """Raise InputError where a picture of so many inches would not fit into memory, at so many dots per inch."""
+        found = width * height * self.dpi**2
+        if found > _MOST_PIXELS:
+            raise InputError(
+                f"found {found:.2g} dots in a picture of {width * CENTIMETRES_PER_INCH:.0f} x "
+                f"{height * CENTIMETRES_PER_INCH:.0f} cm, expected at most {_MOST_PIXELS:.2g}: take fewer dots per "
+                f"inch than {self.dpi}"
+            )
+
+    @property
+    def small(self) -> float:
+        """The size of numbers at axes and of legends, in points."""
+        return max(3.0, self.font_size - 1)
+
+    @property
+    def smallest(self) -> float:
+        """The size of notes and of numbers beside points: two points less, but not below 6, where reading ends."""
+        return min(self.font_size, max(6.0, self.font_size - 2))
+
     def settings(self) -> dict[str, Any]:
         """The settings of matplotlib for this style; nothing of a user's matplotlibrc gets through."""
-        small = max(3.0, self.font_size - 1)
+        small = self.small
         return {
             "font.family": "STIXGeneral",
             "font.size": self.font_size,

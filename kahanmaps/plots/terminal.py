@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 _INK = 48  # how far from white, in steps of 255, a dot has to be to be seen
 _FRAME = "#808080"
+_LEAST_ROWS = 4  # of one panel of several, in which something is to be seen
 
 
 @dataclass(frozen=True)
@@ -68,14 +69,24 @@ def draw_in_characters(figure: Figure, columns: int, rows: int, style: Style) ->
 def _lay_out(canvas: Any, columns: int, rows: int) -> None:
     """Draw once, so that everything has its place. Raises InputError where there is too little room."""
     with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing", category=UserWarning)  # the terminal has them
         warnings.filterwarnings("error", message="constrained_layout not applied", category=UserWarning)
         try:
             canvas.draw()
-        except UserWarning as warning:
-            raise InputError(
-                f"found {columns} columns and {rows} rows, expected more for this picture: make the terminal larger, "
-                "or write a file with -o"
-            ) from warning
+            panels = _panels(canvas.figure)
+            enough = len(panels) < 2 or all(axes.bbox.height >= 4 * _LEAST_ROWS for axes in panels)
+        except UserWarning:
+            enough = False
+    if not enough:
+        raise InputError(
+            f"found {columns} columns and {rows} rows, expected more for this picture: make the terminal larger, "
+            "or write a file with -o"
+        )
+
+
+def _panels(figure: Figure) -> list[Any]:
+    """The axes side by side: not those of colour bars, nor those inside others."""
+    return [axes for axes in figure.axes if axes.get_visible() and axes.get_label() != "<colorbar>"]
 
 
 def _visible(figure: Figure, kind: Any) -> list[Any]:
@@ -108,6 +119,8 @@ def _off_scale(figure: Figure) -> set[int]:
 
 def _placed(text: Any, columns: int, rows: int) -> list[tuple[int, int, str]]:
     """Row, column and content of a text, line by line."""
+    from matplotlib.text import Annotation
+
     box = text.get_window_extent()
     lines = [" ".join(readable(line).split())[:columns] for line in text.get_text().split("\n")]
     middle_row = rows - 1 - int((box.y0 + box.y1) / 8)
@@ -119,6 +132,10 @@ def _placed(text: Any, columns: int, rows: int) -> list[tuple[int, int, str]]:
         )
         column = min(max(0, round(anchor)), columns - len(content))
         row = middle_row + k - (len(lines) - 1) // 2
+        if isinstance(text, Annotation) and text.axes is not None and text.xycoords == "data":
+            panel = text.axes.bbox  # the names of points stay inside, where they cover no numbers
+            row = min(max(row, rows - int(panel.y1 / 4)), rows - 2 - int(panel.y0 / 4))
+            column = min(max(column, 1 + int(panel.x0 / 2)), max(0, int(panel.x1 / 2) - len(content)))
         found.append((min(max(0, row), rows - 1), column, content))
     return found
 

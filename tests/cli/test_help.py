@@ -113,3 +113,10 @@ def test_the_lines_of_the_list_of_commands_are_not_broken(kahanmaps, monkeypatch
     monkeypatch.setenv("COLUMNS", "80")
     lines = kahanmaps("--help").out.splitlines()
     assert [line for _, line in COMMANDS.values() if not any(shown.endswith(line) for shown in lines)] == []
+
+
+@pytest.mark.parametrize("group", ["family", "batch", "plot"])
+def test_the_first_sentences_in_the_list_of_a_group_are_not_cut(kahanmaps, group):
+    lines = kahanmaps(group, "--help").out.partition("Commands:\n")[2].splitlines()
+    assert [line for line in lines if line.endswith("...")] == []
+    assert lines[-1].endswith(".")

@@ -8,7 +8,7 @@ import shlex
 import pytest
 from cli_helpers import terminal
 
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import ending
 from kahanmaps_cli.terminal import wrapped
 
@@ -74,6 +74,16 @@ def test_the_columns_of_an_orbit_fit_the_width():
     assert {len(line) for line in table if line.strip()[:1].isdigit()} == {48}
 
 
+def test_a_number_in_a_table_is_never_broken():
+    command = "lyapunov lorenz --eps 1/100 --random 2 --steps 100"
+    wide = shown(command, 120)
+    numbers = [word for line in wide for word in line.split() if re.fullmatch(r"-?\d\.\d{4,}", word)]
+    narrow = " ".join(shown(command, 50)).split()
+    assert len(numbers) > 6
+    assert [number for number in numbers if number not in narrow] == []
+    assert max(map(len, shown(command, 40))) <= 40
+
+
 def test_a_point_of_many_coordinates_takes_a_line_for_each():
     lines = shown("orbit paper_m3 --start 1,2,3,4,5,6 --eps 1/10 --steps 1", 50)
     assert "step 0" in lines
@@ -92,6 +102,30 @@ def test_a_line_of_progress_is_cut_to_the_terminal(monkeypatch, capsys, slow_clo
     with Progress() as progress:
         progress("x" * 100)
         assert capsys.readouterr().err == "\r" + "x" * 29
+
+
+def talk_to_forty_columns(monkeypatch):
+    """Make standard error a terminal; in the test itself, for pytest puts another one there after its fixtures."""
+    monkeypatch.setattr("kahanmaps_cli.progress._width", lambda: 40)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+
+
+def test_an_error_is_broken_at_words(kahanmaps, monkeypatch):
+    talk_to_forty_columns(monkeypatch)
+    lines = kahanmaps("analyze").err.splitlines()
+    assert max(map(len, lines)) <= 40
+    assert " ".join(" ".join(lines).split()).endswith("--vars x,y --rhs 'x*y' --rhs '-x^2'")
+
+
+def test_an_error_in_a_pipe_is_one_line(kahanmaps):
+    assert kahanmaps("analyze").err.splitlines()[-1].endswith("--rhs '-x^2'")
+
+
+def test_a_caret_points_where_it_did(monkeypatch, capsys):
+    talk_to_forty_columns(monkeypatch)
+    say("Error: " + "word " * 10 + "\n  " + "x + " * 12 + "?\n  " + " " * 48 + "^")
+    *_, formula, caret = capsys.readouterr().err.splitlines()
+    assert formula[caret.index("^")] == "?"
 
 
 def test_how_an_orbit_ended_is_said_once():

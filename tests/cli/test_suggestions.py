@@ -24,6 +24,9 @@ ORBIT = "--start 1,2,3 --eps 1/10 --steps 1"
         ("batch tasks hieghts", "did you mean heights?"),
         ("euler_top", "kahanmaps analyze euler_top"),
         ("my.toml", "kahanmaps analyze my.toml"),
+        ("help", "kahanmaps COMMAND --help"),
+        ("check euler_top", "Did you mean check-commute or check-integrals or check-measure or check-poisson?"),
+        ("analyse euler_top", "Did you mean analyze?"),  # and not manual, which is less like it
     ],
 )
 def test_what_was_meant_is_suggested(kahanmaps, command, meant):
@@ -72,6 +75,12 @@ def test_a_file_in_a_folder_that_is_not_there_cannot_be_made(kahanmaps, tmp_path
     outcome = kahanmaps(command, Path(tmp_path / "nowhere" / "x.npy"), *(["--arithmetic float"] * ("orbit" in command)))
     assert outcome.status == 2
     assert f"there is no folder {tmp_path / 'nowhere'}: make it first, or check the name" in outcome.err
+
+
+def test_what_is_missing_is_told_with_its_help(kahanmaps):
+    outcome = kahanmaps("orbit euler_top --eps 1/10 --steps 1")
+    assert outcome.status == 2
+    assert "Error: Missing option '--start': The start, e.g. 1/2,-1/3,0.25.\n" in outcome.err
 
 
 @pytest.mark.parametrize(

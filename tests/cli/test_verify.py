@@ -359,10 +359,10 @@ def plain(outcome):
     ("options", "columns"),
     [
         ("--m 2", 80),
-        ("--m 3 -v", 100),
+        pytest.param("--m 3 -v", 100, marks=pytest.mark.slow),
         ("--m 2 --section 9 -v", 80),
         ("--m 2 --controls", 100),
-        ("--m 2 --universal", 100),
+        pytest.param("--m 2 --universal", 100, marks=pytest.mark.slow),
         ("--chi (t-1)^2", 100),
         ("--m 2 --section 6 --eps 1/10", 60),
     ],

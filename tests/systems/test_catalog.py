@@ -42,6 +42,11 @@ HOLDS = {Verdict.PROVED, Verdict.SUPPORTED}
 ONE_EPS = fmpq(2, 7)
 
 over_the_catalogue = pytest.mark.parametrize("name", names())
+# The largest take seconds, and nothing here depends on their size.
+_LARGE = ("paper_m3", "three_wave", "volterra_periodic_5")
+over_the_smaller_systems = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in _LARGE else name for name in names()]
+)
 
 
 def with_random_parameters(name, seed):
@@ -133,7 +138,7 @@ def test_every_claim_holds_at_random_parameters(name, eps):
         assert all(finding.verdict in HOLDS for finding in findings(with_random_parameters(name, seed), eps))
 
 
-@over_the_catalogue
+@over_the_smaller_systems
 def test_every_claim_of_a_file_is_among_the_findings(name):
     file = load(name)
     found = findings(file)

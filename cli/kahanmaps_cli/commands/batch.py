@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 _ONLY = click.option(
-    "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment . Repeatable."
+    "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment. Repeatable."
 )
 
 
@@ -164,7 +164,7 @@ def show(key: str, db: str, as_json: bool) -> None:
       kahanmaps batch show 3fa8 --db study.db
       kahanmaps batch show 3fa8 --db study.db --json | jq .result
 
-    KEY: the first digits of its key, four or more.
+    KEY: the first digits of its key, four or more; batch run --dry-run and batch export have the keys.
     """
     from kahanmaps.errors import InputError
     from kahanmaps_cli.batch_show import found_data, print_found
@@ -213,7 +213,7 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
 @command.command("summary", short_help="Counts and quantiles for groups of tasks.")
 @_database()
 @click.option("--by", default="experiment", show_default=True, metavar="NAME,...", help="Group by these, e.g. m,eps.")
-@click.option("--value", "values", multiple=True, metavar="NAME", help="Only these numbers . Repeatable.")
+@click.option("--value", "values", multiple=True, metavar="NAME", help="Only these numbers. Repeatable.")
 @click.option("--stable", is_flag=True, help="Leave out times and memory.")
 @click.option("--markdown", "as_markdown", is_flag=True, help="Tables in Markdown.")
 @_ONLY

@@ -55,13 +55,13 @@ def command(system: str | None, **options: Any) -> int:
     if options["count"] is not None and options["given"]:
         raise click.UsageError("give --start X or --random N, not both: --random draws the starts")
     file: SystemFile | None = None
-    whole = True
+    whole, digits = True, options["max_digits"]
     if options["record"] is not None:
         if system is not None or options["variables"] or options["rhs"]:
             raise click.UsageError("give a SYSTEM or --from FILE, not both")
         record = read_record(options["record"])
         curves = curves_of_record(record, options["record"])
-        whole = record.get("whole") is not False
+        whole, digits = record.get("whole") is not False, record.get("max_digits", digits)
     else:
         file = load_system(system, options["variables"], options["rhs"], options["parameters"])
         survey = _surveyed(file, options)
@@ -71,7 +71,7 @@ def command(system: str | None, **options: Any) -> int:
     if not options["quiet"]:
         short = sum(curve.status == "budget" for curve in curves)
         if short:
-            say(f"{short} of {len(curves)} orbits ended where the numbers exceed --max-digits {options['max_digits']}")
+            say(f"{short} of {len(curves)} orbits ended where the numbers exceed --max-digits {digits}")
         if early:
             say(f"{early} of {len(curves)} orbits ended early, at a singular point of the map")
         if not whole:

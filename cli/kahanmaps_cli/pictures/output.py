@@ -6,6 +6,7 @@ import re
 import shlex
 import shutil
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -105,7 +106,7 @@ def require_output(options: dict[str, Any]) -> None:
 
 def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = None) -> None:
     """Write the figure to its file, or draw it in the terminal; the options are those of `picture_options`."""
-    from kahanmaps.plots.figures import drawing, format_of, picture_bytes, plain
+    from kahanmaps.plots.figures import drawing, format_of, picture_bytes, plain, wrapped
     from kahanmaps.plots.recipe import Recipe
     from kahanmaps.whole_files import write_whole
 
@@ -113,12 +114,17 @@ def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = N
     path, kind = options["output"], options["kind"]
     if options["title"]:
         with drawing(style):
-            figure.suptitle(plain(options["title"]), fontsize=style.font_size + 1)
+            size = style.font_size + 1
+            figure.suptitle(plain(wrapped(options["title"], 72 * figure.get_size_inches()[0], size)), fontsize=size)
     if kind == "text" or (kind is None and path == "-"):
         _draw_in_terminal(figure, style, path)
         return
     kind = format_of(path, kind)
-    content = picture_bytes(figure, kind, style, Recipe(command_line(), "" if file is None else file.to_toml()))
+    with warnings.catch_warnings(record=True) as found:
+        warnings.filterwarnings("always", message="Glyph .* missing", category=UserWarning)
+        content = picture_bytes(figure, kind, style, Recipe(command_line(), "" if file is None else file.to_toml()))
+    if found and not options["quiet"]:
+        say("the fonts lack some letters of the texts: they are drawn as boxes")
     if path == "-":
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
