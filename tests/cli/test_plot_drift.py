@@ -7,6 +7,13 @@ import re
 import pytest
 
 
+@pytest.fixture
+def unrendered(monkeypatch):
+    """Figures are made but not rendered: for tests of what is said."""
+    monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda *_: b"")
+    monkeypatch.setattr("kahanmaps.plots.terminal.draw_in_characters", lambda *_: [])
+
+
 def test_all_methods_are_drawn(kahanmaps):
     done = kahanmaps("plot drift weierstrass --eps 1/20 --start 1/4,1/8 --steps 300")
     assert done.status == 0
@@ -35,6 +42,7 @@ def test_the_time_step_is_twice_eps(kahanmaps, tmp_path):
     assert first.read_text().split("</metadata>")[1] == second.read_text().split("</metadata>")[1]
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_another_seed_is_another_start(kahanmaps):
     command = "plot drift harmonic --eps 1/20 --steps 5 --method generic"
     assert kahanmaps(command).err != kahanmaps(f"{command} --seed 1").err

@@ -11,6 +11,13 @@ import pytest
 
 
 @pytest.fixture
+def unrendered(monkeypatch):
+    """Figures are made but not rendered: for tests of what is said."""
+    monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda *_: b"")
+    monkeypatch.setattr("kahanmaps.plots.terminal.draw_in_characters", lambda *_: [])
+
+
+@pytest.fixture
 def piped(monkeypatch):
     """Put text on standard input."""
     return lambda text: monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(text.encode())))
@@ -63,6 +70,7 @@ def test_a_system_that_is_stopped_early_is_told_and_drawn(kahanmaps):
     assert "euler_top: stopped" not in done.err
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_terms_that_were_asked_for_are_no_early_end(kahanmaps):
     assert kahanmaps("plot degrees henon_heiles --terms 3").status == 0
 
@@ -112,6 +120,7 @@ def test_heights_of_a_record_are_drawn(kahanmaps, tmp_path):
     assert (done.status, (tmp_path / "h.pdf").read_bytes()[:4]) == (0, b"%PDF")
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_a_record_of_a_survey_that_was_not_whole_is_told(kahanmaps, tmp_path):
     record = kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20 --json").json
     (tmp_path / "r.json").write_text(json.dumps({**record, "whole": False}))
@@ -119,12 +128,14 @@ def test_a_record_of_a_survey_that_was_not_whole_is_told(kahanmaps, tmp_path):
     assert (done.status, "stopped early" in done.err) == (3, True)
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_orbits_that_reach_the_digit_budget_are_told(kahanmaps):
     done = kahanmaps("plot heights lotka_volterra --eps 1/10 --random 2 --max-digits 500")
     assert done.status == 0
     assert "2 of 2 orbits ended where the numbers exceed --max-digits 500" in done.err
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_an_orbit_through_a_singular_point_is_told(kahanmaps):
     # 1 - eps f'(x) = 1 - 2 eps x is 0 at the start.
     done = kahanmaps("plot heights --vars x --rhs x^2 --eps 1/2 --start 1")

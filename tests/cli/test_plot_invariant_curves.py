@@ -10,6 +10,13 @@ POLE = "--vars x,y --rhs=-6*x*y --rhs '3*y^2 - 3*x^2' --start 3/5,4/5 --eps 1/6"
 PAIR = "plot invariant-curves paper_m2 --start 1/2,-1/3,0,1 --eps 1/20 --steps 30"
 
 
+@pytest.fixture
+def unrendered(monkeypatch):
+    """Figures are made but not rendered: for tests of what is said."""
+    monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda *_: b"")
+    monkeypatch.setattr("kahanmaps.plots.terminal.draw_in_characters", lambda *_: [])
+
+
 def test_a_picture_is_written_and_the_structure_said(kahanmaps, tmp_path):
     outcome = kahanmaps(PAIR, "-o", tmp_path / "curves.svg")
     assert outcome.status == 0
@@ -18,6 +25,7 @@ def test_a_picture_is_written_and_the_structure_said(kahanmaps, tmp_path):
     assert (tmp_path / "curves.svg").read_text().count("<svg") == 1
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_quiet_says_nothing(kahanmaps, tmp_path):
     outcome = kahanmaps(PAIR, "-q -o", tmp_path / "curves.png")
     assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
@@ -30,11 +38,13 @@ def test_the_terminal_shows_the_panels(kahanmaps):
     assert "step" in outcome.out
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_dots_outside_are_counted_unless_the_whole_plane_is_shown(kahanmaps, tmp_path):
     assert "dots outside the windows:" in kahanmaps(PAIR, "-o", tmp_path / "a.png").err
     assert "dots outside" not in kahanmaps(PAIR, "--projective -o", tmp_path / "a.png").err
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_a_hidden_member_is_said_to_be_one(kahanmaps, tmp_path):
     outcome = kahanmaps(
         "plot invariant-curves --vars x,y --rhs=-6*x*y --rhs '3*y^2 - 3*x^2' --start 1,1/3 --eps 1/6 -o",
@@ -44,6 +54,7 @@ def test_a_hidden_member_is_said_to_be_one(kahanmaps, tmp_path):
     assert "a hidden member of the family" in outcome.err
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_a_pole_is_told_and_gives_status_3_with_a_picture(kahanmaps, tmp_path):
     outcome = kahanmaps(f"plot invariant-curves {POLE} -o", tmp_path / "pole.png")
     assert outcome.status == 3
@@ -51,12 +62,14 @@ def test_a_pole_is_told_and_gives_status_3_with_a_picture(kahanmaps, tmp_path):
     assert (tmp_path / "pole.png").exists()
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_several_starts_name_the_one_with_the_pole(kahanmaps, tmp_path):
     outcome = kahanmaps(f"plot invariant-curves {POLE} --start 1,1 -o", tmp_path / "pole.png")
     assert outcome.status == 3
     assert "start 1: the orbit ends before step 1" in outcome.err
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_the_orbit_itself_is_shown_in_two_variables(kahanmaps, tmp_path):
     assert kahanmaps(PAIR, "--original x1,x3 --flow -o", tmp_path / "a.pdf").status == 0
     outcome = kahanmaps(PAIR, "--original x1,y -o", tmp_path / "b.pdf")

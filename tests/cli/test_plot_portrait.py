@@ -19,7 +19,9 @@ LV = "plot portrait lotka_volterra --eps 1/20 --start 1,2 --steps 30"
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """What was drawn last, as the numbers that were handed to the drawing functions."""
+    """What was drawn last, as the numbers that were handed to the drawing functions; figures are not rendered."""
+    monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda *_: b"")
+    monkeypatch.setattr("kahanmaps.plots.terminal.draw_in_characters", lambda *_: [])
     seen = []
     for name in ("draw_portrait", "draw_density"):
         draw = getattr(drawing, name)
@@ -256,7 +258,7 @@ def test_files_that_hold_no_orbit_are_refused(kahanmaps, tmp_path, name, content
         ("euler_top --eps 1/20 --start 1,2,3 --axes x1,x2 --levels x3", "found x3 in it"),
         ("lotka_volterra --eps 1/20 --density --lines", "it does not go with --lines"),
         ("lotka_volterra --eps 1/20 --density --colour-by step", "it does not go with --colour-by"),
-        ("riccati --eps 1/20 --start 0 --density", "it takes two axes, and step is not one"),
+        ("riccati --eps 1/20 --start 0 --steps 9 --density", "it takes two axes, and step is not one"),
         ("- --eps 1/20 --starts -", "found - twice"),
         ("lotka_volterra --eps 1/20 -o picture.gif", "found the ending .gif"),
     ],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
+from functools import cache
 from itertools import pairwise
 
 import matplotlib as mpl
@@ -36,14 +37,19 @@ def a_figure(count=10, style=STYLE):
     return figure
 
 
+@cache
+def the_bytes(kind):
+    return picture_bytes(a_figure(), kind, STYLE)
+
+
 @pytest.mark.parametrize("kind", FORMATS)
 def test_the_same_picture_is_the_same_bytes(kind):
-    assert picture_bytes(a_figure(), kind, STYLE) == picture_bytes(a_figure(), kind, STYLE)
+    assert picture_bytes(a_figure(), kind, STYLE) == the_bytes(kind)
 
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_another_picture_is_other_bytes(kind):
-    assert picture_bytes(a_figure(10), kind, STYLE) != picture_bytes(a_figure(11), kind, STYLE)
+    assert picture_bytes(a_figure(11), kind, STYLE) != the_bytes(kind)
 
 
 def test_the_size_is_in_centimetres():
@@ -70,7 +76,7 @@ def test_settings_of_matplotlib_are_left_as_they_were():
 
 
 def test_settings_of_a_user_do_not_get_into_a_picture():
-    expected = picture_bytes(a_figure(), "png", STYLE)
+    expected = the_bytes("png")
     mpl.rcParams["font.size"] = 30
     try:
         assert picture_bytes(a_figure(), "png", STYLE) == expected
