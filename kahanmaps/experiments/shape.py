@@ -120,6 +120,9 @@ def shape_mistakes(document: Mapping[str, Any]) -> list[tuple[Place, str, str]]:
     return []
 
 
+_OF_SYSTEM_FILES = (("system",), ("hamiltonian",), ("family",), ("variables",))
+
+
 def shape_schema() -> dict[str, Any]:
     """The shape as a JSON schema, with the parts `_ExperimentShape` and `_LimitsShape`."""
     return _SpecShape.model_json_schema()
@@ -132,7 +135,8 @@ def _mistake(detail: Any) -> tuple[Place, str, str]:
     expected = f"expected {field.description if field and field.description else 'a table'}"
     if detail["type"] == "extra_forbidden":
         known = list(shape.model_fields)
-        sentence = f"unknown key, expected one of {', '.join(known)}{suggestion(name, known)}"
+        hint = " (a system file is for the other commands)" if place in _OF_SYSTEM_FILES else suggestion(name, known)
+        sentence = f"unknown key, expected one of {', '.join(known)}{hint}"
     elif detail["type"] == "missing":
         sentence = f"missing, {expected}"
     elif detail["type"] == "value_error":  # ours, a sentence already

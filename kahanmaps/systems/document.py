@@ -53,6 +53,14 @@ class Contents(NamedTuple):
     integrals: Mapping[str, RationalFunction]
     density: RationalFunction | None
     document: Mapping[str, Any]
+_EXPECTED = {
+    ("system", "rhs"): "a list of polynomials of degree at most 2 in quotes, one for each variable",
+    ("hamiltonian", "H"): "a polynomial of degree at most 3 in quotes",
+    ("hamiltonian", "J"): '"standard", which is [[0, I], [-I, 0]], or the rows of a skew matrix',
+    ("family", "A"): "the rows of a skew-Hamiltonian matrix",
+    ("family", "H"): "a homogeneous cubic in quotes",
+    ("density", "phi"): "a rational function of the variables and eps in quotes",
+}
 
 
 class DocumentReader:
@@ -114,7 +122,8 @@ class DocumentReader:
         for key in table:
             if key not in known:
                 path = f"{section}.{key}" if section else key
-                self._mistake(path, f"unknown key, expected one of {', '.join(sorted(known))}")
+                hint = " (a batch spec is for kahanmaps batch run)" if path == "experiments" else ""
+                self._mistake(path, f"unknown key, expected one of {', '.join(sorted(known))}{hint}")
 
     def _table(self, key: str) -> dict[str, Any] | None:
         value = self.document.get(key, {})
@@ -233,7 +242,7 @@ class DocumentReader:
 
     def _required(self, section: str, table: Mapping[str, Any], key: str) -> Any:
         if key not in table:
-            self._mistake(f"{section}.{key}", "missing")
+            self._mistake(f"{section}.{key}", f"missing, expected {_EXPECTED[section, key]}")
         return table.get(key)
 
     def _read_rhs(self, section: Mapping[str, Any]) -> QuadraticSystem | None:

@@ -567,3 +567,8 @@ def test_every_document_is_a_spec_or_a_list_of_mistakes(tmp_path_factory, text):
 def test_every_sequence_of_bytes_is_a_spec_or_wrong_input(data):
     with pytest.raises(InputError):
         parse_spec(data)
+
+
+def test_a_system_file_is_told_from_a_spec():
+    with pytest.raises(SpecError, match="a system file is for the other commands"):
+        parse_spec('variables = ["x"]\n[system]\nrhs = ["x"]\n')

@@ -10,6 +10,7 @@ from itertools import pairwise
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from kahanmaps.errors import InputError
 from kahanmaps.plots.figures import (
@@ -22,6 +23,7 @@ from kahanmaps.plots.figures import (
     picture_bytes,
     points,
     svg_text,
+    wrapped,
 )
 from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
 
@@ -118,6 +120,37 @@ def test_names_of_users_are_labels_and_no_formulas():
         figure = new_figure(STYLE)
         figure.subplots().set_xlabel(label_of(r"a$\frac$_b"))
     assert picture_bytes(figure, "svg", STYLE)
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+def test_titles_of_two_lines_stay_inside_where_axes_are_squares(columns):
+    style = Style(width=8.6, font_size=8)
+    with drawing(style):
+        figure = new_figure(style, 0.6)
+        for axes in figure.subplots(1, columns, squeeze=False)[0]:
+            axes.set_box_aspect(1)
+            axes.set_title("two\nlines")
+            axes.set_xlabel("x")
+        FigureCanvasAgg(figure).draw()
+    assert all(axes.title.get_window_extent().y1 <= figure.bbox.y1 for axes in figure.axes)
+
+
+def test_long_texts_are_cut_into_lines_and_what_is_left_becomes_dots():
+    assert wrapped("one two three four", width=40, size=8, most=3) == "one two\nthree four"
+    assert wrapped("one two three four five six", width=40, size=8, most=2) == "one two\nthree f..."
+    assert wrapped("x" * 99, width=40, size=8) == "x" * 7 + "..."
+
+
+def test_no_text_is_set_smaller_than_six_points_unless_all_are():
+    assert [Style(font_size=size).smallest for size in (5, 7, 8, 12)] == [5, 6, 6, 10]
+
+
+def test_pictures_of_more_dots_than_fit_into_memory_are_refused():
+    with pytest.raises(InputError, match="take fewer dots per inch than 2400"):
+        Style(width=200, dpi=2400)
+    tall = Style(width=20, dpi=2000)  # 12 000 x 16 000 dots are few enough, as high as three times that are not
+    with pytest.raises(InputError, match="2000"):
+        picture_bytes(new_figure(tall, aspect=3), "png", tall)
 
 
 def lightness(colour):

@@ -179,9 +179,8 @@ def test_many_points_are_an_image_however_few_each_orbit_has(count):
     assert all(artist.get_rasterized() for artist in drawn)
 
 
-@pytest.mark.parametrize("kind", ["pdf", "png"])
-def test_the_same_portrait_is_the_same_bytes(kind):
-    first, second = (picture_bytes(draw_portrait(portrait_of(orbits(3), AXES), STYLE), kind, STYLE) for _ in "ab")
+def test_the_same_portrait_is_the_same_bytes():
+    first, second = (picture_bytes(draw_portrait(portrait_of(orbits(3), AXES), STYLE), "pdf", STYLE) for _ in "ab")
     assert first == second
 
 
@@ -189,7 +188,7 @@ def test_the_same_portrait_is_the_same_bytes(kind):
 def test_a_single_point_is_drawn_whatever_its_size(value):
     found = Trajectories(("x", "y"), np.full((1, 1, 2), value), np.arange(1))
     figure = draw_portrait(portrait_of(found, AXES), STYLE)
-    assert picture_bytes(figure, "png", STYLE)
+    assert picture_bytes(figure, "png", Style(width=8.6, dpi=50))
 
 
 def test_no_points_at_all_are_an_empty_picture():

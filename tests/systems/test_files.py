@@ -729,3 +729,22 @@ def test_a_wrong_word_is_answered_with_those_that_are_known():
         "  catalog.growth: found 'fast', expected one of bounded, linear, quadratic, exponential",
         "  catalog.verdict: found 'nice', expected one of integrable, linearisable, not integrable",
     ]
+
+
+@pytest.mark.parametrize(
+    ("document", "expected"),
+    [
+        ('variables = ["q", "p"]\n[hamiltonian]\nH = "q^3"\n', r'hamiltonian\.J: missing, expected "standard"'),
+        ('variables = ["q", "p"]\n[hamiltonian]\nJ = "standard"\n', r"hamiltonian\.H: missing, expected a polynomial"),
+        ('variables = ["x"]\n[system]\n', r"system\.rhs: missing, expected a list"),
+        ("[family]\n", r"family\.A: missing, expected the rows"),
+        (
+            'variables = ["x"]\n[system]\nrhs = ["x"]\n[density]\n',
+            r"density\.phi: missing, expected a rational function",
+        ),
+        ('[experiments.a]\ntask = "degrees"\n', "a batch spec is for kahanmaps batch run"),
+    ],
+)
+def test_what_is_missing_is_said_with_what_is_expected(document, expected):
+    with pytest.raises(SystemFileError, match=expected):
+        parse_system(document)
