@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 FORMATS = ("pdf", "svg", "png")
 # More points than this are stored as an image of `dpi` dots per inch: as vectors, a million are 15 MB and ten seconds.
 RASTERISE_ABOVE = 20_000
-_SETTLED = 1e-3  # of the width or height: nothing moves by a dot any more
+_PASSES = 5  # of the layout: the second may change nothing, and the third does
 _LETTER = 0.5  # the width of a letter on average, in its height
 
 
@@ -79,12 +79,8 @@ def _settled_layout() -> LayoutEngine:
     class Settled(ConstrainedLayoutEngine):
         def execute(self, fig: Figure) -> None:
             is_fixed = any(axes.get_box_aspect() is not None or axes.get_aspect() != "auto" for axes in fig.axes)
-            places: list[Any] = []
-            for _ in range(5 if is_fixed else 1):
+            for _ in range(_PASSES if is_fixed else 1):
                 super().execute(fig)
-                before, places = places, [number for axes in fig.axes for number in axes.get_position().bounds]
-                if before and max(abs(a - b) for a, b in zip(before, places, strict=True)) < _SETTLED:
-                    break
 
     return Settled()
 

@@ -29,7 +29,7 @@ def test_a_member_of_the_family_is_drawn_in_normal_form_too(kahanmaps):
 
 
 def test_methods_and_functions_are_as_asked_for(kahanmaps):
-    done = kahanmaps("plot drift euler_top --eps 1/20 --steps 50 --method rk4 --integral F1 --integral 'E=x1^2+eps'")
+    done = kahanmaps("plot drift euler_top --eps 1/20 --steps 9 --method rk4 --integral F1 --integral 'E=x1^2+eps'")
     assert done.status == 0
     assert "RK4" in done.out
     assert "Kahan" not in done.out
@@ -38,7 +38,7 @@ def test_methods_and_functions_are_as_asked_for(kahanmaps):
 def test_the_time_step_is_twice_eps(kahanmaps, tmp_path):
     first, second = tmp_path / "a.svg", tmp_path / "b.svg"
     for target, eps in ((first, "--eps 1/20"), (second, "--time-step 1/10")):
-        kahanmaps(f"plot drift harmonic {eps} --method generic --steps 9 -q -o", target)
+        kahanmaps(f"plot drift harmonic {eps} --method generic --steps 9 --size 4 -q -o", target)
     assert first.read_text().split("</metadata>")[1] == second.read_text().split("</metadata>")[1]
 
 
@@ -64,9 +64,10 @@ def test_an_absolute_error_is_told(kahanmaps):
 
 def test_a_picture_carries_its_recipe(kahanmaps, tmp_path):
     target = tmp_path / "d.pdf"
-    kahanmaps("plot drift harmonic --eps 1/20 --steps 9 -q -o", target)
+    kahanmaps("plot drift harmonic --eps 1/20 --steps 9 --size 4 -q -o", target)
     assert (
-        kahanmaps("plot recipe", target).out == f"kahanmaps plot drift harmonic --eps 1/20 --steps 9 -q -o {target}\n"
+        kahanmaps("plot recipe", target).out
+        == f"kahanmaps plot drift harmonic --eps 1/20 --steps 9 --size 4 -q -o {target}\n"
     )
 
 

@@ -45,9 +45,9 @@ def test_an_inline_system_is_drawn(kahanmaps):
 def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, piped):
     first, second = tmp_path / "a.png", tmp_path / "b.png"
     record = kahanmaps("degrees euler_top --json").out
-    assert kahanmaps("plot degrees euler_top -q -o", first).status == 0
+    assert kahanmaps("plot degrees euler_top --size 4 -q -o", first).status == 0
     (tmp_path / "record.json").write_text(record)
-    assert kahanmaps("plot degrees -q --from", tmp_path / "record.json", "-o", second).status == 0
+    assert kahanmaps("plot degrees --size 4 -q --from", tmp_path / "record.json", "-o", second).status == 0
     piped(record)
     assert "euler_top" in kahanmaps("plot degrees --from -").out
     # The metadata tell the two commands; the pixels are the same.
@@ -116,7 +116,7 @@ def test_heights_are_drawn_in_the_terminal(kahanmaps):
 def test_heights_of_a_record_are_drawn(kahanmaps, tmp_path):
     record = kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20 --json").out
     (tmp_path / "r.json").write_text(record)
-    done = kahanmaps("plot heights --from", tmp_path / "r.json", "-o", tmp_path / "h.pdf")
+    done = kahanmaps("plot heights --size 4 --from", tmp_path / "r.json", "-o", tmp_path / "h.pdf")
     assert (done.status, (tmp_path / "h.pdf").read_bytes()[:4]) == (0, b"%PDF")
 
 
@@ -133,6 +133,14 @@ def test_orbits_that_reach_the_digit_budget_are_told(kahanmaps):
     done = kahanmaps("plot heights lotka_volterra --eps 1/10 --random 2 --max-digits 500")
     assert done.status == 0
     assert "2 of 2 orbits ended where the numbers exceed --max-digits 500" in done.err
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_the_digit_budget_of_a_record_is_its_own(kahanmaps, tmp_path):
+    record = kahanmaps("heights lotka_volterra --eps 1/10 --starts 1 --max-digits 300 --json").out
+    (tmp_path / "r.json").write_text(record)
+    done = kahanmaps("plot heights --from", tmp_path / "r.json")
+    assert "1 of 1 orbits ended where the numbers exceed --max-digits 300" in done.err
 
 
 @pytest.mark.usefixtures("unrendered")

@@ -42,10 +42,25 @@ def test_a_portrait_is_drawn_in_the_terminal_unless_a_file_is_named(kahanmaps):
 
 
 def test_a_file_carries_its_recipe(kahanmaps, tmp_path):
-    assert kahanmaps(LV + " -q -o", tmp_path / "lv.svg").status == 0
+    assert kahanmaps(LV + " --size 4 -q -o", tmp_path / "lv.svg").status == 0
     recipe = read_recipe(str(tmp_path / "lv.svg"))
     assert recipe.command.startswith(f"kahanmaps {LV}")
     assert 'rhs = ["x*(a - b*y)"' in recipe.system
+
+
+def test_a_long_title_is_set_in_lines_and_no_formula(kahanmaps, monkeypatch):
+    titles = []
+    monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda figure, *_: titles.append(figure) or b"")
+    kahanmaps(LV + " --format svg --size 8 --title", "'" + "costs $5 " * 12 + "'")
+    first, _, third = titles[0].get_suptitle().split("\n")
+    assert first.startswith(r"costs \$5 costs \$5")
+    assert third
+
+
+def test_letters_that_no_font_has_are_told_in_a_sentence(kahanmaps, tmp_path):
+    outcome = kahanmaps(LV + " --size 4 --title '\u6570' -o", tmp_path / "a.png")
+    assert outcome.status == 0
+    assert outcome.err.splitlines()[1] == "the fonts lack some letters of the texts: they are drawn as boxes"
 
 
 def test_starts_are_chosen_where_none_are_given(kahanmaps, drawn):
@@ -92,7 +107,7 @@ def test_axes_are_drawn_in_the_order_they_are_named_in(kahanmaps, drawn):
 
 
 def test_one_variable_is_drawn_over_the_step(kahanmaps, drawn):
-    kahanmaps("plot portrait riccati --eps 1/10 --start 0 --steps 3")
+    assert "1 orbit, 100 steps" in kahanmaps("plot portrait riccati --eps 1/10 --start 0").err
     assert drawn[0][0].labels == ("step", "$x$")
 
 

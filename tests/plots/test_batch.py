@@ -164,6 +164,7 @@ def test_no_pair_is_refused():
         draw_pairs(value_pairs([], "eps", "c"))
 
 
+@pytest.mark.slow
 def test_the_same_summary_is_the_same_bytes():
     rows = [*numbers(range(9)), row(7, verdict="refuted")]
     first, second = (picture_bytes(draw_batch(summarise(rows, ["m"])), "png", Style(dpi=50)) for _ in range(2))

@@ -261,8 +261,17 @@ def test_another_scale_is_refused():
         drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")]), scale="polar")
 
 
+@pytest.mark.slow
 def test_the_same_survey_is_the_same_bytes():
     first, second = (
         picture_bytes(drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")])), "png", Style(dpi=50)) for _ in range(2)
     )
     assert first == second
+
+
+def test_the_name_of_a_long_function_is_set_in_two_lines():
+    found = survey(CIRCLE, [1, 1], 20, [("a_name_" * 9, "x^2 + y^2"), ("E", "x")])
+    first, second = draw_drift(found, Style(width=8.6, font_size=8)).axes
+    assert first.get_ylabel().startswith("relative error of\na_name_")
+    assert first.get_ylabel().endswith("...")
+    assert second.get_ylabel() == "relative error of $E$"

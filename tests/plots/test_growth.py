@@ -128,6 +128,7 @@ def test_another_scale_is_refused():
         draw_degrees({"x": growth(POWERS)}, scale="cubic")
 
 
+@pytest.mark.slow
 def test_the_same_degrees_are_the_same_bytes():
     first, second = (picture_bytes(draw_degrees({"top": growth(SQUARES)}), "png", Style(dpi=50)) for _ in range(2))
     assert first == second

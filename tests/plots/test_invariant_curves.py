@@ -304,6 +304,7 @@ def test_wrong_variables_are_refused(curves):
         draw_invariant_curves(curves("m = 2"), STYLE, original=(0, 4))
 
 
+@pytest.mark.slow
 def test_the_same_picture_is_the_same_bytes(curves):
     first, second = (picture_bytes(draw_invariant_curves(curves("m = 2"), STYLE), "png", COARSE) for _ in range(2))
     assert first == second

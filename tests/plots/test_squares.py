@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flint import fmpq
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
 
 from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_chi
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.plots import squares as module
-from kahanmaps.plots.draw_squares import draw_squares, widest_axes
+from kahanmaps.plots.draw_squares import _in_two_digits, draw_squares, widest_axes
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.squares import Pair, pair_of_systems, pairs_of_member, squares
 from kahanmaps.plots.style import Style
@@ -183,6 +185,38 @@ def test_a_small_gap_is_shown_magnified(both):
     assert open_.child_axes[0].texts[0].get_text().startswith(r"$\times")
 
 
+def test_how_much_a_gap_is_magnified_is_a_number_and_no_computer_notation():
+    assert [_in_two_digits(number) for number in (6.08, 183.0, 0.52, 1.26e6)] == [
+        "6.1",
+        "180",
+        "0.52",
+        r"1.3\cdot10^{6}",
+    ]
+
+
+@pytest.mark.parametrize("width", [8.6, 17])
+def test_titles_and_names_of_corners_stay_inside(width):
+    style = Style(width=width, font_size=8)
+    figure = draw_squares([squares(pair, START, "1/50") for pair in pairs_of_member(load("paper_m2"))], style)
+    FigureCanvasAgg(figure).draw()
+    for axes in figure.axes:
+        assert axes.title.get_window_extent().y1 <= figure.bbox.y1
+        for text in axes.texts:
+            box = Text.get_window_extent(text)
+            assert axes.bbox.x0 <= box.x0 <= box.x1 <= axes.bbox.x1
+            assert axes.bbox.y0 <= box.y0 <= box.y1 <= axes.bbox.y1
+
+
+def test_a_title_of_three_lines_stays_inside():
+    start = [1, 0, "1/2", 0, "1/3", 1]
+    found = [squares(pair, start, "1/50", 3) for pair in pairs_of_member(load("paper_m3"))]
+    style = Style(width=8.6, font_size=8)
+    figure = draw_squares(found, style)
+    assert figure.axes[1].get_title().endswith("\n4 of 32 points outside")
+    FigureCanvasAgg(figure).draw()
+    assert figure.axes[1].title.get_window_extent().y1 <= figure.bbox.y1
+
+
 def test_a_square_has_four_arrows_and_named_corners():
     found = [squares(pair, START, "1/50") for pair in pairs_of_member(load("paper_m2"))]
     closed, open_ = draw_squares(found, STYLE).axes
@@ -209,6 +243,7 @@ def test_a_start_that_cannot_be_drawn_is_refused():
         draw_squares([squares(plane_pair(["x", "0"], ["0", "y"]), [10**200, 1], "1/10")], STYLE)
 
 
+@pytest.mark.slow
 def test_the_same_picture_is_the_same_bytes(both):
     first, second = (picture_bytes(draw_squares(both, STYLE), "png", Style(width=12, dpi=50)) for _ in range(2))
     assert first == second

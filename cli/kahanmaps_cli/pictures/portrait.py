@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from kahanmaps.plots.windows import Window
 
 _MAX_STEPS = 10**9
-_STEPS, _DENSITY_STEPS = 1000, 100_000
+_STEPS, _STEPS_ON_A_LINE, _DENSITY_STEPS = 1000, 100, 100_000
 _WALKING = ("start", "starts", "count", "box", "seed", "steps", "backward", "euler")
 
 
@@ -37,7 +37,12 @@ _WALKING = ("start", "starts", "count", "box", "seed", "steps", "backward", "eul
 @eps_options
 @click.option("--start", type=PointText(), multiple=True, metavar="X", help="A start, 1/2,-1/3; again for more orbits.")
 @random_starts_options
-@click.option("--steps", type=int, metavar="N", help="Steps of each orbit (default 1000; with --density 100000).")
+@click.option(
+    "--steps",
+    type=int,
+    metavar="N",
+    help="Steps of each orbit (default 1000; of one variable 100; with --density 100000).",
+)
 @backward_option
 @click.option(
     "--from",
@@ -169,7 +174,9 @@ def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
         starts = drawn(options["count"], file.system.dim, box, options["seed"] or 0, None)
     steps = options["steps"]
     if steps is None:
-        steps = _DENSITY_STEPS if options["density"] else _STEPS
+        # in one variable the map is a fraction: all there is to be seen happens at the beginning, drawn over the step
+        few = _STEPS if file.system.dim > 1 else _STEPS_ON_A_LINE
+        steps = _DENSITY_STEPS if options["density"] else few
     return Orbits.to_walk(file, eps, starts, steps, backward=options["backward"], axes=options["axes"])
 
 
