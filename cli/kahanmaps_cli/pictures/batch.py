@@ -29,13 +29,11 @@ _TOLD = 1000  # rows between words of progress
     help="The database of results, instead of DB (or set KAHANMAPS_DB).",
 )
 @click.option("--by", metavar="NAME,...", help="Group by these, e.g. m,eps (default: experiment).")
-@click.option("--value", "values", multiple=True, metavar="NAME", help="The distribution of a number (repeatable).")
+@click.option("--value", "values", multiple=True, metavar="NAME", help="The distribution of a number. Repeatable.")
 @click.option("--x", metavar="NAME", help="With --y: a dot for each task, along this axis ...")
 @click.option("--y", metavar="NAME", help="... and at the height of this number; --by NAME colours them.")
 @click.option("--scale", type=click.Choice(["linear", "log"]), help="Of the numbers (default: by their range).")
-@click.option(
-    "-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment (may be repeated)."
-)
+@click.option("-e", "--experiment", "only", multiple=True, metavar="NAME", help="Only this experiment. Repeatable.")
 @picture_options
 def command(database: str | None, db: str | None, **options: Any) -> int:
     """Results of a batch: counts, distributions, or one number against another.

@@ -19,10 +19,12 @@ HOLDS, UNDECIDED = 0, 3
 @click.argument("system", required=False)
 @click.argument("other", required=False)
 @inline_options
-@click.option("--start", type=PointText(), required=True, help="The point x.")
+@click.option("--start", type=PointText(), metavar="X", required=True, help="The point x.")
 @eps_options
-@click.option("--eps2", type=ExactNumber(), help="Another eps for the map of OTHER.")
-@click.option("--steps", type=int, default=1, show_default=True, help="Steps of each map: a lattice, up to 12.")
+@click.option("--eps2", type=ExactNumber(), metavar="E", help="Another eps for the map of OTHER.")
+@click.option(
+    "--steps", type=int, metavar="N", default=1, show_default=True, help="Steps of each map: a lattice, up to 12."
+)
 @click.option("--axes", "axes", metavar="X,Y", help="The two variables shown (default: where squares are widest).")
 @picture_options
 def command(system: str | None, other: str | None, **options: Any) -> int:

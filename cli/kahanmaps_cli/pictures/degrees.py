@@ -26,11 +26,15 @@ if TYPE_CHECKING:
 @click.command("degrees", cls=PictureCommand)
 @click.argument("systems", nargs=-1, metavar="[SYSTEM]...")
 @inline_options
-@click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json (may be repeated).")
+@click.option("--from", "records", multiple=True, metavar="FILE", help="Written by degrees --json. Repeatable.")
 @eps_options
 @seconds_option(10.0, "Stop each system after about so many.")
-@click.option("--terms", type=int, help="Measure d_1, ..., d_N (default: until a recurrence is certain enough).")
-@click.option("--max-degree", type=int, default=20_000, show_default=True, help="Work out no larger degree.")
+@click.option(
+    "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: until a recurrence is certain enough)."
+)
+@click.option(
+    "--max-degree", type=int, metavar="N", default=20_000, show_default=True, help="Work out no larger degree."
+)
 @seed_option
 @click.option("--scale", type=click.Choice(["linear", "log", "loglog"]), help="Chosen by itself unless given.")
 @picture_options

@@ -26,7 +26,7 @@ _SHOWN = 3  # known integrals, unless more are asked for
 @system_options
 @click.option("--start", type=PointText(), metavar="X", help="Where orbits start (default: a random small point).")
 @eps_options
-@click.option("--steps", type=int, default=10_000, show_default=True, help="Steps of each orbit.")
+@click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="Steps of each orbit.")
 @click.option(
     "--integral",
     "integrals",

@@ -26,8 +26,10 @@ _EARLY = ("singular",)
 @eps_options
 @click.option("--random", "count", type=Whole(1), metavar="N", help="N starts drawn at random (default 3).")
 @click.option("--start", "given", type=PointText(), multiple=True, metavar="X", help="Instead: this start. Repeatable.")
-@click.option("--steps", type=int, default=60, show_default=True, help="Steps of each orbit.")
-@click.option("--max-digits", type=int, default=20_000, show_default=True, help="Digit budget of each orbit.")
+@click.option("--steps", type=int, metavar="N", default=60, show_default=True, help="Steps of each orbit.")
+@click.option(
+    "--max-digits", type=int, metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
+)
 @seconds_option(30.0, "Begin no orbit after so many seconds.")
 @seed_option
 @click.option("--scale", type=click.Choice(["linear", "log", "loglog"]), help="Chosen by itself unless given.")

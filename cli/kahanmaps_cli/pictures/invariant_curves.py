@@ -21,10 +21,16 @@ HOLDS, UNDECIDED = 0, 3
 @click.command("invariant-curves", cls=PictureCommand)
 @system_options
 @click.option(
-    "--start", "starts", type=PointText(), multiple=True, required=True, help="Start of an orbit; repeatable."
+    "--start",
+    "starts",
+    type=PointText(),
+    metavar="X",
+    multiple=True,
+    required=True,
+    help="Start of an orbit. Repeatable.",
 )
 @eps_options
-@click.option("--steps", type=int, default=120, show_default=True, help="Steps of each orbit.")
+@click.option("--steps", type=int, metavar="N", default=120, show_default=True, help="Steps of each orbit.")
 @click.option("--original", metavar="X,Y", help="A first panel with the orbit in these two variables.")
 @click.option("--projective", is_flag=True, help="All of each plane as a disc, infinity as its rim.")
 @click.option("--flow", is_flag=True, help="Dashed: the level curves of the differential equation.")

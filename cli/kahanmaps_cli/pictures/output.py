@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import shutil
@@ -16,6 +17,7 @@ import click
 from kahanmaps_cli.options import stack
 from kahanmaps_cli.params import OptionType
 from kahanmaps_cli.progress import say
+from kahanmaps_cli.terminal import is_coloured
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 _ARGUMENTS = "kahanmaps_cli.arguments"
 _MOST_ROWS = 60
+_DARKEST, _LIGHTEST = 85, 165  # what can be seen on black and on white, of 255
 
 
 class Size(OptionType):
@@ -155,7 +158,7 @@ def _draw_in_terminal(figure: Figure, style: Style, path: str) -> None:
         cells = draw_in_characters(figure, columns, rows, style)
     except InputError:  # several panels do not fit into a small window, and there they are scrolled
         cells = draw_in_characters(figure, columns, _MOST_ROWS, style)
-    if path == "-" and sys.stdout.isatty():
+    if path == "-" and is_coloured():
         _print_in_colour(cells)
         return
     text = "".join("".join(cell.character for cell in row).rstrip() + "\n" for row in cells)
@@ -169,10 +172,27 @@ def _print_in_colour(cells: list[list[Cell]]) -> None:
     from rich.console import Console
     from rich.text import Text
 
-    console = Console(markup=False, emoji=False, highlight=False)
+    colours: Any = "truecolor" if os.environ.get("COLORTERM") in ("truecolor", "24bit") else "256"
+    console = Console(
+        markup=False, emoji=False, highlight=False, force_terminal=True, color_system=colours, width=len(cells[0])
+    )
     for row in cells:
         line = Text(no_wrap=True, overflow="crop")
         for cell in row:
-            line.append(cell.character, None if cell.colour is None else "#{:02x}{:02x}{:02x}".format(*cell.colour))
+            colour = None if cell.colour is None else "#{:02x}{:02x}{:02x}".format(*_seen_on_both_grounds(cell.colour))
+            line.append(cell.character, colour)
         line.rstrip()
         console.print(line)
+
+
+def _seen_on_both_grounds(colour: tuple[int, int, int]) -> tuple[int, int, int]:
+    """The colour, darker where it would vanish on white and lighter where it would on black."""
+    light = 0.299 * colour[0] + 0.587 * colour[1] + 0.114 * colour[2]
+    if light > _LIGHTEST:
+        red, green, blue = (round(c * _LIGHTEST / light) for c in colour)
+    elif light < _DARKEST:
+        part = (_DARKEST - light) / (255 - light)
+        red, green, blue = (round(c + (255 - c) * part) for c in colour)
+    else:
+        red, green, blue = colour
+    return red, green, blue
