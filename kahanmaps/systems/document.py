@@ -53,6 +53,8 @@ class Contents(NamedTuple):
     integrals: Mapping[str, RationalFunction]
     density: RationalFunction | None
     document: Mapping[str, Any]
+
+
 _EXPECTED = {
     ("system", "rhs"): "a list of polynomials of degree at most 2 in quotes, one for each variable",
     ("hamiltonian", "H"): "a polynomial of degree at most 3 in quotes",
