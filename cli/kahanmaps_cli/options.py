@@ -135,6 +135,18 @@ backward_option: Callable[[F], F] = click.option(
 )
 
 
+def integral_option(help_text: str) -> Callable[[F], F]:
+    """--integral [NAME=]EXPR, repeatable; pairs of a name, which may be empty, and an expression."""
+    return click.option(
+        "--integral",
+        "integrals",
+        type=NameValue(name_is_optional=True),
+        multiple=True,
+        metavar="[NAME=]EXPR",
+        help=help_text,
+    )
+
+
 def seconds_option(default: float | None, help_text: str) -> Callable[[F], F]:
     """--seconds T; None where the default depends on the system, and `help_text` says how."""
     return click.option(

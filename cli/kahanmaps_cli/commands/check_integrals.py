@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import check_options, load_system, settings_from, system_options
-from kahanmaps_cli.params import NameValue
+from kahanmaps_cli.options import check_options, integral_option, load_system, settings_from, system_options
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
 
@@ -19,14 +18,7 @@ if TYPE_CHECKING:
 
 @click.command("check-integrals")
 @system_options
-@click.option(
-    "--integral",
-    "integrals",
-    type=NameValue(name_is_optional=True),
-    multiple=True,
-    metavar="[NAME=]EXPR",
-    help="A claimed integral: a rational function of the variables and eps.",
-)
+@integral_option("A claimed integral: a rational function of the variables and eps.")
 @check_options
 def command(system: str | None, integrals: tuple[tuple[str, str], ...], **options: Any) -> int:
     """Are the integrals of SYSTEM conserved by its Kahan map?

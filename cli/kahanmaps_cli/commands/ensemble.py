@@ -14,13 +14,14 @@ from kahanmaps_cli.ensemble_starts import drawn, read_starts
 from kahanmaps_cli.options import (
     backward_option,
     eps_options,
+    integral_option,
     load_system,
     output_options,
     random_starts_options,
     system_options,
     the_eps,
 )
-from kahanmaps_cli.params import Arithmetic, NameValue
+from kahanmaps_cli.params import Arithmetic
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.signals import interruptible
@@ -50,14 +51,7 @@ _MAX_BITS = 61
 )
 @click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE.npy", help="Write the points there.")
 @click.option("--every", type=int, metavar="K", help="Write every K-th iterate (default: the start and the last one).")
-@click.option(
-    "--integral",
-    "integrals",
-    type=NameValue(name_is_optional=True),
-    multiple=True,
-    metavar="[NAME=]EXPR",
-    help="Watch an expression in the variables and eps, or an integral of the file by its name.",
-)
+@integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
 @click.option("--method", type=click.Choice(("generic", "normal-form")), help="Chosen by itself unless given.")
 @click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Makes no difference to numbers, only to speed.")
 @click.option("--threads", type=int, metavar="T", help="For the kernel numba (default: all processors).")

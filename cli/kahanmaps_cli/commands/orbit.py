@@ -12,10 +12,18 @@ from typing import IO, TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.numbers import json_float, short_float
-from kahanmaps_cli.options import backward_option, eps_options, load_system, quiet_option, system_options, the_eps
+from kahanmaps_cli.options import (
+    backward_option,
+    eps_options,
+    integral_option,
+    load_system,
+    quiet_option,
+    system_options,
+    the_eps,
+)
 from kahanmaps_cli.orbit_formats import Csv, JsonLines, Npz, OutputFull, Text, Writer
 from kahanmaps_cli.orbit_run import OrbitRun
-from kahanmaps_cli.params import Arithmetic, NameValue, PointText, Steps
+from kahanmaps_cli.params import Arithmetic, PointText, Steps
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import ending
 from kahanmaps_cli.signals import interruptible
@@ -50,14 +58,9 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 )
 @click.option("--accuracy", type=click.IntRange(1, 100_000), metavar="DIGITS", help="For ball:auto; default 15.")
 @click.option("--kernel", type=click.Choice(("numpy", "numba")), help="What computes float orbits; numba needs [fast].")
-@click.option(
-    "--integral",
-    "integrals",
-    type=NameValue(name_is_optional=True),
-    multiple=True,
-    metavar="[NAME=]EXPR",
-    help="A column beside the point: an expression in the variables and eps, the name of an integral of the file, or "
-    "the word known for all that theorems give (not in floats).",
+@integral_option(
+    "A column beside the point: an expression in the variables and eps, the name of an integral of the file, or "
+    "the word known for all that theorems give (not in floats)."
 )
 @click.option("--max-digits", type=int, metavar="N", help="Digit budget (exact arithmetic; default 200000).")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="Default text, or what the name of FILE says.")

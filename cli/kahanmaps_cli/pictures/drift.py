@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.options import eps_options, load_system, seed_option, system_options, the_eps
-from kahanmaps_cli.params import NameValue, PointText
+from kahanmaps_cli.options import eps_options, integral_option, load_system, seed_option, system_options, the_eps
+from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
 from kahanmaps_cli.progress import Progress, say
 
@@ -27,14 +27,7 @@ _SHOWN = 3  # known integrals, unless more are asked for
 @click.option("--start", type=PointText(), metavar="X", help="Where orbits start (default: a random small point).")
 @eps_options
 @click.option("--steps", type=int, metavar="N", default=10_000, show_default=True, help="Steps of each orbit.")
-@click.option(
-    "--integral",
-    "integrals",
-    type=NameValue(name_is_optional=True),
-    multiple=True,
-    metavar="[NAME=]EXPR",
-    help="An expression in the variables and eps, a known one by name, or 'known' for all of these.",
-)
+@integral_option("An expression in the variables and eps, a known one by name, or 'known' for all of these.")
 @click.option(
     "--method",
     "methods",
