@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from inspect import cleandoc
 from textwrap import wrap
 
 import click
@@ -123,8 +124,11 @@ def _list(entries: dict[str, str]) -> Iterator[str]:
 
 
 def _text(text: str) -> Iterator[str]:
-    """Paragraphs, and as they stand those that follow the mark for click."""
-    for k, paragraph in enumerate(re.split(r"\n\s*\n", text.strip())):
+    """Paragraphs, and as they stand those that follow the mark for click.
+
+    Python 3.13 takes the common indentation from docstrings, the versions before do not: `cleandoc` makes them equal.
+    """
+    for k, paragraph in enumerate(re.split(r"\n\s*\n", cleandoc(text))):
         if k:
             yield ".PP"
         lines = paragraph.split("\n")
