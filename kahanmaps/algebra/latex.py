@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
-from kahanmaps.algebra.reading import first_terms, reading_order
+from kahanmaps.algebra.reading import factors_of, first_terms, reading_order
 from kahanmaps.errors import InputError, counted
 
 # TeX has no commands for the letters that look Latin, such as omicron and capital Alpha.
@@ -133,14 +133,11 @@ def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:
 
 def _term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:
     """One term with a positive coefficient; a coefficient 1 is left out before factors."""
-    factors = [
-        name if exponent == 1 else f"{name}^{_braced(str(exponent))}"
-        for name, exponent in zip(names, exponents, strict=True)
-        if exponent
-    ]
-    if not factors or coefficient != 1:
-        factors.insert(0, latex_number(coefficient))
-    return " ".join(factors)
+    return " ".join(factors_of(coefficient, exponents, names, _power, latex_number))
+
+
+def _power(name: str, exponent: int) -> str:
+    return f"{name}^{_braced(str(exponent))}"
 
 
 def _braced(digits: str) -> str:

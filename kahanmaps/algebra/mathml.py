@@ -14,7 +14,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.latex import GREEK_NAMES
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
-from kahanmaps.algebra.reading import first_terms, reading_order
+from kahanmaps.algebra.reading import factors_of, first_terms, reading_order
 from kahanmaps.algebra.text import format_number
 from kahanmaps.errors import InputError, counted
 from kahanmaps.markup import escape
@@ -197,14 +197,7 @@ def _pieces(polynomial: fmpq_mpoly) -> list[tuple[str, str]]:
 
 def _term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:
     """One term with a positive coefficient; a coefficient 1 is left out before factors."""
-    factors = [
-        name if exponent == 1 else _power(name, exponent)
-        for name, exponent in zip(names, exponents, strict=True)
-        if exponent
-    ]
-    if not factors or coefficient != 1:
-        factors.insert(0, mathml_number(coefficient))
-    return _TIMES.join(factors)
+    return _TIMES.join(factors_of(coefficient, exponents, names, _power, mathml_number))
 
 
 def _power(name: str, exponent: int) -> str:
@@ -212,11 +205,6 @@ def _power(name: str, exponent: int) -> str:
 
 
 def _plain_term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:
-    factors = [
-        name if exponent == 1 else f"{name}^{exponent}"
-        for name, exponent in zip(names, exponents, strict=True)
-        if exponent
-    ]
-    if not factors or coefficient != 1:
-        factors.insert(0, format_number(coefficient))
-    return "*".join(factors)
+    return "*".join(
+        factors_of(coefficient, exponents, names, lambda name, exponent: f"{name}^{exponent}", format_number)
+    )

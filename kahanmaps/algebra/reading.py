@@ -1,8 +1,8 @@
-"""The order in which a polynomial is read, and the beginning of one that is too long to be shown."""
+"""The order in which a polynomial is read, its terms, and the beginning of one that is too long to be shown."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from flint import fmpq, fmpq_mpoly
 
@@ -36,6 +36,28 @@ def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
             break
         kept[monomial] = value
     return polynomial if len(kept) == len(polynomial) else polynomial.context().from_dict(kept)
+
+
+def factors_of(
+    coefficient: fmpq,
+    exponents: Sequence[int],
+    names: Sequence[str],
+    power: Callable[[str, int], str],
+    number: Callable[[fmpq], str],
+) -> list[str]:
+    """The factors of a term with a positive coefficient, as they are written; a 1 is left out before others.
+
+    >>> factors_of(fmpq(3, 2), [2, 0, 1], ["x", "y", "z"], lambda name, k: f"{name}^{k}", str)
+    ['3/2', 'x^2', 'z']
+    """
+    factors = [
+        name if exponent == 1 else power(name, exponent)
+        for name, exponent in zip(names, exponents, strict=True)
+        if exponent
+    ]
+    if not factors or coefficient != 1:
+        factors.insert(0, number(coefficient))
+    return factors
 
 
 def _terms(polynomial: fmpq_mpoly) -> Iterator[tuple[tuple[int, ...], fmpq]]:
