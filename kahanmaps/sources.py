@@ -35,6 +35,21 @@ SOURCES: dict[str, str] = {
     "sanz-serna-1994": (
         "J. M. Sanz-Serna. An unconventional symplectic integrator of W. Kahan. Appl. Numer. Math. 16 (1994), 245-250"
     ),
+    "fiat-shamir-1987": (
+        "A. Fiat, A. Shamir. How to prove yourself: practical solutions to identification and signature problems. "
+        "Advances in Cryptology - CRYPTO '86, Lecture Notes in Computer Science 263, Springer 1987, 186-194"
+    ),
+    "bellare-rogaway-1993": (
+        "M. Bellare, P. Rogaway. Random oracles are practical: a paradigm for designing efficient protocols. "
+        "1st ACM Conference on Computer and Communications Security, 1993, 62-73"
+    ),
+    "canetti-2004": (
+        "R. Canetti, O. Goldreich, S. Halevi. The random oracle methodology, revisited. J. ACM 51 (2004), 557-594"
+    ),
+    "albrecht-2018": (
+        "M. R. Albrecht, J. Massimo, K. G. Paterson, J. Somorovsky. Prime and prejudice: primality testing under "
+        "adversarial conditions. ACM Conference on Computer and Communications Security, 2018, 281-298"
+    ),
     "ward-1948": "M. Ward. Memoir on elliptic divisibility sequences. Amer. J. Math. 70 (1948), 31-74",
     "fassbender-1999": (
         "H. Fassbender, D. S. Mackey, N. Mackey, H. Xu. Hamiltonian square roots of skew-Hamiltonian matrices. "

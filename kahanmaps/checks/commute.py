@@ -44,7 +44,7 @@ def commutativity(f: QuadraticSystem, g: QuadraticSystem, eps: fmpq | None, name
     poles = after_f.degree + after_g.degree + left.degree + right.degree
     first, second = names
     labels = (f"Phi_{second}(Phi_{first}(x))", f"Phi_{first}(Phi_{second}(x))")
-    return Identity(f.dim, sides, left * right + right * left, poles, eps, *labels)
+    return Identity(f.dim, sides, left * right + right * left, poles, eps, *labels, subject=(f.rhs, g.rhs))
 
 
 def check_commute(
@@ -95,7 +95,7 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
     if proof is None:
         proof = theorems.commuting_by_splitting(f, g)
     identity = commutativity(f, g, settings.eps, ("f", "g"))
-    orbit = run_orbit(KahanMap(f, settings.orbit_eps), settings, proof is not None and file.member is not None)
+    orbit = run_orbit(f, settings, g.rhs, proof is not None and file.member is not None)
     finding = judge(
         f"the Kahan maps of f = {file.name} and g = {other.name} commute",
         identity,
@@ -123,7 +123,7 @@ def _check_member(file: SystemFile, member: FamilyMember, settings: Settings) ->
     for k, associate in enumerate(associates):
         settings.progress(f"associated system {k + 1} of {len(associates)}")
         verified[associate.label] = theorems.associated_hypotheses(member, associate)
-    orbit = run_orbit(KahanMap(associates[0].system, settings.orbit_eps), settings, is_integrable=True)
+    orbit = run_orbit(associates[0].system, settings, (member.A, member.H), is_integrable=True)
     findings = []
     pairs = list(combinations(associates, 2))
     tried = _PAIRS_TRIED if member.dim <= 16 else _PAIRS_TRIED_IN_HIGH_DIMENSION

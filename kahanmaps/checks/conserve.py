@@ -53,7 +53,8 @@ def conservation(system: QuadraticSystem, integral: PhaseFunction, eps: fmpq | N
     image = step_size(system, size, VARIABLE)
     after, before = integral.size(size, image), integral.size(size, VARIABLE)
     poles = image.degree + after.below.degree + before.below.degree
-    return Identity(system.dim, sides, after.equation(before), poles, eps, "I(x~)", "I(x)")
+    subject = (system.rhs, integral.subject)
+    return Identity(system.dim, sides, after.equation(before), poles, eps, "I(x~)", "I(x)", subject=subject)
 
 
 def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:
@@ -87,7 +88,8 @@ def check_integrals(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "
             "or give --integral 'NAME=EXPRESSION'"
         )
-    orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings, file.member is not None)
+    claimed = [integral.subject for integral, _, _ in candidates]
+    orbit = run_orbit(file.system, settings, claimed, file.member is not None)
     findings = []
     tried = _TRIED if file.system.dim <= 16 else _TRIED_IN_HIGH_DIMENSION
     for k, (integral, proof, source) in enumerate(candidates):

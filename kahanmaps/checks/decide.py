@@ -1,7 +1,8 @@
 """Deciding an identity of rational functions at random points, with a bound on the probability of error.
 
 The identity is a polynomial equation P(x, eps) = 0 over the integers once denominators are cleared. For each trial
-a prime p is drawn at random from [2^62, 2^63) and then a point over GF(p). If P is not the zero polynomial, the
+a prime p is drawn from [2^62, 2^63) and then a point over GF(p), by a hash of the identity and a seed, so that nobody
+can write an identity for given points (algebra/chance.py). If P is not the zero polynomial, the
 trial passes only if p divides all its coefficients (at most bits/62 of more than 2^55 primes do) or the point is a
 root (probability at most degree/p). Points where a denominator vanishes are drawn again; since that happens less
 than half of the time, the sum of both is doubled. Trials are independent, so the bounds multiply. Sources:
@@ -16,10 +17,12 @@ import math
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from typing import Any
 
 from flint import fmpq, fmpz
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, Field, PrimeField
 from kahanmaps.checks.claims import Evidence, Verdict, Witness
 from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep
@@ -31,6 +34,8 @@ _PRIME_BITS = 62
 _PRIMES_LOG2 = math.log2(0.6) + _PRIME_BITS - math.log2(_PRIME_BITS * math.log(2))
 _MAX_POLES = 200
 _WITNESS_TRIES = 400
+_HIGH_TRIES = 20  # beyond them: a function that is not 0 is hardly ever 0 at points of this many bits
+_HIGH_BITS = 62
 
 Sides = tuple[Sequence[Any], Sequence[Any]]
 
@@ -41,7 +46,8 @@ class Identity:
 
     `sides(field, x, eps)` gives both as lists of field elements; it returns None, or raises SingularStep, where
     they are not defined. `equation` bounds the polynomials that vanish when they are equal, `poles` the degree of
-    the product of all denominators. `eps` is the step the identity is stated for, None for every eps.
+    the product of all denominators. `eps` is the step the identity is stated for, None for every eps. `subject` is
+    all that determines the two sides, as `seed_for` takes it: points are drawn by its hash.
     """
 
     dim: int
@@ -52,6 +58,11 @@ class Identity:
     left_label: str = "left side"
     right_label: str = "right side"
     entries: tuple[str, ...] = ()  # names of the entries, where a witness should show only one that differs
+    subject: tuple[Any, ...] = dataclass_field(kw_only=True)
+
+    def seed(self, seed: int) -> int:
+        """What everything drawn for this identity is drawn from."""
+        return seed_for(seed, self.dim, self.eps, self.left_label, self.right_label, self.subject)
 
     def at(self, field: Field, point: tuple[Any, ...], eps: Any) -> Sides | None:
         """Both sides, None where they are not defined."""
@@ -72,7 +83,7 @@ class Decision:
 
 def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
     """Decide an identity at random points over GF(p): supported with error below 2^-error_bits, or refuted."""
-    rng = random.Random(f"identity {seed}")
+    rng = random.Random(f"identity {identity.seed(seed)}")
     per_trial = trial_bound(identity)
     if per_trial >= -1:
         return Decision(
@@ -178,20 +189,30 @@ def _refuted(
     identity: Identity, seed: int, field: PrimeField, point: tuple[Any, ...], eps: Any, sides: Sides
 ) -> Decision:
     """A rational witness for an identity that failed over GF(p); failing that, the modular one, which is as good."""
-    rng = random.Random(f"witness {seed}")
-    for k, candidate in enumerate(small_points(identity.dim, rng, _WITNESS_TRIES)):
+    found = fails_over_Q(identity, seed)
+    if found is not None:
+        return found
+    witness = witness_of(identity, field, point, eps, sides)
+    summary = (
+        f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
+        f"none of {_WITNESS_TRIES + _HIGH_TRIES} rational points shows it"
+    )
+    return Decision(Verdict.REFUTED, Evidence("point over GF(p)", summary, {"prime": str(field.prime)}), witness)
+
+
+def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
+    """The refutation by a rational point at which the sides differ: a small one if possible; None where none shows."""
+    rng = random.Random(f"witness {identity.seed(seed)}")
+    points = small_points(identity.dim, rng, _WITNESS_TRIES)
+    points += [tuple(fmpq(rng.getrandbits(_HIGH_BITS)) for _ in range(identity.dim)) for _ in range(_HIGH_TRIES)]
+    for k, candidate in enumerate(points):
         at_eps = identity.eps if identity.eps is not None else fmpq(1, 1 + k % 5)
         found = identity.at(QQ, candidate, at_eps)
         witness = witness_of(identity, QQ, candidate, at_eps, found) if found is not None else None
         if witness is not None:
             where = f"fails at a rational point of height at most {_height(candidate)}, exactly"
             return Decision(Verdict.REFUTED, Evidence("exact rational point", where, {}), witness)
-    witness = witness_of(identity, field, point, eps, sides)
-    summary = (
-        f"fails at a point over GF({field.prime}), where all denominators are units, so it fails over Q; "
-        f"none of {_WITNESS_TRIES} small rational points shows it"
-    )
-    return Decision(Verdict.REFUTED, Evidence("point over GF(p)", summary, {"prime": str(field.prime)}), witness)
+    return None
 
 
 def witness_of(identity: Identity, field: Field, point: tuple[Any, ...], eps: Any, sides: Sides) -> Witness | None:

@@ -1,13 +1,14 @@
 """One claim from start to end: proof where there is one, random points, an exact orbit, and that they agree.
 
 Proof and experiment are independent ways to the same answer, so each guards the other: a proved claim that fails at
-a point is a bug here, and is reported as one.
+a point is a bug here, and is reported as one. A false claim may pass at random points, with the probability that the
+bound states; where both sides can be multiplied out, what comes out decides.
 """
 
 from __future__ import annotations
 
 from kahanmaps.checks.claims import Evidence, Finding, Verdict, Witness
-from kahanmaps.checks.decide import Identity, decide
+from kahanmaps.checks.decide import Identity, decide, fails_over_Q
 from kahanmaps.checks.expand import NotEqual, expansion
 from kahanmaps.checks.settings import OrbitRun, Settings, along
 
@@ -48,10 +49,14 @@ def judge(
         try:
             expanded = expansion(identity)
         except NotEqual as error:
-            raise Contradiction(f"{claim}: {decision.evidence.summary}, but {error}") from error
-        if expanded is not None:
-            verdict, evidence = Verdict.PROVED, expanded
-            also.append(decision.evidence)
+            refutation = fails_over_Q(identity, settings.seed)
+            verdict, evidence = Verdict.REFUTED, Evidence("expansion", str(error))
+            if refutation is not None:
+                evidence, witness = refutation.evidence, refutation.witness
+        else:
+            if expanded is not None:
+                verdict, evidence = Verdict.PROVED, expanded
+                also.append(decision.evidence)
     if orbit is not None:
         experience, failure = along(identity, orbit)
         also.append(experience)

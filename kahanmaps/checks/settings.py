@@ -9,6 +9,7 @@ from typing import Any
 
 from flint import fmpq
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.claims import Evidence, Witness
@@ -17,10 +18,10 @@ from kahanmaps.errors import InputError
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit, OrbitEnd
 from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
 
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
-DEFAULT_ORBIT_EPS = fmpq(1, 10)
 
 
 def _silent(_: str) -> None:
@@ -60,11 +61,6 @@ class Settings:
     def cut_short(self, run: OrbitRun) -> bool:
         """Whether an orbit that the user asked for ended early."""
         return self.orbit_is_asked and not run.end.is_whole
-
-    @property
-    def orbit_eps(self) -> fmpq:
-        """The eps of the exact orbit, 1/10 where the claims are for every eps."""
-        return self.eps if self.eps is not None else DEFAULT_ORBIT_EPS
 
     def context(self, files: Sequence[SystemFile], **more: Any) -> dict[str, Any]:
         """What is needed to redo the check, as plain data: the systems themselves among it."""
@@ -116,13 +112,23 @@ def random_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
         yield tuple(fmpq(rng.choice((-1, 1)) * rng.randint(1, 5), rng.randint(1, 5)) for _ in range(dim))
 
 
-def run_orbit(kahan: KahanMap, settings: Settings, is_integrable: bool = False) -> OrbitRun:
-    """The exact orbit of the given start, or of random small rational starts until one has no singular point."""
+def run_orbit(
+    system: QuadraticSystem, settings: Settings, subject: Sequence[Any] = (), is_integrable: bool = False
+) -> OrbitRun:
+    """The exact orbit of the given start, or of random small rational starts until one has no singular point.
+
+    A claim for every eps is tried at one that is drawn. Everything drawn follows the system and the `subject`, what
+    is claimed of it: no claim can be written for an orbit that is known in advance.
+    """
+    seed = seed_for(settings.seed, system.rhs, settings.eps, subject)
+    rng = random.Random(f"eps {seed}")
+    eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
+    kahan = KahanMap(system, eps)
     # A claim that takes two more steps of a map without structure multiplies the digits by dim^2, and elimination
     # by dim once more; for the family numbers hardly grow from one step to the next.
     by_dimension = 5_000 if is_integrable else max(100, 60_000 // kahan.dim**2)
     max_digits = by_dimension if settings.max_digits is None else settings.max_digits
-    draws = random_starts(kahan.dim, settings.seed)
+    draws = random_starts(kahan.dim, seed)
     attempt = 0
     while True:
         start = settings.start if settings.start is not None else next(draws)
@@ -136,7 +142,7 @@ def run_orbit(kahan: KahanMap, settings: Settings, is_integrable: bool = False) 
             raise AssertionError("an orbit ended without saying how")
         attempt += 1
         if end.status != "singular" or settings.start is not None or attempt >= 20:
-            return OrbitRun(orbit.start, tuple(points), fmpq(kahan.eps), end)
+            return OrbitRun(orbit.start, tuple(points), eps, end)
 
 
 def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:

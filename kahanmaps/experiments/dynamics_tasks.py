@@ -28,7 +28,7 @@ def confinement(
     from kahanmaps.laboratory.fates import NOT_CONTRACTED, UNDECIDED
     from kahanmaps.laboratory.singularities import default_eps, singularities
 
-    values = default_eps(seed) if eps is None else (eps,)
+    values = default_eps(system.system, seed) if eps is None else (eps,)
     runs = [singularities(system.system, value, steps=steps, seed=seed, seconds=seconds) for value in values]
     agree = len({run.shape for run in runs}) == 1
     first = runs[0]

@@ -32,6 +32,10 @@ class ModifiedHamiltonian(PhaseFunction):
         self.name = f"modified {letter}"
         self.formula = f"{letter} + (2 eps/3) grad {letter}^T (I - eps f')^(-1) f, f = J grad {letter}"
 
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return ("modified", self.hamiltonian.H, self.hamiltonian.J)
+
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         image = KahanMap(self.hamiltonian.system, eps, field).step(point)
         with field.working():
@@ -63,6 +67,10 @@ class PaperIntegral(PhaseFunction):
             f"x^ the image of x under the Kahan map of J grad {letter}{index}"
         )
 
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return ("paper", self.hamiltonian.H)
+
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         image = KahanMap(self.hamiltonian.system, eps, field).step(point)
         m = len(image) // 2
@@ -90,6 +98,10 @@ class CommutantIntegral(PhaseFunction):
         self.matrix = (A**power).transpose()
         self.name = f"{letter}~_{power}"
         self.formula = f"{self.name} = eps^(-1) x^T J {'A^T' if power == 1 else f'(A^T)^{power}'} x~"
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return ("commutant", self.hamiltonian.H, self.hamiltonian.J, self.matrix)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         image = KahanMap(self.hamiltonian.system, eps, field).step(point)

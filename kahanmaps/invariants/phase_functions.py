@@ -22,6 +22,11 @@ class PhaseFunction(ABC):
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         """The value at a point over `field`; None at a pole. Raises SingularStep where a map in it has no value."""
 
+    @property
+    @abstractmethod
+    def subject(self) -> tuple[Any, ...]:
+        """All that determines the function, as `seed_for` takes it."""
+
     @abstractmethod
     def size(self, eps: Size, point: Size) -> Fraction:
         """Bounds for numerator and denominator of the value at a point of this size."""
@@ -34,6 +39,10 @@ class ClaimedFunction(PhaseFunction):
         self.name = name
         self.function = function
         self.formula = format_rational_function(function)
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return ("claimed", self.function)
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         with field.working():

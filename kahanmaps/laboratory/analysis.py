@@ -237,7 +237,7 @@ def analyze(
 
     def confinement() -> None:
         if system.dim <= MAX_SINGULAR_DIMENSION:
-            values = default_eps(seed) if found.eps is None else (found.eps,)
+            values = default_eps(system, seed) if found.eps is None else (found.eps,)
             part = share(0.1)
             found.singularities = [
                 singularities(system, value, seed=seed, seconds=part / len(values), progress=told("singularities"))

@@ -15,6 +15,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.polynomials import ring
@@ -174,7 +175,7 @@ def commuting_systems(
         raise InputError(f"found the shape {shape!r}, expected {' or '.join(SHAPES)}")
     if not seconds > 0:
         raise InputError(f"found {seconds} seconds, expected a positive number")
-    settings = Settings(seed=seed, error_bits=error_bits, progress=progress)
+    settings = Settings(seed=seed_for(seed, system.rhs), error_bits=error_bits, progress=progress)
     search = _Search(system, shape, settings, time.monotonic() + seconds)
     search.run()
     return search.found

@@ -195,7 +195,8 @@ def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: Componen
     left, right = step_g(after_f), step_size(f, VARIABLE, after_g)
     poles = after_f.degree + after_g.degree + left.degree + right.degree
     labels = ("Phi_g(Phi_f(x))", "Phi_f(Phi_g(x))")
-    return Identity(n + len(free), sides, left * right + right * left, poles, None, *labels)
+    subject = (f.rhs, table, free)
+    return Identity(n + len(free), sides, left * right + right * left, poles, None, *labels, subject=subject)
 
 
 def _over(field: Field, table: Sequence[Sequence[fmpq_mpoly]], parameters: Sequence[Any], n: int) -> SystemOver:

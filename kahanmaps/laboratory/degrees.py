@@ -21,6 +21,7 @@ from typing import Any
 
 from flint import fmpq
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
 from kahanmaps.errors import BadPrime, InputError, counted
@@ -189,7 +190,7 @@ class _Search:
     def __init__(self, system: QuadraticSystem, eps: fmpq | None, deadline: float, max_degree: int, seed: int) -> None:
         self._system, self._eps = system, eps
         self._deadline, self._max_degree, self._seed = deadline, max_degree, seed
-        self._rng = random.Random(f"degrees {seed}")
+        self._rng = random.Random(f"degrees {seed_for(seed, system.rhs, eps)}")
         self._replaced = 0
         self.degrees = [1]
         self.notes: list[str] = []

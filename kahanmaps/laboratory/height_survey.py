@@ -15,6 +15,7 @@ from typing import Any
 
 from flint import fmpq
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
 from kahanmaps.errors import InputError, counted
@@ -139,7 +140,7 @@ def height_survey(
     orbits: list[SurveyedOrbit] = []
     for value in DEFAULT_EPS if eps is None else (rational(eps),):
         kahan_map = KahanMap(system, value)
-        draws = _generic_starts(system.dim, seed)
+        draws = _generic_starts(system.dim, seed_for(seed, system.rhs, value))
         given = [None] * starts if isinstance(starts, int) else [kahan_map.point(start) for start in starts]
         for k, start in enumerate(given):
             if orbits and time.monotonic() > deadline:

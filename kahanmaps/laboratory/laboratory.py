@@ -9,6 +9,7 @@ from typing import Any
 
 from flint import fmpq_mpoly
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime, InputError
@@ -40,9 +41,9 @@ class Laboratory:
             raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
         if self.eps is not None and "eps" in symbols:
             raise InputError("found eps both as a number and as a symbol, expected one of the two")
-        self.seed = seed
         self.system = ParametricSystem.of(file, self.symbols)
-        rng = random.Random(f"laboratory {seed}")
+        self.seed = seed_for(seed, self.symbols, self.system.rhs, self.eps)  # of all that is drawn for this system
+        rng = random.Random(f"laboratory {self.seed}")
         self.maps: list[ModularMap] = []
         while len(self.maps) < 2:
             prime = random_prime(rng)

@@ -19,6 +19,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
@@ -140,7 +141,7 @@ def singularities(
             for factor, multiplicity in critical.factor()[1]:
                 pole = factors.get(str(factor), (factor, False, 0))[1]
                 factors[str(factor)] = (factor, pole, int(multiplicity))
-    rng = random.Random(f"singularities {seed} {exact_eps}")
+    rng = random.Random(f"singularities {seed_for(seed, system.rhs, exact_eps)}")
     found, stopped = [], False
     for factor, pole, multiplicity in factors.values():
         if time.monotonic() > end:
@@ -183,13 +184,9 @@ def symbolic_denominator(system: QuadraticSystem) -> list[tuple[str, int]] | Non
     return [(format_polynomial(factor), int(power)) for factor, power in kernel_minors(rows)[-1].factor()[1]]
 
 
-def default_eps(seed: int) -> tuple[fmpq, fmpq]:
-    """Two different rational numbers of small height, the same ones for the same seed.
-
-    >>> default_eps(0)
-    (7/11, 4/13)
-    """
-    rng = random.Random(f"singularities eps {seed}")
+def default_eps(system: QuadraticSystem, seed: int) -> tuple[fmpq, fmpq]:
+    """Two different rational numbers of small height, the same ones for the same system and seed."""
+    rng = random.Random(f"singularities eps {seed_for(seed, system.rhs)}")
     first = fmpq(rng.randint(2, 9), 11)
     return first, fmpq(rng.randint(2, 11), 13)
 

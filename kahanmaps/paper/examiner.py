@@ -140,7 +140,7 @@ class Examiner(ABC):
             proof = self.proof(claim, needs, equation, poles)
             also = tuple(self.also(claim))
         except Contradiction as error:
-            text = f"{error}, although it {decision.evidence.summary}: an error in kahanmaps"
+            text = f"{error}, although it {decision.evidence.summary}: the exact computation decides"
             return self._finding(claim, Verdict.REFUTED, Evidence("contradiction", text), witness=error.witness)
         if proof is not None:
             if decision.verdict is Verdict.SUPPORTED:

@@ -24,6 +24,7 @@ from typing import Any
 
 from flint import fmpq_poly
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.text import format_number
@@ -137,6 +138,7 @@ class _MemberExaminer(Examiner):
     def __init__(self, member: FamilyMember, settings: Settings, options: VerifyOptions) -> None:
         super().__init__(settings, options)
         self.member = member
+        self._seed = seed_for(settings.seed, member.A, member.H, settings.eps)
         self.m = member.m
         self.roots = realise.rational_roots(member)
 
@@ -149,7 +151,7 @@ class _MemberExaminer(Examiner):
         return self._points[key]
 
     def _new_point(self, needs_split: bool, number: int) -> PaperObjects | None:
-        rng = random.Random(f"verify {self.settings.seed} {needs_split} {number}")
+        rng = random.Random(f"verify {self._seed} {needs_split} {number}")
         if needs_split and not self.member.is_generic:
             return None
         while True:
@@ -173,7 +175,7 @@ class _MemberExaminer(Examiner):
     def exact_point(self, roots: bool, number: int) -> PaperObjects | None:
         if roots and self.roots is None:
             return None
-        rng = random.Random(f"exact {self.settings.seed} {number}")
+        rng = random.Random(f"exact {self._seed} {number}")
         return realise.point_over(self.member, QQ, self.roots, self.settings.eps, rng, self.options.order)
 
     def bounds(self) -> PaperObjects:
@@ -247,7 +249,7 @@ class _MemberExaminer(Examiner):
         return Evidence("symbolic", f"both sides are the same function of {scope}, multiplied out for this member")
 
     def also(self, claim: Claim) -> Iterable[Evidence]:
-        rng = random.Random(f"also {self.settings.seed} {claim.key}")
+        rng = random.Random(f"also {self._seed} {claim.key}")
         if claim.blockwise and claim.symplectic and self.member.is_generic:
             objects = realise.etale_objects(self.member, rng, self.settings.eps, self.options.order)
             chi = format_univariate(chi_of(self.member.A))

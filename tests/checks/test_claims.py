@@ -7,6 +7,7 @@ of its claims, controls left out. What a report says of itself is enough to run 
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 from itertools import product
 
 import pytest
@@ -197,7 +198,7 @@ def test_every_report_comes_out_the_same_from_the_same_seed(run):
 @over_reports
 def test_a_report_run_again_from_its_own_start_takes_the_same_orbit(run):
     first = run(Settings(steps=2, seed=11)).to_json()["orbit"]
-    again = run(Settings(steps=2, start=first["start"], seed=12)).to_json()["orbit"]
+    again = run(Settings(steps=2, eps=first["eps"], start=first["start"], seed=12)).to_json()["orbit"]
     assert again == first
 
 
@@ -211,7 +212,14 @@ def test_refuted_claims_and_no_others_have_a_witness(run):
 def test_every_report_says_every_eps_when_none_is_named(run):
     plain = run(QUICK).to_json()
     assert (plain["eps"], plain["time_step"]) == ("every", "every")
-    assert plain["orbit"]["eps"] == "1/10"
+    assert 0 < Fraction(plain["orbit"]["eps"]) < 1
+
+
+@over_reports
+def test_the_orbit_and_its_eps_follow_the_seed(run):
+    orbits = [run(Settings(steps=1, seed=seed)).to_json()["orbit"] for seed in range(4)]
+    assert len({tuple(orbit["start"]) for orbit in orbits}) > 1
+    assert len({orbit["eps"] for orbit in orbits}) > 1
 
 
 # Settings
@@ -227,7 +235,6 @@ def test_settings_are_for_every_eps_and_an_error_of_two_to_the_minus_one_hundred
     settings = Settings()
     assert (settings.eps, settings.start, settings.seed, settings.error_bits) == (None, None, 0, 100)
     assert not settings.orbit_is_asked
-    assert settings.orbit_eps == fmpq(1, 10)
 
 
 def test_settings_refuse_a_machine_float():

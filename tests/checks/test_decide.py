@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
+from itertools import chain
 from typing import Any
 
 import pytest
@@ -56,7 +58,7 @@ def identity_of(
         (x,) = point
         return ([left(x, eps_value, field)], [right(x, eps_value, field)]) if defined(x, field) else None
 
-    return Identity(1, sides, Size(degree, bits), poles, eps)
+    return Identity(1, sides, Size(degree, bits), poles, eps, subject=())
 
 
 def counted(identity: Identity) -> tuple[Identity, list[Field]]:
@@ -67,7 +69,7 @@ def counted(identity: Identity) -> tuple[Identity, list[Field]]:
         fields.append(field)
         return identity.sides(field, point, eps_value)
 
-    return Identity(identity.dim, sides, identity.equation, identity.poles, identity.eps), fields
+    return Identity(identity.dim, sides, identity.equation, identity.poles, identity.eps, subject=()), fields
 
 
 def square_left(x: Any, e: Any, K: Field) -> Any:
@@ -148,7 +150,7 @@ def test_the_error_of_a_trial_covers_bad_primes_and_roots(degree, bits, poles):
     primes = Fraction(3, 5) * N / Fraction(math.log(2**62))
     bad = Fraction(max(1, math.ceil(bits / 62)), 1) / primes
     roots = Fraction(degree) / N
-    found = trial_bound(Identity(1, TRUE.sides, Size(degree, float(bits)), poles, None))
+    found = trial_bound(Identity(1, TRUE.sides, Size(degree, float(bits)), poles, None, subject=()))
     # At most floor(bits/62) primes divide a coefficient; ceil is one more at the most.
     # Doubled: given that no denominator vanishes, which is more likely than not.
     assert found <= math.log2(2 * (bad + roots)) + 1e-9
@@ -158,14 +160,14 @@ def test_the_error_of_a_trial_covers_bad_primes_and_roots(degree, bits, poles):
 @pytest.mark.parametrize("larger", [(2**41, 1e3), (2**40, 1e9)])
 def test_more_degree_or_coefficients_mean_a_larger_error(larger):
     def error(degree, bits):
-        return trial_bound(Identity(1, TRUE.sides, Size(degree, bits), 9, None))
+        return trial_bound(Identity(1, TRUE.sides, Size(degree, bits), 9, None, subject=()))
 
     assert error(2**40, 1e3) < error(*larger) < -1
 
 
 @pytest.mark.parametrize(("degree", "poles"), [(1, 2**60), (2**60, 1)])
 def test_beyond_degree_2_to_the_60_there_is_no_bound(degree, poles):
-    assert trial_bound(Identity(1, TRUE.sides, Size(degree, 1e3), poles, None)) == 0.0
+    assert trial_bound(Identity(1, TRUE.sides, Size(degree, 1e3), poles, None, subject=())) == 0.0
 
 
 # False identities
@@ -222,9 +224,11 @@ def test_an_identity_that_fails_only_away_from_small_integers_is_refuted():
     verify_witness(decision.witness, [math.prod(x - a for a in range(-40, 41))], [Fraction(0)])
 
 
-def test_where_no_small_rational_point_shows_it_the_witness_is_modular():
+def test_an_identity_that_holds_at_every_small_point_that_is_tried_is_refuted_by_a_high_one():
+    # The points that are tried follow `subject`, which is () here: whoever knows them can hide the failure from them.
     seed = 3
-    hidden = {point[0] for point in small_points(1, random.Random(f"witness {seed}"), 400)}
+    place = identity_of(square_left, square_right).seed(seed)
+    hidden = {point[0] for point in small_points(1, random.Random(f"witness {place}"), 400)}
 
     def product(x, e, K):
         value = K.one
@@ -232,16 +236,21 @@ def test_where_no_small_rational_point_shows_it_the_witness_is_modular():
             value = value * (x - K.convert(a))
         return value
 
-    identity = identity_of(product, lambda x, e, K: K.zero, degree=len(hidden), bits=5000.0)
-    decision = decide(identity, seed)
+    decision = decide(identity_of(product, lambda x, e, K: K.zero, degree=len(hidden), bits=5000.0), seed)
+    assert decision.verdict is REFUTED
+    (x,) = exact(*decision.witness.point)
+    assert abs(x) > 10**9
+    verify_witness(decision.witness, [math.prod(x - fraction(a) for a in hidden)], [Fraction(0)])
+
+
+def test_where_no_rational_point_shows_it_the_witness_is_modular():
+    identity = identity_of(lambda x, e, K: x, lambda x, e, K: -x, defined=lambda x, field: field is not QQ)
+    decision = decide(identity, 0)
     assert decision.verdict is REFUTED
     p = int(decision.evidence.data["prime"])
     assert decision.witness.field == f"GF({p})"
     x = int(decision.witness.point[0])
-    value = math.prod((x - int(a.p) * pow(int(a.q), -1, p)) % p for a in hidden) % p
-    assert value != 0
-    assert decision.witness.left == (str(value),)
-    assert decision.witness.right == ("0",)
+    assert (decision.witness.left, decision.witness.right) == ((str(x),), (str(p - x),))
 
 
 def test_a_difference_that_the_first_prime_divides_is_found_with_the_next():
@@ -252,12 +261,26 @@ def test_a_difference_that_the_first_prime_divides_is_found_with_the_next():
     assert decision.verdict is REFUTED
 
 
-def test_a_difference_that_all_primes_of_the_run_divide_is_why_they_are_random():
-    # Not a failure: whoever knows the seed can build this; its coefficients are counted in the error bound.
+def shifted(shift: int, subject: tuple[Any, ...]) -> Identity:
+    """x = x + shift, which is false."""
+    identity = identity_of(lambda x, e, K: x, lambda x, e, K: x + K.convert(shift), degree=1, bits=127.0)
+    return replace(identity, subject=subject)
+
+
+def test_points_that_do_not_follow_the_claim_let_a_false_one_pass_that_is_made_for_them():
+    # Why `subject` has to be all that determines the two sides: here it leaves out the shift.
     primes = [int(prime) for prime in decide(TRUE, 0).evidence.data["primes"]]
-    identity = identity_of(lambda x, e, K: x, lambda x, e, K: x + K.convert(math.prod(primes)), degree=1, bits=127.0)
-    assert decide(identity, 0).verdict is SUPPORTED
-    assert decide(identity, 1).verdict is REFUTED
+    shift = math.prod(primes)
+    assert decide(shifted(shift, ()), 0).verdict is SUPPORTED
+    assert decide(shifted(shift, ()), 1).verdict is REFUTED
+
+
+def test_a_false_claim_made_of_the_primes_of_another_is_refuted():
+    shift = 1
+    for _ in range(5):  # each time the primes at which the claim before would pass
+        primes = [int(p) for p in decide(replace(TRUE, subject=(shift,)), 0).evidence.data["primes"]]
+        shift = math.prod(primes)
+        assert decide(shifted(shift, (shift,)), 0).verdict is REFUTED
 
 
 def test_a_false_identity_is_refuted_by_the_first_trial():
@@ -313,7 +336,7 @@ def fourth_power(w: fmpq | int, eps: fmpq | None) -> Identity:
     for _ in range(4):
         images.append(step_size(system, size, images[-1]))
     equation = SizeFraction(images[-1], images[-1]).equation(SizeFraction(VARIABLE, ONE))
-    return Identity(2, sides, equation, sum(image.degree for image in images[1:]), eps)
+    return Identity(2, sides, equation, sum(image.degree for image in images[1:]), eps, subject=())
 
 
 @pytest.mark.parametrize(("w", "eps"), [(1, fmpq(1)), (1, fmpq(-1)), (2, fmpq(1, 2)), (fmpq(3, 5), fmpq(5, 3))])
@@ -333,20 +356,24 @@ def test_four_steps_are_not_the_identity_for_another_or_for_every_eps(w, eps):
     verify_witness(decision.witness, x, start)
 
 
-def test_a_prime_that_divides_eps_is_drawn_again():
-    first = fmpq(int(decide(TRUE, 0).evidence.data["primes"][0]))
-    identity = identity_of(square_left, square_right, eps=first)
-    evidence = decide(identity, 0).evidence
-    assert evidence.data["poles_met"] == 1
-    assert str(first) not in evidence.data["primes"]
+def draw_first(monkeypatch, prime):
+    """The first prime drawn is this one; then they are random."""
+    fields = chain([GF(prime)], iter(lambda: random_prime_field(random.Random(7)), None))
+    monkeypatch.setattr(decide_module, "random_prime_field", lambda rng: next(fields))
 
 
-def test_a_prime_that_divides_a_denominator_of_eps_is_drawn_again():
-    first = int(decide(TRUE, 0).evidence.data["primes"][0])
-    identity = identity_of(square_left, square_right, eps=fmpq(1, first))
-    evidence = decide(identity, 0).evidence
+def test_a_prime_that_divides_eps_is_drawn_again(monkeypatch):
+    draw_first(monkeypatch, 101)
+    evidence = decide(identity_of(square_left, square_right, eps=fmpq(101)), 0).evidence
     assert evidence.data["poles_met"] == 1
-    assert str(first) not in evidence.data["primes"]
+    assert "101" not in evidence.data["primes"]
+
+
+def test_a_prime_that_divides_a_denominator_of_eps_is_drawn_again(monkeypatch):
+    draw_first(monkeypatch, 101)
+    evidence = decide(identity_of(square_left, square_right, eps=fmpq(1, 101)), 0).evidence
+    assert evidence.data["poles_met"] == 1
+    assert "101" not in evidence.data["primes"]
 
 
 # Nowhere defined, or too large
@@ -365,7 +392,7 @@ def raises(error):
     ids=["pole", "singular step", "singular matrix"],
 )
 def test_an_identity_defined_nowhere_is_undecided(sides):
-    decision = decide(Identity(1, sides, Size(1, 1.0), 1, None), 0)
+    decision = decide(Identity(1, sides, Size(1, 1.0), 1, None, subject=()), 0)
     assert decision.verdict is UNDECIDED
     assert decision.witness is None
     assert "a denominator seems to vanish identically" in decision.evidence.summary
@@ -397,7 +424,7 @@ def test_an_identity_with_too_many_poles_is_undecided(poles):
 
 def test_an_error_of_another_kind_is_not_swallowed():
     with pytest.raises(ZeroDivisionError):
-        decide(Identity(1, raises(ZeroDivisionError), Size(1, 1.0), 1, None), 0)
+        decide(Identity(1, raises(ZeroDivisionError), Size(1, 1.0), 1, None, subject=()), 0)
 
 
 # Chance, and how to repeat it
@@ -466,7 +493,7 @@ def test_every_eps_is_drawn_from_the_units(monkeypatch):
         return [], []
 
     monkeypatch.setattr(decide_module, "random_prime_field", lambda rng: GF(3))
-    decide(Identity(1, sides, Size(1, 1.0), 0, None), 0, 3000)
+    decide(Identity(1, sides, Size(1, 1.0), 0, None, subject=()), 0, 3000)
     assert seen == {1, 2}
 
 
@@ -494,7 +521,7 @@ def test_a_witness_shows_all_of_both_sides():
 
 
 def test_a_witness_with_named_entries_shows_the_first_that_differs():
-    named = Identity(1, TRUE.sides, TRUE.equation, 0, None, "Pi", "Pi~", ("entry (1,1)", "entry (1,2)"))
+    named = Identity(1, TRUE.sides, TRUE.equation, 0, None, "Pi", "Pi~", ("entry (1,1)", "entry (1,2)"), subject=())
     witness = witness_of(named, QQ, (fmpq(1),), fmpq(1), ([fmpq(1), fmpq(2)], [fmpq(1), fmpq(3)]))
     assert (witness.left, witness.right) == (("2",), ("3",))
     assert (witness.left_label, witness.right_label) == ("entry (1,2) of Pi", "entry (1,2) of Pi~")

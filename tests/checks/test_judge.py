@@ -25,7 +25,9 @@ PROOF = theorems.evidence("Theorem 1", [("a hypothesis", True)])
 
 def identity_of(right) -> Identity:
     """x = right(x, field)."""
-    return Identity(1, lambda field, point, eps: ([point[0]], [right(point[0], field)]), Size(40, 200.0), 0, None)
+    return Identity(
+        1, lambda field, point, eps: ([point[0]], [right(point[0], field)]), Size(40, 200.0), 0, None, subject=()
+    )
 
 
 TRUE = identity_of(lambda x, field: x)
@@ -38,6 +40,7 @@ POLE_FIRST = Identity(
     Size(1, 10.0),
     1,
     None,
+    subject=(),
 )
 
 
@@ -50,7 +53,7 @@ def undefined(field, point, eps):
     raise SingularStep("no value")
 
 
-NOWHERE = Identity(1, undefined, Size(1, 1.0), 1, None)
+NOWHERE = Identity(1, undefined, Size(1, 1.0), 1, None, subject=())
 
 
 @pytest.fixture

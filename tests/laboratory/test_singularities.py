@@ -23,7 +23,8 @@ PRIME = 2_305_843_009_213_693_951
 
 
 def runs(name: str, **options):
-    return [singularities(load(name).system, eps, **options) for eps in default_eps(0)]
+    system = load(name).system
+    return [singularities(system, eps, **options) for eps in default_eps(system, 0)]
 
 
 def test_the_forms_are_those_of_the_map():

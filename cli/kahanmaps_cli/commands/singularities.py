@@ -71,7 +71,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
                 seconds=options["seconds"],
                 progress=progress,
             )
-            for value in ((eps,) if eps is not None else default_eps(options["seed"]))
+            for value in ((eps,) if eps is not None else default_eps(file.system, options["seed"]))
         ]
     agree = len({run.shape for run in runs}) == 1
     verdict = runs[0].verdict if agree else UNDECIDED

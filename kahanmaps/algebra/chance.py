@@ -1,0 +1,59 @@
+"""Chance that follows the question: what is drawn comes from a hash of what is asked together with the seed.
+
+A seed alone is public, and whoever knows the primes and points in advance can write a false claim that passes at all of
+them. Hashed with the claim they are known only once the claim is written, and change with every letter of it
+(fiat-shamir-1987). docs/mathematics.md says what an error bound then means.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
+
+from kahanmaps.algebra.polynomials import RationalFunction
+
+
+def seed_for(seed: int, *subject: Any) -> int:
+    """A seed of 256 bits for whatever is drawn about `subject`: the same for the same seed and subject.
+
+    Args:
+        seed: the one that the user chose.
+        subject: all that determines what is asked: text, integers, fmpq, None, polynomials and rational functions in
+            fmpq_mpoly, fmpq_mat, and sequences of these.
+
+    Returns:
+        An integer, SHA-256 of all of this.
+
+    Raises:
+        TypeError: for a part of another kind, whose text might leave something out.
+
+    Source: fiat-shamir-1987.
+
+    >>> seed_for(0, "x*y") == seed_for(0, "x*y"), seed_for(0, "x*y") == seed_for(1, "x*y")
+    (True, False)
+    >>> seed_for(0, ["x", "y"]) == seed_for(0, ["xy"])
+    False
+    """
+    return int.from_bytes(hashlib.sha256(_written((seed, *subject)).encode()).digest(), "big")
+
+
+def _written(part: Any) -> str:
+    """Text that differs for different parts; its length stands in front of each piece, so that pieces cannot merge."""
+    if isinstance(part, int):
+        part = fmpz(part)  # whose text may be of any length
+    if part is None or isinstance(part, str | fmpz | fmpq):
+        text = f"{type(part).__name__} {part}"
+    elif isinstance(part, fmpq_mpoly):
+        text = f"{' '.join(part.context().names())}: {part}"
+    elif isinstance(part, RationalFunction):
+        text = _written((part.numerator, part.denominator))
+    elif isinstance(part, fmpq_mat):
+        text = f"{part.nrows()} {part.ncols()} {part.entries()}"
+    elif isinstance(part, Sequence):
+        text = "".join(_written(piece) for piece in part)
+    else:
+        raise TypeError(f"found a {type(part).__name__}, expected text, numbers, polynomials, matrices or sequences")
+    return f"{len(text)} {text}"

@@ -1,0 +1,139 @@
+"""Systems and claims made of the primes that another run drew gain nothing: what is drawn follows the question.
+
+Euler's top with y z + N x^2 for y z is integrable modulo every prime that divides N, and over Q it is not: its degrees
+grow like those of a map with one integral, and the second integral of the top is lost. N is made of all primes that
+the same command drew, with the same seed, for the system before.
+"""
+
+from __future__ import annotations
+
+from math import prod
+
+import pytest
+
+from kahanmaps import (
+    QuadraticSystem,
+    SystemFile,
+    check_commute,
+    check_integrals,
+    find_integrals,
+    parse_rational_function,
+)
+from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.checks.settings import Settings
+from kahanmaps.laboratory.degrees import degree_growth
+from kahanmaps.laboratory.densities import find_densities
+
+ROUNDS = 2
+
+
+def top(N: int) -> QuadraticSystem:
+    return QuadraticSystem.from_text(["x", "y", "z"], [f"y*z + {N}*x^2", "-2*z*x", "x*y"])
+
+
+def file_of(system: QuadraticSystem) -> SystemFile:
+    return SystemFile.from_system(system)
+
+
+def test_degrees_are_not_those_of_a_system_made_for_its_primes():
+    N = 1
+    for _ in range(ROUNDS):
+        found = degree_growth(top(N), max_terms=7)
+        assert found.degrees[:6] == (1, 3, 9, 23, 57, 139)
+        N = prod(found.primes)
+
+
+def test_integrals_are_not_those_of_a_system_made_for_its_primes():
+    N = 0
+    counts = []
+    for _ in range(ROUNDS + 1):
+        found = find_integrals(file_of(top(N)), max_degree=2)
+        counts.append(len(found.integrals))
+        N = prod(found.primes)
+    assert counts == [2] + [1] * ROUNDS
+
+
+def test_densities_are_not_those_of_a_system_made_for_its_primes():
+    # The Lotka-Volterra system has phi = x y, and with y^2 in x' no density of degree 2.
+    N = 0
+    counts = []
+    for _ in range(ROUNDS + 1):
+        system = QuadraticSystem.from_text(["x", "y"], [f"x*(1 - y) + {N}*y^2", "y*(x - 1)"])
+        found = find_densities(file_of(system), max_degree=2)
+        counts.append(bool(found.densities))
+        N = prod(found.primes)
+    assert counts == [True] + [False] * ROUNDS
+
+
+def primes_of(report) -> int:
+    """The product of all primes at which the claims of a report were tried."""
+    evidence = [one for finding in report.findings for one in (finding.evidence, *finding.also)]
+    return prod(int(p) for one in evidence for p in one.data.get("primes", ()))
+
+
+@pytest.mark.parametrize("seed", [0, 5])
+def test_an_integral_made_of_the_primes_of_another_is_refuted(seed):
+    system = file_of(top(0))
+    settings = Settings(seed=seed, steps=2)
+    N = 0
+    for k in range(ROUNDS + 1):
+        claim = parse_rational_function(f"(y^2 + 2*z^2)/(1 + 2*eps^2*x^2) + {N}*x", ["x", "y", "z", "eps"])
+        report = check_integrals(system, settings, {"I": claim})
+        assert str(report.verdict) == ("refuted" if k else "proved")
+        N = primes_of(report) or N + 1
+
+
+@pytest.mark.parametrize("seed", [0, 5])
+def test_maps_made_to_commute_modulo_the_primes_of_another_pair_are_refuted(seed):
+    f = QuadraticSystem.from_text(["x", "y"], ["x^2 + x", "y^2 - y"])
+    settings = Settings(seed=seed, steps=2)
+    N = 0
+    for k in range(ROUNDS + 1):
+        g = QuadraticSystem.from_text(["x", "y"], [f"x^2 + x + {N}*x*y", "y - y^2"])
+        report = check_commute(file_of(f), file_of(g), settings)
+        assert str(report.verdict) == ("refuted" if k else "proved")
+        N = primes_of(report) or N + 1
+
+
+def test_an_integral_that_is_one_only_at_the_eps_of_another_orbit_is_refuted_along_its_own():
+    system = file_of(QuadraticSystem.from_text(["x", "y"], ["x^2 + y", "y^2 + x*y + 1"]))
+    steps = Settings(steps=3)
+    eps = check_integrals(system, steps, {"I": claim_at("1/10")}).to_json()["orbit"]["eps"]
+    for _ in range(4):
+        report = check_integrals(system, steps, {"I": claim_at(eps)})
+        orbit = [one for one in report.findings[0].also if one.method == "exact orbit"]
+        assert "fails" in orbit[0].summary
+        eps = report.to_json()["orbit"]["eps"]
+
+
+def claim_at(eps: str):
+    return parse_rational_function(f"(eps - {eps})*x", ["x", "y", "eps"])
+
+
+# The hash itself
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (("xy",), ("x", "y")),
+        ((("x",), "y"), ("x", ("y",))),
+        ((1,), ("1",)),
+        ((None,), ("None",)),
+        ((), ((),)),
+        ((ring(["x", "y"]).gens()[0],), (ring(["y", "x"]).gens()[1],)),
+        (([1, 2], 3), ([1], 2, 3)),
+    ],
+)
+def test_subjects_that_differ_have_seeds_that_differ(one, other):
+    assert seed_for(0, *one) != seed_for(0, *other)
+
+
+def test_a_subject_of_a_kind_whose_text_might_leave_something_out_is_refused():
+    with pytest.raises(TypeError, match="found a float"):
+        seed_for(0, 0.5)
+
+
+def test_numbers_of_any_length_have_seeds():
+    assert seed_for(10**6000, 10**6000) != seed_for(10**6000, 10**6000 + 1)
