@@ -161,6 +161,20 @@ def substitute(polynomial: fmpq_mpoly, values: Mapping[str, fmpq]) -> fmpq_mpoly
     return target.from_dict(terms)
 
 
+def coefficients_in(polynomial: fmpq_mpoly, count: int) -> list[fmpq_mpoly]:
+    """The coefficients of the monomials in the first `count` variables, polynomials in the others, in the same ring.
+
+    >>> x, a, b = ring(["x", "a", "b"]).gens()
+    >>> coefficients_in(a*x**2 + b*x - a*b*x + 3, 1)
+    [a, -a*b + b, 3]
+    """
+    found: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}
+    for monomial, value in polynomial.terms():
+        exponents = tuple(int(e) for e in monomial)
+        found.setdefault(exponents[:count], {})[((0,) * count + exponents[count:])] = value
+    return [polynomial.context().from_dict(terms) for terms in found.values()]
+
+
 @dataclass(frozen=True, eq=False)
 class RationalFunction:
     """A quotient of two polynomials over Q; the denominator has coprime integer coefficients, the first positive.

@@ -50,7 +50,8 @@ def density_identity(system: QuadraticSystem, density: PhaseFunction, eps: fmpq 
     right = Fraction(before.above * there.above, before.below * there.below)
     poles = image.degree + left.below.degree + right.below.degree
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
-    return Identity(system.dim, sides, left.equation(right), poles, eps, *labels)
+    subject = (system.rhs, density.subject)
+    return Identity(system.dim, sides, left.equation(right), poles, eps, *labels, subject=subject)
 
 
 def _image(kahan: KahanMap, point: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -77,26 +78,25 @@ def check_measure(file: SystemFile, settings: Settings | None = None, extra: Rat
     Raises InputError where no density is known or claimed.
     """
     settings = settings or Settings()
-    candidates: list[tuple[PhaseFunction, Evidence | None, str]] = []
+    candidates: list[tuple[DeterminantDensity | ClaimedDensity, Evidence | None, str]] = []
     if file.hamiltonian is not None:
         proof = theorems.determinant_density_invariant(file.hamiltonian)
         candidates.append((DeterminantDensity(file.system), proof, "petrera-suris-2016, eq. (eq: CMOQ measure)"))
     if extra is not None:
         file.require_claim("a density", extra)
-        if extra.numerator.is_zero():
-            raise InputError("found the density 0, expected a function that is not zero: the measure is dx/phi")
     for function in (file.density, extra):
         if function is not None:
-            candidates.append((ClaimedDensity(function), None, ""))
+            candidates.append((ClaimedDensity(function, settings.eps), None, ""))
     if not candidates:
         raise InputError(
             f"no density of {file.name} is known or claimed: add a section [density] with phi to the file, "
             "or give --density EXPRESSION (the measure is dx/phi)"
         )
-    orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings, file.member is not None)
+    claimed = [density.subject for density, _, _ in candidates]
+    orbit = run_orbit(file.system, settings, claimed, file.member is not None)
     findings = tuple(
         judge(
-            "the measure dx/phi is invariant",
+            f"the measure dx/phi is invariant{f', {density.condition}' if density.condition else ''}",
             density_identity(file.system, density, settings.eps),
             settings,
             proof,
@@ -124,7 +124,8 @@ def transformation_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> 
     entries = tuple(f"entry ({i + 1},{j + 1})" for i in range(n) for j in range(n))
     labels = ("(I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T", "(I - eps f'(x)) Pi(x~) (I - eps f'(x))^T")
     equation = transformation_size(hamiltonian, size, VARIABLE)
-    return Identity(n, sides, equation, 4 * image.degree + 4, eps, *labels, entries)
+    subject = (hamiltonian.H, hamiltonian.J)
+    return Identity(n, sides, equation, 4 * image.degree + 4, eps, *labels, entries, subject=subject)
 
 
 def jacobi_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> Identity:
@@ -140,7 +141,8 @@ def jacobi_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> Identity
     )
     size = eps_size(eps)
     equation = jacobi_size(hamiltonian, size, VARIABLE)
-    return Identity(n, sides, equation, 8, eps, "the cyclic sum", "what it should be", entries)
+    subject = (hamiltonian.H, hamiltonian.J)
+    return Identity(n, sides, equation, 8, eps, "the cyclic sum", "what it should be", entries, subject=subject)
 
 
 def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:
@@ -156,7 +158,7 @@ def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:
         )
     hamiltonian = file.hamiltonian
     proof = theorems.poisson_tensor_invariant(hamiltonian, file.member)
-    orbit = run_orbit(KahanMap(file.system, settings.orbit_eps), settings, file.member is not None)
+    orbit = run_orbit(file.system, settings, (hamiltonian.H, hamiltonian.J), file.member is not None)
     source = "petrera-suris-2016, Theorem 12" if file.member is not None else ""
     law = judge(
         "the Kahan map is Poisson for Pi",

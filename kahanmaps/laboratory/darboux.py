@@ -221,13 +221,18 @@ def _list(
         found.reason = f"no closed form for the cofactor {product.text(cofactors)}: {forms.reason}"
         return
     polynomials = tuple(forms.bases[0])
-    proved = all(_is_proved(laboratory, cofactors, product, P) for P in polynomials)
-    verdict = Verdict.PROVED if proved else Verdict.SUPPORTED
+    outcomes = [_expanded(laboratory, cofactors, product, P) for P in polynomials]
+    if Verdict.REFUTED in outcomes:
+        found.reason = f"a formula for the cofactor {product.text(cofactors)} did not pass as an identity"
+        return
+    verdict = Verdict.PROVED if all(one is Verdict.PROVED for one in outcomes) else Verdict.SUPPORTED
     found.spaces.append(DarbouxPolynomials(product.text(cofactors), polynomials, verdict))
 
 
-def _is_proved(laboratory: Laboratory, cofactors: Sequence[Cofactor], product: CofactorProduct, P: fmpq_mpoly) -> bool:
-    """Whether P(x~) prod g(x, eps)^k = prod g(x~, -eps)^k P(x), expanded; False where that is too large."""
+def _expanded(
+    laboratory: Laboratory, cofactors: Sequence[Cofactor], product: CofactorProduct, P: fmpq_mpoly
+) -> Verdict | None:
+    """Whether P(x~) prod g(x, eps)^k = prod g(x~, -eps)^k P(x), expanded: proved, refuted, or None where too large."""
     system = laboratory.system
     K = FunctionField((*system.variables, *system.symbols, "eps"), _BUDGET)
     point, values = K.variables[: system.dim], K.variables[system.dim : -1]
@@ -243,6 +248,6 @@ def _is_proved(laboratory: Laboratory, cofactors: Sequence[Cofactor], product: C
                 else:
                     left = left * evaluate(one.polynomial, K, (*point, *values, eps))
                     right = right * evaluate(one.polynomial, K, (*image, *values, -eps))
-        return K.equal(left, right)
+        return Verdict.PROVED if K.equal(left, right) else Verdict.REFUTED
     except (BudgetExceeded, SingularMatrix, SingularStep, ZeroDivisionError):
-        return False
+        return None

@@ -9,13 +9,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from math import comb
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.latex import latex_rational_function
-from kahanmaps.algebra.polynomials import RationalFunction, primitive_part
+from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, primitive_part
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.errors import InputError
@@ -216,7 +217,8 @@ def _theorem(laboratory: Laboratory) -> FoundDensity | None:
         D = D.subs(at)
     if D.is_zero():
         return None
-    _, phi = primitive_part(D / _content(D, laboratory.system.dim))
+    content = reduce(lambda common, c: common.gcd(c), coefficients_in(D, laboratory.system.dim))
+    _, phi = primitive_part(D / content)
     evidence = Evidence(
         "theorem", "f = J grad H with a constant skew matrix J: dx/det(I - eps f'(x)) is invariant (cmoq-2013)"
     )
@@ -226,19 +228,6 @@ def _theorem(laboratory: Laboratory) -> FoundDensity | None:
 def _degree_in(polynomial: fmpq_mpoly, n: int) -> int:
     """The degree in the first n variables."""
     return max((sum(int(e) for e in monomial[:n]) for monomial in polynomial.monoms()), default=0)
-
-
-def _content(polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
-    """The greatest common divisor of the coefficients of monomials in the first n variables."""
-    coefficients: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}
-    for monomial, value in polynomial.terms():
-        exponents = tuple(int(e) for e in monomial)
-        coefficients.setdefault(exponents[:n], {})[((0,) * n + exponents[n:])] = value
-    context = polynomial.context()
-    common = context.constant(0)
-    for terms in coefficients.values():
-        common = common.gcd(context.from_dict(terms))
-    return common
 
 
 def _period(laboratory: Laboratory) -> int | None:

@@ -13,6 +13,7 @@ from typing import Any
 
 from flint import fmpq
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate, ring
@@ -23,7 +24,7 @@ from kahanmaps.checks.decide import decide
 from kahanmaps.checks.preserve import density_identity
 from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep
 from kahanmaps.invariants.integrals import ClaimedIntegral
-from kahanmaps.invariants.measures import ClaimedDensity
+from kahanmaps.invariants.measures import ClaimedDensity, density_condition
 from kahanmaps.maps.kahan import KahanMapOver
 from kahanmaps.systems.parametric import ParametricSystem
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -90,6 +91,9 @@ def _verdict(
     system: ParametricSystem, function: RationalFunction, eps: fmpq | None, seed: int, is_density: bool
 ) -> tuple[Verdict, Evidence]:
     scope = _scope(system, eps)
+    if is_density:
+        condition = density_condition(function, system.dim, eps)
+        scope = f"{scope} {condition}".strip()
     holds = _holds_at_points(system, function, eps, seed, is_density)
     if holds is None:
         return Verdict.UNDECIDED, Evidence("random points over GF(p)", f"has no value at random points, {scope}")
@@ -107,8 +111,9 @@ def _verdict(
                 field.variables[-1] if eps is None else field.convert(eps),
                 is_density,
             )
-            if field.equal(*sides):
-                return Verdict.PROVED, Evidence("expansion", f"both sides are the same rational function, {scope}")
+            if not field.equal(*sides):
+                return Verdict.REFUTED, Evidence("expansion", f"the two sides are different functions, {scope}")
+            return Verdict.PROVED, Evidence("expansion", f"both sides are the same rational function, {scope}")
         except (BudgetExceeded, SingularMatrix, ZeroDivisionError):
             pass
     if system.symbols:
@@ -121,7 +126,7 @@ def _verdict(
         [polynomial.compose(*ring(system.variables).gens(), ctx=ring(system.variables)) for polynomial in system.rhs]
     )
     if is_density:
-        identity = density_identity(quadratic, ClaimedDensity(function), eps)
+        identity = density_identity(quadratic, ClaimedDensity(function, eps), eps)
     else:
         identity = conservation(quadratic, ClaimedIntegral("I", function), eps)
     decision = decide(identity, seed)
@@ -148,9 +153,9 @@ def _sides(
     here, there = (*point, *values, eps), (*image, *values, eps)
     P, Q = (evaluate(part, field, here) for part in (function.numerator, function.denominator))
     P_there, Q_there = (evaluate(part, field, there) for part in (function.numerator, function.denominator))
-    # Where a map is not invertible, P and Q may both vanish on its image: then I has no value there.
-    if any(field.is_zero(p) and field.is_zero(q) for p, q in ((P, Q), (P_there, Q_there))):
-        raise ZeroDivisionError("0/0")
+    # Q may vanish at the eps in force, and where a map is not invertible on its image: then P/Q has no value there.
+    if field.is_zero(Q) or field.is_zero(Q_there):
+        raise ZeroDivisionError("the denominator is 0")
     left, right = P_there * Q, P * Q_there
     if is_density:
         above, below = map_.inverse.determinant(image), map_.determinant(point)
@@ -164,7 +169,7 @@ def _holds_at_points(
     system: ParametricSystem, function: RationalFunction, eps: fmpq | None, seed: int, is_density: bool
 ) -> bool | None:
     """Whether the sides agree at random points modulo primes, None where they had no value at any of many."""
-    rng = random.Random(f"identity {seed}")
+    rng = random.Random(f"identity {seed_for(seed, system.symbols, system.rhs, function, eps, is_density)}")
     good = 0
     for _ in range(10 * _POINTS):
         field: Field = GF(random_prime(rng))

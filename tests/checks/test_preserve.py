@@ -7,6 +7,7 @@ generic Hamiltonian in dimension 4. Witnesses are computed a second time, det dP
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from fractions import Fraction
 
 import pytest
@@ -48,11 +49,11 @@ from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.invariants import poisson
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.files import SystemFile, parse_system
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-PROVED, REFUTED, SUPPORTED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED
+PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
 few = settings(max_examples=15)
 
 PLANE = hamiltonian_of("q p", "p^2/2 - q^3/3 + q")
@@ -198,6 +199,45 @@ def test_a_system_without_any_density_is_wrong_use():
 def test_the_density_zero_is_wrong_use():
     with pytest.raises(InputError, match="found the density 0"):
         check_measure(file_of(LORENZ), extra=claim("x - x", "x y z"))
+
+
+@pytest.mark.parametrize("eps", ["1/10", "-2"])
+@pytest.mark.parametrize("of", [LORENZ, LOTKA_VOLTERRA, EULER_TOP])
+def test_a_density_that_is_zero_at_the_eps_in_force_is_wrong_use(eps, of):
+    # 0 = 0 is every law that a density obeys.
+    phi = f"(eps^2 - ({eps})*eps)*({of.variables[0]} + 1)"
+    with pytest.raises(InputError, match=f"which is identically 0 at eps = {eps}, expected a function"):
+        check_measure(file_of(of), Settings(eps=eps, steps=1), claim(phi, " ".join(of.variables)))
+    with pytest.raises(InputError, match="identically 0"):
+        check_measure(file_of(of, phi=phi), Settings(eps=eps, steps=1))
+
+
+def test_a_density_that_is_zero_at_the_values_of_the_parameters_is_wrong_use():
+    text = """variables = ["x", "y"]
+        parameters = { a = "1/10" }
+        [system]
+        rhs = ["x^2 + y", "y^2 + x*y + 1"]
+        [density]
+        phi = "(a - eps)*x"
+        """
+    for eps, ends in (("1/10", pytest.raises(InputError, match="identically 0 at eps = 1/10")), ("1/5", nullcontext())):
+        with ends:
+            assert check_measure(parse_system(text), Settings(eps=eps, steps=1)).verdict is REFUTED
+    with pytest.raises(InputError, match="found 0, expected a function that is not zero"):
+        parse_system(text.replace("a - eps", "a - 1/10"))
+
+
+def test_a_density_for_every_eps_says_at_which_eps_it_is_none():
+    report = check_measure(file_of(LOTKA_VOLTERRA), QUICK, claim("(10*eps - 1)*(eps + 2)*x*y", "x y"))
+    assert only(report).claim == "the measure dx/phi is invariant, where 10*eps^2 + 19*eps - 2 is not 0"
+    assert report.verdict in (SUPPORTED, PROVED)
+    plain = check_measure(file_of(LOTKA_VOLTERRA), QUICK, claim("x*y", "x y"))
+    assert only(plain).claim == "the measure dx/phi is invariant"
+
+
+def test_a_density_without_a_value_at_the_eps_in_force_is_undecided():
+    phi = claim("x*y/(10*eps - 1)", "x y")
+    assert check_measure(file_of(LOTKA_VOLTERRA), Settings(eps="1/10", steps=1), phi).verdict is UNDECIDED
 
 
 @pytest.mark.parametrize("names", [("x", "y"), ("y", "x", "eps")])

@@ -1,0 +1,91 @@
+"""Formulas that were found are put to the proof: what is expanded decides, and what has no value is undecided."""
+
+from __future__ import annotations
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory import identities
+from kahanmaps.laboratory.darboux import darboux_polynomials
+from kahanmaps.laboratory.densities import find_densities
+from kahanmaps.laboratory.identities import density_verdict, integral_verdict
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.files import SystemFile, parse_system
+from kahanmaps.systems.parametric import ParametricSystem
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+ROTATION = ParametricSystem.of_system(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]))
+LOTKA_VOLTERRA = ParametricSystem.of_system(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]))
+VERDICTS = {False: integral_verdict, True: density_verdict}
+
+
+def function(text: str):
+    return parse_rational_function(text, ["x", "y", "eps"])
+
+
+@pytest.fixture
+def blind(monkeypatch):
+    """Random points that let everything pass."""
+    monkeypatch.setattr(identities, "_holds_at_points", lambda *arguments: True)
+
+
+@pytest.mark.parametrize("is_density", [False, True])
+@pytest.mark.parametrize("eps", [None, fmpq(1, 3)])
+def test_an_expansion_refutes_what_random_points_let_pass(blind, is_density, eps):
+    verdict, evidence = VERDICTS[is_density](ROTATION, function("x^2 - y^2 + eps"), eps)
+    assert verdict is Verdict.REFUTED
+    assert evidence.method == "expansion"
+
+
+def test_the_proof_for_every_eps_is_for_eps_and_not_for_a_coordinate():
+    # Conserved where eps = x or eps = y, and nowhere else.
+    for name in ("x", "y"):
+        assert integral_verdict(ROTATION, function(f"(eps - {name})^2"), None)[0] is Verdict.REFUTED
+    assert integral_verdict(ROTATION, function("eps*(x^2 + y^2)"), None)[0] is Verdict.PROVED
+
+
+@pytest.mark.parametrize("is_density", [False, True])
+def test_a_function_without_values_at_the_eps_in_force_is_undecided(is_density):
+    system = LOTKA_VOLTERRA if is_density else ROTATION
+    phi = function("x*y/(10*eps - 1)" if is_density else "x/(10*eps - 1)")
+    assert VERDICTS[is_density](system, phi, fmpq(1, 10))[0] is Verdict.UNDECIDED
+    assert VERDICTS[is_density](system, phi, fmpq(1, 9))[0] is (Verdict.PROVED if is_density else Verdict.REFUTED)
+
+
+def test_a_density_that_is_zero_at_the_eps_in_force_is_wrong_use():
+    with pytest.raises(InputError, match="identically 0 at eps = 1/10"):
+        density_verdict(ROTATION, function("(10*eps - 1)*x"), fmpq(1, 10))
+
+
+def file_with(rhs: str, **values: str) -> SystemFile:
+    parameters = ", ".join(f'{name} = "{value}"' for name, value in values.items())
+    return parse_system(f'variables = ["x", "y"]\nparameters = {{ {parameters} }}\n[system]\nrhs = {rhs}\n')
+
+
+def test_a_density_with_symbols_is_for_those_at_which_it_is_not_zero():
+    lines = file_with('["(a*x + b*y + c)*x", "2*(a*x + b*y + c)*y"]', a="1", b="2", c="3")
+    (found,) = find_densities(lines, symbols=("a", "b", "c")).densities
+    assert found.evidence.summary.endswith("for every eps and every a, b, c where a, b, c are not all 0")
+    # The second line is c = a - 1, which is not 0 where the first, a, is.
+    lines = file_with('["(a*x + b*y)*x", "2*(a*x + b*y)*y"]', a="1", b="2")
+    (found,) = find_densities(lines, symbols=("a",)).densities
+    assert found.evidence.summary.endswith("for every eps and every a")
+
+
+def test_a_darboux_polynomial_that_expansion_refutes_is_left_out(monkeypatch):
+    formulas = Laboratory.formulas
+
+    def wrong(self, model, spaces_on, deadline):
+        found = formulas(self, model, spaces_on, deadline)
+        one = parse_polynomial("x + y", found.bases[0][0].context().names())
+        found.bases[0][0] = found.bases[0][0] + one
+        return found
+
+    monkeypatch.setattr(Laboratory, "formulas", wrong)
+    found = darboux_polynomials(load("lotka_volterra"), 1)
+    assert found.spaces == []
+    assert "did not pass as an identity" in found.reason
