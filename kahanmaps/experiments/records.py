@@ -93,13 +93,21 @@ class Job:
 
 
 class Outcome(StrEnum):
-    """What became of a task. Everything but `ok` is a failure of the task, not of a claim: that is its verdict."""
+    """What became of a task. Everything but `ok` is a failure of the task, not of a claim: that is its verdict.
+
+    `lost` is no result: what did the task was killed from outside at every try. No database has it, and the task stays
+    without a result.
+    """
 
     OK = "ok"
     FAILED = "failed"
     CRASHED = "crashed"
     TIMEOUT = "timeout"
     OUT_OF_MEMORY = "out-of-memory"
+    LOST = "lost"
+
+
+KEPT = tuple(outcome for outcome in Outcome if outcome is not Outcome.LOST)  # the outcomes of results
 
 
 @dataclass(frozen=True)

@@ -229,8 +229,12 @@ class Store:
     # Results
 
     def add(self, records: Sequence[Record]) -> None:
-        """Store these records, all or none. A failure does not replace a result, otherwise the later one counts."""
+        """Store these records, all or none. A failure does not replace a result, otherwise the later one counts.
+
+        What is lost is no result, and leaves the task as it was.
+        """
         self._database.must_write()
+        records = [record for record in records if record.outcome is not Outcome.LOST]
         rows = [row_of(record) for record in records]  # what JSON cannot hold is refused here
         with self._database.transaction():
             for record, row in zip(records, rows, strict=True):

@@ -19,7 +19,7 @@ from typing import Any
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.export import NUMBER, Entry, entries, plain
-from kahanmaps.experiments.records import Outcome, Row, canonical
+from kahanmaps.experiments.records import KEPT, Row, canonical
 from kahanmaps.experiments.shown import summary_html
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
@@ -119,7 +119,7 @@ class Summary:
     def counts(self, digits: int | None = None) -> Table:
         """What became of the tasks of each group; what never happened has no column. For `digits`, see `tables`."""
         kinds: dict[str, list[int]] = {"missing": [group.missing for group in self.groups]}
-        for outcome in Outcome:
+        for outcome in KEPT:
             kinds[outcome] = [group.outcomes[outcome] for group in self.groups]
         for verdict in sorted({verdict for group in self.groups for verdict in group.verdicts}, key=_place_of_verdict):
             kinds[verdict] = [group.verdicts.get(verdict, 0) for group in self.groups]
@@ -314,7 +314,7 @@ class _Gathering:
             self.values,
             self.tasks,
             self.missing,
-            {str(outcome): self.outcomes[outcome] for outcome in Outcome},
+            {str(outcome): self.outcomes[outcome] for outcome in KEPT},
             {verdict: self.verdicts[verdict] for verdict in verdicts},
             {name: self.numbers[name].finish() for name in sorted(self.numbers, key=lambda n: (n in OF_THE_RUN, n))},
             {name: (true, false) for name, (true, false) in sorted(self.flags.items())},

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.experiments.records import KEY_LENGTH, Limits, Outcome, Record, Task, canonical, digest
+from kahanmaps.experiments.records import KEPT, KEY_LENGTH, Limits, Outcome, Record, Task, canonical, digest
 
 plain = st.recursive(
     st.none() | st.booleans() | st.integers() | st.text(max_size=5),
@@ -124,7 +124,9 @@ def test_only_a_task_that_was_done_is_ok(outcome):
 
 
 def test_outcomes_are_spelled_as_documented():
-    assert [str(outcome) for outcome in Outcome] == ["ok", "failed", "crashed", "timeout", "out-of-memory"]
+    kept = ["ok", "failed", "crashed", "timeout", "out-of-memory"]
+    assert [str(outcome) for outcome in Outcome] == [*kept, "lost"]
+    assert [str(outcome) for outcome in KEPT] == kept
 
 
 def test_nothing_is_limited_unless_said():
