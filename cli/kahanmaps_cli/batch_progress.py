@@ -25,6 +25,7 @@ class BatchProgress:
     def __init__(self, todo: int, quiet: bool) -> None:
         self.todo = todo
         self.outcomes: Counter[str] = Counter()
+        self.why_lost = ""  # the last of them
         self._quiet = quiet
         self._in_flight = 0
         self._begin = self._last = time.monotonic()
@@ -36,8 +37,13 @@ class BatchProgress:
 
     @property
     def done(self) -> int:
-        """How many records there were."""
-        return sum(self.outcomes.values())
+        """How many tasks have come to a result."""
+        return sum(self.outcomes.values()) - self.lost
+
+    @property
+    def lost(self) -> int:
+        """How many were given up without a result."""
+        return self.outcomes["lost"]
 
     @property
     def seconds(self) -> float:
@@ -47,7 +53,10 @@ class BatchProgress:
     def tell(self, records: Sequence[Record], in_flight: int) -> None:
         """Some more records, or none for a while; how many tasks are being done."""
         self._in_flight = in_flight
-        self.outcomes.update(str(record.outcome) for record in records)
+        for record in records:
+            self.outcomes[str(record.outcome)] += 1
+            if record.outcome == "lost":
+                self.why_lost = record.message
         now = time.monotonic()
         if self._quiet or now - self._last < (_SHOW_EVERY if self._bar is not None else _LINE_EVERY):
             return
@@ -68,6 +77,8 @@ class BatchProgress:
         bad = self.done - self.outcomes["ok"]
         if bad:
             pieces.append(f"{bad} failed")
+        if self.lost:
+            pieces.append(f"{self.lost} lost")
         return ", ".join(pieces)
 
     def __enter__(self) -> BatchProgress:

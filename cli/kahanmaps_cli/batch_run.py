@@ -185,6 +185,13 @@ def _tell_end(
             again += f" --{name.replace('_', '-')} {options[name]}"
     if options["shard"]:
         again += f" --shard {options['shard'][0]}/{options['shard'][1]}"
+    if progress.lost:
+        from kahanmaps.experiments.endings import TRIES
+
+        say(
+            f"{_tasks(progress.lost)} lost, without a result: what did them was killed, or could not be run, "
+            f"{TRIES} times ({progress.why_lost})"
+        )
     if missing:
         say(f"{'interrupted: ' if interrupted else ''}{_tasks(missing)} without a result yet; to continue: {again}")
     if failed:

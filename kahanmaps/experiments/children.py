@@ -1,8 +1,9 @@
 """Tasks in child processes on this machine: short ones in groups, each within its limits, and no child outlives us.
 
 A child is given one task after the other until it has worked for some seconds; then another one takes its place. What
-goes wrong in a child that has done other tasks before, or that somebody kills, is tried once more alone in a new
-child, and only that decides: so what is recorded does not depend on the order of tasks.
+goes wrong in a child that has done other tasks before, or dies of a signal, is tried once more alone in a new child,
+and only that decides: so what is recorded does not depend on the order of tasks. What is killed from outside decides
+nothing: it is tried a few times, and then it is lost.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from signal import SIGKILL, Signals
+from signal import SIGKILL
 from typing import IO, Any
 
 from kahanmaps.errors import KahanmapsError
+from kahanmaps.experiments.endings import TRIES, ending, is_from_outside
 from kahanmaps.experiments.executor import Documents
 from kahanmaps.experiments.options import OTHER
 from kahanmaps.experiments.records import Job, Outcome, Record, Task
@@ -43,23 +45,33 @@ class ChildrenError(KahanmapsError):
 
 @dataclass
 class _Work:
-    """A job in flight; `alone` says that it is being tried once more, in a child of its own."""
+    """A job in flight; `alone` says that it is being tried once more, in a child of its own.
+
+    `tries` of it have ended with a child that was killed from outside; `had_fault`: one with a child that died of a
+    signal of its own.
+    """
 
     job: Job
     alone: bool = False
+    tries: int = 0
+    had_fault: bool = False
     begun: float | None = None
 
 
 class LocalChildren:
     """An executor that runs at most `jobs` child processes on this machine.
 
-    `documents` gives the text of a system document by its digest. Raises ChildrenError where no child can be started.
+    `documents` gives the text of a system document by its digest. A job whose children are killed from outside is lost
+    after so many `tries`. Raises ChildrenError where no child can be started.
     """
 
-    def __init__(self, jobs: int, documents: Documents, *, group_seconds: float = GROUP_SECONDS) -> None:
+    def __init__(
+        self, jobs: int, documents: Documents, *, group_seconds: float = GROUP_SECONDS, tries: int = TRIES
+    ) -> None:
         self.jobs = jobs
         self._documents = documents
         self._group_seconds = group_seconds
+        self._tries = tries
         self._selector = selectors.DefaultSelector()
         self._children: list[_Child] = []
         self._waiting: deque[_Work] = deque()
@@ -222,8 +234,8 @@ class LocalChildren:
         self._bury(child)
         if not child.is_ready:
             self._stillborn += 1
-            if self._stillborn >= (_KILLED_STARTS * self.jobs if status == -SIGKILL else _STARTS):
-                raise ChildrenError(f"a child process cannot start ({_how(status)}): {told or 'it says nothing'}")
+            if self._stillborn >= (_KILLED_STARTS * self.jobs if is_from_outside(status) else _STARTS):
+                raise ChildrenError(f"a child process cannot start (it {ending(status)}): {told or 'it says nothing'}")
             if work is not None:
                 work.begun = None
                 self._give(work)
@@ -231,13 +243,21 @@ class LocalChildren:
         if work is None:
             return []
         no_memory = any(words in told.lower() for words in _NO_MEMORY)
-        if not work.alone and (not was_fresh or status in (-SIGKILL, 0)):
+        outcome, message = Outcome.CRASHED, f"the child {ending(status)}"
+        if is_from_outside(status):
+            outcome = Outcome.LOST
+            work.tries += 1
+            again = work.tries < self._tries
+        elif no_memory:
+            outcome, message = Outcome.OUT_OF_MEMORY, "out of memory"
+            again = not was_fresh
+        else:
+            # Status 0 is the end of the questions. The signal of a fault may have been sent as well, but hardly twice.
+            again = not was_fresh or (status is not None and status <= 0 and not work.had_fault)
+            work.had_fault = True
+        if again:
             self._again(work)
             return []
-        outcome = Outcome.OUT_OF_MEMORY if no_memory else Outcome.CRASHED
-        message = "out of memory" if no_memory else f"the child {_how(status)}"
-        if status == -SIGKILL:
-            message += ", twice: from outside, or by the system for want of memory"
         record = self._record(child, work, outcome, message, told)
         self._go_on()
         return [record]
@@ -262,7 +282,8 @@ class LocalChildren:
         return Record(key, outcome, message=message, stderr=stderr, seconds=seconds, **child.circumstances())
 
     def _again(self, work: _Work) -> None:
-        self._give(_Work(work.job, alone=True))
+        work.alone, work.begun = True, None
+        self._give(work)
         self._go_on()
 
     def _go_on(self) -> None:
@@ -385,14 +406,3 @@ def documents_of(task: Task) -> list[str]:
     """The digests of the documents that a task needs."""
     recipes = (task.system, task.options.get(OTHER))
     return [recipe["document"] for recipe in recipes if recipe and "document" in recipe]
-
-
-def _how(status: int | None) -> str:
-    """How a process ended, in words."""
-    if status is None:
-        return "closed the pipe for its answers"
-    if status >= 0:
-        return f"ended with status {status}"
-    with suppress(ValueError):
-        return f"was killed by signal {-status} ({Signals(-status).name})"
-    return f"was killed by signal {-status}"

@@ -21,10 +21,11 @@ from itertools import count
 
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.experiments.dask_client import DaskClient, Result
+from kahanmaps.experiments.endings import TRIES
 from kahanmaps.experiments.executor import Documents, Executor
 from kahanmaps.experiments.group_results import Failure, failure_of, record_on
 from kahanmaps.experiments.job_groups import Grouping, JobGroup, KeptJob
-from kahanmaps.experiments.records import Job, Record, Task
+from kahanmaps.experiments.records import Job, Outcome, Record, Task
 
 GROUP_MODULE = "kahanmaps.experiments.group"
 TASKS_VARIABLE = "KAHANMAPS_TASKS"
@@ -52,8 +53,8 @@ class ClusterWorkers(Executor):
     now and then, what is being waited for.
 
     At most two groups for each thread of the workers are under way, so that memory here does not depend on the number
-    of tasks. A group that ends early is taken apart: each job without a record is tried once more, alone, so that only
-    the guilty one is recorded as crashed. dask itself moves the group of a dead worker elsewhere.
+    of tasks. A group that ends early is taken apart: each job without a record is tried a few times more, alone, before
+    it is lost. dask itself moves the group of a dead worker elsewhere.
 
     While one of these is open, the log of distributed in this process is silent: its news arrive as exceptions here.
     """
@@ -80,7 +81,7 @@ class ClusterWorkers(Executor):
         self._again: deque[KeptJob] = deque()  # jobs to be tried alone
         self._suspects: deque[KeptJob] = deque()  # jobs to be tried one after the other
         self._groups: dict[int, JobGroup] = {}  # at the scheduler
-        self._held: list[tuple[str, Failure]] = []  # failures, while it is open whose fault they are
+        self._held: list[tuple[str, KeptJob, Failure]] = []  # failures, while it is open whose fault they are
         self._given_up = 0
         self._numbers = count()
         self._is_proven = False  # a record has come from the workers
@@ -190,7 +191,7 @@ class ClusterWorkers(Executor):
 
     def _send_alone(self, job: KeptJob, is_suspect: bool = False) -> None:
         group = JobGroup(is_alone=True, is_suspect=is_suspect)
-        self._grouping.add(group, Task.from_text(job.text), job.limits)
+        self._grouping.add(group, Task.from_text(job.text), job.limits, job.tries)
         self._send(group)
 
     def _send(self, group: JobGroup) -> None:
@@ -210,12 +211,15 @@ class ClusterWorkers(Executor):
         for line in result.stdout.split(b"\n"):
             record = record_on(line)
             job = None if record is None else group.jobs.pop(record.key, None)
-            if record is not None and job is not None:  # so a record that is printed twice is handed back once
-                self._grouping.learn(job.kind, record.seconds, len(line))
-                self._keys.discard(record.key)
-                records.append(record)
-        if records:
+            if record is None or job is None:  # a record that is printed twice is handed back once
+                continue
             self._is_proven = True
+            if record.outcome is Outcome.LOST:
+                self._failed_alone(record.key, job, Failure(record.message, record.stderr))
+                continue
+            self._grouping.learn(job.kind, record.seconds, len(line))
+            self._keys.discard(record.key)
+            records.append(record)
         if group.jobs:
             self._sort_out(group, failure_of(result, timeout))
         return records
@@ -230,31 +234,51 @@ class ClusterWorkers(Executor):
             self._suspects.extend(group.jobs.values())
         elif not group.is_alone:
             self._again.extend(group.jobs.values())
+        elif failure.is_the_workers:
+            self._held += [(key, job, failure) for key, job in group.jobs.items()]
         else:
-            self._held += [(key, failure) for key in group.jobs]
+            for key, job in group.jobs.items():
+                self._failed_alone(key, job, failure)
+
+    def _failed_alone(self, key: str, job: KeptJob, failure: Failure) -> None:
+        """Put up a job that was the only one at work for another try, or hold it.
+
+        A command that cannot be run is not tried again before another one has been: that would only take longer.
+        """
+        job = job._replace(tries=job.tries + 1)
+        is_worth_it = self._is_proven or not failure.is_unfit
+        if failure.outcome is Outcome.LOST and job.tries < TRIES and is_worth_it:
+            self._again.append(job)
+        else:
+            self._held.append((key, job, failure))
 
     def _judged(self) -> list[Record]:
-        """Records of the jobs that failed alone, as soon as it is clear that it was their fault.
+        """Records of the jobs that failed alone, as soon as it is clear that there is no use in another try.
 
         Before the first record there has been no sign that the workers can run anything: a missing installation
-        must not be recorded as thousands of crashed tasks, nor a single task that kills its group as a missing
-        installation.
+        must not be told as thousands of lost tasks, nor a single task that kills its group as a missing installation.
         """
         if not self._held:
             return []
         if not self._is_proven:
             is_all = len(self._held) == len(self._keys)  # nothing else is in flight that might tell
-            unfit = [failure for _, failure in self._held if failure.is_unfit]
+            unfit = [failure for _, _, failure in self._held if failure.is_unfit]
             if len(unfit) >= UNFIT_AFTER or (unfit and is_all):
                 raise WorkersUnfit(self._unfit(unfit[-1]))
             if self._given_up + len(self._held) >= HOPELESS_AFTER:
-                raise WorkersUnfit(self._unfit(self._held[-1][1]))
+                raise WorkersUnfit(self._unfit(self._held[-1][2]))
             if not is_all:
                 return []
         held, self._held = self._held, []
-        self._given_up += len(held)
-        self._keys.difference_update(key for key, _ in held)
-        return [failure.record(key) for key, failure in held]
+        records = []
+        for key, job, failure in held:
+            if failure.is_unfit and job.tries < TRIES:  # by now others have been run
+                self._again.append(job)
+            else:
+                records.append(failure.record(key))
+        self._given_up += len(records)
+        self._keys.difference_update(record.key for record in records)
+        return records
 
     def _unfit(self, failure: Failure) -> str:
         command = " ".join(self._command)

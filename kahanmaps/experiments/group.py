@@ -3,7 +3,8 @@
     python -m kahanmaps.experiments.group < group.json
 
 The input is {"documents": {DIGEST: TEXT, ...}, "jobs": [{"task": TEXT, "limits": {"time": S, "memory": BYTES}}, ...]};
-for every job there comes one line, the record, as soon as it is there. The exit status is 0 whatever the tasks did.
+for every job there comes one line, the record, as soon as it is there. A job whose child is killed from outside is lost
+at once: whoever has sent it tries it again, elsewhere maybe. The exit status is 0 whatever the tasks did.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ def main(source: IO[str], target: IO[str]) -> None:
     """Do the jobs that `source` describes, one after the other."""
     group = json.load(source)
     jobs = [Job(Task.from_text(job["task"]), Limits(**job["limits"])) for job in group["jobs"]]
-    children = LocalChildren(1, group["documents"].__getitem__)
+    children = LocalChildren(1, group["documents"].__getitem__, tries=1)
     try:
         for job in jobs:
             children.submit(job)

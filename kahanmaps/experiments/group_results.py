@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from kahanmaps.experiments.dask_client import Result, distributed, told
+from kahanmaps.experiments.endings import ending
 from kahanmaps.experiments.records import Outcome, Record
 
 TAIL = 2000  # characters of standard error kept
@@ -17,17 +18,19 @@ TAIL = 2000  # characters of standard error kept
 class Failure:
     """Why a group ended without all its records.
 
-    `is_unfit`: by itself, as if the command could not be run at all; `is_the_workers`: they died, and it with them.
+    A task has a process of its own below the group command, whose death the command tells in a record: so its own end
+    is the machine's doing, and `outcome` is that of a job with which it has ended like this at every try. `is_unfit`:
+    by itself, as if it could not be run at all; `is_the_workers`: they died, and it with them.
     """
 
     message: str
     stderr: str
-    outcome: Outcome = Outcome.CRASHED
+    outcome: Outcome = Outcome.LOST
     is_unfit: bool = False
     is_the_workers: bool = False
 
     def record(self, key: str) -> Record:
-        """The record of a job whose fault it was."""
+        """The record of a job that is not tried again."""
         return Record(
             key,
             self.outcome,
@@ -52,10 +55,9 @@ def failure_of(result: Result, timeout: float | None) -> Failure:
     process, error = result.process, result.error
     stderr = result.stderr.decode(errors="replace")[-TAIL:]
     if process is not None:
-        message = f"the worker's command ended with status {process.returncode}"
-        if process.returncode == 0:
-            message += " and no record"
-        return Failure(message, stderr, is_unfit=process.returncode >= 0)
+        status = process.returncode
+        message = f"the worker's command {ending(status)}" + (" and no record" if status == 0 else "")
+        return Failure(message, stderr, is_unfit=status >= 0)
     if isinstance(error, subprocess.TimeoutExpired):
         message = f"the worker's command did not end within {timeout or 0:g} s"
         return Failure(message, stderr, outcome=Outcome.TIMEOUT)

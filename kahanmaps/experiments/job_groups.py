@@ -20,11 +20,15 @@ MEMORY_OF_MEANS = 20  # a mean follows a batch that goes from cheap tasks to dea
 
 
 class KeptJob(NamedTuple):
-    """A job in flight. Its canonical text is a quarter as large as the task with its dictionaries."""
+    """A job in flight, and how many tries of it alone have failed.
+
+    Its canonical text is a quarter as large as the task with its dictionaries.
+    """
 
     kind: str
     text: str
     limits: Limits
+    tries: int = 0
 
 
 @dataclass
@@ -85,13 +89,13 @@ class Grouping:
             or group.expected >= LARGEST_TEXT
         )
 
-    def add(self, group: JobGroup, task: Task, limits: Limits) -> None:
+    def add(self, group: JobGroup, task: Task, limits: Limits, tries: int = 0) -> None:
         """Put a job into the group, with the documents that it needs."""
         for wanted in documents_of(task):
             if wanted not in group.documents:
                 group.documents[wanted] = self._documents(wanted)
                 group.sent += len(group.documents[wanted])
-        group.jobs[task.key] = KeptJob(task.kind, task.text, limits)
+        group.jobs[task.key] = KeptJob(task.kind, task.text, limits, tries)
         group.seconds += self._seconds(task.kind)
         group.expected += self._mean(task.kind).size
         group.sent += len(task.text)

@@ -115,7 +115,8 @@ def run(
     `spec` is a path, the text of a spec (anything with a line break), or a Spec. With `db`, a path, tasks that have
     a record there are not done again, and every record is in the database before it is yielded; without, nothing is
     kept. `jobs` children work at a time, or those of a dask `scheduler`. `only` names experiments, `shard` = (i, n) is
-    the i-th of n parts, `retry_failed` does failed tasks again. Closing the generator kills what is in flight.
+    the i-th of n parts, `retry_failed` does failed tasks again. A task that is killed from outside at every try is
+    yielded as lost, and stays without a record in `db`. Closing the generator kills what is in flight.
 
     Raises SpecError, StoreError.
 

@@ -412,6 +412,32 @@ def test_ctrl_c_ends_the_tasks_in_flight_and_says_how_to_continue(batch, start, 
     assert batch("run", PAUSE, "-q").status == 0
 
 
+def test_the_end_of_a_run_says_how_many_tasks_were_lost_and_how_to_continue(batch):
+    spec = FAULT.replace("[8]", "[1]").replace('"0..3"', '"0..2"')  # order 1: killed by SIGKILL, where the seed is odd
+    done = batch("run", spec, "--json")
+    assert done.status == 3
+    assert (done.json["done"], done.json["missing"]) == ({"ok": 2, "lost": 1}, 1)
+    assert done.json["experiments"][0]["outcomes"] == {"ok": 2}
+    assert "1 task lost, without a result: what did them was killed, or could not be run, 5 times" in done.err
+    assert "(the child was killed by signal 9 (SIGKILL), from outside or for want of memory)" in done.err
+    assert "1 task without a result yet; to continue: kahanmaps batch run study.toml --db study.db" in done.err
+    assert "failed" not in done.err
+    assert [line.split("\t")[1:4] for line in batch("status", "--db", "study.db").out.splitlines()] == [
+        ["tasks", "missing", "ok"],
+        ["3", "1", "2"],
+    ]
+    lines = [json.loads(line) for line in batch("export", "--db", "study.db", "--jsonl").out.splitlines()]
+    assert [line["number"] for line in lines if line["record"] == "result"] == [0, 2]
+    (group,) = batch("summary", "--db", "study.db", "--json").json["groups"]
+    assert (group["tasks"], group["missing"], sum(group["outcomes"].values())) == (3, 1, 2)
+    again = batch("run", spec, "--jsonl")
+    assert again.status == 3
+    (record,) = map(json.loads, again.out.splitlines())
+    assert (record["outcome"], record["result"]) == ("lost", None)
+    shown = batch("show", record["key"], "--db", "study.db")
+    assert "outcome\tnone yet" in shown.out
+
+
 def test_a_second_ctrl_c_is_immediate(batch):
     Path("study.toml").write_text(PAUSE.replace("steps = 30", "steps = 60000").replace('"0..199"', '"0..3"'))
     process = subprocess.Popen(

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 from kahanmaps.errors import InputError
@@ -48,6 +49,17 @@ def first(steps: int = 0, seed: int = 0) -> dict[str, Any]:
 
 
 _seen: list[int] = []
+
+
+@task("signalled")
+def signalled(order: int = 0, seed: int = 0) -> dict[str, Any]:
+    """Send signal `order` to oneself in the first `seed` tries, which are counted in the folder FAULT_TRIES."""
+    tries = Path(os.environ["FAULT_TRIES"], f"{order}-{seed}")
+    with tries.open("a") as file:
+        file.write("x")
+    if tries.stat().st_size <= seed:
+        os.kill(os.getpid(), order)
+    return {"lived": True}
 
 
 def _kill(number: int) -> dict[str, Any]:

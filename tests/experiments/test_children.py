@@ -61,7 +61,7 @@ def outcome_of(job: Job, **settings: float) -> Record:
 @pytest.mark.parametrize(
     ("order", "outcome", "message"),
     [
-        (KILL, Outcome.CRASHED, "signal 9 (SIGKILL)"),
+        (KILL, Outcome.LOST, "signal 9 (SIGKILL)"),
         (ABORT, Outcome.CRASHED, "signal 6 (SIGABRT)"),
         (SEGFAULT, Outcome.CRASHED, "signal 11 (SIGSEGV)"),
         (EXIT, Outcome.CRASHED, "ended with status 7"),

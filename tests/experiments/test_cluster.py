@@ -287,21 +287,34 @@ def test_what_is_in_flight_is_bounded_by_the_threads(workers):
 # Failures of a task
 
 
-def test_a_group_that_is_killed_leaves_only_the_guilty_job_crashed(workers):
+def test_a_group_that_is_killed_leaves_only_the_guilty_job_lost(workers):
     good = jobs_of(60)
     bad = jobs_of(1, die=9)
     records = done(workers, [*good[:40], *bad, *good[40:]])
     assert_exactly_once(records, good + bad)
-    (crashed,) = [record for record in records if not record.is_ok]
-    assert (crashed.key, crashed.outcome) == (bad[0].task.key, Outcome.CRASHED)
-    assert crashed.message == "the worker's command ended with status -9"
-    assert crashed.stderr.endswith("the last words")
-    assert len(crashed.stderr) == 2000
+    (lost,) = [record for record in records if not record.is_ok]
+    assert (lost.key, lost.outcome) == (bad[0].task.key, Outcome.LOST)
+    assert lost.message == "the worker's command was killed by signal 9 (SIGKILL), from outside or for want of memory"
+    assert lost.stderr.endswith("the last words")
+    assert len(lost.stderr) == 2000
 
 
-def test_a_job_that_kills_its_group_is_crashed_even_when_it_is_the_only_one(workers):
+def test_a_job_that_kills_its_group_is_lost_even_when_it_is_the_only_one(workers):
     (record,) = done(workers, jobs_of(1, die=11))
-    assert (record.outcome, record.message) == (Outcome.CRASHED, "the worker's command ended with status -11")
+    assert (record.outcome, record.message) == (Outcome.LOST, "the worker's command was killed by signal 11 (SIGSEGV)")
+
+
+def test_a_group_of_one_job_that_is_killed_once_is_done_at_the_next_try_whatever_the_signal(workers, tmp_path):
+    jobs = [
+        Job(Task("test", None, {"die": int(number), "once": str(tmp_path / number.name), "claim": 60.0}))
+        for number in signal.Signals
+        if number not in (signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH, signal.SIGPIPE)
+        and number not in (signal.SIGSTOP, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
+    ]
+    records = done(workers, jobs)
+    assert_exactly_once(records, jobs)
+    assert all(record.is_ok for record in records)
+    assert {record.result["jobs"] for record in records} == {1}
 
 
 def test_a_job_whose_group_ends_early_once_is_done_at_the_second_try(workers, tmp_path):
@@ -359,7 +372,7 @@ def test_an_interpreter_that_the_workers_lack_is_one_error(shared):
 
 
 def test_groups_that_all_die_before_any_record_are_one_error(workers):
-    with pytest.raises(WorkersUnfit, match="status -9"):
+    with pytest.raises(WorkersUnfit, match="signal 9 "):
         done(workers, jobs_of(5000, die=9))
 
 
@@ -385,7 +398,7 @@ def test_everything_comes_back_once_though_a_worker_and_its_nanny_are_killed(own
 
 
 @pytest.mark.slow
-def test_a_job_that_takes_its_workers_with_it_is_crashed_and_the_others_are_done(own):
+def test_a_job_that_takes_its_workers_with_it_is_lost_and_the_others_are_done(own):
     # The command kills its parent, the worker; nannies start it anew, until dask gives the task up.
     own.script.write_text(GROUP.replace("os.kill(os.getpid()", "os.kill(os.getppid()"), encoding="utf-8")
     own.worker(threads=1)
@@ -397,9 +410,9 @@ def test_a_job_that_takes_its_workers_with_it_is_crashed_and_the_others_are_done
     finally:
         workers.close()
     assert_exactly_once(records, good + bad)
-    (crashed,) = [record for record in records if not record.is_ok]
-    assert (crashed.key, crashed.outcome) == (bad[0].task.key, Outcome.CRASHED)
-    assert "workers died one after the other" in crashed.message
+    (lost,) = [record for record in records if not record.is_ok]
+    assert (lost.key, lost.outcome) == (bad[0].task.key, Outcome.LOST)
+    assert "workers died one after the other" in lost.message
 
 
 def test_workers_may_come_later_and_are_waited_for_aloud(own, monkeypatch):
