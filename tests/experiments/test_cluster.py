@@ -431,6 +431,45 @@ def test_workers_may_come_later_and_are_waited_for_aloud(own, monkeypatch):
         workers.close()
 
 
+class NoWorkers:
+    """In place of dask: a scheduler without workers, and a clock that runs while one waits for it."""
+
+    def __init__(self) -> None:
+        self.threads, self.lost, self.now = 0, None, 1000.0
+
+    def submit(self, number, command, text, timeout):
+        pass
+
+    def drained(self, seconds):
+        self.now += seconds
+        return []
+
+    def monotonic(self):
+        return self.now
+
+    def close(self):
+        pass
+
+
+def test_words_about_missing_workers_come_ever_more_rarely_and_from_the_start_again_after_workers(monkeypatch):
+    dask, said = NoWorkers(), []
+    monkeypatch.setattr(cluster, "time", dask)
+    monkeypatch.setattr(ClusterWorkers, "_connect", lambda self, seconds: dask)
+    workers = ClusterWorkers("tcp://127.0.0.1:1", str, talk=lambda text: said.append(dask.now))
+    workers.submit(jobs_of(1)[0])
+    begin = dask.now + 1.0  # the first look
+    assert workers.wait(100.0) == []
+    assert [now - begin for now in said] == [3.0, 6.0, 12.0, 24.0, 48.0, 96.0]
+    dask.threads = 1
+    assert workers.wait(1.0) == []
+    dask.threads = 0
+    begin = dask.now + 1.0
+    said.clear()
+    assert workers.wait(10.0) == []
+    assert [now - begin for now in said] == [3.0, 6.0]
+    workers.close()
+
+
 @pytest.mark.parametrize("is_busy", [True, False])
 def test_a_scheduler_that_is_killed_is_told_at_once_and_holds_nobody_up(own, is_busy):
     own.worker(nanny=False)
