@@ -296,20 +296,20 @@ def _add_general(found: Symmetries, deadline: float) -> None:
     gens = context.gens()
     matrix = [list(gens[i * n : (i + 1) * n]) for i in range(n)]
     known = {_key(t.S) for t in found.signed if not any(e != 0 for e in t.r)}
+    complete = True
     for sign in (1, -1):
         equations = matrix_equations(f, matrix, sign)
         solved = solve_system(equations, gens, deadline)
         for component in solved.components:
+            # In a family of solutions all are singular: invertible ones would be a group with infinitesimal symmetries.
             S = fmpq_mat(n, n, list(component.point))
-            if component.free:
-                if not is_singular(component, n):
-                    found.undecided.append(f"a family of matrices S with {len(component.free)} parameters")
-            elif S.det() != 0 and _key(S) not in known:
+            if not component.free and S.det() != 0 and _key(S) not in known:
                 found.others.append(Symmetry(f.variables, S, (fmpq(0),) * n, sign < 0))
         left = [part for part in solved.unsolved if not is_singular(part, n)]
         if left:
+            complete = False
             found.undecided.append(f"the equations f(S x) = {'-' * (sign < 0)}S f(x) were not solved: {solved.reason}")
-    if not any("were not solved" in text or "a family" in text for text in found.undecided):
+    if complete:
         found.searched.append("rational matrices S, without a translation: all")
 
 

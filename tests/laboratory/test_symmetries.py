@@ -201,6 +201,15 @@ def test_too_large_is_undecided_with_a_reason():
 
 def test_no_time():
     assert not linear_symmetries(load("three_wave", {}).system, seconds=1e-9).complete
+    lorenz = load("lorenz", {}).system
+    stopped, whole = linear_symmetries(lorenz, seconds=1e-9), linear_symmetries(lorenz)
+    assert any("f(S x) = S f(x) were not solved: the time is over" in text for text in stopped.undecided)
+    assert stopped.searched == ["affine infinitesimal symmetries and scalings: all"]
+    assert whole.searched == [
+        *stopped.searched,
+        "signed permutations, with a translation: all",
+        "rational matrices S, without a translation: all",
+    ]
 
 
 def test_the_json_has_the_documented_shape():
