@@ -78,6 +78,30 @@ def test_determinant_and_solution_agree_with_numbers(n):
     assert [value(entry, POINT) for entry in matrix.solve(right).entries()] == expected
 
 
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        ["x1", "01"],  # upper triangular: the second index does not lead back to the first
+        ["10", "x1"],
+        ["1x0", "010", "0y1"],
+        ["x0y", "0y0", "001"],
+        ["0x00", "y000", "00x1", "000y"],
+        ["x001", "0y00", "1010", "000x"],
+    ],
+)
+def test_matrices_with_zeros_agree_with_numbers(pattern):
+    x, y = FIELD.variables
+    entry = {"0": FIELD.zero, "1": FIELD.one, "x": x, "y": y}
+    number = {"0": fmpq(0), "1": fmpq(1), "x": POINT[0], "y": POINT[1]}
+    n = len(pattern)
+    letters = "".join(pattern)
+    matrix, numbers = FIELD.matrix(n, n, [entry[c] for c in letters]), fmpq_mat(n, n, [number[c] for c in letters])
+    assert value(matrix.det(), POINT) == numbers.det()
+    solution = matrix.solve(FIELD.column([x + FIELD.convert(i) for i in range(n)]))
+    expected = numbers.solve(fmpq_mat(n, 1, [POINT[0] + i for i in range(n)]))
+    assert [value(one, POINT) for one in solution.entries()] == expected.entries()
+
+
 def test_a_singular_matrix_is_refused():
     x, y = FIELD.variables
     with pytest.raises(ZeroDivisionError):

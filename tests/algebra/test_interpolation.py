@@ -267,6 +267,16 @@ def test_vectors_of_rationals(numbers: list[fmpq], below: int) -> None:
     assert rational_vector(residues, modulus) == tuple(numbers)
 
 
+@pytest.mark.parametrize("count", [2, 3, 7])
+def test_few_numbers_over_one_denominator_may_be_higher_than_one_alone(count: int) -> None:
+    """For k numbers the bound is about m^(k/(k+1)), so 2^40 for two of them, where one alone has to be below 2^30."""
+    modulus, below = 2**61 - 1, 2**34 + 25
+    numbers = tuple(fmpq(2**34 - 3**k, below) for k in range(5, 5 + count))
+    residues = [int(x.p) * pow(int(x.q), -1, modulus) % modulus for x in numbers]
+    assert all(rational_reconstruction(residue, modulus) != x for residue, x in zip(residues, numbers, strict=True))
+    assert rational_vector(residues, modulus) == numbers
+
+
 def test_residues_without_simple_numbers() -> None:
     rng = random.Random(1)
     assert rational_vector([rng.randrange(2**61 - 1) for _ in range(9)], 2**61 - 1) is None

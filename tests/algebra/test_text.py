@@ -31,6 +31,7 @@ from kahanmaps.algebra.text import (
     parse_point,
     parse_polynomial,
     parse_rational_function,
+    shorten,
 )
 from kahanmaps.errors import ExpressionError, InexactNumber, InputError
 
@@ -614,3 +615,17 @@ def test_threads_do_not_share_a_parse() -> None:
 def test_numbers_do_not_load_the_parser_of_expressions() -> None:
     code = "import sys, kahanmaps.algebra.text as t; t.parse_number('1/2'); assert 'lark' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [("x" * 40, "'" + "x" * 40 + "'"), ("x" * 41, "'" + "x" * 40 + "...'"), ("a\nb", r"'a\nb'")],
+)
+def test_what_is_longer_than_40_characters_is_cut_and_what_is_not_is_shown_whole(text, shown):
+    assert shorten(text) == shown
+
+
+@pytest.mark.parametrize(("text", "sign"), [("--x", 1), ("---x", -1), ("-+-x", 1), ("+-x", -1), ("-(-(-x))", -1)])
+def test_signs_before_a_variable_multiply(text, sign):
+    assert parse_polynomial(text, NAMES) == sign * x
+    assert parse_polynomial(f"y - {text}", NAMES) == y - sign * x

@@ -38,13 +38,13 @@ from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.text import format_rational_function, parse_rational_function
 from kahanmaps.checks import judge, theorems
 from kahanmaps.checks.claims import Finding, Verdict
-from kahanmaps.checks.conserve import check_integrals, known_integrals
+from kahanmaps.checks.conserve import check_integrals, conservation, known_integrals
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian, PaperIntegral
+from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.files import SystemFile, parse_system
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -503,3 +503,16 @@ def test_x_in_place_of_its_image_in_the_papers_integral_contradicts_the_theorem(
     monkeypatch.setattr(PaperIntegral, "value", wrong)
     with pytest.raises(Contradiction, match="H~ is conserved"):
         check_integrals(SystemFile.from_member(FAMILY["m=2"][0]), QUICK)
+
+
+@pytest.mark.parametrize(
+    ("rhs", "claimed", "degree"),
+    [
+        ("x^2", "1/(x^3 + 1)", 7),  # x~ = x/(1 - 2 eps x): the denominators x^3 + 1, x^3 + W^3 and W = 1 - 2 eps x
+        ("x", "1/x", 2),  # x~ = x (1 + eps)/(1 - eps): x twice
+        ("1 + x^2", "x/(x^4 + 1)", 9),
+    ],
+)
+def test_the_degree_of_all_poles_is_bounded(rhs, claimed, degree):
+    integral = ClaimedIntegral("I", claim(claimed, "x"))
+    assert conservation(system_of("x", rhs), integral, fmpq(1, 3)).poles >= degree

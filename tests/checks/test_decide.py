@@ -29,6 +29,7 @@ from kahanmaps.checks.decide import (
     DEFAULT_ERROR_BITS,
     Identity,
     decide,
+    log2_error,
     random_prime_field,
     small_points,
     trial_bound,
@@ -163,6 +164,14 @@ def test_more_degree_or_coefficients_mean_a_larger_error(larger):
         return trial_bound(Identity(1, TRUE.sides, Size(degree, bits), 9, None, subject=()))
 
     assert error(2**40, 1e3) < error(*larger) < -1
+
+
+@pytest.mark.parametrize("conjugates", [2, 6, 24])
+@pytest.mark.parametrize("bits", [62, 6200.0])
+def test_coefficients_in_a_number_field_of_degree_c_multiply_the_bad_primes_by_2_c_squared(conjugates, bits):
+    """A norm is c times as long, and at least 1/(2 c) of the primes split: half of what Chebotarev's density gives."""
+    size = Size(0, float(bits))
+    assert log2_error(size, 0, conjugates) - log2_error(size, 0) == pytest.approx(math.log2(2 * conjugates**2))
 
 
 @pytest.mark.parametrize(("degree", "poles"), [(1, 2**60), (2**60, 1)])

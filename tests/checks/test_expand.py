@@ -73,6 +73,31 @@ def test_expansion_agrees_with_the_value_at_a_point():
     assert left == right
 
 
+@pytest.mark.parametrize("k", [0, 1, 2])
+def test_every_eps_is_not_an_eps_that_equals_a_coordinate(k):
+    """eps = x_k holds where eps is that coordinate, and eps x_k = x_k eps everywhere."""
+    size = Size(2, 0.0)
+    with pytest.raises(NotEqual):
+        expansion(Identity(3, lambda field, x, eps: ([eps], [x[k]]), size, 0, None))
+    with pytest.raises(NotEqual):
+        expansion(Identity(3, lambda field, x, eps: ([eps * eps], [x[k] * eps]), size, 0, None))
+    evidence = expansion(Identity(3, lambda field, x, eps: ([eps * x[k]], [x[k] * eps]), size, 0, None))
+    assert evidence is not None
+    assert evidence.data["eps"] == "every"
+
+
+def test_a_function_conserved_where_eps_equals_a_constant_of_motion_is_not_proved():
+    """x' = x, y' = 0: x~ = x (1 + eps)/(1 - eps), so x (eps - y)/(...) is conserved on eps = y, where it is 0."""
+    system = QuadraticSystem.from_text(["x", "y"], ["x", "0"])
+
+    def claimed(text):
+        return conservation(system, ClaimedIntegral("I", parse_rational_function(text, ["x", "y", "eps"])), None)
+
+    assert expansion(claimed("y*(eps - y)")) is not None
+    with pytest.raises(NotEqual):
+        expansion(claimed("x*(eps - y)"))
+
+
 def test_a_map_commutes_with_its_inverse_and_not_with_another():
     names = ("f", "g")
     assert expansion(commutativity(TOP, TOP.scaled(-1), None, names)) is not None

@@ -6,9 +6,11 @@ For H = q p the determinant is 1 - eps^2, so at eps = 1 and eps = -1 the Kahan m
 from __future__ import annotations
 
 import pytest
+from flint import fmpq, fmpq_mat
 
 from kahanmaps import (
     CubicHamiltonian,
+    KahanMap,
     Settings,
     SystemFile,
     check_commute,
@@ -18,6 +20,7 @@ from kahanmaps import (
     parse_polynomial,
     standard_structure,
 )
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.checks.theorems import commutant_integral
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.invariants.integrals import CommutantIntegral
@@ -50,3 +53,18 @@ def test_the_commutant_lemma_asks_for_the_standard_structure():
     other = CubicHamiltonian(standard.H, standard.J * 2)
     assert commutant_integral(standard, CommutantIntegral(standard, member.A, 1), "A^T") is not None
     assert commutant_integral(other, CommutantIntegral(other, member.A, 1), "A^T") is None
+
+
+def test_the_commutant_lemma_asks_for_a_homogeneous_cubic():
+    """Two planes side by side, H = q1^3 + q1 p1^2 + q2 p2: A commutes with f', and x^T J A^T x~ is not conserved."""
+    A = fmpq_mat(4, 4, [1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2])
+    H = parse_polynomial("q1^3 + q1*p1^2 + q2*p2 + p1", ["q1", "q2", "p1", "p2"])
+    hamiltonian = CubicHamiltonian(H, standard_structure(4))
+    jacobian = hamiltonian.system.over(QQ).jacobian([fmpq(2), fmpq(3), fmpq(5), fmpq(7)])
+    assert A.transpose() * jacobian == jacobian * A.transpose()
+    integral = CommutantIntegral(hamiltonian, A, 1)
+    assert commutant_integral(hamiltonian, integral, "A^T") is None
+    kahan = KahanMap(hamiltonian.system, "1/7")
+    x = kahan.point([1, 2, 3, 4])
+    values = [integral.value(QQ, kahan.eps, point) for point in (x, kahan.step(x))]
+    assert values[0] != values[1]

@@ -467,6 +467,23 @@ def test_slow_decay_of_the_rise_is_no_line():
     assert of_heights(heights).kind is U
 
 
+@pytest.mark.parametrize(
+    ("slopes", "width", "kind"),
+    [
+        ((4, 4, 4, 5), 4, LIN),  # rises of 16 and 20: they differ by 4 bits and a quarter of the least, both allowed
+        ((3, 3, 3, 4), 4, U),  # 12 and 16: by more than a quarter
+        ((4, 4, 4, 5), 5, U),  # 20 and 25: by a quarter, but more than 4 bits and 1/32
+        ((32, 32, 32, 33), 8, LIN),  # 256 and 264: by 1/32
+        ((31, 31, 31, 32), 8, U),  # 248 and 256: by more
+    ],
+)
+def test_rises_that_differ_by_as_much_as_the_rule_allows_are_a_line(slopes, width, kind):
+    heights = [100]
+    for slope in slopes:
+        heights += [heights[-1] + slope * k for k in range(1, width + 1)]
+    assert of_heights(heights).kind is kind
+
+
 @pytest.mark.parametrize("heights", [[7], [7, 8], [k * k + 9 for k in range(8)], [20 * k + 9 for k in range(8)]])
 def test_few_heights_decide_nothing(heights):
     found = of_heights(heights)

@@ -24,6 +24,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, 
 from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.preserve import density_identity, jacobi_identity, transformation_identity
+from kahanmaps.invariants import poisson
 from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity
 from kahanmaps.invariants.sizes import (
@@ -32,6 +33,7 @@ from kahanmaps.invariants.sizes import (
     Size,
     determinant_size,
     eps_size,
+    function_size,
     polynomial_size,
     step_size,
 )
@@ -268,6 +270,21 @@ def test_the_size_of_the_determinant_bounds_numerator_and_denominator(system, ep
         for sign in (1, -1):
             within(leibniz(written.matrix(*point, sign)), bound.above)
         within((written.q * written.L * point[1]) ** written.n, bound.below)
+
+
+@pytest.mark.parametrize(
+    ("text", "above", "below"),
+    [
+        ("x/(x + y)", (1, 0.0), (1, 1.0)),
+        ("(x^2 + 3*y)/8", (2, 2.0), (2, 3.0)),  # over 8 at x = X/W: (X^2 + 3 Y W) / (8 W^2)
+        ("eps*x*y/(1 - eps^2)", (4, 0.0), (4, 1.0)),
+    ],
+)
+def test_the_size_of_a_function_is_that_of_its_numerator_and_denominator(text, above, below):
+    found = function_size(claim(text, "x y"), 2, VARIABLE, VARIABLE)
+    for bound, (degree_, bits) in ((found.above, above), (found.below, below)):
+        assert bound.degree == degree_
+        assert bound.bits == pytest.approx(bits, abs=ROUNDING)
 
 
 @pytest.mark.parametrize("eps", [None, fmpq(2, 3)])
@@ -548,6 +565,28 @@ def check_tensor(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> None:
 @given(hamiltonians(dims=(1, 2)), some_eps)
 def test_the_transformation_law_is_bounded(hamiltonian, eps):
     check_tensor(hamiltonian, eps)
+
+
+@pytest.mark.parametrize(
+    ("names", "H"),
+    [
+        ("q p", "q^2*p + q*p^2"),
+        ("q p", "q^2*p"),
+        ("q p", "5*q^2*p - 3*q*p^2 + p"),
+        ("q a b c p d e f", "q^2*p + q*p^2"),
+    ],
+)
+@pytest.mark.parametrize("eps", [None, fmpq(1), fmpq(2, 3)])
+def test_single_entries_of_the_tensor_and_of_the_matrices_beside_it_are_bounded(names, H, eps):
+    hamiltonian = hamiltonian_of(names, H)
+    written, size = Written(hamiltonian.system, eps), eps_size(eps)
+    for row in tensor(written, hamiltonian.J, written.x, written.one):
+        for entry in row:
+            within(entry, poisson._tensor_entry(hamiltonian, size, VARIABLE))
+    for sign in (1, -1):
+        for row in written.matrix(written.x, written.one, sign):
+            for entry in row:
+                within(entry, poisson._denominator_entry(hamiltonian, size, VARIABLE))
 
 
 @settings(max_examples=4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -112,6 +113,18 @@ def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
     assert generic.conclusion.growth == "quadratic"
     assert "only" not in generic.conclusion.sentence
     assert generic.integrals.profile.period is None
+
+
+def test_dots_stand_where_more_degrees_are_known_than_shown():
+    found = analyze(system("x", "1 + x^2"))
+
+    def told(count):
+        cut = replace(found, degrees=replace(found.degrees, degrees=(1,) * (count + 1)))
+        (line,) = [line for line in text_of(cut).splitlines() if line.startswith("degrees of the iterates: ")]
+        return line.removeprefix("degrees of the iterates: ")
+
+    assert told(12) == ", ".join(["1"] * 12)
+    assert told(13) == told(12) + ", ..."
 
 
 def test_henon_heiles_closes_after_four_steps_at_eps_1_only():

@@ -314,6 +314,18 @@ def test_a_reversor_reverses_the_map():
     assert not is_reversor(system, fmpq_mat([[1, 0], [0, -1]]))
 
 
+def test_a_reversor_need_not_be_a_symmetric_matrix():
+    """In u = x + y, v = y the reversor diag(1, -1) of x' = y, y' = 6 x^2 - 2 is T R T^{-1} = [[1, -2], [0, -1]]."""
+    sheared = system_of("y + 6*(x - y)^2 - 2", "6*(x - y)^2 - 2")
+    R = fmpq_mat([[1, -2], [0, -1]])
+    assert is_reversor(sheared, R)
+    assert not is_reversor(sheared, R.transpose())
+    kahan, back = KahanMap(sheared, "1/7"), KahanMap(sheared, "-1/7")
+    u, v = kahan.point(["2/3", "1/5"])
+    a, b = kahan.step([u, v])
+    assert back.step([u - 2 * v, -v]) == (a - 2 * b, -b)
+
+
 @pytest.mark.parametrize(
     ("matrix", "words"),
     [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.darboux import darboux_polynomials
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.catalog import load
 from kahanmaps.systems.files import SystemFile
@@ -95,3 +97,20 @@ def test_a_degree_with_too_many_terms_is_lowered_and_said() -> None:
     found = darboux_polynomials(load("kirchhoff_generic"), 12, seconds=1.0)
     assert found.reason
     assert found.degree == 12
+
+
+def test_a_polynomial_that_is_one_only_where_eps_equals_a_coordinate_is_not_proved(monkeypatch) -> None:
+    """x' = x, y' = 0 keeps y. P = x + eps - y is x where eps = y, but no Darboux polynomial; P = x is one."""
+    file = SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], ["x", "0"]))
+    (right,) = [space for space in darboux_polynomials(file, 1).spaces if space.cofactor != "1"]
+    assert ([str(P) for P in right.polynomials], right.verdict) == (["x"], Verdict.PROVED)
+    found = Laboratory.formulas
+
+    def wrong(*arguments: Any) -> Any:
+        forms = found(*arguments)
+        x, y, eps = forms.bases[0][0].context().gens()
+        return replace(forms, bases=[[x + eps - y if P == x else P for P in basis] for basis in forms.bases])
+
+    monkeypatch.setattr(Laboratory, "formulas", wrong)
+    spaces = [space for space in darboux_polynomials(file, 1).spaces if space.cofactor == right.cofactor]
+    assert all(space.verdict is not Verdict.PROVED for space in spaces)

@@ -187,6 +187,9 @@ def test_random_points_tell_what_polynomials_do(name, monkeypatch):
         }
 
     assert fates(unwritten) == fates(written)
+    assert {h.polynomial for h in unwritten.hypersurfaces if h.is_pole} == {
+        h.polynomial for h in written.hypersurfaces if h.is_pole
+    }
     degrees = sum(h.degree for h in unwritten.hypersurfaces if h.polynomial == "?")
     assert degrees == sum(h.degree for h in written.hypersurfaces if not h.is_pole and h.polynomial != "Z")
 

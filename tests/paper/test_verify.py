@@ -22,6 +22,7 @@ from kahanmaps.checks.settings import Settings
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.paper import realise
 from kahanmaps.paper import verify as verify_module
 from kahanmaps.paper.controls import CONTROLS
 from kahanmaps.paper.examiner import VerifyOptions
@@ -166,6 +167,16 @@ def test_complex_balls_overlap_to_within_a_few_bits(name):
         assert int(balls.summary.split("2^-")[1]) > 100
 
 
+def test_roots_are_shown_to_twenty_digits_however_narrow_the_balls():
+    """The square root of 2, 1.41421356237309504880168872420969807856967..., and with it 20 digits at most."""
+    member = draw_with_chi(fmpq_poly([-2, 0, 1]), seed=1)
+    for bits_, digits in ((200, "1.4142135623730950488"), (2000, "1.4142135623730950488")):
+        (minus, plus) = realise.root_enclosures(member, bits_)
+        assert minus.startswith(f"[-{digits} +/- ")
+        assert plus.startswith(f"[{digits} +/- ")
+    assert realise.root_enclosures(member, 40)[1].startswith("[1.41421356237309")
+
+
 def test_without_balls_there_is_no_evidence_by_balls():
     methods = {evidence.method for evidence in all_evidence(verify(file("m=2, complex"), options=SIXTH))}
     assert "complex balls" not in methods
@@ -299,6 +310,22 @@ def test_what_is_said_in_general_only_is_not_refuted_by_a_special_member():
     evidence = by_key(report)["hamiltonians-are-independent"].evidence
     assert (evidence.method, evidence.data["points"]) == ("special member", 4)
     assert "H vanishes on the eigenspaces of the roots of t - 2" in evidence.summary
+
+
+@pytest.mark.parametrize(
+    ("H", "reason"),
+    [
+        ("x1^3 + x1*x3^2 + x2^3", "H is the cube of a linear form on the eigenspaces of the roots of t - 2"),
+        ("x1^3 + x2^3", "H is the cube of a linear form on the eigenspaces of the roots of t^2 - 3*t + 2"),
+        ("x1^3 + x1*x3^2", "H vanishes on the eigenspaces of the roots of t - 2"),
+        ("x1^3 + x1*x3^2 + x2^3 + x2*x4^2", "its A or H is special"),
+    ],
+)
+def test_what_is_special_about_a_member_is_said(H, reason):
+    """A = diag(1, 2, 1, 2): H is a cubic in x1, x3 plus one in x2, x4."""
+    A = fmpq_mat(4, 4, [1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2])
+    member = FamilyMember(A, parse_polynomial(H, ["x1", "x2", "x3", "x4"]))
+    assert verify_module._MemberExaminer(member, Settings(), VerifyOptions()).what_is_special() == reason
 
 
 def test_identities_are_proved_for_a_special_member_as_well():
