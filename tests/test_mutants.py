@@ -1,0 +1,81 @@
+"""The changes that `make mutants` tries: which ones there are, where there are none, and that samples come again."""
+
+from __future__ import annotations
+
+import ast
+
+import pytest
+from mutants import Changes, all_mutants, batches, sample
+
+
+def changed(source: str) -> list[str]:
+    """The sources that differ from this one by one change."""
+    found = Changes("example.py", source).found
+    texts = [source[: one.begin] + one.new + source[one.end :] for one in found]
+    for text in texts:
+        ast.parse(text)
+    return texts
+
+
+@pytest.mark.parametrize(
+    ("source", "mutants"),
+    [
+        ("a - b*c", ["((a) + (b*c))", "a - ((b) + (c))"]),
+        ("x = -y", ["x = (y)"]),
+        ("a <= b", ["(a < b)", "(a > b)"]),
+        ("a < b == c", ["(a <= b == c)", "(a >= b == c)", "(a < b != c)"]),
+        ("a is None and not b", ["((a is None) or (not b))", "(a is not None) and not b", "a is None and (b)"]),
+        ("Q[i][j, k]", ["Q[i][k, j]"]),
+        ("S.transpose()", ["S"]),
+        ("min(a, b)", ["max(a, b)"]),
+        ("f(7)", ["f(8)", "f(6)"]),
+        ("x = True", ["x = False"]),
+        ("n += k", ["n -= k"]),
+        ("if a:\n    return\n", ["if False:\n    return\n"]),
+        ("d = a + é*b", ["d = ((a) - (é*b))", "d = a + ((é) + (b))"]),
+    ],
+)
+def test_a_change_is_one_of_the_mathematics(source: str, mutants: list[str]) -> None:
+    inside = source.startswith("if")
+    texts = changed(f"def f():\n    {source}".replace("\n    return", "\n        return") if inside else source)
+    assert [text.removeprefix("def f():\n    ").replace("\n        ", "\n    ") for text in texts] == mutants
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        '"""One, 1 + 1."""',
+        "def f(x: Array[1, 2]) -> Matrix[3]: ...",
+        "def f(x, seed=0, *, seconds=60): ...",
+        "raise ValueError(1 + x)",
+        'text = f"{x + 1}"',
+        'text = "a" + b',
+        "zip(a, b, strict=True)",
+        "def __repr__(self):\n    return self.x + 1",
+        "deadline = monotonic() + seconds",
+        "progress(k + 1)",
+        "@cache(maxsize=3)\ndef f(): ...",
+    ],
+)
+def test_what_is_no_mathematics_is_left_alone(source: str) -> None:
+    assert changed(source) == []
+
+
+def test_names_of_changes_are_unique_within_a_file() -> None:
+    found = Changes("example.py", "x = 1 + 1\ndef f():\n    x = 1 + 1\n    x = 1 + 1\n").found
+    assert len({one.key for one in found}) == len(found)
+    assert [one.kind for one in found if one.function == "f"][:2] == ["+ -> -", "1 -> 2"]
+
+
+def test_a_seed_and_a_count_give_the_same_sample_again_and_lines_but_once() -> None:
+    every = all_mutants()
+    chosen = sample(every, 50, seed=3)
+    assert chosen == sample(list(every), 50, seed=3)
+    assert chosen != sample(every, 50, seed=4)
+    assert len({(one.path, one.line) for one in chosen}) == 50
+
+
+def test_tests_run_in_order_and_within_their_time() -> None:
+    seconds = {f"t{k}": 1.0 for k in range(200)}
+    assert [len(some) for some in batches(list(seconds), seconds, 1000)] == [15, 90, 95]
+    assert [test for some in batches(list(seconds), seconds, 20) for test in some] == [f"t{k}" for k in range(20)]
