@@ -22,7 +22,8 @@ from kahanmaps.algebra.latex import latex_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
-from kahanmaps.errors import InputError
+from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.laboratory.branches import Branches, Pattern, tell_apart
 from kahanmaps.laboratory.cofactors import Cofactor
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION, constant_structures
@@ -30,7 +31,7 @@ from kahanmaps.laboratory.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.identities import integral_verdict
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, rank
-from kahanmaps.laboratory.search import Found, may_be_conjugate, repeat, search
+from kahanmaps.laboratory.search import Found, classes, may_be_conjugate, repeat, search
 from kahanmaps.laboratory.shown import integrals_html
 from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.parametric import ParametricSystem
@@ -254,8 +255,12 @@ def _formulas(
         return [], "what was found at one eps was not found at another"
     progress("interpolating closed forms")
 
+    branches, reason = _branches(laboratory, found, cofactors, reference, deadline)
+    if reason:
+        return [], f"integrals were found modulo primes, but no closed form: {reason}"
+
     def spaces_on(map_: ModularMap) -> list[DarbouxSpace] | None:
-        again = repeat(found, map_, cofactors, reference)
+        again = repeat(found, map_, cofactors, reference, branches)
         return None if again is None else again.all_spaces
 
     forms = laboratory.formulas(found.all_spaces, spaces_on, deadline)
@@ -265,6 +270,42 @@ def _formulas(
     return [
         (_ratio(P, basis[0]), origin) for basis, origin in zip(forms.bases, origins, strict=True) for P in basis[1:]
     ], ""
+
+
+def _branches(
+    laboratory: Laboratory, found: Found, cofactors: Sequence[Cofactor], reference: int, deadline: float
+) -> tuple[dict[int, dict[Pattern, Branches]], str]:
+    """What tells the spaces of each step apart that have zeros at the same places, and a reason where nothing does."""
+    seen: dict[tuple[int, tuple[int, ...]], Found | None] = {}
+    count = len(laboratory.symbols)
+    names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
+
+    def again(prime: int, values: tuple[int, ...]) -> Found | None:
+        if (prime, values) not in seen:
+            try:
+                map_ = laboratory.map_at(prime, values[:count], (*values, 1)[count])
+                seen[prime, values] = repeat(found, map_, cofactors, reference)
+            except (NoPoint, BadPrime):
+                seen[prime, values] = None
+        return seen[prime, values]
+
+    branches: dict[int, dict[Pattern, Branches]] = {}
+    for number, group in enumerate(found.spaces):
+        for kind, model in classes(group).items():
+            if len(model) == 1:
+                continue
+
+            def alike(
+                prime: int, values: tuple[int, ...], number: int = number, kind: Pattern = kind
+            ) -> list[DarbouxSpace] | None:
+                other = again(prime, values)
+                return None if other is None else classes(other.spaces[number])[kind]
+
+            told = tell_apart(model, alike, names, laboratory.seed, deadline)
+            if told is None:
+                return {}, f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
+            branches.setdefault(number, {})[kind] = told
+    return branches, ""
 
 
 def _ratio(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
@@ -283,7 +324,12 @@ def _independent(
     rows: list[list[int]] = []
     map_ = laboratory.maps[0]
     point = map_.random_point()
-    by_size = sorted(formulas, key=lambda pair: (degree(pair[0].numerator), len(pair[0].numerator)))
+
+    # By size, then by monomials: the order must not depend on the primes.
+    def size(P: fmpq_mpoly) -> tuple[int, int, list[list[int]]]:
+        return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
+
+    by_size = sorted(formulas, key=lambda pair: size(pair[0].numerator))
     for function, origin in by_size:
         row = _gradient(map_, function, point)
         if rank([*rows, row], map_.prime) == len(rows):

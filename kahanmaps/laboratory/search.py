@@ -8,13 +8,15 @@ values of the symbols gives the coefficients of the same polynomials there, from
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
+from types import MappingProxyType
 
 from flint import fmpq
 
 from kahanmaps.algebra.residues import rational_reconstruction
+from kahanmaps.laboratory.branches import Branches, Pattern, pattern
 from kahanmaps.laboratory.cofactors import (
     Cofactor,
     CofactorProduct,
@@ -30,6 +32,7 @@ from kahanmaps.laboratory.modular_points import ModularMap, null_space
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 5, 6: 4}
 _MOST_TERMS = 1000
+NOTHING: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _FEW = 20  # with more relations than these, cofactors come first
 
 
@@ -131,19 +134,26 @@ def _take_relations(
     before = gradient_rank(map_, known)
     if found.spaces and gradient_rank(map_, [*known, *found.spaces]) > before:
         steps.append(Step("relations", degree, None, f"relations of degree {degree} along orbits"))
-        spaces.append(sorted(found.spaces, key=_pattern))
+        spaces.append(sorted(found.spaces, key=pattern))
     return found.unresolved
 
 
-def repeat(found: Found, map_: ModularMap, cofactors: Sequence[Cofactor], reference: int) -> Found | None:
+def repeat(
+    found: Found,
+    map_: ModularMap,
+    cofactors: Sequence[Cofactor],
+    reference: int,
+    branches: Mapping[int, Mapping[Pattern, Branches]] = NOTHING,
+) -> Found | None:
     """The same steps on another map; None where they give spaces of another shape (a special value).
 
-    `reference` is the prime of `found`, by which spaces of the same shape are told apart.
+    `reference` is the prime of `found`. Spaces of the same shape come in any order where there are no `branches` of
+    their step, by which they are told apart.
     """
     spaces: list[list[DarbouxSpace]] = []
     top = max((step.degree for step in found.steps if step.kind == "cofactor"), default=0)
     sample = Sample.of(map_, cofactors, points_needed(map_.dim, top)) if top else None
-    for step, model in zip(found.steps, found.spaces, strict=True):
+    for number, (step, model) in enumerate(zip(found.steps, found.spaces, strict=True)):
         known = [space for group in spaces for space in group]
         if step.kind == "affine":
             affine = affine_space(map_)
@@ -153,11 +163,19 @@ def repeat(found: Found, map_: ModularMap, cofactors: Sequence[Cofactor], refere
             group = [cofactor_space(sample, step.product, step.degree)]
         else:
             group = darboux_spaces(map_, step.degree, known).spaces
-        ordered = _in_order(group, model, map_.prime, reference)
+        ordered = _in_order(group, model, map_, reference, branches.get(number, {}))
         if ordered is None:
             return None
         spaces.append(ordered)
     return Found(found.steps, spaces, found.independent, found.unresolved)
+
+
+def classes(group: Sequence[DarbouxSpace]) -> dict[Pattern, list[DarbouxSpace]]:
+    """The spaces by the places of their zeros."""
+    found: dict[Pattern, list[DarbouxSpace]] = {}
+    for space in group:
+        found.setdefault(pattern(space), []).append(space)
+    return found
 
 
 def may_be_conjugate(found: Found) -> bool:
@@ -165,31 +183,47 @@ def may_be_conjugate(found: Found) -> bool:
 
     These exist only modulo primes where the extension splits, and have no formula over Q.
     """
-    return any(len(set(map(_pattern, group))) < len(group) for group in found.spaces)
-
-
-def _pattern(space: DarbouxSpace) -> tuple[tuple[bool, ...], ...]:
-    return tuple(tuple(bool(entry) for entry in vector) for vector in space.basis)
+    return any(len(classes(group)) < len(group) for group in found.spaces)
 
 
 def _in_order(
-    group: list[DarbouxSpace], model: list[DarbouxSpace], prime: int, reference: int
+    group: list[DarbouxSpace],
+    model: list[DarbouxSpace],
+    map_: ModularMap,
+    reference: int,
+    branches: Mapping[Pattern, Branches],
 ) -> list[DarbouxSpace] | None:
-    """The spaces in the order of the model, by the places of their zeros and, where these agree, by their numbers.
+    """The spaces in the order of the model, by the places of their zeros and, where these agree, by `branches`.
 
     There may be more of them than in the model, see `may_be_conjugate`; None where there are fewer.
     """
-    waiting = list(group)
-    ordered = []
-    for space in model:
-        alike = [one for one in waiting if _pattern(one) == _pattern(space)]
-        if not alike:
+    by_pattern = classes(group)
+    waiting: dict[Pattern, list[DarbouxSpace]] = {}
+    for kind, wanted in classes(model).items():
+        alike = by_pattern.get(kind, [])
+        if kind in branches:
+            known = branches[kind].in_order(alike, map_)
+            if known is None:
+                return None
+            alike = known
+        elif len(alike) > len(wanted):
+            alike = _most_alike(alike, wanted, map_.prime, reference)
+        if len(alike) < len(wanted):
             return None
-        if len(alike) > 1:
-            alike.sort(key=lambda one: -_equal_entries(one, space, prime, reference))
-        waiting.remove(alike[0])
-        ordered.append(alike[0])
-    return ordered
+        waiting[kind] = alike
+    return [waiting[pattern(space)].pop(0) for space in model]
+
+
+def _most_alike(
+    alike: list[DarbouxSpace], wanted: list[DarbouxSpace], prime: int, reference: int
+) -> list[DarbouxSpace]:
+    """Those spaces that share most numbers with the wanted ones: conjugate ones, which are too many, share none."""
+    waiting = list(alike)
+    found = []
+    for space in wanted:
+        found.append(max(waiting, key=lambda one: _equal_entries(one, space, prime, reference)))
+        waiting.remove(found[-1])
+    return found
 
 
 def _equal_entries(one: DarbouxSpace, model: DarbouxSpace, prime: int, reference: int) -> int:
