@@ -193,7 +193,7 @@ def default_eps(system: QuadraticSystem, seed: int) -> tuple[fmpq, fmpq]:
 
 def _is_dominant(system: QuadraticSystem, eps: fmpq) -> bool:
     """Whether det dPhi is not 0 at one of a few points: proved where it is, and false otherwise as good as never."""
-    kahan_map, rng = KahanMap(system, eps), random.Random("dominant")
+    kahan_map, rng = KahanMap(system, eps), random.Random(f"dominant {seed_for(0, system.rhs, eps)}")
     for _ in range(_POINTS):
         try:
             if det(kahan_map.jacobian([rng.randint(-(10**9), 10**9) for _ in range(system.dim)])) != 0:
