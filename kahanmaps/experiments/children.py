@@ -47,8 +47,8 @@ class ChildrenError(KahanmapsError):
 class _Work:
     """A job in flight; `alone` says that it is being tried once more, in a child of its own.
 
-    `tries` of it have ended with a child that was killed from outside; `had_fault`: one with a child that died of a
-    signal of its own.
+    `tries` of it have ended with a child that was killed or stopped from outside; `had_fault`: one with a child that
+    died by itself.
     """
 
     job: Job
@@ -242,23 +242,32 @@ class LocalChildren:
             return []
         if work is None:
             return []
-        no_memory = any(words in told.lower() for words in _NO_MEMORY)
-        outcome, message = Outcome.CRASHED, f"the child {ending(status)}"
+        message = f"the child {ending(status)}"
         if is_from_outside(status):
-            outcome = Outcome.LOST
-            work.tries += 1
-            again = work.tries < self._tries
-        elif no_memory:
+            return self._ended_from_outside(child, work, message, told)
+        if any(words in told.lower() for words in _NO_MEMORY):
             outcome, message = Outcome.OUT_OF_MEMORY, "out of memory"
-            again = not was_fresh
+            is_doubtful = False
         else:
-            # Status 0 is the end of the questions. The signal of a fault may have been sent as well, but hardly twice.
-            again = not was_fresh or (status is not None and status <= 0 and not work.had_fault)
+            # The signal of a fault may have been sent as well, but hardly twice. Status 0 is the end of the questions;
+            # where there is none, the end may have been slow.
+            outcome = Outcome.CRASHED
+            is_doubtful = (status is None or status <= 0) and not work.had_fault
             work.had_fault = True
-        if again:
+        if is_doubtful or not was_fresh:
             self._again(work)
             return []
         record = self._record(child, work, outcome, message, told)
+        self._go_on()
+        return [record]
+
+    def _ended_from_outside(self, child: _Child, work: _Work, message: str, told: str) -> list[Record]:
+        """Have the work done by another child; or the record that it is lost."""
+        work.tries += 1
+        if work.tries < self._tries:
+            self._again(work)
+            return []
+        record = self._record(child, work, Outcome.LOST, message, told)
         self._go_on()
         return [record]
 
@@ -270,8 +279,13 @@ class LocalChildren:
             work = child.work
             if work is not None and (deadline := child.deadline()) is not None and now >= deadline:
                 child.read_the_rest()
+                was_stopped = child.is_stopped
                 self._bury(child)
                 message = f"not done within {work.job.limits.time:g} seconds"
+                if was_stopped:
+                    message += ", stopped from outside"
+                    records += self._ended_from_outside(child, work, message, child.told())
+                    continue
                 records.append(self._record(child, work, Outcome.TIMEOUT, message, child.told()))
                 self._go_on()
         return records
@@ -351,6 +365,13 @@ class _Child:
             return self.process.wait(1.0)
         except subprocess.TimeoutExpired:
             return None
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether somebody has stopped it (SIGSTOP) and not let it go on, where that can be known."""
+        with suppress(AttributeError, ChildProcessError):
+            return os.waitid(os.P_PID, self.process.pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
+        return False
 
     def circumstances(self) -> dict[str, Any]:
         """Where and when."""

@@ -246,8 +246,7 @@ class ClusterWorkers(Executor):
         A command that cannot be run is not tried again before another one has been: that would only take longer.
         """
         job = job._replace(tries=job.tries + 1)
-        is_worth_it = self._is_proven or not failure.is_unfit
-        if failure.outcome is Outcome.LOST and job.tries < TRIES and is_worth_it:
+        if job.tries < TRIES and (self._is_proven or not failure.is_unfit):
             self._again.append(job)
         else:
             self._held.append((key, job, failure))

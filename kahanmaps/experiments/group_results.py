@@ -18,14 +18,13 @@ TAIL = 2000  # characters of standard error kept
 class Failure:
     """Why a group ended without all its records.
 
-    A task has a process of its own below the group command, whose death the command tells in a record: so its own end
-    is the machine's doing, and `outcome` is that of a job with which it has ended like this at every try. `is_unfit`:
-    by itself, as if it could not be run at all; `is_the_workers`: they died, and it with them.
+    A task has a process of its own below the group command, whose limits the command keeps and whose death it tells in
+    a record: so what becomes of the command itself is the machine's doing, and no result. `is_unfit`: it ended by
+    itself, as if it could not be run at all; `is_the_workers`: they died, and it with them.
     """
 
     message: str
     stderr: str
-    outcome: Outcome = Outcome.LOST
     is_unfit: bool = False
     is_the_workers: bool = False
 
@@ -33,7 +32,7 @@ class Failure:
         """The record of a job that is not tried again."""
         return Record(
             key,
-            self.outcome,
+            Outcome.LOST,
             message=self.message,
             stderr=self.stderr,
             finished=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -60,7 +59,7 @@ def failure_of(result: Result, timeout: float | None) -> Failure:
         return Failure(message, stderr, is_unfit=status >= 0)
     if isinstance(error, subprocess.TimeoutExpired):
         message = f"the worker's command did not end within {timeout or 0:g} s"
-        return Failure(message, stderr, outcome=Outcome.TIMEOUT)
+        return Failure(message, stderr)
     if isinstance(error, distributed().KilledWorker):
         message = f"{error.allowed_failures + 1} workers died one after the other while they ran it"
         return Failure(message, stderr, is_the_workers=True)

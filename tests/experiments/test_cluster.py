@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import socket
 import subprocess
@@ -22,6 +23,7 @@ import pytest
 from kahanmaps.errors import InputError
 from kahanmaps.experiments import cluster, job_groups
 from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
+from kahanmaps.experiments.endings import TRIES
 from kahanmaps.experiments.group_results import record_on
 from kahanmaps.experiments.job_groups import JobGroup, KeptJob
 from kahanmaps.experiments.records import Job, Limits, Outcome, Task
@@ -325,7 +327,25 @@ def test_a_job_whose_group_ends_early_once_is_done_at_the_second_try(workers, tm
     assert all(record.is_ok for record in records)
 
 
-def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_times_out(shared, monkeypatch):
+def test_a_job_whose_group_ends_early_before_any_record_is_tried_again_after_the_first_one(workers, tmp_path):
+    jobs = [*jobs_of(1, leave=3, once=str(tmp_path / "been-here")), *jobs_of(1, kind="other", sleep=1.0)]
+    records = done(workers, jobs)
+    assert_exactly_once(records, jobs)
+    assert all(record.is_ok for record in records)
+
+
+def test_a_job_whose_group_always_ends_early_is_lost_after_a_few_tries_and_has_no_result(workers, tmp_path):
+    counted = f"printf x >> {shlex.quote(str(tmp_path / 'tries'))}; exec {shlex.join(workers._command)}"
+    workers._command = ["/bin/sh", "-c", counted]
+    bad, good = jobs_of(1, leave=3), jobs_of(1, kind="other")
+    records = {record.key: record for record in done(workers, [*bad, *good])}
+    assert (tmp_path / "tries").stat().st_size == TRIES + 1
+    lost = records[bad[0].task.key]
+    assert (lost.outcome, lost.message) == (Outcome.LOST, "the worker's command ended with status 3")
+    assert records[good[0].task.key].is_ok
+
+
+def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_is_lost(shared, monkeypatch):
     monkeypatch.setattr(job_groups, "START_UP", 0.5)
     monkeypatch.setattr(job_groups, "START_UP_OF_A_JOB", 0.05)
     limits = Limits(time=0.05)
@@ -338,7 +358,7 @@ def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_times_out(shared, m
         workers.close()
     assert_exactly_once(records, good + bad)
     (hung,) = [record for record in records if not record.is_ok]
-    assert (hung.key, hung.outcome) == (bad[0].task.key, Outcome.TIMEOUT)
+    assert (hung.key, hung.outcome) == (bad[0].task.key, Outcome.LOST)
     assert hung.message == "the worker's command did not end within 0.6 s"
 
 
