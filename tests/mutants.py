@@ -76,7 +76,7 @@ TURNED: dict[type[ast.AST], list[tuple[str, str]]] = {
 }
 PRINTS = re.compile(r"__repr__|__str__|_repr_\w+_|to_json|\w*_html")
 NO_MATHEMATICS = {"seed", "seconds", "progress", "maxsize", "strict"}  # arguments by these names
-NO_MATHEMATICS_IN = re.compile(r"\b(seconds|deadline|monotonic|get_close_matches|progress)\b")
+NO_MATHEMATICS_IN = re.compile(r"\b(seconds|deadline|monotonic|get_close_matches|progress|randint|randrange|Random)\b")
 NOT_READ = {"kahanmaps/checks/shown.py", "kahanmaps/laboratory/shown.py"}  # pages only
 
 

@@ -209,6 +209,35 @@ def test_orbits_do_not_depend_on_their_company(name, kernel):
 
 
 @over_kernels
+def test_orbits_of_general_blocks_do_not_depend_on_their_company(kernel):
+    member = member_of_repeated_factor()
+    form = normal_form(member)
+    starts = starts_of(4, 40)
+    starts[7] *= 1e200
+    starts[8] = [5.0, 0.1, 0.1, 0.1]  # x1~ = x1/(1 - x1/5)
+    together = FloatEnsemble(member.chosen.system, EPS, starts, form=form, kernel=kernel)
+    together.advance(70)
+    assert together.status[7] != "completed"
+    assert together.status[8] == "singular"
+    for orbit in (0, 6, 7, 8, 9, 39):
+        alone = FloatEnsemble(member.chosen.system, EPS, starts[orbit : orbit + 1], form=form, kernel=kernel)
+        alone.advance(70)
+        assert np.array_equal(alone.x[0], together.x[orbit], equal_nan=True)
+        assert alone.end(0) == together.end(orbit)
+
+
+@over_kernels
+def test_orbits_beyond_the_first_group_are_walked_sampled_and_recorded_as_alone(kernel):
+    starts = starts_of(2, 4200)
+    together = ensemble("one plane", starts, kernel=kernel, sampled=5)
+    alone = ensemble("one plane", starts[4097:], kernel=kernel, sampled=5)
+    assert np.array_equal(together.run(20, 10)[:, 4097:], alone.run(20, 10), equal_nan=True)
+    assert np.array_equal(together.x[4097:], alone.x, equal_nan=True)
+    for whole, part in zip(together.drift, alone.drift, strict=True):
+        assert np.array_equal(whole.largest[4097:], part.largest)
+
+
+@over_kernels
 def test_portions_and_records_do_not_change_the_numbers(kernel):
     starts = starts_of(6, 30)
     whole = ensemble("three real roots", starts, kernel=kernel, sampled=70)
