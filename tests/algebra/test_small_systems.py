@@ -5,12 +5,13 @@ from __future__ import annotations
 import itertools
 import time
 
+import pytest
 from flint import fmpq
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.small_systems import Component, decoupling, independent, solve_system
+from kahanmaps.algebra.small_systems import Component, decoupling, independent, normal_form, solve_system
 
 RING = ring(["x", "y", "z"])
 x, y, z = RING.gens()
@@ -94,3 +95,56 @@ def test_cubes_of_linear_forms_are_decoupled():
 def test_point_and_slopes():
     line = Component((2 * x + 1, y - x, RING.constant(4)))
     assert (line.free, line.point, line.slopes(0)) == ((0, 1), (1, 0, 4), [fmpq(2), fmpq(-1), fmpq(0)])
+
+
+@pytest.mark.parametrize(
+    ("equations", "expected"),
+    [
+        ([x**2 + y**2 - 5, x * y - 2, z - x - y], {(1, 2, 3), (2, 1, 3), (-1, -2, -3), (-2, -1, -3)}),
+        ([x + y + z - 6, x * y + y * z + z * x - 11, x * y * z - 6], set(itertools.permutations((1, 2, 3)))),
+        ([x**2 - y, y**2 - z, z**2 - x], {(0, 0, 0), (1, 1, 1)}),  # x^8 = x: two rational solutions and six others
+        ([x**2 + y**2 + z**2 - 3, x + y + z - 3, x * y - z], {(1, 1, 1)}),  # a double one
+    ],
+)
+def test_rational_points_of_irreducible_equations_are_found(equations, expected):
+    found = solve(*equations)
+    assert (points(found), found.complete) == (expected, True)
+    assert not any(component.free for component in found.components)
+
+
+def test_conjugate_solutions_are_told_in_groups():
+    found = solve(x**2 + y**2 - 3, x * y - 1, z)  # x + y = sqrt 5 or -sqrt 5, x - y = 1 or -1
+    assert (found.components, found.complete) == ([], True)
+    assert found.irrational
+
+
+def test_a_remainder_is_found_by_replacing_leading_monomials():
+    """x^2 = 2 y, y^2 = z + 1 and z^2 = 3: the leading monomials are coprime, so this is a Groebner basis."""
+    basis = [x**2 - 2 * y, y**2 - z - 1, z**2 - 3]
+    assert normal_form(x**3 * y**2 * z, basis) == 0 * x + 2 * x * y * z + 6 * x * y
+    assert normal_form(x**4 + 5 * z**3 - x, basis) == 4 * z + 4 + 15 * z - x
+    assert normal_form(x * y * z - 7, basis) == x * y * z - 7
+    assert normal_form(basis[0] * (x - 3 * z) + basis[2] * x**5, basis).is_zero()
+    assert normal_form(3 * x**2, [2 * x**2 - y]) == y * fmpq(3, 2)
+
+
+def test_planes_of_cubics_are_decoupled():
+    """Cubics in (u, v) and in (s, t), four linear forms of x, y, z, w, mixed with each other."""
+    four = ring(["x", "y", "z", "w"])
+    gens = four.gens()
+    a, b, c, d = gens
+    u, v, s, t = a + 2 * b - d, b + c, a - c + 3 * d, 2 * a + b + d
+    apart = [u**3 + u * v**2, u**2 * v - 2 * v**3, s**2 * t, s**3 - t**3]
+    mixed = [sum((f * (i * j + i + 1) ** 2 for j, f in enumerate(apart)), four.constant(0)) for i in range(1, 5)]
+    T = decoupling(mixed, 4)
+    moved = [sum((g * T[i, j] for j, g in enumerate(gens)), four.constant(0)) for i in range(4)]
+    spanned = [p.compose(*moved, ctx=four) for p in apart]
+    used = [{i for i, e in enumerate(p.degrees()) if e} for p in spanned]
+    assert T.det() != 0
+    assert not (used[0] | used[1]) & (used[2] | used[3])
+    assert [len(part) for part in used] == [2, 2, 2, 2]
+
+
+@pytest.mark.parametrize("form", [x**3 + y**3 + z**3 + x * y * z, x**3 + x * y**2 + y * z**2 + 3 * x**2 * z])
+def test_a_cubic_that_is_no_sum_over_blocks_is_not_decoupled(form):
+    assert decoupling([form], 3) is None

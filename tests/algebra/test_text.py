@@ -629,3 +629,19 @@ def test_what_is_longer_than_40_characters_is_cut_and_what_is_not_is_shown_whole
 def test_signs_before_a_variable_multiply(text, sign):
     assert parse_polynomial(text, NAMES) == sign * x
     assert parse_polynomial(f"y - {text}", NAMES) == y - sign * x
+
+
+@pytest.mark.parametrize(
+    ("good", "bad"),
+    [
+        ("x^64", "x^65"),
+        ("1^1000", "1^1001"),
+        ("(" * 100 + "x" + ")" * 100, "(" * 101 + "x" + ")" * 101),
+        ("1e10000", "1e10001"),
+        ("x" + " " * 199_999, "x" + " " * 200_000),
+    ],
+)
+def test_the_limits_are_those_that_are_documented(good: str, bad: str) -> None:
+    parse_rational_function(good, NAMES)
+    with pytest.raises(ExpressionError):
+        parse_rational_function(bad, NAMES)

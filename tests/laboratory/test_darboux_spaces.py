@@ -6,16 +6,18 @@ import random
 from math import comb
 
 import pytest
+from flint import nmod_mat
 from search_helpers import random_system, system
 
 from kahanmaps.laboratory.darboux_spaces import (
     DarbouxSpace,
     _is_darboux,
+    _of_rank_two,
     darboux_spaces,
     gradient_rank,
 )
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import combine, exponents_up_to, monomial_values
+from kahanmaps.laboratory.modular_points import combine, echelon, exponents_up_to, monomial_values
 from kahanmaps.systems.catalog import load
 
 SMALL = 101
@@ -128,3 +130,33 @@ def test_linear_maps():
     [space] = darboux_spaces(map_, 2).spaces
     assert space.basis[0] == [1, 0, 0, 0, 0, 0]
     assert [k for k, entry in enumerate(space.basis[1]) if entry] == [exponents_up_to(2, 2).index((1, 1))]
+
+
+@pytest.mark.parametrize(("others", "size"), [(1, 4), (2, 5), (3, 6)])
+def test_the_only_combination_of_rank_two_is_found(others, size):
+    """u wedge v among random skew matrices, mixed with them: its row space is that of u and v, in the given basis."""
+    prime, rng = 2**61 - 1, random.Random(others)
+
+    def vector(length):
+        return [rng.randrange(prime) for _ in range(length)]
+
+    def mixed(matrices, weights):
+        total = matrices[0] * weights[0]
+        for matrix, weight in zip(matrices[1:], weights[1:], strict=True):
+            total = total + matrix * weight
+        return total
+
+    u, v = vector(size), vector(size)
+    forms = [nmod_mat(size, size, [u[i] * v[j] - u[j] * v[i] for i in range(size) for j in range(size)], prime)]
+    for _ in range(others):
+        full = nmod_mat(size, size, vector(size * size), prime)
+        forms.append(full - full.transpose())
+    solutions = [mixed(forms, vector(len(forms))) for _ in forms]
+    fresh = [vector(size + 2) for _ in range(size)]
+    expected = echelon(combine([u, v], fresh, prime), prime)
+    found = _of_rank_two(solutions, fresh, prime)
+    if (others, size) == (1, 4):  # the Pfaffian has two zeros on a line, and none of them is the only one
+        assert found == []
+    else:
+        assert found == [expected]
+    assert _of_rank_two(solutions[:1], fresh, prime) == []

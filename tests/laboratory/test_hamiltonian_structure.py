@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import random
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import gradient, monomials, ring
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, constant_structures
+from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, _invertible, _small, constant_structures
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.files import read_system
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations
@@ -170,3 +172,35 @@ def test_random_structures(hamiltonian: CubicHamiltonian, seed: int) -> None:
 def test_the_seed_changes_no_form(seed: int) -> None:
     system = read_system(CATALOG / "paper_m3.toml").system
     assert constant_structures(system, seed=seed).forms == constant_structures(system).forms
+
+
+def skew(m, *places):
+    K = fmpq_mat(m, m)
+    for i, j in places:
+        K[i, j], K[j, i] = fmpq(1), fmpq(-1)
+    return K
+
+
+@pytest.mark.parametrize(
+    ("m", "forms", "found"),
+    [
+        (4, [skew(4, (0, 1)), skew(4, (2, 3))], skew(4, (0, 1), (2, 3))),  # each of rank 2, the sum of rank 4
+        (4, [skew(4, (0, 2), (1, 3))], -skew(4, (0, 2), (1, 3))),  # the standard one, which is taken if it can be
+        (4, [skew(4, (0, 1)), skew(4, (0, 2)), skew(4, (0, 3))], None),  # e1 wedge v: of rank 2
+        (6, [skew(6, (0, 1)), skew(6, (2, 3))], None),
+        (2, [], None),
+    ],
+)
+def test_an_invertible_combination_is_found_where_the_pfaffian_is_not_zero(m, forms, found):
+    assert _invertible(forms, m, random.Random(1)) == (found, True)
+
+
+def test_a_pfaffian_in_many_variables_is_not_proved_to_vanish():
+    """e1 wedge v in dimension 8: five values for each of seven coefficients are more points than are looked at."""
+    assert _invertible([skew(8, (0, j)) for j in range(1, 8)], 8, random.Random(1)) == (None, False)
+
+
+def test_simple_coefficients_come_first():
+    first = list(itertools.islice(_small(3, random.Random(1)), 5))
+    assert first[:4] == [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)]
+    assert max(map(abs, first[4])) <= 1

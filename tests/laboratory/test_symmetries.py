@@ -11,9 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kahanmaps import KahanMap
+from kahanmaps.algebra.small_systems import Component
+from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.laboratory.symmetries import linear_symmetries
-from kahanmaps.laboratory.symmetry_equations import is_symmetry
+from kahanmaps.laboratory.symmetry_equations import is_singular, is_symmetry
 from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -231,3 +233,27 @@ def test_the_json_has_the_documented_shape():
 def test_wrong_use(seconds):
     with pytest.raises(InputError, match="expected a positive number"):
         linear_symmetries(system("x", "x^2"), seconds=seconds)
+
+
+@pytest.mark.parametrize("entries", [["a", "b", "b", "a"], ["a", "b", "0", "a"], ["0", "a", "b", "0"]])
+def test_a_family_with_an_invertible_matrix_is_not_singular(entries):
+    assert not is_singular(family(entries), 2)
+
+
+@pytest.mark.parametrize(
+    ("entries", "singular"),
+    [
+        (["0", "a", "b", "-a", "0", "c", "-b", "-c", "0"], True),  # skew, of odd size
+        (["a", "0", "0", "0", "b", "0", "0", "0", "c"], False),
+        (["0", "a", "0", "0", "0", "b", "c", "0", "0"], False),
+        (["a", "b", "c", "b", "c", "a", "a + b", "b + c", "a + c"], True),  # the third row is the sum of the others
+        (["a", "b", "c", "b", "c", "a", "c", "a", "b"], False),
+        (["a", "b", "0", "0", "a", "0", "0", "0", "0"], True),
+    ],
+)
+def test_a_family_of_three_by_three_matrices_is_singular_where_its_determinant_is_zero(entries, singular):
+    assert is_singular(family(entries), 3) is singular
+
+
+def family(entries):
+    return Component(tuple(parse_polynomial(entry, ["a", "b", "c"]) for entry in entries))

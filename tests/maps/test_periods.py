@@ -12,11 +12,12 @@ from math import lcm
 
 import pytest
 from flint import fmpq, fmpq_poly, fmpz, fq_default_ctx
+from planar_helpers import structure_and_system
 
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.errors import BadPrime
+from kahanmaps.errors import BadPrime, SingularStep
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
@@ -32,7 +33,9 @@ from kahanmaps.maps.orbits import Orbit
 from kahanmaps.maps.periods import (
     Kind,
     OrbitPeriod,
+    _reductions,
     orbit_period,
+    period_of,
     period_over_rationals,
     plane_period,
     plane_period_over_rationals,
@@ -437,3 +440,58 @@ def test_random_rational_orbits_are_proved_not_to_be_periodic():
 def test_the_origin_is_a_fixed_point_over_q():
     form = normal_form(draw_with_eigenvalues([1, -2], seed=7))
     assert period_over_rationals(form, "1/10", [0, 0, 0, 0]).period == 1
+
+
+@pytest.mark.parametrize(("gamma", "first"), [(fmpq(7, 3), 101), (fmpq(5, 101), 103), (fmpq(1, 101 * 103), 107)])
+def test_a_number_is_reduced_at_primes_above_100_that_do_not_divide_its_denominator(gamma, first):
+    for (prime, residue, context), expected in zip(_reductions(gamma), (first, 109, 113), strict=False):
+        assert prime >= first
+        assert (int(residue) * int(gamma.q) - int(gamma.p)) % prime == 0
+        assert context is None
+        if expected == first:
+            assert prime == first
+
+
+@pytest.mark.parametrize(
+    ("chi", "primes"),
+    [
+        ([-2, 0, 1], [(101, 2), (103, 1), (107, 2), (109, 2), (113, 1)]),  # 2 is a square modulo 1 and 7 mod 8
+        ([-2, 0, 0, 1], [(101, 1), (103, 3), (107, 1), (109, 1), (113, 1)]),  # cubes: p = 2 mod 3, or 2 is one
+        ([fmpq(-1, 101), 0, 1], [(103, 2), (107, 1), (109, 2)]),
+    ],
+)
+def test_an_algebraic_number_is_reduced_to_the_smallest_residue_field_above_a_prime(chi, primes):
+    K = EtaleAlgebra(fmpq_poly(chi))
+    for (prime, residue, context), (expected, degree) in zip(_reductions(K.generator), primes, strict=False):
+        assert prime == expected
+        assert (1 if context is None else context.degree()) == degree
+        total = 0 * residue
+        for coefficient in reversed(chi):  # chi(residue) = 0, by Horner
+            coefficient = fmpq(coefficient)
+            number = int(coefficient.p) * pow(int(coefficient.q), -1, prime)
+            total = total * residue + (number if context is None else context(number))
+        assert total == 0
+
+
+@pytest.mark.parametrize("name", ["m = 2", "m = 2, another J"])
+@pytest.mark.parametrize("prime", [29, 31])
+def test_the_period_in_the_systems_own_coordinates_is_what_walking_shows(name, prime):
+    structure, system = structure_and_system(name)
+    kahan = KahanMap(system, "1/10", GF(prime))
+    walked = set()
+    for start in (["1/2", "-1/3", 0, 1], [1, 2, 3, 4], [5, 0, 0, 1]):
+        found = period_of(structure, "1/10", start, prime)
+        home = point = kahan.point(start)
+        for step in range(1, prime**4):
+            try:
+                point = kahan.step(point)
+            except SingularStep:
+                assert found.meets_pole is not False
+                walked.add("singular")
+                break
+            if point == home:
+                assert (found.status, found.period, found.meets_pole) == ("periodic", step, False)
+                walked.add("periodic")
+                break
+    assert walked
+    assert period_of(structure, "1/10", [1, 2, 3, 4]).status == "aperiodic"
