@@ -1,12 +1,13 @@
 """Do the tests bite?  Single changes to the mathematics at random, and whether a test sees each one (`make mutants`).
 
-    python tests/mutants.py [--count 100] [--seed 0] [--only kahanmaps/maps/] [--jobs 2] [--most 300] [--list]
+    python tests/mutants.py [--count 100] [--seed 0] [--only kahanmaps/maps/] [--jobs 2] [--list]
 
 A mutant is one change to one line: another operator, a sign or `not` or transpose dropped, a number one larger or
 smaller, a comparison turned round or moved by its boundary, and for or, indices swapped, a guard that never closes. It
 is written into a copy of the project in a temporary folder, and the tests that execute the line run there: those of its
 own folder first, quick ones first. One that fails, or takes far too long, has seen the change. Which test executes what
-is measured once, which takes a quarter of an hour, and kept in .mutants; after changes of code or tests: --measure.
+is measured once, which takes a quarter of an hour, and kept in .mutants: it is done again where the code has changed,
+and for new tests by --measure tests/NEW.py.
 
 Lines are drawn first, then one of the changes to each. Changes that no test can see, for they change nothing that is
 promised, are listed with their reasons in tests/mutants.toml. The exit status is 1 if tests see fewer than 95 of 100 of
@@ -294,13 +295,15 @@ class Coverage:
         return set(range(holder.lineno, _end(holder) + 1))
 
 
-def measure() -> None:
-    """Run all tests once and write down which lines each executes (from half an hour on)."""
+def measure(tests: list[str]) -> None:
+    """Run all tests once, or some of them again, and write down which lines each executes."""
+    if not tests:
+        shutil.rmtree(KEPT, ignore_errors=True)
     KEPT.mkdir(exist_ok=True)
     environment = {**os.environ, "COVERAGE_FILE": str(KEPT / "coverage"), "PYTHONPATH": str(ROOT / "tests")}
-    command = [sys.executable, "-m", "coverage", "run", "--source=kahanmaps", "-m", "pytest", "-p", "mutants"]
-    command += ["-m", "not slow", "-q", "-n", "0", "--timeout", "900", "--hypothesis-seed=0", *TESTS]
-    subprocess.run(command, cwd=ROOT, env=environment, check=True)
+    command = [sys.executable, "-m", "coverage", "run", "--append", "--source=kahanmaps", "-m", "pytest"]
+    command += ["-p", "mutants", "-m", "not slow", "-q", "-n", "0", "--timeout", "900", "--hypothesis-seed=0"]
+    subprocess.run([*command, *(tests or TESTS)], cwd=ROOT, env=environment, check=True)
     (KEPT / "measured").write_text(state())
 
 
@@ -406,7 +409,7 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2, help="how many at once")
     parser.add_argument("--most", type=float, default=300.0, help="seconds of tests for a mutant")
     parser.add_argument("--list", action="store_true", help="print the sample and try nothing")
-    parser.add_argument("--measure", action="store_true", help="run all tests to see which lines each executes")
+    parser.add_argument("--measure", nargs="*", metavar="FILE", help="run all tests, or new ones, to see their lines")
     options = parser.parse_args()
     chosen = [m for m in all_mutants() if options.only in f"{m.path}:{m.line}:"]
     chosen = sample(chosen, options.count, options.seed)
@@ -414,8 +417,8 @@ def main() -> int:
         print(*chosen, sep="\n")
         return 0
     measured = KEPT / "measured"
-    if options.measure or not measured.exists() or measured.read_text() != state():
-        measure()
+    if options.measure is not None or not measured.exists() or measured.read_text() != state():
+        measure(options.measure or [])
     record = Coverage()
     listed = tomllib.loads((ROOT / "tests" / "mutants.toml").read_text(encoding="utf-8"))["equivalent"]
     equivalent = {(one["file"], one["function"], one["line"], one["kind"]): one["reason"] for one in listed}
@@ -479,7 +482,9 @@ def pytest_fixture_setup(fixturedef: Any, request: pytest.FixtureRequest) -> Ite
 
 
 def pytest_sessionfinish() -> None:
-    (KEPT / "seconds.json").write_text(json.dumps(_seconds))
+    """Write down how long each test took, beside what is known of others."""
+    known = KEPT / "seconds.json"
+    known.write_text(json.dumps((json.loads(known.read_text()) if known.exists() else {}) | _seconds))
 
 
 def _switch(context: str) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
-from flint import fmpq
+from flint import fmpq, fmpq_mat
 from helpers import rationals, some
 from hypothesis import given
 from hypothesis import strategies as st
@@ -18,6 +18,7 @@ from kahanmaps.algebra.mathml import (
     mathml_number,
     mathml_polynomial,
     mathml_rational_function,
+    matrix,
 )
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import LIMITS, parse_polynomial, parse_rational_function
@@ -177,3 +178,24 @@ def test_numbers():
     assert mathml_number(fmpq(5)) == "<mn>5</mn>"
     assert mathml_number(fmpq(1, 2)) == "<mfrac><mn>1</mn><mn>2</mn></mfrac>"
     assert mathml_number(fmpq(-5)) == '<mrow><mo form="prefix">−</mo><mn>5</mn></mrow>'
+
+
+def test_a_quotient_by_one_is_shown_as_its_numerator():
+    short, long = parse_polynomial("x^2 + 3*y", ["x", "y"]), LONG
+    for polynomial in (short, long):
+        one = polynomial.context().constant(1)
+        assert formula(RationalFunction(polynomial, one), "I1", 60) == formula(polynomial, "I1", 60)
+
+
+def test_a_matrix_is_shown_row_by_row_up_to_eight_and_by_its_size_beyond():
+    found = element(matrix(fmpq_mat([[1, fmpq(-1, 2)], [0, 3]]), "A"))
+    assert next(found.iter("math")).get("alttext") == "A = [[1, -1/2], [0, 3]]"
+    rows = [["".join(cell.itertext()) for cell in row.iter("mtd")] for row in found.iter("mtr")]
+    assert rows == [["1", "−12"], ["0", "3"]]
+    assert next(element(matrix(fmpq_mat([[1, 2]]))).iter("math")).get("alttext") == "[[1, 2]]"
+    assert len(list(element(matrix(fmpq_mat(8, 8))).iter("mtd"))) == 64
+    for rows_, columns in ((9, 1), (1, 9)):
+        told = f"a matrix with {rows_} rows and {columns} columns"
+        assert "".join(element(matrix(fmpq_mat(rows_, columns), "J")).itertext()) == f"J: {told}"
+        assert "".join(element(matrix(fmpq_mat(rows_, columns))).itertext()) == told
+    assert "2 columns" in matrix(fmpq_mat([[1, fmpq(10) ** 100]]))

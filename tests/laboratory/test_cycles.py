@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.errors import BadPrime, InputError, SingularStep
-from kahanmaps.laboratory.cycle_laws import LAWS, compare
+from kahanmaps.laboratory.cycle_laws import LAWS, _critical, _distance, compare
 from kahanmaps.laboratory.cycles import cycle_census, default_eps
 from kahanmaps.laboratory.reversors import find_reversor, is_reversor
 from kahanmaps.maps.kahan import KahanMap
@@ -207,6 +207,7 @@ def test_lotka_volterra_goes_like_a_random_reversible_map_and_not_along_curves()
         assert set(found.refused) == {"integrable bound", "random permutation"}
         assert census.longest > hasse_weil(499)
         assert found.model_scale == pytest.approx(499.5, abs=1)
+        assert f", where 2 N/(fixed points) = {found.model_scale:.1f}, " in found.reasons["random reversible"]
         assert census.lost == 3  # the base points of a quadratic map of the plane
 
 
@@ -220,6 +221,28 @@ def test_the_law_is_refused_for_an_integrable_reversible_map():
     system = load("weierstrass").system
     found = compare(cycle_census(system, "1/7", 199, reversor=find_reversor(system)))
     assert "random reversible" in found.refused
+
+
+@pytest.mark.parametrize(
+    ("lengths", "expected"),
+    [
+        ([(1.0, 1)], 2 / math.e),  # the law at 1 is 1 - 2/e: all points below it, none there
+        ([(1.0, 7)], 2 / math.e),
+        ([(0.5, 1), (1.5, 1)], 2.5 * math.exp(-1.5)),  # from a quarter to 1 at 1.5, where the law is 1 - 2.5 e^-1.5
+        ([(1.5, 3), (0.5, 3)], 2.5 * math.exp(-1.5)),
+        ([(0.1, 9), (9.0, 1)], 1 - 10 * math.exp(-9) - 0.9 / 9.9),  # 1/11 until just below 9
+    ],
+)
+def test_the_distance_of_a_distribution_from_the_law_of_random_reversible_maps(lengths, expected):
+    assert _distance(lengths) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_critical_distance_shrinks_like_that_of_a_mean():
+    assert _critical(1600, 3) == pytest.approx(_critical(400, 3) / 2, rel=1e-12)
+    assert _critical(20, 3) > _critical(100, 3) > _critical(400, 3)
+    # Kolmogorov: 1.63/sqrt(count) for a law without parameters; points count by the lengths of their cycles, which
+    # makes it larger, and the mean is fitted, which makes it smaller.
+    assert 0.5 < _critical(400, 3) * 20 < 2.5
 
 
 def test_a_moebius_map_is_one_rotation_of_the_projective_line():
@@ -357,6 +380,12 @@ def test_a_wrong_reversor_is_refused(matrix, words):
 def test_wrong_primes_and_eps_are_refused(eps, prime, kind, words):
     with pytest.raises(kind, match=words):
         cycle_census(load("lorenz").system, eps, prime)
+
+
+@pytest.mark.parametrize("samples", [-1, 0, 100_001])
+def test_a_wrong_number_of_samples_is_refused(samples):
+    with pytest.raises(InputError, match="expected 1 to 100000"):
+        cycle_census(load("lorenz").system, "1/7", 101, samples=samples)
 
 
 def test_laws_have_names_and_reasons():

@@ -340,6 +340,9 @@ def test_the_zero_hamiltonian_refutes_nothing():
     zero = parse_polynomial("x1 - x1", ["x1", "x2", "x3", "x4"])
     report = verify(SystemFile.from_member(FamilyMember(A, zero)))
     assert keys(report, REFUTED) <= misprints(2)
+    told = {key: finding.evidence.summary for key, finding in by_key(report).items()}
+    assert "both sides agree at 4 random points" in told["associated-fields-are-pairwise-different"]
+    assert "not attained at 4 random points" in told["hamiltonians-are-independent"]
 
 
 # Systems of files
