@@ -291,7 +291,7 @@ def test_integrals_are_shown_as_formulas(top):
     found = km.find_integrals(top, seconds=10)
     alttexts = [one.get("alttext") for one in html_of(found).iter("math")]
     assert "I1 =" in alttexts
-    assert "2 found; orbits show 2 (measured)" in text_of(found)
+    assert "2 found; in all 2 independent (measured: relations of degree up to 2 along orbits show 2)" in text_of(found)
 
 
 def test_many_commuting_systems_are_counted_not_all_shown():

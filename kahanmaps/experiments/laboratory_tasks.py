@@ -63,7 +63,7 @@ def integrals(
     seed: int = 0,
     report: bool = False,
 ) -> Result:
-    """Integrals in closed form with their verdict, and how many there are as far as orbits show."""
+    """Integrals in closed form with their verdict, and how many there are at least, by theorems and by orbits."""
     from kahanmaps.laboratory.integrals import find_integrals
 
     found = find_integrals(system, symbols=symbolic or (), eps=eps, max_degree=max_degree, seconds=seconds, seed=seed)

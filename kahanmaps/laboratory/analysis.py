@@ -69,16 +69,21 @@ class Analysis:
 
     @property
     def integral_count(self) -> int:
-        """The number of independent integrals: found, shown by orbits, or given by the commuting family."""
-        measured = self.integrals.codimension if self.integrals is not None else 0
+        """The number of independent integrals: found, shown by orbits, or given by theorems; see `count_is_exact`."""
+        known = self.integrals.codimension if self.integrals is not None else 0
         family = self.structure.form.m if isinstance(self.structure, Structure) else 0
-        return max(measured, family)
+        return max(known, family)
+
+    @property
+    def count_is_exact(self) -> bool:
+        """Whether there are no more than `integral_count` integrals: else it is a lower bound."""
+        return self.integrals is not None and self.integrals.is_exact
 
     @property
     def integrals_were_counted(self) -> bool:
         """Whether `integral_count` says anything: it is 0 as well where the orbits were not reached or not defined."""
-        measured = self.integrals is not None and bool(self.integrals.profile.nullities or self.integrals.integrals)
-        return measured or isinstance(self.structure, Structure)
+        measured = self.integrals is not None and bool(self.integrals.profile.nullities)
+        return measured or self.integral_count > 0
 
     @property
     def conclusion(self) -> Conclusion:
@@ -118,6 +123,7 @@ class Analysis:
             "verdict": {
                 "integrability": final.kind,
                 "integrals": final.integrals if self.integrals_were_counted else None,
+                "integrals_exact": self.count_is_exact,
                 "growth": final.growth,
                 "sentence": final.sentence,
             },

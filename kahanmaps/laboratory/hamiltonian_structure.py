@@ -93,8 +93,8 @@ def constant_structures(system: QuadraticSystem, *, seed: int = 0) -> ConstantSt
         )
     rng = random.Random(seed)
     everything = quotient_by((), n)
-    forms = _closed_forms(system, everything, rng)
-    functions = tuple(_hamiltonian_function(system, everything, K) for K in forms)
+    forms = closed_forms(system, everything, rng)
+    functions = tuple(hamiltonian_function(system, everything, K) for K in forms)
     integrals = affine_integrals(system)
     reason, proved = "the dimension is odd", True
     if n % 2 == 0:
@@ -112,7 +112,7 @@ def constant_structures(system: QuadraticSystem, *, seed: int = 0) -> ConstantSt
         proved = proved and len(integrals) == 1
     else:
         quotient = quotient_by(integrals, n)
-        K, decided = _invertible(_closed_forms(system, quotient, rng), len(quotient.free), rng)
+        K, decided = _invertible(closed_forms(system, quotient, rng), len(quotient.free), rng)
         if K is not None:
             H = _hamiltonian(system, quotient, K)
             rows = fmpq_mat([[fmpq(entry) for entry in v] for v in integrals])
@@ -124,7 +124,7 @@ def constant_structures(system: QuadraticSystem, *, seed: int = 0) -> ConstantSt
     return ConstantStructures(system, forms, functions, None, (), reason, proved)
 
 
-def _closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.Random) -> tuple[fmpq_mat, ...]:
+def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.Random) -> tuple[fmpq_mat, ...]:
     """A basis of the skew K for which K f_y is a gradient with respect to the coordinates y of the quotient."""
     m, n = len(quotient.free), system.dim
     local = system.over(QQ)
@@ -168,10 +168,10 @@ def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) 
     factor = next(
         (integer / entry for integer, entry in zip(primitive_integers(entries), entries, strict=True) if entry != 0), 1
     )
-    return CubicHamiltonian(_hamiltonian_function(system, quotient, K / factor), J * factor)
+    return CubicHamiltonian(hamiltonian_function(system, quotient, K / factor), J * factor)
 
 
-def _hamiltonian_function(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> fmpq_mpoly:
+def hamiltonian_function(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> fmpq_mpoly:
     """The H with grad_y H = K f_y that vanishes for y = 0: the integral of y . K f_y from x - S y, where y = 0, to x.
 
     The integrand is a polynomial of degree 2 in the parameter, so Simpson's rule is exact.

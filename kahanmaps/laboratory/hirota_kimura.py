@@ -44,24 +44,27 @@ _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 class OrbitRelations:
     """The polynomials of degree at most `degree` that vanish along one orbit.
 
-    `vectors` is the reduced echelon basis on the monomials `exponents_up_to(dim, degree)`; `codimension` the rank of
-    their gradients at a point of the orbit; `period` is the number of points of an orbit that closed, else None.
+    `vectors` is the reduced echelon basis on the monomials `exponents_up_to(dim, degree)`; `normals` span their
+    gradients at the last point, `end`, and `codimension` is the rank of these; `period` is the number of points of an
+    orbit that closed, else None.
     """
 
     degree: int
     vectors: list[list[int]]
+    normals: list[list[int]]
     codimension: int
     period: int | None
     start: Point
+    end: Point
 
 
 @dataclass(frozen=True)
 class Profile:
     """The dimensions of the spaces of polynomials of degree 1, 2, ... that vanish along a generic orbit.
 
-    `codimension` is that of the orbit's variety as far as these polynomials show it. `period` is the number of points
-    of orbits that close, else None; `agree` tells whether all maps gave the same numbers, `complete` whether all
-    degrees that were asked for were tried.
+    `codimension` is that of the orbit's variety as far as these polynomials show it, `with_known` the same together
+    with the integrals that were known before. `period` is the number of points of orbits that close, else None;
+    `agree` tells whether all maps gave the same numbers, `complete` whether all degrees that were asked for were tried.
     """
 
     dim: int
@@ -70,6 +73,7 @@ class Profile:
     period: int | None
     agree: bool
     complete: bool
+    with_known: int = 0
 
     @property
     def codimension(self) -> int:
@@ -114,7 +118,8 @@ def relations_on_orbit(map_: ModularMap, degree: int, start: Point | None = None
     period = len(points) if len(points) < count else None
     rows = [monomial_values(support, x, map_.prime) for x in points]
     vectors = null_space(rows, len(support), map_.prime)
-    return OrbitRelations(degree, vectors, _codimension(map_, vectors, support, points[-1]), period, points[0])
+    normals = _normals(map_, vectors, support, points[-1])
+    return OrbitRelations(degree, vectors, normals, rank(normals, map_.prime), period, points[0], points[-1])
 
 
 def span_of_relations(map_: ModularMap, degree: int, seconds: float = 30.0) -> tuple[list[list[int]], int]:
@@ -134,6 +139,7 @@ def orbit_profile(
     *,
     max_degree: int | None = None,
     seconds: float = 20.0,
+    known: Callable[[ModularMap, Point], list[list[int]]] = lambda map_, x: [],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Profile:
     """Dimensions and codimensions for degree 1, 2, ..., on one orbit of each of the maps, which are to agree.
@@ -142,6 +148,7 @@ def orbit_profile(
         maps: the maps, with different primes and, where eps is not given, different eps.
         max_degree: the last degree; by default one that takes seconds.
         seconds: the time that may be taken, about.
+        known: the gradients of known integrals at a point.
         progress: is told what is being tried.
 
     Returns:
@@ -163,6 +170,7 @@ def orbit_profile(
     deadline = time.monotonic() + seconds
     nullities: list[int] = []
     codimensions: list[int] = []
+    with_known = 0
     agree, period, took, complete = True, None, 0.0, True
     top = max_degree if max_degree is not None else _MAX_DEGREE.get(dim, 4)
     if max_degree is None:
@@ -185,12 +193,16 @@ def orbit_profile(
         # A special orbit has more relations, never fewer.
         nullities.append(min(len(one.vectors) for one in found))
         codimensions.append(min(one.codimension for one in found))
+        together = [
+            rank([*one.normals, *known(map_, one.end)], map_.prime) for map_, one in zip(maps, found, strict=True)
+        ]
+        with_known = max(with_known, min(together))
         if period is None and len({one.period for one in found}) == 1:
             period = found[0].period
         # Orbits that close are points, whatever curves of lower degree go through them.
         if codimensions[-1] >= (dim - 1 if period is None else dim):
             break
-    return Profile(dim, tuple(nullities), tuple(codimensions), period, agree, complete)
+    return Profile(dim, tuple(nullities), tuple(codimensions), period, agree, complete, with_known)
 
 
 @dataclass(frozen=True)
@@ -272,12 +284,12 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
     )
 
 
-def _codimension(map_: ModularMap, vectors: list[list[int]], support: tuple[tuple[int, ...], ...], point: Point) -> int:
-    """The rank of the gradients at the point, of random combinations where there are many vectors."""
-    if not vectors:
-        return 0
+def _normals(
+    map_: ModularMap, vectors: list[list[int]], support: tuple[tuple[int, ...], ...], point: Point
+) -> list[list[int]]:
+    """The gradients at the point, of random combinations where there are many vectors."""
     prime, rng = map_.prime, random.Random(map_.prime)
     if len(vectors) > map_.dim + 2:
         weights = [[rng.randrange(prime) for _ in vectors] for _ in range(map_.dim + 2)]
         vectors = combine(weights, vectors, prime)
-    return rank([gradient_values(vector, support, point, prime)[1] for vector in vectors], prime)
+    return [gradient_values(vector, support, point, prime)[1] for vector in vectors]

@@ -1,17 +1,17 @@
 """Integrals of a Kahan map in closed form, found without being told anything but the right-hand sides.
 
-How many there are is measured first (the codimension of orbits, hirota_kimura.py). Then spaces of polynomials with a
-common cofactor are sought modulo a prime (search.py); their ratios are the integrals. The coefficients are functions of
-eps and of the parameters that are left as symbols; they are interpolated (closed_forms.py), and what comes out is put
-to the proof as an identity (identities.py). A Hamiltonian system with constant structure has the integral of cmoq-2013
-in any case.
+How many there are at least is found first: by theorems (inherited.py) and by the codimension of orbits, which is
+measured (hirota_kimura.py). Then spaces of polynomials with a common cofactor are sought modulo a prime (search.py);
+their ratios are the integrals. The coefficients are functions of eps and of the parameters that are left as symbols;
+they are interpolated (closed_forms.py), and what comes out is put to the proof as an identity (identities.py). What the
+theorems give and was not found is added.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
@@ -19,23 +19,25 @@ from flint import fmpq, fmpq_mpoly, fmpz
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.latex import latex_rational_function
-from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate
+from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate, ring
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.branches import Branches, Pattern, tell_apart
 from kahanmaps.laboratory.cofactors import Cofactor
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION, constant_structures
 from kahanmaps.laboratory.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.identities import integral_verdict
+from kahanmaps.laboratory.inherited import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, rank
-from kahanmaps.laboratory.search import Found, classes, may_be_conjugate, repeat, search
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
+from kahanmaps.laboratory.search import AFFINE, Found, classes, may_be_conjugate, repeat, search
 from kahanmaps.laboratory.shown import integrals_html
 from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.parametric import ParametricSystem
 
+_AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
+_SHOWN_TERMS = 500
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
 
 
@@ -54,6 +56,14 @@ class FoundIntegral:
         """The formula."""
         return format_rational_function(self.function)
 
+    @property
+    def short_text(self) -> str:
+        """The formula, or its size where it would fill pages."""
+        sizes = len(self.function.numerator), len(self.function.denominator)
+        if sum(sizes) <= _SHOWN_TERMS:
+            return self.text
+        return f"P/Q with {sizes[0]} and {sizes[1]} terms, which find-integrals writes out"
+
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
@@ -71,9 +81,10 @@ class FoundIntegral:
 class IntegralSearch:
     """What `find_integrals` found.
 
-    `integrals` are functionally independent; `codimension` is how many independent integrals the orbits show
-    (measured), `profile` how they show it. `reason` says what is missing and why, empty where nothing is. `eps` is None
-    for every eps.
+    `integrals` are functionally independent; `profile` is what relations along orbits show (measured); `by_theorems` is
+    how many independent integrals the Kahan map has by the theorems of inherited.py, and `theorems` says which (with
+    symbols: at random values). `reason` says what is missing and why, empty where nothing is. `eps` is None for every
+    eps.
     """
 
     file: SystemFile
@@ -84,6 +95,8 @@ class IntegralSearch:
     reason: str
     primes: tuple[int, ...]
     seed: int
+    by_theorems: int = 0
+    theorems: str = ""
 
     @property
     def note(self) -> str:
@@ -92,12 +105,37 @@ class IntegralSearch:
 
     @property
     def codimension(self) -> int:
-        """How many independent integrals the orbits show, not fewer than were found."""
-        return max(self.profile.codimension, len(self.integrals))
+        """How many independent integrals are known: shown by orbits, given by theorems, or found in closed form."""
+        return max(self.profile.codimension, self.profile.with_known, self.by_theorems, len(self.integrals))
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether there can be no more than `codimension` integrals: else it is a lower bound.
+
+        Relations of higher degrees, which were not tried, can show more, until orbits lie on curves; points, where
+        they close.
+        """
+        dim, measured = self.profile.dim, bool(self.profile.nullities)
+        return self.codimension >= (dim - 1 if measured and self.profile.period is None else dim)
+
+    @property
+    def count_text(self) -> str:
+        """How many integrals there are, and how that is known."""
+        tried = f"relations of degree up to {self.profile.degree} along orbits"
+        if self.codimension == 0:
+            if not self.profile.nullities:
+                return "orbits were not measured"
+            return f"there is no integral (measured, {tried})" if self.is_exact else f"none shows in {tried} (measured)"
+        parts = [f"{self.by_theorems} by theorems: {self.theorems}"] if self.by_theorems else []
+        if self.profile.nullities:
+            shown = "no more" if self.codimension == self.by_theorems else str(self.codimension)
+            parts.append(f"measured: {tried} show {shown}")
+        at_least = "" if self.is_exact else "at least "
+        return f"in all {at_least}{self.codimension} independent ({'; '.join(parts)})"
 
     @property
     def is_complete(self) -> bool:
-        """Whether there is a closed form for every integral that the orbits show."""
+        """Whether there is a closed form for every integral that is known."""
         return len(self.integrals) >= self.codimension
 
     def _repr_html_(self) -> str:
@@ -109,6 +147,8 @@ class IntegralSearch:
             "integrals": [one.to_json() for one in self.integrals],
             "found": len(self.integrals),
             "codimension": self.codimension,
+            "codimension_is_exact": self.is_exact,
+            "by_theorems": self.by_theorems,
             "relations": self.profile.to_json(),
             "note": self.note,
             "reason": self.reason,
@@ -188,31 +228,45 @@ def find_integrals(
     deadline = time.monotonic() + seconds
     primes = laboratory.primes
 
+    values = dict.fromkeys(map_.values for map_ in laboratory.maps)  # of the symbols; without symbols all the same
+    systems = {value: inherited_integrals(laboratory.system.at(value), seed=seed) for value in values}
+    inherited = [systems[map_.values] for map_ in laboratory.maps]
+    by_theorems = 0
+
+    def gradients(map_: ModularMap, x: Point) -> list[list[int]]:
+        return inherited[laboratory.maps.index(map_)].gradients(map_, x)
+
     def result(integrals: Sequence[FoundIntegral], profile: Profile, reason: str) -> IntegralSearch:
-        return IntegralSearch(file, laboratory.symbols, laboratory.eps, tuple(integrals), profile, reason, primes, seed)
+        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, inherited[0].text)
+        return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found)
 
     empty = Profile(file.system.dim, (), (), None, True, False)
     if laboratory.defect:
         return result([], empty, laboratory.defect)
+    by_theorems = min(one.count(map_) for one, map_ in zip(inherited, laboratory.maps, strict=True))
     try:
-        profile = orbit_profile(laboratory.maps, max_degree=max_degree, seconds=seconds / 3, progress=progress)
-        if profile.codimension == 0:
-            return result(_theorem(laboratory, [], 1), profile, _unfinished(profile, max_degree))
+        profile = orbit_profile(
+            laboratory.maps, max_degree=max_degree, seconds=seconds / 3, known=gradients, progress=progress
+        )
         cofactors = laboratory.cofactors()
         base, found = _search(laboratory, profile, cofactors, deadline, progress)
         formulas, reason = _formulas(laboratory, base, found, cofactors, deadline, progress)
     except NoPoint as error:
         return result([], empty, str(error))
     integrals = _independent(laboratory, formulas, progress)
-    integrals += _theorem(laboratory, integrals, profile.codimension)
-    if len(integrals) >= profile.codimension:
+    if not laboratory.symbols:
+        integrals = _by_theorems(laboratory, inherited[0], integrals, deadline)
+    done = result(integrals, profile, "")
+    missing = done.codimension - len(integrals)
+    if missing <= 0:
         reason = ""
     elif not reason:
+        have = "has" if missing == 1 else "have"
         reason = (
-            f"{profile.codimension - len(integrals)} of the {profile.codimension} integrals that orbits show have no "
-            "closed form P/Q of the degrees that were tried: coefficients of Hirota-Kimura bases are such integrals"
+            f"{missing} of the {done.codimension} independent integrals {have} no closed form P/Q of the degrees and "
+            "sizes that were tried: coefficients of Hirota-Kimura bases are such integrals"
         )
-    return result(integrals, profile, "; ".join(filter(None, (reason, _unfinished(profile, max_degree)))))
+    return replace(done, reason="; ".join(filter(None, (reason, _unfinished(profile, max_degree)))))
 
 
 def _unfinished(profile: Profile, max_degree: int | None) -> str:
@@ -336,7 +390,7 @@ def _independent(
             continue
         progress("verifying an integral")
         if _is_affine_integral(laboratory.system, function):
-            verdict, evidence = Verdict.PROVED, Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
+            verdict, evidence = Verdict.PROVED, _AFFINE_EVIDENCE
         else:
             verdict, evidence = integral_verdict(laboratory.system, function, laboratory.eps, laboratory.seed)
         if verdict.holds:
@@ -372,32 +426,53 @@ def _gradient(map_: ModularMap, function: RationalFunction, point: Sequence[int]
     ]
 
 
-def _theorem(laboratory: Laboratory, known: Sequence[FoundIntegral], wanted: int) -> list[FoundIntegral]:
-    """The modified Hamiltonian, where the system has one with numbers for parameters and it is a new integral."""
-    if laboratory.symbols or len(known) >= wanted or laboratory.system.dim > MAX_DIMENSION:
-        return []
-    structures = constant_structures(laboratory.file.system)
-    integral = structures.integral
-    if integral is None:
-        return []
-    system = laboratory.file.system
-    field = FunctionField((*system.variables, "eps"), reduces=False)
-    eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
-    try:
-        value = integral.value(field, eps, field.variables[:-1])
-        common = value.above.gcd(value.below)
-        function = RationalFunction(value.above / common, value.below / common)
-    except BudgetExceeded:
-        return []
+def _by_theorems(
+    laboratory: Laboratory, inherited: InheritedIntegrals, known: Sequence[FoundIntegral], deadline: float
+) -> list[FoundIntegral]:
+    """The integrals of the theorems that do not depend on the known ones, as far as they can be written out."""
     map_ = laboratory.maps[0]
     point = map_.random_point()
     rows = [_gradient(map_, one.function, point) for one in known]
-    if rank([*rows, _gradient(map_, function, point)], map_.prime) == len(rows):
-        return []
-    evidence = Evidence(
-        "theorem",
-        "f = J grad H with a constant skew matrix J: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)",
-        {"H": str(structures.hamiltonian.H) if structures.hamiltonian else ""},
+    found = list(known)
+    affine = len(inherited.quotient.integrals)
+    for k, row in enumerate(inherited.gradients(map_, point)):
+        if rank([*rows, row], map_.prime) == len(rows):
+            continue
+        if k < affine:
+            function, origin, evidence = _affine(laboratory, inherited.quotient.integrals[k])
+        else:
+            written = None if time.monotonic() > deadline else _modified(laboratory, inherited, k - affine)
+            if written is None:
+                continue
+            function, origin, evidence = written
+        rows.append(row)
+        found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, Verdict.PROVED, evidence))
+    return found
+
+
+def _affine(laboratory: Laboratory, vector: Sequence[fmpz]) -> tuple[RationalFunction, str, Evidence]:
+    """v.x as a function of the variables and eps."""
+    context = ring((*laboratory.system.variables, "eps"))
+    total = sum((gen * v for gen, v in zip(context.gens(), vector, strict=False)), context.constant(0))
+    return RationalFunction(total, context.constant(1)), AFFINE, _AFFINE_EVIDENCE
+
+
+def _modified(
+    laboratory: Laboratory, inherited: InheritedIntegrals, k: int
+) -> tuple[RationalFunction, str, Evidence] | None:
+    """The modified Hamiltonian that belongs to the k-th form; None where it is too long to be written out."""
+    field = FunctionField((*laboratory.system.variables, "eps"), reduces=False)
+    eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
+    try:
+        value = inherited.modified(k, field, eps, field.variables[:-1])
+    except BudgetExceeded:
+        return None
+    common = value.above.gcd(value.below)
+    function = RationalFunction(value.above / common, value.below / common)
+    is_hamiltonian = inherited.forms[k].rank() == len(inherited.quotient.free)
+    what = (
+        "f = J grad H with a constant skew matrix J" if is_hamiltonian else "K f = grad H with a constant skew matrix K"
     )
-    name = f"I{len(known) + 1}"
-    return [FoundIntegral(name, function, "modified Hamiltonian (cmoq-2013)", Verdict.PROVED, evidence)]
+    summary = f"{what}: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)"
+    evidence = Evidence("theorem", summary, {"H": str(inherited.hamiltonian(k))})
+    return function, "modified Hamiltonian (cmoq-2013)", evidence

@@ -43,14 +43,10 @@ class Conclusion:
 
 def conclude(found: Analysis) -> Conclusion:
     """The verdict on what was found."""
-    n, count = found.dim, found.integral_count
+    count = found.integral_count
     growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
     phrase = found.degrees.growth_text if found.degrees is not None else "degrees not measured"
-    if found.integrals_were_counted:
-        integrals = "no integral" if count == 0 else counted(count, "independent integral")
-        integrals += f" in dimension {n}"
-    else:
-        integrals = "the integrals were not counted"
+    integrals = _count_text(found) if found.integrals_were_counted else "the integrals were not counted"
     period = found.integrals.profile.period if found.integrals is not None else None
     suffix = "" if found.eps is None else f" All this at eps = {found.eps} only: other eps may differ."
     if found.symbols:
@@ -88,6 +84,16 @@ def conclude(found: Analysis) -> Conclusion:
     return verdict("undecided", f"The growth is undecided: {phrase}; {integrals}.")
 
 
+def _count_text(found: Analysis) -> str:
+    """How many integrals there are; where that is a lower bound, the sentence says so."""
+    count, search = found.integral_count, found.integrals
+    where = f" in dimension {found.dim}"
+    if count == 0 and search is not None and not found.count_is_exact:
+        return f"no integral{where}, as far as relations of degree up to {search.profile.degree} along orbits show"
+    number = "no integral" if count == 0 else counted(count, "independent integral")
+    return number + where if found.count_is_exact else f"at least {number}{where}"
+
+
 def _is_affine(found: Analysis) -> bool:
     return all(int(p.total_degree()) <= 1 for p in found.file.system.rhs)
 
@@ -113,8 +119,11 @@ def _integral_lines(found: Analysis) -> list[Statement]:
     search = found.integrals
     if search is None:
         return []
-    lines = [Statement(str(one.verdict), f"{one.name} = {one.text}  [{one.origin}]") for one in search.integrals]
+    lines = [Statement(str(one.verdict), f"{one.name} = {one.short_text}  [{one.origin}]") for one in search.integrals]
     profile = search.profile
+    if search.by_theorems:
+        number = counted(search.by_theorems, "independent integral")
+        lines.append(Statement(PROVED, f"{number} by theorems: {search.theorems}"))
     if not profile.nullities:
         lines.append(Statement(UNDECIDED, f"how many integrals there are was not measured: {search.reason}"))
     elif profile.period is not None:
@@ -124,8 +133,9 @@ def _integral_lines(found: Analysis) -> list[Statement]:
         lines.append(
             Statement(
                 MEASURED,
-                f"orbits have codimension {profile.codimension}: so many independent integrals; polynomials of degree "
-                f"at most 1, 2, ... that vanish along an orbit: {nullities} dimensions",
+                f"generic orbits lie on varieties of codimension {'' if search.is_exact else 'at least '}"
+                f"{search.codimension}; relations along an orbit, of degree at most 1, 2, ...: spaces of dimension "
+                f"{nullities}",
             )
         )
         if not profile.agree:

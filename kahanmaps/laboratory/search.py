@@ -33,6 +33,7 @@ from kahanmaps.laboratory.modular_points import ModularMap, null_space
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 5, 6: 4}
 _MOST_TERMS = 1000
 NOTHING: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
+AFFINE = "v.x with v.f(x) = 0"
 _FEW = 20  # with more relations than these, cofactors come first
 
 
@@ -95,7 +96,7 @@ def search(
 
     affine = affine_space(map_)
     if affine is not None:
-        steps.append(Step("affine", 1, None, "v.x with v.f(x) = 0"))
+        steps.append(Step("affine", 1, None, AFFINE))
         spaces.append([affine])
     later: list[int] = []
     for degree, nullity in enumerate(profile.nullities, 1):

@@ -59,7 +59,7 @@ def integrals_html(search: IntegralSearch) -> str:
         (formula(one.function, one.name, CHARACTERS), markup.verdict(one.verdict), _text(one.origin))
         for one in search.integrals[:_FORMULAS]
     ]
-    said = f"{len(search.integrals)} found; orbits show {search.codimension} (measured)"
+    said = f"{len(search.integrals)} found; {search.count_text}"
     notes = _notes([_rest(search.integrals, _FORMULAS), search.note, search.reason])
     inside = markup.table(["integral", "verdict", "found by"], rows) if rows else ""
     return markup.titled(

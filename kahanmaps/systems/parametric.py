@@ -128,6 +128,12 @@ class ParametricSystem:
             field, field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants)
         )
 
+    def at(self, values: Sequence[Any]) -> QuadraticSystem:
+        """The system with numbers for its symbols."""
+        context = ring(self.variables)
+        images = [*context.gens(), *(context.constant(value) for value in values)]
+        return QuadraticSystem.from_polynomials([polynomial.compose(*images, ctx=context) for polynomial in self.rhs])
+
     def jacobian(self, names: Sequence[str]) -> list[list[fmpq_mpoly]]:
         """f'(x) as polynomials in `names`, which contain the variables and the symbols."""
         context = ring(names)

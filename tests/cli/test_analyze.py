@@ -80,6 +80,7 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
         "verdict": {
             "integrability": "integrable",
             "integrals": 2,
+            "integrals_exact": True,
             "growth": "quadratic",
             "sentence": "Integrable in the sense of complexity: quadratic growth, dynamical degree 1 (measured); "
             "2 independent integrals in dimension 3. The integrals are for every a2, all else for the values of the "

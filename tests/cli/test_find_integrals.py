@@ -30,7 +30,8 @@ def test_formulas_verdicts_and_what_was_measured(kahanmaps):
         "find-integrals: nahm_tetrahedral, every eps (the time step is 2 eps)",
         "I1\tproved\t(3*x^2*y - y^3)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)",
         "\trelations of degree 3 along orbits: both sides are the same rational function, for every eps",
-        "found\t1 functionally independent; orbits show 1 independent (measured, relations of degree up to 3)",
+        "found\t1 functionally independent; in all 1 independent (1 by theorems: 1 modified Hamiltonian; "
+        "measured: relations of degree up to 3 along orbits show no more)",
     ]
 
 
@@ -170,7 +171,7 @@ def test_maps_that_are_none_give_3(kahanmaps, command, words):
 def test_integrals_without_a_formula_give_3(kahanmaps):
     outcome = kahanmaps("find-integrals clebsch_first_flow --max-degree 2 --json")
     assert (outcome.status, outcome.json["found"], outcome.json["codimension"]) == (3, 1, 4)
-    assert "3 of the 4 integrals that orbits show have no closed form P/Q" in outcome.json["reason"]
+    assert "3 of the 4 independent integrals have no closed form P/Q" in outcome.json["reason"]
 
 
 def test_too_little_time_gives_3(kahanmaps):

@@ -284,7 +284,7 @@ def test_wrong_use(options, words):
 
 def test_too_little_time_is_told():
     found = find_integrals(load("lagrange_top"), seconds=1e-9)
-    assert (found.integrals, found.profile.complete) == ((), False)
+    assert ([one.text for one in found.integrals], found.profile.complete) == (["m3"], False)  # by a theorem
     assert "relations of degree 1 and more were not tried" in found.reason
 
 

@@ -48,11 +48,11 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals volterra_periodic_4 --darboux 2
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
-    Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals orbits show is
-    measured modulo primes; every formula is verified as an identity.
+    Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals there are is known
+    from theorems, and from orbits, measured modulo primes; every formula is verified as an identity.
 
-    Exit status: 0 every integral that orbits show has a formula, 2 wrong use, 3 some have none, orbits were not
-    measured, or the time was too short.
+    Exit status: 0 every integral that theorems give or orbits show has a formula, 2 wrong use, 3 some have none,
+    orbits were not measured, or the time was too short.
     """
     from kahanmaps.laboratory.integrals import find_integrals
 
@@ -84,18 +84,10 @@ def command(system: str | None, **options: Any) -> int:
     return 3 if found.reason else 0
 
 
-def _was_not_measured(found: Any) -> bool:
-    return not found.profile.nullities
-
-
 def _count(found: Any) -> str:
-    if _was_not_measured(found):
+    if not found.profile.nullities and not found.codimension:
         return "orbits\tnot measured"
-    measured = f"measured, relations of degree up to {found.profile.degree}"
-    return (
-        f"found\t{len(found.integrals)} functionally independent; orbits show {found.codimension} independent "
-        f"({measured})"
-    )
+    return f"found\t{len(found.integrals)} functionally independent; {found.count_text}"
 
 
 def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, Any], progress: Progress) -> int:

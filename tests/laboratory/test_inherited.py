@@ -1,0 +1,159 @@
+"""What theorems give counts: integrals of every Kahan map by linear algebra, and no analysis tells of fewer."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpq
+from search_helpers import random_system, ranks, system
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.inherited import inherited_integrals
+from kahanmaps.laboratory.integrals import _gradient, find_integrals
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import rank
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def lotka_volterra(n: int, k: int) -> SystemFile:
+    """LV(n, k): x_i' = x_i sum_j a_ij x_j, a skew, a_ij = 1 for 0 < j - i <= k and -1 above."""
+
+    def sign(i: int, j: int) -> int:
+        return 0 if i == j else -sign(j, i) if i > j else 1 if j - i <= k else -1
+
+    names = [f"x{i}" for i in range(n)]
+    sums = ["+".join(f"({sign(i, j)})*{name}" for j, name in enumerate(names)) for i in range(n)]
+    return system(" ".join(names), *(f"{name}*({total})" for name, total in zip(names, sums, strict=True)))
+
+
+# x' and y' are those of a cubic H(x, y), z' is anything: K f = grad H with a K of rank 2 in dimension 3.
+DRIVEN = system("x y z", "x^2 + 2*x*y + 3*y + 1", "-2*x*y - y^2 + 4*x^2 + x + 7", "x*z + y^2 + z^2 - 5*x + 2")
+# f = J grad H with a J of rank 4 in dimension 6, and H of degree 3 in all variables
+DEGENERATE = system(
+    "q1 q2 p1 p2 z w",
+    "p1 + 2*q1*z",
+    "p2 + q1^2",
+    "-3*q1^2 - 2*p1*z - 2*q1*p2 + w",
+    "-q2*z + w^2",
+    "0",
+    "0",
+)
+CASES = [
+    (lotka_volterra(4, 1), 1, 1),
+    (lotka_volterra(5, 2), 1, 1),
+    (lotka_volterra(6, 2), 1, 1),
+    (lotka_volterra(7, 3), 1, 1),
+    (lotka_volterra(8, 5), 1, 1),
+    (lotka_volterra(5, 1), 1, 0),
+    (DRIVEN, 0, 1),
+    (DEGENERATE, 2, 1),
+    (load("paper_m3"), 0, 3),
+    (load("three_wave"), 0, 1),
+    (load("euler_top"), 0, 0),
+    (random_system(4, 3), 0, 0),
+]
+
+
+@pytest.mark.parametrize(("file", "affine", "modified"), CASES)
+def test_the_numbers_of_integrals_that_theorems_give(file, affine, modified):
+    found = inherited_integrals(file.system)
+    assert (len(found.quotient.integrals), len(found.forms)) == (affine, modified)
+    assert [found.count(map_) for map_ in Laboratory(file).maps] == [affine + modified] * 2
+
+
+@pytest.mark.parametrize("file", [lotka_volterra(8, 5), DRIVEN, DEGENERATE, load("paper_m2")])
+def test_modified_hamiltonians_are_constant_along_exact_orbits_also_for_a_singular_form(file):
+    found, rng = inherited_integrals(file.system), random.Random(3)
+    for k, form in enumerate(found.forms):
+        H, values = found.hamiltonian(k), []
+        kahan = KahanMap(file.system, fmpq(1, 9))
+        x = kahan.point([fmpq(rng.randint(-9, 9), rng.randint(2, 5)) for _ in range(file.system.dim)])
+        energies = set()
+        for _ in range(4):
+            values.append(found.modified(k, QQ, fmpq(1, 9), x))
+            energies.add(H(*x))
+            x = kahan.step(x)
+        assert len(set(values)) == 1
+        assert len(energies) > 1  # H itself is not conserved
+        assert form.transpose() == form * -1
+
+
+@pytest.mark.parametrize("file", [lotka_volterra(4, 1), DRIVEN, DEGENERATE, load("planar_cubic_hamiltonian")])
+def test_gradients_are_those_of_the_functions_written_out(file):
+    found = find_integrals(file, max_degree=1)
+    inherited, map_ = inherited_integrals(file.system), Laboratory(file).maps[0]
+    point = map_.random_point()
+    rows = inherited.gradients(map_, point)
+    written = [_gradient(map_, one.function, point) for one in found.integrals]
+    assert rank(rows, map_.prime) == rank([*rows, *written], map_.prime) == rank(written, map_.prime) == len(rows)
+    assert all(one.verdict is Verdict.PROVED for one in found.integrals)
+
+
+@pytest.mark.parametrize("file", [lotka_volterra(7, 3), lotka_volterra(6, 3), DEGENERATE])
+def test_no_search_tells_of_fewer_integrals_than_theorems_give(file):
+    """Relations of degree 1 show the affine integrals only."""
+    found = find_integrals(file, max_degree=1, seconds=20)
+    assert found.by_theorems == found.codimension > found.profile.codimension
+    assert not found.is_exact
+    assert f"in all at least {found.codimension} independent ({found.codimension} by theorems" in found.count_text
+    as_json = found.to_json()
+    assert (as_json["codimension"], as_json["by_theorems"]) == (found.codimension, found.by_theorems)
+    assert as_json["codimension_is_exact"] is False
+
+
+def test_theorems_and_relations_count_together():
+    """u' = z u and v' = -z v give u v/(1 - eps^2 z^2), a relation of degree 2; x and y are Hamiltonian."""
+    file = system("u v x y z", "u*z", "-v*z", "y + x^2", "-2*x*y + 3*x^2", "x + u*y")
+    found = find_integrals(file, max_degree=2)
+    assert (found.by_theorems, found.profile.codimension, found.codimension) == (1, 1, 2)
+    functions = [parse_rational_function("u*v/(1 - eps^2*z^2)", (*file.variables, "eps"))]
+    known = [one.function for one in found.integrals]
+    assert ranks(known, functions, Laboratory(file).maps[0]) == (2, 1, 2)
+
+
+def test_with_symbols_theorems_are_asked_at_random_values():
+    file = system("x y z", "y + a*x^2", "-2*a*x*y - x", "x*z + b", a="1", b="0")
+    found = find_integrals(file, symbols=["a", "b"], max_degree=1)
+    assert (found.by_theorems, found.codimension, found.integrals) == (1, 1, ())
+    assert "1 of the 1 independent integrals has no closed form" in found.reason
+    # x' has no y at a = 0: what holds there only is no theorem for every a
+    special = system("x y", "x*y", "-x*y + a*x", a="0")
+    assert find_integrals(special, symbols=["a"], max_degree=2).by_theorems == 0
+    assert find_integrals(special, max_degree=2).by_theorems == 1
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        (lotka_volterra(7, 3), "at least 2 independent integrals in dimension 7."),
+        (DEGENERATE, "at least 3 independent integrals in dimension 6."),
+        (load("volterra_periodic_3"), "; 2 independent integrals in dimension 3."),
+        (random_system(2, 1), "no integral in dimension 2, as far as relations of degree up to "),
+    ],
+)
+def test_an_analysis_says_how_many_there_are_at_least(file, words):
+    found = analyze(file, seconds=6)
+    assert words in found.conclusion.sentence
+    assert found.to_json()["verdict"]["integrals_exact"] == ("at least" not in words and "no integral" not in words)
+
+
+def test_orbits_that_were_not_measured_leave_what_theorems_give():
+    found = find_integrals(DEGENERATE, seconds=1e-9)
+    assert found.profile.nullities == ()
+    assert (found.by_theorems, found.codimension, found.is_exact) == (3, 3, False)
+    assert (
+        found.count_text
+        == "in all at least 3 independent (3 by theorems: 2 affine integrals and 1 modified Hamiltonian)"
+    )
+
+
+def test_a_system_that_stands_still_has_all_coordinates():
+    found = inherited_integrals(QuadraticSystem.from_text(["x", "y"], ["0", "0"]))
+    assert (found.text, found.forms) == ("2 affine integrals", ())
