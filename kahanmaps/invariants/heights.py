@@ -189,15 +189,7 @@ def height_of(point: OrbitPoint) -> int:
         return value.bits  # kept in lowest terms
     if isinstance(value, tuple):
         return height(value)
-    # `PlanesPoint.bits` is a few bits too high: primes of the planes and of the change of coordinates cancel.
-    numerators, below = value.common()
-    common = below
-    for entry in numerators:
-        if common == 1:
-            break
-        common = common.gcd(entry % common)  # large once, small from then on
-    largest = max(map(abs, [*numerators, below]))
-    return int((largest // abs(common)).bit_length())
+    return value.height
 
 
 def height_growth(

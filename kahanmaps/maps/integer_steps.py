@@ -55,6 +55,11 @@ class IntegerPoint:
         """The bit length of the largest of the integers."""
         return max(self.denominator.bit_length(), *(entry.bit_length() for entry in self.numerators))
 
+    def exceeding(self, limit: int) -> int:
+        """The bits if they are more than the limit, otherwise 0."""
+        bits = self.bits
+        return bits if bits > limit else 0
+
 
 class IntegerSteps:
     """Steps of Phi(., eps) on integer points."""

@@ -18,10 +18,11 @@ from kahanmaps.algebra.fields import QQ, BallField, Field
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.family.structure import Structure
 from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.jump import Jump, OverBudget
+from kahanmaps.maps.jump import Jump
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_steps import NormalSteps
 from kahanmaps.maps.planes_point import PlanesPoint
+from kahanmaps.maps.rational_jump import OverBudget
 from kahanmaps.maps.shown import orbit_html
 
 DEFAULT_MAX_DIGITS = 200_000
@@ -73,7 +74,7 @@ class OrbitPoint:
     @property
     def digits(self) -> int:
         """About how many decimal digits the largest integer over the common denominator has (0 unless over Q)."""
-        return 0 if isinstance(self.value, tuple) else digits_of(self.value)
+        return 0 if isinstance(self.value, tuple) else _digits(self.value.bits)
 
     def __repr__(self) -> str:
         return f"OrbitPoint({self.step}: {','.join(self.text)})"
@@ -141,8 +142,8 @@ class Orbit:
         value = start = next(images)
         step, period = 0, None
         yield OrbitPoint(0, field, value)  # the budget is for what is computed
-        if self._too_large(value):
-            self.end = self._over_budget(value, 0)
+        if bits := self._excess(value):
+            self.end = OrbitEnd("budget", 0, _budget_text(0, bits, self.max_digits))
             return
         while self.steps is None or step < self.steps:
             if self._interrupted:
@@ -156,8 +157,8 @@ class Orbit:
             except PrecisionLost as error:
                 self.end = OrbitEnd("precision", step, f"step {step + 1} cannot be decided: {error}")
                 return
-            if self._too_large(value):
-                self.end = self._over_budget(value, step + 1)
+            if bits := self._excess(value):
+                self.end = OrbitEnd("budget", step, _budget_text(step + 1, bits, self.max_digits))
                 return
             step += 1
             if period is None and field.exact and value == start:
@@ -194,16 +195,10 @@ class Orbit:
                 yield value
                 value = self.map.step(value)
 
-    def _too_large(self, value: Any) -> bool:
-        return self.max_digits is not None and not isinstance(value, tuple) and digits_of(value) > self.max_digits
-
-    def _over_budget(self, value: IntegerPoint | PlanesPoint, step: int) -> OrbitEnd:
-        return OrbitEnd(
-            "budget",
-            max(0, step - 1),
-            f"step {step} has numbers of {counted(digits_of(value), 'digit')}, "
-            f"more than the budget of {self.max_digits} (--max-digits)",
-        )
+    def _excess(self, value: Any) -> int:
+        """The bits of a value that is beyond the budget, otherwise 0."""
+        limit = _bits(self.max_digits)
+        return 0 if limit is None or isinstance(value, tuple) else value.exceeding(limit)
 
     def _singular_message(self, step: int) -> str:
         sign = "+" if self.backward else "-"
@@ -267,7 +262,7 @@ class Iterates:
 
     def _points(self) -> Iterator[OrbitPoint]:
         done = 0
-        max_bits = None if self.max_digits is None else int(self.max_digits / _DIGITS_PER_BIT)
+        max_bits = _bits(self.max_digits)
         for step in self.at:
             if self._interrupted:
                 self.end = OrbitEnd("interrupted", done, f"interrupted after step {done}")
@@ -282,11 +277,7 @@ class Iterates:
                 self.end = OrbitEnd("precision", done, f"step {step} cannot be decided: {error}")
                 return
             except OverBudget as error:
-                digits = counted(int(error.bits * _DIGITS_PER_BIT), "digit")
-                message = f"step {step} would have numbers of about {digits}"
-                if self.max_digits is not None:
-                    message += f", more than the budget of {self.max_digits} (--max-digits)"
-                self.end = OrbitEnd("budget", done, message)
+                self.end = OrbitEnd("budget", done, _budget_text(error.step, error.bits, self.max_digits, step))
                 return
             finally:
                 self._busy_in = None
@@ -295,9 +286,21 @@ class Iterates:
         self.end = OrbitEnd("completed", done, f"{counted(len(self.at), 'iterate')} reached directly")
 
 
-def digits_of(point: IntegerPoint | PlanesPoint) -> int:
-    """About how many decimal digits the largest of the integers has."""
-    return int(point.bits * _DIGITS_PER_BIT) + 1
+def _bits(max_digits: int | None) -> int | None:
+    """A budget of digits in bits."""
+    return None if max_digits is None else max_digits * 100_000 // 30103
+
+
+def _budget_text(step: int, bits: int | None, max_digits: int | None, wanted: int | None = None) -> str:
+    """How the budget is exceeded at a step, perhaps on the way to the one that is wanted."""
+    limit = "can be held" if max_digits is None else f"the budget of {max_digits} (--max-digits)"
+    has = "would have longer numbers" if bits is None else f"has numbers of {counted(_digits(bits), 'digit')}, more"
+    text = f"step {step} {has} than {limit}"
+    return text if wanted is None or wanted == step else f"step {wanted} cannot be reached: {text}"
+
+
+def _digits(bits: int) -> int:
+    return int(bits * _DIGITS_PER_BIT) + 1
 
 
 def require_steps(steps: int | None) -> None:

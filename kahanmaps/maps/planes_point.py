@@ -53,6 +53,15 @@ class Assembly:
             for r in range(self.dim)
         ]
         self.fixed = radical(*(row.fixed for row in self.rows))
+        # By so many bits numerators may be longer than the products of the triples they are made of.
+        below = fmpz(1)
+        for row in self.rows:
+            below = below.lcm(row.below)
+        largest = max(
+            (abs(entry) * (below // row.below) for row in self.rows for form in row.forms for entry in form),
+            default=fmpz(1),
+        )
+        self.excess = int(max(below.bit_length(), (2 * len(blocks) * largest).bit_length()))
 
 
 def _row(blocks: Sequence[IntegerBlock], forms: Sequence[Sequence[fmpq]]) -> _Row:
@@ -80,17 +89,41 @@ def _row(blocks: Sequence[IntegerBlock], forms: Sequence[Sequence[fmpq]]) -> _Ro
 class PlanesPoint:
     """The point of R^{2m} with these primitive triples in the planes of an assembly."""
 
-    __slots__ = ("_assembly", "triples")
+    __slots__ = ("_assembly", "_height", "triples")
 
     def __init__(self, assembly: Assembly, triples: Sequence[IntegerTriple]) -> None:
         self._assembly = assembly
+        self._height: int | None = None
         self.triples = tuple(triples)
 
     @property
     def bits(self) -> int:
         """About the bit length of the largest of the integers over one common denominator."""
         below = sum(W.bit_length() for _, _, W in self.triples)
-        return below + max(max(U.bit_length(), V.bit_length()) - W.bit_length() for U, V, W in self.triples)
+        return below + max(0, *(max(U.bit_length(), V.bit_length()) - W.bit_length() for U, V, W in self.triples))
+
+    @property
+    def height(self) -> int:
+        """The bit length of the largest of the integers over one common denominator in lowest terms; costs a gcd.
+
+        `bits` is a few bits off, and much too high where planes have denominators in common.
+        """
+        if self._height is None:
+            numerators, below = self.common()
+            common = below
+            for entry in numerators:
+                if common == 1:
+                    break
+                common = common.gcd(entry % common)  # large once, small from then on
+            largest = max(map(abs, [*numerators, below]))
+            self._height = int((largest // abs(common)).bit_length())
+        return self._height
+
+    def exceeding(self, limit: int) -> int:
+        """The height if it is more than the limit, otherwise 0; a gcd is run only where that is needed to tell."""
+        if self.bits + self._assembly.excess <= limit:
+            return 0
+        return self.height if self.height > limit else 0
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, PlanesPoint):

@@ -1,8 +1,8 @@
 """The n-th point of an orbit in a plane over any field, directly: a translation on a plane cubic, by doublings.
 
 The formulas are those of `tau`, with natural lifts and without scales: over a finite field, or in balls, numbers do
-not grow. Where the level cubic is no translation of this kind the orbit moves on lines, on which Psi (or Psi^3, if
-the cubic is three lines) is a projective map: a 2 x 2 matrix to the power n.
+not grow. Where the level cubic is three lines (gamma = 0), Psi^3 is a projective map of each line: a 2 x 2 matrix to
+the power n. Where delta = 0 there is a formula for P_n: see `parabolic_ratio`.
 
 Poles are passed over: P_n is the value of the rational map Psi^n, also if an orbit that steps would have met W = 0
 before.
@@ -48,10 +48,10 @@ def iterate(block: PlanarBlock, start: Triple, n: int, is_zero: Callable[[Any], 
     if period is not None:
         return points[n % period]
     above, below = block.level(start)
+    if above == 0 or block.discriminant == 0:
+        return _parabolic(block, start, n)
     level = above / below
     gamma = 1 - block.discriminant * level * level
-    if is_zero(determinant(points[0], points[1], points[2])) and is_zero(determinant(points[0], points[1], points[3])):
-        return _along_line(points[:4], n, is_zero)  # four points of an irreducible cubic are not on a line
     if is_zero(gamma):
         return _along_line(points[n % 3 : n % 3 + 10 : 3], n // 3, is_zero)
     for base in range(3, len(points) - 3):
@@ -61,6 +61,42 @@ def iterate(block: PlanarBlock, start: Triple, n: int, is_zero: Callable[[Any], 
         if small is not None:
             return _doubled(small, gamma, n - base)
     raise NoTranslation
+
+
+def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
+    """r = W/s at a start with delta = 0 and an image, s^2 = -D; None where D = 0, so that P_n = P_0 + n (P_1 - P_0).
+
+    A step takes 1 from r, and W' = W^2 - s^2 vanishes for r = 1 or r = -1: the orbit meets a pole at step r, if r is a
+    positive integer, and none otherwise. r is rational in r^2 at the start and at its image.
+    """
+
+    def square(point: Triple) -> Any:
+        U, V, W = point
+        p, q, r = block.D
+        below = p * (U * U) + q * (U * V) + r * (V * V)
+        return None if below == 0 else -(W * W) / below
+
+    here = square(start)
+    return None if here is None else (here - square(block.image(start)) + 1) / 2
+
+
+def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
+    """P_n for delta = 0, in characteristic 0 or at least 5; the start has an image.
+
+    (U/W, V/W) has a part with h = 0 or in the simple root of h, which is multiplied by r/(r - n), and one in the double
+    root, which is multiplied by ((r - n)^2 - 1)/(r^2 - 1).
+    """
+    U, V, W = block.image(start)
+    here, after = (start[0] / start[2], start[1] / start[2]), (U / W, V / W)
+    r = parabolic_ratio(block, start)
+    if r is None:
+        u, v = (z + n * (w - z) for z, w in zip(here, after, strict=True))
+        return u, v, W / W
+    rest, below = r - n, r * r - 1
+    factor = rest * (rest * rest - 1)
+    parts = [(z, (z * r * (r + 1) - w * below) / (3 * r)) for z, w in zip(here, after, strict=True)]
+    u, v = ((z - double) * r * below + double * factor for z, double in parts)
+    return u, v, rest * below
 
 
 def _first_points(block: PlanarBlock, start: Triple, count: int, is_zero: Callable[[Any], bool]) -> list[Triple]:

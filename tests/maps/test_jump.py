@@ -28,11 +28,13 @@ from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi
 from kahanmaps.family.structure import structure_of
-from kahanmaps.maps import jump
-from kahanmaps.maps.jump import Jump, OverBudget
+from kahanmaps.maps import tau_table
+from kahanmaps.maps.integer_steps import IntegerPoint
+from kahanmaps.maps.jump import Jump
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit
 from kahanmaps.maps.planes_point import PlanesPoint
+from kahanmaps.maps.rational_jump import OverBudget
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 NUMBERS = (0, 1, 2, 3, 5, 16, 17, 18, 23, 24, 25, 26, 33, 40)
@@ -318,15 +320,15 @@ def test_a_negative_number_of_steps_is_refused(field):
 
 
 @pytest.mark.parametrize("name", ["m = 2", "m = 2, sqrt 2"])
-def test_what_would_be_too_long_is_refused_beforehand(name):
+def test_what_would_be_too_long_is_refused_with_the_first_step_that_is_too_long(name):
     structure, system = structure_and_system(name)
     found, start = Jump(structure, "1/10", QQ), random_point(system.dim, 6, height=3)
-    value = found.value(start, 40)
-    bits = value.bits if isinstance(value, PlanesPoint) else max(entry.q.bit_length() for entry in value)
+    points, _ = walked(system, "1/10", QQ, start, 40)
+    bits = [IntegerPoint.from_rationals(point).bits for point in points]
     with pytest.raises(OverBudget) as refused:
-        found.value(start, 40, max_bits=bits // 2)
-    assert 0.7 * bits < refused.value.bits < 1.4 * bits
-    assert coordinates(found.value(start, 40, max_bits=2 * bits)) == coordinates(value)
+        found.value(start, 40, max_bits=bits[12])
+    assert (refused.value.step, refused.value.bits) == (13, bits[13])
+    assert coordinates(found.value(start, 40, max_bits=bits[40])) == points[40]
 
 
 def test_without_a_budget_there_is_a_limit_all_the_same():
@@ -354,10 +356,10 @@ def test_a_prime_without_reduction_is_refused():
 def test_a_wrong_doubling_is_noticed(monkeypatch):
     # Every iterate over Q is compared with the orbit modulo a random prime.
     structure, _ = structure_and_system("m = 2")
-    iterate = jump.tau_table.iterate
-    monkeypatch.setattr(jump.tau_table, "iterate", lambda block, n: iterate(block, n + 1))
+    iterate = tau_table.iterate
+    monkeypatch.setattr(tau_table, "iterate", lambda block, n: iterate(block, n + 1))
     with pytest.raises(ArithmeticError, match="disagrees with the orbit modulo a prime"):
-        Jump(structure, "1/10", QQ).value([1, 2, 3, "1/4"], 40)
+        Jump(structure, "1/10", QQ).value([1, 2, 3, "1/4"], 300)
 
 
 # A rational plane beside one over Q(i).

@@ -1,0 +1,127 @@
+"""What an orbit over Q comes to first: a pole, the end of its budget, or the step that was asked for.
+
+Specified here: an iterate that is reached directly ends as the orbit that is stepped to it, whichever way either is
+computed, at the same step, for starts near poles as for others; numbers that stay short are delivered however far the
+step is.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+from flint import fmpq
+from helpers import random_point
+from planar_helpers import STARTS, over_members, planar_system, side_by_side, structure_and_system
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.family.structure import Structure, structure_of
+from kahanmaps.maps.jump import Jump
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.normal_steps import splits
+from kahanmaps.maps.orbits import Iterates, Orbit, OrbitEnd
+from kahanmaps.maps.splitting import Splitting
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+# Roots: three rational, one rational (in other coordinates), none rational, double, triple.
+CUBICS = [(0, 3, -4, -4), (0, 1, 1, 0), (0, 3, 0, -1), (1, 0, 0, -2), (1, 0, -3, 2), (0, 1, 0, 0), (1, 3, 3, 1)]
+EPS = ("1/2", "1", "1/3", "-1/2")
+FAR = 10**12
+
+
+def found_structure(system) -> Structure:
+    found = structure_of(system)
+    assert isinstance(found, Structure)
+    return found
+
+
+def ended(orbit) -> OrbitEnd:
+    for _ in orbit:
+        pass
+    return orbit.end
+
+
+def event(system, structure, eps, start, steps, digits):
+    """What comes first, with the step before it; by three ways, which have to agree."""
+    kahan = KahanMap(system, eps)
+    ways = (None, structure) if splits(Splitting(structure.form, kahan.field, eps)) else (None,)
+    walks = [ended(Orbit(kahan, start, steps, structure=known, max_digits=digits)) for known in ways]
+    assert walks[0] == walks[-1]
+    jump = ended(Iterates(kahan, start, [steps], structure=structure, max_digits=digits))
+    walk = walks[0]
+    if walk.is_whole:
+        assert (jump.status, jump.steps) == ("completed", steps)
+    elif walk.status == "singular":
+        where = f"step {steps} cannot be reached: the map has no value at step {walk.steps}"
+        assert jump == OrbitEnd("singular", 0, where)
+    else:
+        assert jump.status == walk.status == "budget"
+        assert jump.message.endswith(walk.message)
+    return walk
+
+
+def seen_from(cubic, eps, sixths, runs):
+    """The events of starts with coordinates in sixths, and that far steps end so, too."""
+    system = planar_system(cubic)
+    structure, seen = found_structure(system), []
+    for u, v in product([fmpq(i, 6) for i in sixths], repeat=2):
+        for steps, digits in runs:
+            walk = event(system, structure, eps, [u, v], steps, digits)
+            seen.append(walk.status)
+            far = ended(Iterates(KahanMap(system, eps), [u, v], [FAR], structure=structure, max_digits=digits))
+            if not walk.is_whole:
+                assert far.status == walk.status
+    return seen
+
+
+@pytest.mark.parametrize("cubic", CUBICS)
+def test_small_starts_end_alike_by_steps_and_by_jumps(cubic):
+    seen = [status for eps in EPS[:2] for status in seen_from(cubic, eps, range(-6, 7, 3), [(70, 12), (26, 3)])]
+    assert {"singular", "budget"} & set(seen)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("eps", EPS)
+@pytest.mark.parametrize("cubic", [*CUBICS, (1, 3, 3, -4), (1, 0, 0, 1), (0, 2, -1, 2), (2, -1, 0, 3), (0, 0, 1, 5)])
+def test_many_small_starts_end_alike_by_steps_and_by_jumps(cubic, eps):
+    assert {"singular", "budget"} & set(seen_from(cubic, eps, range(-12, 13, 3), [(120, 30), (31, 3), (25, 1)]))
+
+
+def test_a_pole_comes_before_a_budget_that_is_exceeded_far_behind_it():
+    system = QuadraticSystem.from_text(["u", "v"], ["6*u*v-12*v^2", "-3*u^2-3*v^2"])
+    structure, kahan = found_structure(system), KahanMap(system, "1/2")
+    for n in (100, 1_000_002, 10**26):
+        end = ended(Iterates(kahan, ["-1/3", 0], [n], structure=structure))
+        assert end == OrbitEnd("singular", 0, f"step {n} cannot be reached: the map has no value at step 1")
+
+
+@over_members
+def test_members_end_alike_by_steps_and_by_jumps(name):
+    structure, system = structure_and_system(name)
+    for seed, eps in enumerate(EPS[:2]):
+        event(system, structure, eps, random_point(system.dim, seed, height=2), 30, 40)
+
+
+@pytest.mark.parametrize("names", [("level 0", "a triple root"), ("a double root", "a triple root, level 0")])
+def test_numbers_that_stay_short_are_delivered_however_far_the_step_is(names):
+    system, structure, start = side_by_side(*names)
+    n, field = 10**26, GF(2**61 - 1)
+    value = Jump(structure, "1/2", KahanMap(system, "1/2").field).value(start, n, 10**5)
+    expected = Jump(structure, "1/2", field).value(start, n)
+    assert tuple(map(field.convert, value.rationals())) == tuple(expected)
+    assert value.height < 2000
+
+
+def test_a_plane_over_its_budget_comes_before_a_pole_far_behind_in_another():
+    # h = u^2 v at v = 0: u is multiplied by r/(r - n), with r = 1/u for 2 eps = 1 a pole at step r.
+    system, structure, (_, u, _, v) = side_by_side("a double root, level 0", "three rational roots")
+    (a, b, c, d) = STARTS["a double root, level 0"][0]
+    direction = next((x, y) for x, y in ((3, 1), (1, 0)) if a * x**3 + b * x * x * y + c * x * y * y + d * y**3 == 0)
+    single = planar_system((a, b, c, d))
+    for sign, far in product((1, -1), (40, 1000)):
+        point = [fmpq(sign * x, far * direction[1] ** 2) for x in direction]
+        alone = ended(Orbit(KahanMap(single, "1/2"), point, 2000, max_digits=50))
+        both = ended(Iterates(KahanMap(system, "1/2"), [point[0], u, point[1], v], [FAR], structure=structure))
+        walk = ended(Orbit(KahanMap(system, "1/2"), [point[0], u, point[1], v], 60, structure=structure))
+        assert both.status == ("singular" if alone.status == "singular" and alone.steps < 60 else "budget")
+        assert walk.status == ("singular" if both.status == "singular" else "completed")
