@@ -31,7 +31,8 @@ in common. Two planes with the same cubic and the same start have all in common,
 from __future__ import annotations
 
 import decimal
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
@@ -200,8 +201,11 @@ def height_growth(
     structure: Structure | NoStructure | None = None,
     every: int = 1,
     max_digits: int | None = DEFAULT_MAX_DIGITS,
+    deadline: float | None = None,
 ) -> HeightGrowth:
     """The heights of an orbit over Q at the steps 0, every, 2 every, ... up to `steps`, as far as it goes.
+
+    It is interrupted after the step in flight when time.monotonic() passes the `deadline`.
 
     With a `structure` (family.structure.structure_of) the orbit is walked in normal form, where chi splits over Q,
     and for large `every` its points are reached directly; the numbers are the same. Then every height costs a gcd of
@@ -223,11 +227,11 @@ def height_growth(
     method = choose_method(None, "exact", structure, None if every == 1 else at).name
     if method == "jump" and isinstance(structure, Structure):
         iterates = Iterates(kahan_map, start, at, structure=structure, max_digits=max_digits)
-        heights, end = _reached(iterates)
+        heights, end = _reached(iterates, deadline)
     else:
         form = structure if method == "normal-form" and isinstance(structure, Structure) else None
         orbit = Orbit(kahan_map, start, at[-1], structure=form, max_digits=max_digits)
-        heights = [height_of(point) for point in orbit if point.step % every == 0]
+        heights = [height_of(point) for point in _in_time(orbit, deadline) if point.step % every == 0]
         assert orbit.end is not None
         end = orbit.end
     return HeightGrowth(tuple(heights), end, every, method)
@@ -244,11 +248,19 @@ def decimal_text(value: Fraction, digits: int = 6) -> str:
     return format(context.divide(decimal.Decimal(value.numerator), decimal.Decimal(value.denominator)), "f")
 
 
-def _reached(iterates: Iterates) -> tuple[list[int], OrbitEnd]:
+def _in_time(orbit: Orbit | Iterates, deadline: float | None) -> Iterator[OrbitPoint]:
+    """The points, until the time is over."""
+    for point in orbit:
+        yield point
+        if deadline is not None and time.monotonic() > deadline:
+            orbit.interrupt()
+
+
+def _reached(iterates: Iterates, deadline: float | None) -> tuple[list[int], OrbitEnd]:
     """Heights of iterates that are reached directly, the start among them; a return to the start is noticed here."""
     heights: list[int] = []
     first, back = None, None
-    for point in iterates:
+    for point in _in_time(iterates, deadline):
         if first is None:
             first = point.value
         elif back is None and point.value == first:

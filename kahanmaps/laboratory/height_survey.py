@@ -122,7 +122,8 @@ def height_survey(
     """The growth of heights along exact orbits over Q from given starts, or so many random ones, for one or two eps.
 
     `eps` is one exact number (time step 2 eps) or None for 1/10 and 3/11. Orbits end at `max_digits` digits a number;
-    no orbit is begun after `seconds`. A random start whose orbit meets a singular point is replaced by another.
+    after `seconds` no orbit is begun, and the one in flight ends. A random start whose orbit meets a singular point is
+    replaced by another.
     Raises InputError for wrong values.
 
     >>> from kahanmaps.systems.catalog import load
@@ -147,10 +148,14 @@ def height_survey(
                 return HeightSurvey(tuple(orbits), False)
             progress(f"heights: eps = {value}, orbit {k + 1} of {len(given)}")
             for candidate in _candidates(draws) if start is None else (start,):
-                found = height_growth(kahan_map, candidate, steps, structure=structure, max_digits=max_digits)
-                if found.end.status != "singular":
+                found = height_growth(
+                    kahan_map, candidate, steps, structure=structure, max_digits=max_digits, deadline=deadline
+                )
+                if found.end.status != "singular" or time.monotonic() > deadline:
                     break
             orbits.append(SurveyedOrbit(value, tuple(candidate), found))
+            if found.end.status == "interrupted":
+                return HeightSurvey(tuple(orbits), False)
     return HeightSurvey(tuple(orbits), True)
 
 

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kahanmaps.algebra.text import format_number
 from kahanmaps.errors import InputError
 from kahanmaps.plots.drift import METHODS, DriftCurve, DriftSurvey
 from kahanmaps.plots.figures import drawing, new_figure, wrapped
-from kahanmaps.plots.legends import legend_above, legend_height
+from kahanmaps.plots.legends import label_number, legend_above, legend_height
 from kahanmaps.plots.style import COLOURS, LINES, Style
 from kahanmaps.plots.zero_band import log_scale_with_zero
 
@@ -56,7 +55,7 @@ def draw_drift(survey: DriftSurvey, style: Style | None = None, *, scale: str = 
             elif k + columns >= count:
                 axes.set_xlabel("step $n$")
                 axes.tick_params(labelbottom=True)
-        title = rf"time step $2\varepsilon = {format_number(2 * survey.eps)}$"
+        title = rf"time step $2\varepsilon = {label_number(2 * survey.eps)}$"
         legend_above(figure, [_handle(method) for method in survey.ends], labels, style, title)
     return figure
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kahanmaps.algebra.text import format_number
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.degrees import DegreeGrowth
@@ -15,7 +14,7 @@ from kahanmaps.laboratory.height_survey import HeightSurvey
 from kahanmaps.laboratory.recurrences import GrowthClass
 from kahanmaps.plots.figures import drawing, new_figure, plain
 from kahanmaps.plots.height_curves import HeightCurve, fit_of, height_curves
-from kahanmaps.plots.legends import legend_above, legend_height
+from kahanmaps.plots.legends import label_number, legend_above, legend_height
 from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
 from kahanmaps.plots.zero_band import log_scale_with_zero
 
@@ -91,7 +90,7 @@ def draw_heights(
     scale = _scale(scale, "log" if Growth.EXPONENTIAL in kinds else "loglog" if grows else "linear")
     style = style or Style()
     with drawing(style):
-        figure = new_figure(style, _ASPECT + legend_height(list(map(str, every_eps)), style, most=1))
+        figure = new_figure(style, _ASPECT + legend_height([label_number(eps) for eps in every_eps], style, most=1))
         axes = figure.subplots()
         _step_axis(axes, scale, longest)
         if scale != "linear":
@@ -171,7 +170,7 @@ def _degree_label(name: str, growth: DegreeGrowth) -> str:
     """A line of the legend: the name, what d_n is, the dynamical degree and what is estimated."""
     name = plain(name)
     if growth.eps is not None:
-        name += rf", $\varepsilon = {format_number(growth.eps)}$"
+        name += rf", $\varepsilon = {label_number(growth.eps)}$"
     rate = growth.dynamical_degree
     if growth.growth is GrowthClass.ZERO:
         return f"{name}: constant from $n = {growth.degrees.index(0)}$ on" if 0 in growth.degrees else f"{name}: zero"
@@ -230,7 +229,7 @@ def _hollow(size: float) -> dict[str, Any]:
 def _height_label(curves: Sequence[HeightCurve]) -> str:
     """A line of the legend: eps, the time step, and what kinds of growth were found."""
     eps = curves[0].eps
-    head = rf"$\varepsilon = {format_number(eps)}$, $2\varepsilon = {format_number(2 * eps)}$"
+    head = rf"$\varepsilon = {label_number(eps)}$, $2\varepsilon = {label_number(2 * eps)}$"
     kinds = list(dict.fromkeys(curve.kind for curve in curves))
     if len(kinds) > 1:
         counts = ", ".join(f"{sum(curve.kind is kind for curve in curves)} {kind}" for kind in kinds)

@@ -6,13 +6,26 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from kahanmaps.algebra.text import format_number
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, Style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_LONGEST = 40  # digits of a number
 _WIDTH = 0.5  # of a letter on average, in its height
 _HANDLE = 5.0  # the line or mark with the space around it
+
+
+def label_number(value: Any) -> str:
+    """An exact number as text for a label, its middle left out where it is long.
+
+    >>> from flint import fmpq
+    >>> label_number(fmpq(3, 10)), len(label_number(fmpq(10) ** 99))
+    ('3/10', 26)
+    """
+    text = format_number(value)
+    return text if len(text) <= _LONGEST else rf"{text[:10]}\ldots{text[-10:]}"
 
 
 def legend_columns(labels: Sequence[str], style: Style, most: int = 4) -> int:

@@ -63,7 +63,15 @@ def test_too_few_steps_decide_nothing(kahanmaps):
 def test_the_time_ends_it(kahanmaps):
     outcome = kahanmaps("heights weierstrass --steps 20 --seconds 0.0001")
     assert (outcome.status, len(outcome.rows)) == (3, 2)
-    assert outcome.err == "stopped early: the time was over before all orbits were begun\n"
+    assert outcome.err == "stopped early: the time was over before all orbits were finished\n"
+
+
+@pytest.mark.parametrize("steps", [10**26, 10**400], ids=["10^26", "10^400"])
+def test_the_time_ends_an_orbit_whose_numbers_stay_short(kahanmaps, steps):
+    outcome = kahanmaps(f"heights riccati --eps 1/10 --start 1 --steps {steps} --seconds 0.2")
+    assert outcome.status == 3
+    assert outcome.err == "stopped early: the time was over before all orbits were finished\n"
+    assert "linear" in outcome.rows[-1][1]
 
 
 def test_a_map_without_a_value_anywhere_is_no_error(kahanmaps):

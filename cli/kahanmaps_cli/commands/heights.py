@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 @click.option(
     "--max-digits", type=int, metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
 )
-@seconds_option(30.0, "Begin no orbit after so many seconds.")
+@seconds_option(30.0, "Stop after about so many seconds.")
 @seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
@@ -97,7 +97,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     else:
         _print(file, found)
     if not found.is_whole and not quiet:
-        say("stopped early: the time was over before all orbits were begun")
+        say("stopped early: the time was over before all orbits were finished")
     return 0 if found.is_whole and found.kind is not Growth.UNDECIDED else 3
 
 

@@ -30,7 +30,7 @@ _EARLY = ("singular",)
 @click.option(
     "--max-digits", type=int, metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
 )
-@seconds_option(30.0, "Begin no orbit after so many seconds.")
+@seconds_option(30.0, "Stop after about so many seconds.")
 @seed_option
 @click.option("--scale", type=click.Choice(["linear", "log", "loglog"]), help="Chosen by itself unless given.")
 @picture_options
@@ -48,7 +48,7 @@ def command(system: str | None, **options: Any) -> int:
     Records hold heights at the steps 0, 1, 2, 4, 8, ... only.
 
     Exit status: 0 done, 2 wrong use, 3 some orbit met a singular point, or the
-    time was over before all orbits were begun (the picture is written).
+    time was over before all orbits were finished (the picture is written).
     """
     from kahanmaps.plots.growth import draw_heights
     from kahanmaps.plots.height_curves import curves_of_record, height_curves
@@ -77,7 +77,7 @@ def command(system: str | None, **options: Any) -> int:
         if early:
             say(f"{early} of {len(curves)} orbits ended early, at a singular point of the map")
         if not whole:
-            say("stopped early: the time was over before all orbits were begun")
+            say("stopped early: the time was over before all orbits were finished")
     return 3 if early or not whole else 0
 
 
