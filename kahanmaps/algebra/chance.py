@@ -1,8 +1,9 @@
 """Chance that follows the question: what is drawn comes from a hash of what is asked together with the seed.
 
 A seed alone is public, and whoever knows the primes and points in advance can write a false claim that passes at all of
-them. Hashed with the claim they are known only once the claim is written, and change with every letter of it
-(fiat-shamir-1987). docs/mathematics.md says what an error bound then means.
+them, as with tests of primality at fixed bases (albrecht-2018). Hashed with the claim they are known only once it is
+written, and change with every letter of it (fiat-shamir-1987). docs/mathematics.md says what an error bound then means:
+the hash stands for a random function (bellare-rogaway-1993), which is an assumption (canetti-2004).
 """
 
 from __future__ import annotations

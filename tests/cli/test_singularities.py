@@ -85,7 +85,7 @@ def test_help_fits_the_screen(tmp_path):
 
 
 def test_one_eps_at_which_the_map_has_no_value_is_not_the_verdict(kahanmaps):
-    """At eps = 5/11, the first of the two that are drawn, I - eps B = 0; at the other one the map is an ordinary linear one."""
+    """At eps = 5/11, the first of the two that are drawn, I - eps B = 0; at the other one the map is linear."""
     outcome = kahanmaps("singularities --vars x --rhs 11/5*x")
     assert outcome.status == 3
     assert "singular everywhere" in outcome.out
