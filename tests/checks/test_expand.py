@@ -78,10 +78,10 @@ def test_every_eps_is_not_an_eps_that_equals_a_coordinate(k):
     """eps = x_k holds where eps is that coordinate, and eps x_k = x_k eps everywhere."""
     size = Size(2, 0.0)
     with pytest.raises(NotEqual):
-        expansion(Identity(3, lambda field, x, eps: ([eps], [x[k]]), size, 0, None))
+        expansion(Identity(3, lambda field, x, eps: ([eps], [x[k]]), size, 0, None, subject=()))
     with pytest.raises(NotEqual):
-        expansion(Identity(3, lambda field, x, eps: ([eps * eps], [x[k] * eps]), size, 0, None))
-    evidence = expansion(Identity(3, lambda field, x, eps: ([eps * x[k]], [x[k] * eps]), size, 0, None))
+        expansion(Identity(3, lambda field, x, eps: ([eps * eps], [x[k] * eps]), size, 0, None, subject=()))
+    evidence = expansion(Identity(3, lambda field, x, eps: ([eps * x[k]], [x[k] * eps]), size, 0, None, subject=()))
     assert evidence is not None
     assert evidence.data["eps"] == "every"
 
