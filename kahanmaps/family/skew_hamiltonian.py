@@ -130,17 +130,31 @@ def diagnosis(A: fmpq_mat) -> str:
         else:
             how = f"{len(factors)} irreducible factors over Q"
         return f"A is generic: chi = {product}, without repeated roots, {how}"
-    radical = fmpq_mat(A.nrows(), A.nrows(), [int(i == j) for i in range(A.nrows()) for j in range(A.nrows())])
-    for factor in factors:
-        radical = radical * evaluate_at_matrix(factor.polynomial, A)
-    diagonalisable = not any(entry != 0 for entry in radical.entries())
-    kind = "still diagonalisable" if diagonalisable else "not diagonalisable"
     names = ", ".join(f"({factor}) {factor.multiplicity} times" for factor in repeated)
+    head = f"A is not generic: chi = {product} has repeated roots, {names}"
+    degree = minimal_degree(A)
+    m = sum(factor.degree * factor.multiplicity for factor in factors)
+    if degree == m:
+        return (
+            f"{head}; A is not diagonalisable, but chi is its minimal polynomial. The space of cubics has dimension 4m, "
+            "and the invariant Poisson structure and m independent integrals are there as for distinct roots"
+        )
+    diagonalisable = degree == sum(factor.degree for factor in factors)
     return (
-        f"A is not generic: chi = {product} has repeated roots, {names}; A is {kind}. The space of cubics may be "
-        "larger than 4m, and the theorems that need m distinct roots (invariant Poisson structure, m independent "
-        "integrals) do not apply; commutativity of associated maps does"
+        f"{head}; A is {'still diagonalisable' if diagonalisable else 'not diagonalisable'} and derogatory: its minimal "
+        f"polynomial has degree {degree}, less than m = {m}. The space of cubics is larger than 4m, and the theorems "
+        "on the invariant Poisson structure and m independent integrals do not apply; commutativity of associated maps "
+        "does"
     )
+
+
+def minimal_degree(A: fmpq_mat) -> int:
+    """The degree of the minimal polynomial: m unless A is derogatory, where I, A, ..., A^(m-1) are dependent.
+
+    >>> minimal_degree(fmpq_mat([[3, 0], [0, 3]]))
+    1
+    """
+    return int(A.minpoly().degree())
 
 
 def evaluate_at_matrix(polynomial: fmpq_poly, A: fmpq_mat) -> fmpq_mat:

@@ -159,7 +159,7 @@ def analyze(
 
     Args:
         file: the system; its claims and facts are not looked at.
-        symbols: names of parameters that formulas are to contain; all else is for the values of the file.
+        symbols: names of parameters that integrals and densities are to contain; all else is for the given values.
         eps: an exact number, to analyse the map at that eps only (time step 2 eps); None for every eps.
         seconds: time for everything, about; by default 16 for planar systems, up to 150 from dimension 6 on.
         seed: of everything random.

@@ -50,7 +50,8 @@ def conclude(found: Analysis) -> Conclusion:
     period = found.integrals.profile.period if found.integrals is not None else None
     suffix = "" if found.eps is None else f" All this at eps = {found.eps} only: other eps may differ."
     if found.symbols:
-        suffix += f" The integrals are for every {', '.join(found.symbols)}, all else for the values of the file."
+        parts = "integrals" if found.densities is None else "integrals and densities"
+        suffix += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
 
     def verdict(kind: str, sentence: str) -> Conclusion:
         return Conclusion(kind, count, str(growth), sentence + suffix)

@@ -201,7 +201,8 @@ def independent_equations(o: PaperObjects) -> Pairs:
     kind=Kind.ATTAINED,
     breaks=(),
     distinct_roots=True,
-    misprint="stated for any A of the kind; it needs distinct roots. With lambda_1 := lambda_2 the dimension is 24",
+    misprint="stated for any A of the kind; its minimal polynomial has to have degree 3. With lambda_1 := lambda_2 (A "
+    "diagonalisable) the dimension is 24",
 )
 def dimension_of_the_cubics_for_any_A(o: PaperObjects) -> Pairs:
     """The cubics of A form a space of dimension 12, without a condition on the roots"""

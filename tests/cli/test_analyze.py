@@ -83,8 +83,8 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
             "integrals_exact": True,
             "growth": "quadratic",
             "sentence": "Integrable in the sense of complexity: quadratic growth, dynamical degree 1 (measured); "
-            "2 independent integrals in dimension 3. The integrals are for every a2, all else for the values of the "
-            "file.",
+            "2 independent integrals in dimension 3. The integrals and densities are for every a2, all else is for the "
+            "given values.",
         },
         "hirota_kimura": ["x1^2 + c1*x3^2 + c2 = 0", "x2^2 + c3*x3^2 + c4 = 0"],
         "family": None,

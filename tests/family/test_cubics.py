@@ -31,8 +31,9 @@ from kahanmaps.family.cubics import (
     third_derivatives,
 )
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
-from kahanmaps.family.skew_hamiltonian import is_generic, random_skew_hamiltonian
-from kahanmaps.systems.hamiltonian import linear_combinations, standard_structure
+from kahanmaps.family.skew_hamiltonian import diagnosis, is_generic, minimal_degree, random_skew_hamiltonian
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
 
 t = fmpq_poly([0, 1])
 DIAGONAL = fmpq_mat([[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]])
@@ -323,3 +324,55 @@ def test_there_are_as_many_unknowns_as_cubic_monomials():
 def test_for_m_equal_to_one_only_multiples_of_the_identity_are_in_the_family(change):
     with pytest.raises(HypothesisError):
         cubic_space(change)
+
+
+def blocks(*jordan: tuple[int, int]) -> fmpq_mat:
+    """A = diag(W, W^T), W with Jordan blocks (root, size)."""
+    m = sum(size for _, size in jordan)
+    A, at = fmpq_mat(2 * m, 2 * m), 0
+    for root, size in jordan:
+        for i in range(at, at + size):
+            A[i, i] = A[m + i, m + i] = root
+            if i + 1 < at + size:
+                A[i, i + 1] = A[m + i + 1, m + i] = 1
+        at += size
+    return A
+
+
+@pytest.mark.parametrize(
+    ("jordan", "dimension"),
+    [
+        ([(1, 2)], 8),
+        ([(1, 3)], 12),
+        ([(1, 2), (2, 1)], 12),
+        ([(1, 2), (2, 2)], 16),
+        ([(1, 1), (1, 1)], 20),
+        ([(1, 1), (1, 1), (2, 1)], 24),
+        ([(1, 2), (1, 1)], 24),
+        ([(1, 1)] * 3, 56),
+    ],
+)
+def test_the_dimension_is_4m_for_jordan_blocks_and_larger_only_for_a_derogatory_A(jordan, dimension):
+    A = blocks(*jordan)
+    m, degree = A.nrows() // 2, minimal_degree(A)
+    assert cubic_space(A).dimension == dimension
+    assert (dimension == 4 * m) is (degree == m)
+    assert ("dimension 4m" in diagnosis(A)) is (degree == m)
+    assert ("larger than 4m" in diagnosis(A)) is (degree < m)
+
+
+@pytest.mark.parametrize(("jordan", "holds"), [([(1, 2)], True), ([(1, 3)], True), ([(1, 1), (1, 1), (2, 1)], False)])
+def test_the_poisson_tensor_is_invariant_for_jordan_blocks_and_not_for_a_derogatory_A(jordan, holds):
+    A, eps = blocks(*jordan), fmpq(1, 7)
+    n, weights = A.nrows(), (2, -1, 3, 1, -2, 1, -3, 2)
+    H = sum(weights[k % 8] * cubic for k, cubic in enumerate(cubic_space(A).basis))
+    J, identity = standard_structure(n), fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+    system = CubicHamiltonian(H, J).system
+    x = [fmpq(k + 1, 2 * k + 3) for k in range(n)]
+    y = KahanMap(system, eps).step(x)
+    before, after = (
+        fmpq_mat(n, n, [rhs.derivative(j)(*point) for rhs in system.rhs for j in range(n)]) for point in (x, y)
+    )
+    slope = (identity - eps * before).inv() * (identity + eps * after)
+    images = [J - eps * eps * (f * f * J) for f in (before, after)]
+    assert (slope * images[0] * slope.transpose() == images[1]) is holds

@@ -211,7 +211,10 @@ DIAGNOSES = [
     (draw_with_chi(t**3 - 2, 1).A, "A is generic: chi = (t^3 - 2), .* irreducible over Q"),
     (draw_with_chi((t - 1) * (t**2 - 2), 1).A, "A is generic: .* 2 irreducible factors over Q"),
     (draw_with_eigenvalues([1, 1, 2], 1).A, "A is not generic: .*(t - 1) 2 times; A is still diagonalisable"),
-    (draw_with_chi((t - 1) ** 2, 1).A, "A is not generic: .*(t - 1) 2 times; A is not diagonalisable"),
+    (
+        draw_with_chi((t - 1) ** 2, 1).A,
+        "A is not generic: .*(t - 1) 2 times; A is not diagonalisable, but chi is its minimal polynomial.*dimension 4m",
+    ),
 ]
 
 
