@@ -19,7 +19,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.invariants.sizes import VARIABLE, eps_size, step_size
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.files import SystemFile, matched
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -70,12 +70,10 @@ def check_commute(
 
 
 def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: fmpq | None) -> Report:
-    f, g = file.system, other.system
-    if f.dim != g.dim:
-        raise InputError(f"{file.name} has dimension {f.dim} and {other.name} {g.dim}, expected the same dimension")
-    notes = []
-    if f.variables != g.variables:
-        notes.append(f"variables are matched by position: {', '.join(f.variables)} with {', '.join(g.variables)}")
+    f = file.system
+    g, note = matched(file, other)
+    notes = [note] if note else []
+    as_they_are = set(f.variables) != set(other.variables) or f.variables == other.variables
     same_step = True
     if eps2 is not None:
         if settings.eps is None:
@@ -90,7 +88,7 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
             f"the map of g at eps2 = {format_number(eps2)} is that of (eps2/eps) g at eps; the evidence names eps only"
         )
     proof = None
-    if same_step and file.member is not None and other.member is not None:
+    if same_step and as_they_are and file.member is not None and other.member is not None:
         proof = theorems.commuting_by_involution_of_members(file.member, other.member)
     if proof is None:
         proof = theorems.commuting_by_splitting(f, g)

@@ -136,15 +136,15 @@ def diagnosis(A: fmpq_mat) -> str:
     m = sum(factor.degree * factor.multiplicity for factor in factors)
     if degree == m:
         return (
-            f"{head}; A is not diagonalisable, but chi is its minimal polynomial. The space of cubics has dimension 4m, "
-            "and the invariant Poisson structure and m independent integrals are there as for distinct roots"
+            f"{head}; A is not diagonalisable, but chi is its minimal polynomial. The space of cubics has dimension "
+            "4m, and the invariant Poisson structure and m independent integrals are there as for distinct roots"
         )
     diagonalisable = degree == sum(factor.degree for factor in factors)
     return (
-        f"{head}; A is {'still diagonalisable' if diagonalisable else 'not diagonalisable'} and derogatory: its minimal "
-        f"polynomial has degree {degree}, less than m = {m}. The space of cubics is larger than 4m, and the theorems "
-        "on the invariant Poisson structure and m independent integrals do not apply; commutativity of associated maps "
-        "does"
+        f"{head}; A is {'still diagonalisable' if diagonalisable else 'not diagonalisable'} and derogatory: its "
+        f"minimal polynomial has degree {degree}, less than m = {m}. The space of cubics is larger than 4m, and the "
+        "theorems on the invariant Poisson structure and m independent integrals do not apply; commutativity of "
+        "associated maps does"
     )
 
 

@@ -21,7 +21,8 @@ There is a formula for c up to a bounded error. Over Q(gamma) the height pairing
     c = h(gamma)/8 + O(1),       gamma = 1 - disc(h) level^2,
 
 where h(gamma) is the height of a rational number in bits. O(1) is bounded, by which numbers is not known to us:
-measured were -0.55 to 0.75 for random gamma of up to 160 bits, and -0.99 for gamma = 1 - 3^-40. So heights grow the faster the longer the coefficients, eps and the start are.
+measured were -0.55 to 0.75 for random gamma of up to 160 bits, and -0.99 for gamma = 1 - 3^-40. So heights grow the
+faster the longer the coefficients, eps and the start are.
 
 Measured, not proved: for a member of the family c is the sum of the constants of its m planes (six members with m = 1,
 2, 3: at n = 120 to 3 parts in 10^5). That is to be expected as long as the denominators of different planes have little

@@ -16,7 +16,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.files import SystemFile, matched
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -29,11 +29,15 @@ Lattice = tuple[tuple[Point | None, ...], ...]  # [i][j], None where a map has n
 
 @dataclass(frozen=True)
 class Pair:
-    """Two systems whose maps are compared, the second scaled where it has another step; `names` are short texts."""
+    """Two systems whose maps are compared, the second scaled where it has another step.
+
+    `names` are short texts, `note` says how variables are matched, where that needs a word.
+    """
 
     f: QuadraticSystem
     g: QuadraticSystem
     names: tuple[str, str]
+    note: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,14 +153,12 @@ def pairs_of_member(file: SystemFile) -> tuple[Pair, Pair]:
 
 def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> Pair:
     """Two systems of one dimension; with `eps2` the second has this step: it is scaled by eps2/eps."""
-    f, g = file.system, other.system
-    if f.dim != g.dim:
-        raise InputError(f"{file.name} has dimension {f.dim} and {other.name} {g.dim}, expected the same dimension")
+    g, note = matched(file, other)
     if eps2 is not None:
         if rational(eps2) == 0:
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")
         g = g.scaled(rational(eps2) / rational(eps))
-    return Pair(f, g, ("f", "g"))
+    return Pair(file.system, g, ("f", "g"), note)
 
 
 def _image(phi: KahanMap, point: Point | None, missing: list[str], told: str) -> Point | None:

@@ -161,3 +161,19 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
 
 def _rows(matrix: fmpq_mat) -> list[list[str]]:
     return [[format_number(entry) for entry in row] for row in matrix.tolist()]
+
+
+def matched(file: SystemFile, other: SystemFile) -> tuple[QuadraticSystem, str]:
+    """The second of two systems in the variables of the first, and a note where these are not the same in order.
+
+    Variables are matched by name where the names agree, otherwise by position. Raises InputError for two dimensions.
+    """
+    f, g = file.system, other.system
+    if f.dim != g.dim:
+        raise InputError(f"{file.name} has dimension {f.dim} and {other.name} {g.dim}, expected the same dimension")
+    if f.variables == g.variables:
+        return g, ""
+    pair = f"{', '.join(f.variables)} with {', '.join(g.variables)}"
+    if set(f.variables) == set(g.variables):
+        return g.reordered(f.variables), f"variables are matched by name: {pair}"
+    return g, f"variables are matched by position: {pair}"

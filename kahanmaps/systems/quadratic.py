@@ -161,6 +161,23 @@ class QuadraticSystem:
         constants = (matrix * fmpq_mat(n, 1, list(self.c))).entries()
         return QuadraticSystem(self.variables, tuple(forms), matrix * self.B, tuple(constants))
 
+    def reordered(self, variables: Sequence[str]) -> QuadraticSystem:
+        """The same system with its variables in another order.
+
+        >>> QuadraticSystem.from_text(["y", "x"], ["x^2", "x*y"]).reordered(["x", "y"]).rhs
+        (x*y, x^2)
+        """
+        n, at = self.dim, [self.variables.index(name) for name in variables]
+        if len(at) != n or len(set(at)) != n:
+            raise InputError(f"found the variables {', '.join(variables)}, expected {', '.join(self.variables)}")
+
+        def moved(matrix: fmpq_mat) -> fmpq_mat:
+            return fmpq_mat(n, n, [matrix[i, j] for i in at for j in at])
+
+        return QuadraticSystem(
+            tuple(variables), tuple(moved(self.Q[i]) for i in at), moved(self.B), tuple(self.c[i] for i in at)
+        )
+
     def over(self, field_of_numbers: Field) -> SystemOver:
         """The same system with its coefficients in another field. Raises BadPrime where GF(p) does not allow it."""
         found = self._over.get(field_of_numbers)

@@ -383,6 +383,17 @@ def test_variables_are_matched_by_position_and_that_is_noted():
     assert report.notes == ["variables are matched by position: x, y with a, b"]
 
 
+@pytest.mark.parametrize("names", [("y", "x"), ("x", "y")])
+def test_variables_are_matched_by_name_where_the_names_agree(names):
+    # x' = x^2 + y, y' = x y, which commutes with itself, and by position does not.
+    f = QuadraticSystem.from_text(["x", "y"], ["x^2+y", "x*y"])
+    rhs = {"x": "x^2+y", "y": "x*y"}
+    report = pair(f, QuadraticSystem.from_text(names, [rhs[name] for name in names]))
+    assert report.verdict is PROVED
+    assert report.notes == (["variables are matched by name: x, y with y, x"] if names[0] == "y" else [])
+    assert pair(f, QuadraticSystem.from_text(["a", "b"], ["a*b", "b^2+a"])).verdict is REFUTED
+
+
 def test_a_start_at_which_the_map_has_no_value_is_told():
     # x' = x^2 at eps = 1/10: det = 1 - 2 eps x vanishes at x = 5.
     f = system_of("x", "x^2")

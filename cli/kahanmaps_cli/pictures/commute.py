@@ -73,6 +73,8 @@ def command(system: str | None, other: str | None, **options: Any) -> int:
         for square in found:
             names = captions[0] if captions else " and ".join(square.pair.names)
             say(f"{names}: {square.verdict}")
+            if square.pair.note:
+                say(f"  {square.pair.note}")
             if square.stopped:
                 say(f"  points are missing: {square.stopped}")
     deliver(figure, options, file if second is None else None)
