@@ -78,7 +78,6 @@ TURNED: dict[type[ast.AST], list[tuple[str, str]]] = {
 PRINTS = re.compile(r"__repr__|__str__|_repr_\w+_|to_json|\w*_html")
 NO_MATHEMATICS = {"seed", "seconds", "progress", "maxsize", "strict"}  # arguments by these names
 NO_MATHEMATICS_IN = re.compile(r"\b(seconds|deadline|monotonic|get_close_matches|progress|randint|randrange|Random)\b")
-NOT_READ = {"kahanmaps/checks/shown.py", "kahanmaps/laboratory/shown.py"}  # pages only
 
 
 @dataclass(frozen=True)
@@ -149,16 +148,21 @@ class Changes(ast.NodeVisitor):
             self.names.append(node.name)
             self.inside(node)
             self.names.pop()
-        elif not (
-            isinstance(node, (ast.BinOp, ast.Compare, ast.Assign, ast.Expr))
-            and NO_MATHEMATICS_IN.search(self.code(node))
-        ):
+        elif not self.is_no_mathematics(node):
             if isinstance(node, ast.arguments):
                 named = [*zip(reversed([*node.posonlyargs, *node.args]), reversed(node.defaults), strict=False)]
                 named += zip(node.kwonlyargs, node.kw_defaults, strict=True)  # type: ignore[arg-type]
                 self.skipped |= {id(default) for argument, default in named if argument.arg in NO_MATHEMATICS}
             self.change(node)
             self.inside(node)
+
+    def is_no_mathematics(self, node: ast.AST) -> bool:
+        """Clocks, random numbers, words; private numbers of a module, which are limits of effort and tables' sizes."""
+        if isinstance(node, ast.Assign) and not self.names and isinstance(node.targets[0], ast.Name):
+            private = node.targets[0].id.startswith(("_", "DEFAULT_")) and isinstance(node.value, ast.Constant)
+            return private or bool(NO_MATHEMATICS_IN.search(self.code(node)))
+        kinds = (ast.BinOp, ast.Compare, ast.Assign, ast.Expr)
+        return isinstance(node, kinds) and bool(NO_MATHEMATICS_IN.search(self.code(node)))
 
     def inside(self, node: ast.AST) -> None:
         """Go on to what belongs to the mathematics."""
@@ -230,7 +234,7 @@ def all_mutants() -> list[Mutant]:
     found: list[Mutant] = []
     for folder in FOLDERS:
         for path in sorted((ROOT / "kahanmaps" / folder).rglob("*.py")):
-            if str(path.relative_to(ROOT)) in NOT_READ:
+            if path.name == "shown.py":  # pages only
                 continue
             found += Changes(str(path.relative_to(ROOT)), path.read_text(encoding="utf-8")).found
     return found
@@ -290,9 +294,11 @@ class Coverage:
         if isinstance(top, (ast.Assign, ast.AnnAssign)):
             names = {n.id for n in ast.walk(top) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
             uses = {n.lineno for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in names}
-            return uses if any(set(lines.get(u, [])) - {""} for u in uses) else set(lines)
-        holder = inner if isinstance(inner, ast.FunctionDef) else top  # defaults; attributes of a class
-        return set(range(holder.lineno, _end(holder) + 1))
+            own = uses
+        else:
+            holder = inner if isinstance(inner, ast.FunctionDef) else top  # defaults; attributes of a class
+            own = set(range(holder.lineno, _end(holder) + 1))
+        return own if any(set(lines.get(line, [])) - {""} for line in own) else set(lines)
 
 
 def measure(tests: list[str]) -> None:

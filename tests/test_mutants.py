@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import ast
+import tomllib
+from pathlib import Path
 
 import pytest
-from mutants import Changes, all_mutants, batches, sample
+from mutants import ROOT, Changes, batches, sample
+
+from kahanmaps.maps import kahan
 
 
 def changed(source: str) -> list[str]:
@@ -55,6 +59,8 @@ def test_a_change_is_one_of_the_mathematics(source: str, mutants: list[str]) -> 
         "deadline = monotonic() + seconds",
         "progress(k + 1)",
         "@cache(maxsize=3)\ndef f(): ...",
+        "_MOST_TERMS = 2000",
+        "DEFAULT_STEPS = 60",
     ],
 )
 def test_what_is_no_mathematics_is_left_alone(source: str) -> None:
@@ -68,11 +74,21 @@ def test_names_of_changes_are_unique_within_a_file() -> None:
 
 
 def test_a_seed_and_a_count_give_the_same_sample_again_and_lines_but_once() -> None:
-    every = all_mutants()
-    chosen = sample(every, 50, seed=3)
-    assert chosen == sample(list(every), 50, seed=3)
-    assert chosen != sample(every, 50, seed=4)
-    assert len({(one.path, one.line) for one in chosen}) == 50
+    path = Path(kahan.__file__)
+    every = Changes("kahan.py", path.read_text(encoding="utf-8")).found
+    chosen = sample(every, 5, seed=3)
+    assert chosen == sample(list(every), 5, seed=3)
+    assert chosen != sample(every, 5, seed=4)
+    assert len({one.line for one in chosen}) == 5
+
+
+def test_equivalent_changes_are_listed_with_a_reason_and_are_changes() -> None:
+    """A line of the list that is not in the code any more is to be deleted."""
+    listed = tomllib.loads((ROOT / "tests" / "mutants.toml").read_text(encoding="utf-8"))["equivalent"]
+    sources = {one["file"]: (ROOT / one["file"]).read_text(encoding="utf-8") for one in listed}
+    keys = {mutant.key for path, source in sources.items() for mutant in Changes(path, source).found}
+    assert [one for one in listed if (one["file"], one["function"], one["line"], one["kind"]) not in keys] == []
+    assert all(one["reason"] for one in listed)
 
 
 def test_tests_run_in_order_and_within_their_time() -> None:

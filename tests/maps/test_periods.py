@@ -222,6 +222,17 @@ def test_a_field_that_is_too_large_is_not_decided_and_says_so():
     assert "about 2^304 elements" in found.text
 
 
+def test_in_a_field_that_is_too_large_no_pole_is_met_where_there_is_none():
+    prime, seen = 10_007, Counter()
+    for block, point in blocks(Small(prime), random.Random(2), 30):
+        found = plane_period(block, point, prime, largest=100)
+        if found.status == "undecided":
+            has_poles = bool(poles(block, prime))
+            assert found.meets_pole is (None if has_poles else False)
+            seen[has_poles] += 1
+    assert min(seen[True], seen[False]) > 0
+
+
 def test_whether_a_pole_is_met_is_known_where_walking_is_too_long_and_both_happen():
     prime = 60_013
     rng, answers = random.Random(8), Counter()
