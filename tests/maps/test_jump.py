@@ -388,3 +388,20 @@ def test_over_q_poles_are_noticed_also_where_chi_does_not_split(steps):
     for n in (last + 1, last + 2, last + 3, last + 4):
         with pytest.raises(SingularStep, match=f"step {last}$"):
             found.value(start, n)
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(name):
+    """The level is infinite where the map has no value, and 0 or delta = 1 as the names of the starts say."""
+    _, structure, start = side_by_side(name)
+    kinds = {
+        "h = 0": "at rest",
+        "the origin": "at rest",
+        "delta = 1": "on three lines",
+        "level 0": "on a singular level",
+        "no value": "on a singular level",
+        "a double root": "on a singular level",
+        "a triple root": "on a singular level",
+    }
+    expected = next((f"the start is {kind} in the plane t = 1" for words, kind in kinds.items() if words in name), "")
+    assert jump.special_start(structure, fmpq(1, 2), start) == expected
