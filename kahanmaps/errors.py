@@ -8,14 +8,23 @@ Each error is also a built-in kind, so that `except ValueError` in a user's scri
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from errno import ENOMEM
 from typing import Any
 
 _MISTAKES_SHOWN = 50
+# What the dynamic linker and the libraries say that are loaded where memory is short.
+_NO_ROOM = re.compile(r"failed to map segment|[Cc]annot allocate memory|[Nn]ot enough memory|Unable to allocate")
+_LONGEST_WORD, _LONGEST_LINE, _MOST_LINES = 300, 1000, 200  # of a message
 
 
 class KahanmapsError(Exception):
-    """The root of all errors that kahanmaps raises on purpose."""
+    """The root of all errors that kahanmaps raises on purpose. Its message is `bounded`."""
+
+    def __str__(self) -> str:
+        return bounded(super().__str__())
 
 
 class InputError(KahanmapsError, ValueError):
@@ -97,6 +106,70 @@ def _caret(text: str, column: int, width: int = 72) -> str:
 
 def _indent(message: str) -> str:
     return message.replace("\n", "\n    ")
+
+
+def quoted(text: str, width: int = 40) -> str:
+    """`text` in quotes, safe to print, cut where it is long.
+
+    >>> quoted("abc"), quoted("1" * 50, 5)
+    ("'abc'", "'11111...'")
+    """
+    return repr(str(text) if len(text) <= width else text[:width] + "...")
+
+
+def bounded(message: str) -> str:
+    """A message without the middle of words and lines that nobody would read to their end; their length is told.
+
+    What somebody wrote is shortened where a message is made; this holds for what was forgotten.
+
+    >>> len(bounded("there is no file " + "x" * 200_000))
+    332
+    """
+    lines = message.split("\n")
+    shown = [
+        _cut(re.sub(rf"\S{{{_LONGEST_WORD + 1},}}", lambda word: _cut(word[0], _LONGEST_WORD), line), _LONGEST_LINE)
+        for line in lines[:_MOST_LINES]
+    ]
+    if len(lines) > _MOST_LINES:
+        shown.append(f"... and {len(lines) - _MOST_LINES} more lines")
+    return "\n".join(shown)
+
+
+def _cut(text: str, most: int) -> str:
+    """At most `most` characters of a text, mostly from its beginning, and how many it has."""
+    if len(text) <= most:
+        return text
+    length = f" ({len(text)} characters)"
+    tail = (most - len(length)) // 4
+    return f"{text[: most - len(length) - tail - 3]}...{text[-tail:]}{length}"
+
+
+@contextmanager
+def reading(name: object) -> Iterator[None]:
+    """Inside, data from outside are read: an error that nobody expected is told together with where they come from.
+
+    The file may be damaged in a way that no check has foreseen, so the error alone would blame the wrong one.
+    """
+    try:
+        yield
+    except Exception as error:
+        note_source(error, name)
+        raise
+
+
+def note_source(error: BaseException, name: object) -> None:
+    """Note in an error that nobody expected where the data came from."""
+    if isinstance(error, Exception) and not isinstance(error, (KahanmapsError, OSError, MemoryError)):
+        error.add_note(str(name))
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Whether an error means that there was not enough memory: also where a library could not be loaded for that."""
+    if isinstance(error, MemoryError):
+        return True
+    if isinstance(error, OSError) and error.errno == ENOMEM:
+        return True
+    return isinstance(error, (ImportError, OSError)) and _NO_ROOM.search(str(error)) is not None
 
 
 def counted(number: int, word: str) -> str:

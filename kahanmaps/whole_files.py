@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -16,7 +17,7 @@ def write_whole(path: Path, content: bytes) -> None:
     if path.exists() and not path.is_file():  # /dev/stdout and its relatives take bytes, but cannot be replaced
         path.write_bytes(content)
         return
-    target = path.resolve()
+    target = resolved(path)
     mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
     try:
         part = NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False)  # noqa: SIM115
@@ -32,6 +33,14 @@ def write_whole(path: Path, content: bytes) -> None:
             with suppress(OSError):
                 os.unlink(part.name)
             raise
+
+
+def resolved(path: str | os.PathLike[str]) -> Path:
+    """The path without symbolic links; OSError where they lead round in a circle."""
+    found = os.path.realpath(path)
+    if os.path.islink(found):
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), os.fspath(path))
+    return Path(found)
 
 
 def _umask() -> int:

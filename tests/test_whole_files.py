@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 
@@ -19,6 +20,23 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
         write_whole(target, b"after")
     assert target.read_bytes() == b"before"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_symbolic_links_in_a_circle_are_told_and_stay(tmp_path):
+    loop = tmp_path / "loop.svg"
+    loop.symlink_to(loop.name)
+    with pytest.raises(OSError, match="symbolic links") as caught:
+        write_whole(loop, b"")
+    assert (caught.value.errno, caught.value.filename) == (errno.ELOOP, str(loop))
+    assert loop.is_symlink()
+
+
+def test_a_symbolic_link_is_written_through(tmp_path):
+    (tmp_path / "there").mkdir()
+    link = tmp_path / "link.svg"
+    link.symlink_to("there/x.svg")
+    write_whole(link, b"x")
+    assert (link.is_symlink(), (tmp_path / "there" / "x.svg").read_bytes()) == (True, b"x")
 
 
 def test_a_new_file_has_the_permissions_of_the_user(tmp_path):

@@ -6,7 +6,6 @@ import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -24,14 +23,14 @@ _VALUE_WIDTH = 300
 
 def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
     """How far the experiments are, as plain data."""
-    from kahanmaps.errors import InputError
+    from kahanmaps.errors import InputError, quoted
     from kahanmaps.version import __version__
 
     found = store.status()
     for name in only:
         if name not in [one.name for one in found]:
             known = ", ".join(one.name for one in found) or "none"
-            raise InputError(f"there is no experiment {name!r} in it, expected one of: {known}")
+            raise InputError(f"there is no experiment {quoted(name)} in it, expected one of: {known}")
     return {
         "command": "batch status",
         "version": __version__,
@@ -75,7 +74,7 @@ def found_data(store: Store, found: Found) -> dict[str, Any]:
 
     task, record, places, attempts = found
     recipes = (task.system, task.options.get("other"))
-    digests = [recipe["document"] for recipe in recipes if recipe and "document" in recipe]
+    digests = [recipe["document"] for recipe in recipes if isinstance(recipe, dict) and "document" in recipe]
     return {
         "command": "batch show",
         "version": __version__,
@@ -153,12 +152,13 @@ def export_rows(store: Store, db: str, form: str, output: str | None, stable: bo
     """Write the results; a file is complete or is not there. `output` is another file than `db`."""
     from kahanmaps.errors import InputError
     from kahanmaps.experiments.export import write_parquet
+    from kahanmaps.whole_files import resolved
 
     if output is None or output == "-":
         _write(store, form, sys.stdout, stable, only)
         return
-    target = Path(output).resolve()
-    if target == Path(db).resolve() or (target.exists() and target.samefile(db)):
+    target = resolved(output)
+    if target == resolved(db) or (target.exists() and target.samefile(db)):
         raise InputError(f"{output} is the database itself: name another file for the export")
     if not target.parent.is_dir():
         raise InputError(f"{output} cannot be made: there is no folder {target.parent}; make it first")

@@ -6,6 +6,8 @@ import re
 
 import click
 
+from kahanmaps.errors import quoted
+
 
 class SuggestingGroup(click.Group):
     """A group that suggests commands where a name is none."""
@@ -15,7 +17,7 @@ class SuggestingGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         known = self.list_commands(ctx)
         if args and args[0] not in known and not args[0].startswith("-") and not ctx.resilient_parsing:
-            raise click.UsageError(f"There is no command {args[0]!r}.{self.hint(args[0], known)}", ctx)
+            raise click.UsageError(f"There is no command {quoted(args[0])}.{self.hint(args[0], known)}", ctx)
         return super().resolve_command(ctx, args)
 
     def hint(self, written: str, known: list[str]) -> str:
@@ -51,9 +53,9 @@ def in_our_words(error: click.ClickException) -> click.ClickException:
         return error if is_told else click.UsageError(text, error.ctx)
     message = error.message
     if found := re.fullmatch(r"'(.*)' is not a valid (integer|float)\.", message, re.DOTALL):
-        message = f"found {found[1]!r}, expected {'an integer' if found[2] == 'integer' else 'a number'}"
+        message = f"found {quoted(found[1])}, expected {'an integer' if found[2] == 'integer' else 'a number'}"
     elif found := re.fullmatch(r"(\S+) is not in the range (.*)\.", message):
-        message = f"found {found[1]}, expected {found[2].replace('<=x<=', ' to ').replace('x>=', 'at least ')}"
+        message = f"found {found[1][:40]}, expected {found[2].replace('<=x<=', ' to ').replace('x>=', 'at least ')}"
     elif isinstance(error.param.type, click.Choice) and (found := re.match(r"'([^']*)' is not one of ", message)):
         close = close_to(found[1].lower(), [str(choice) for choice in error.param.type.choices])
         message += f" Did you mean {' or '.join(close)}?" if close else ""

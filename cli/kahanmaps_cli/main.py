@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kahanmaps.errors import InputError, KahanmapsError, bounded, is_out_of_memory
 from kahanmaps_cli.colour_option import colour_option, with_colour_option
 from kahanmaps_cli.groups import SuggestingGroup, in_our_words
+from kahanmaps_cli.params import with_short_integers
 from kahanmaps_cli.progress import say
 
 if TYPE_CHECKING:
@@ -108,7 +110,7 @@ class LazyGroup(SuggestingGroup):
             return None
         module = import_module(f"kahanmaps_cli.commands.{COMMANDS[cmd_name][0]}")
         command: click.Command = module.command
-        return with_colour_option(command)
+        return with_colour_option(with_short_integers(command))
 
     def hint(self, written: str, known: list[str]) -> str:
         from kahanmaps.systems.catalog import names
@@ -176,9 +178,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    _have_standard_streams()
     status = HOLDS
     try:
+        _have_standard_streams()
         result = cli.main(args=None if argv is None else list(argv), prog_name="kahanmaps", standalone_mode=False)
         status = result if isinstance(result, int) else HOLDS
         sys.stdout.flush()
@@ -187,7 +189,7 @@ def _run(argv: Sequence[str] | None) -> int:
     except click.ClickException as error:
         shown = io.StringIO()
         in_our_words(error).show(shown)
-        say(shown.getvalue().removesuffix("\n"))
+        say(bounded(shown.getvalue().removesuffix("\n")))
         return WRONG_USE
     except (click.Abort, KeyboardInterrupt):
         say("interrupted")
@@ -200,8 +202,6 @@ def _run(argv: Sequence[str] | None) -> int:
 
 
 def _report(error: Exception) -> int:
-    from kahanmaps.errors import InputError, KahanmapsError
-
     if os.environ.get("KAHANMAPS_DEBUG"):
         import traceback
 
@@ -209,17 +209,24 @@ def _report(error: Exception) -> int:
     if isinstance(error, KahanmapsError):
         say(f"Error: {error}")
         return WRONG_USE if isinstance(error, InputError) else UNDECIDED
+    if is_out_of_memory(error):
+        say("Error: out of memory: ask for fewer steps or a smaller --max-digits, or allow more memory (ulimit -v)")
+        return UNDECIDED
     if isinstance(error, OSError):
         where = f": {error.filename or repr('')}" if error.filename is not None else ""
-        say(f"Error: {error.strerror or error}{where}{_missing_folder(error)}")
+        say(bounded(f"Error: {error.strerror or error}{where}{_missing_folder(error)}"))
         return WRONG_USE
-    if isinstance(error, MemoryError):
-        say("Error: out of memory: ask for fewer steps or a smaller --max-digits")
+    if isinstance(error, ImportError) and not (error.name or "kahanmaps").startswith("kahanmaps"):
+        say(
+            bounded(
+                f"Error: {error.name} cannot be loaded: {error}; install it again (kahanmaps version lists what is)"
+            )
+        )
         return UNDECIDED
-    say(
-        f"Internal error: {type(error).__name__}: {error}\n"
-        "This is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened."
-    )
+    say(bounded(f"Internal error: {type(error).__name__}: {error}"))
+    read = " and ".join(getattr(error, "__notes__", ()))
+    blame = f"Either {read}, which was being read, is damaged, or this" if read else "This"
+    say(bounded(f"{blame} is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened."))
     return INTERNAL
 
 

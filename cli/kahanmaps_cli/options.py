@@ -196,7 +196,7 @@ def load_system(
     reference: str | None, variables: str | None, rhs: Sequence[str], parameters: Sequence[tuple[str, str]]
 ) -> SystemFile:
     """The system that a command line names: a path, a catalogue name, `-` for standard input, or an inline system."""
-    from kahanmaps.errors import InputError
+    from kahanmaps.errors import InputError, reading
     from kahanmaps.systems.files import MAX_FILE_BYTES, parse_system
 
     given = dict(parameters)
@@ -218,7 +218,8 @@ def load_system(
         text = sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
         if not text.strip():
             raise InputError("found nothing on standard input, expected a system file")
-        return parse_system(text, "standard input", given)
+        with reading("standard input"):
+            return parse_system(text, "standard input", given)
     return load_reference(reference, given)
 
 

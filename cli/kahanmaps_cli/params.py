@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 
 if TYPE_CHECKING:
     OptionType = click.ParamType[Any]  # generic for the type checker, but not in every version of click we run with
 else:
     OptionType = click.ParamType
+
+
+_MOST_DIGITS = 40  # of a number of steps, as in `Steps`
 
 
 class ExactNumber(OptionType):
@@ -60,8 +63,30 @@ class Whole(OptionType):
         digits = text.removeprefix("-").removeprefix("+")
         # Longer ones are refused before they meet Python's own limit on digits.
         if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= self.least):
-            self.fail(f"found {_shorten(text)}, expected an integer, {self.least} or more", param, ctx)
+            self.fail(f"found {quoted(text)}, expected an integer, {self.least} or more", param, ctx)
         return int(text)
+
+
+class ShortInteger(OptionType):
+    """An integer that a machine can count to, and many digits more: what `type=int` means in our commands."""
+
+    name = "integer"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, str) and len(value.strip()) > _MOST_DIGITS:
+            self.fail(f"found {quoted(value)}, expected an integer of at most {_MOST_DIGITS} digits", param, ctx)
+        return click.INT.convert(value, param, ctx)
+
+
+def with_short_integers(command: click.Command) -> click.Command:
+    """The command, and those below it, with integers of bounded length wherever they say `type=int`."""
+    for parameter in command.params:
+        if parameter.type is click.INT:
+            parameter.type = ShortInteger()
+    if isinstance(command, click.Group):
+        for below in command.commands.values():
+            with_short_integers(below)
+    return command
 
 
 class Seconds(OptionType):
@@ -75,7 +100,7 @@ class Seconds(OptionType):
         except ValueError:
             seconds = 0.0
         if not (isfinite(seconds) and seconds > 0):
-            self.fail(f"found {_shorten(str(value))}, expected a number of seconds above 0", param, ctx)
+            self.fail(f"found {quoted(str(value))}, expected a number of seconds above 0", param, ctx)
         return seconds
 
 
@@ -95,7 +120,7 @@ class NameValue(OptionType):
             return left, right
         if self.name_is_optional and not equals and left:
             return "", left
-        self.fail(f"found {_shorten(value)}, expected NAME=VALUE", param, ctx)
+        self.fail(f"found {quoted(value)}, expected NAME=VALUE", param, ctx)
 
 
 class Arithmetic(OptionType):
@@ -120,7 +145,7 @@ class Arithmetic(OptionType):
         ):
             return kind, int(number)
         self.fail(
-            f"found {_shorten(value)}, expected exact, float, mod:P with a prime P, ball:BITS or ball:auto", param, ctx
+            f"found {quoted(value)}, expected exact, float, mod:P with a prime P, ball:BITS or ball:auto", param, ctx
         )
 
 
@@ -135,16 +160,12 @@ class Steps(OptionType):
         steps = []
         for piece in value.split(","):
             piece = piece.strip()
-            if not (piece.isascii() and piece.isdigit()) or len(piece) > 40:
+            if not (piece.isascii() and piece.isdigit()) or len(piece) > _MOST_DIGITS:
                 self.fail(
-                    f"found {_shorten(piece)}, expected step numbers of at most 40 digits, separated by commas",
+                    f"found {quoted(piece)}, expected step numbers of at most {_MOST_DIGITS} digits, separated by "
+                    "commas",
                     param,
                     ctx,
                 )
             steps.append(int(piece))
         return sorted(set(steps))
-
-
-def _shorten(text: str) -> str:
-    """The text in quotes, cut where it is long."""
-    return repr(text if len(text) <= 60 else text[:60] + "...")

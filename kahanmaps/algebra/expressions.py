@@ -22,8 +22,8 @@ from lark import Lark, Token, Transformer
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import BLANKS, Limits, is_name, number_in, shorten
-from kahanmaps.errors import ExpressionError
+from kahanmaps.algebra.text import BLANKS, Limits, is_name, number_in
+from kahanmaps.errors import ExpressionError, quoted
 
 # Signs below powers, so that -x^2 is -(x^2); powers from the right, so that 2^3^2 is 2^9.
 GRAMMAR = r"""
@@ -194,16 +194,16 @@ def _syntax_error(error: UnexpectedInput, work: _Arithmetic) -> ExpressionError:
     column = token.start_pos or 0
     before = text[:column].rstrip(BLANKS)
     if token.type not in ("NAME", "NUMBER", "LPAR") or not before or before[-1] in "+-*/^(":
-        return ExpressionError(f"found {shorten(token)}, {_OPERAND}", text, column)
+        return ExpressionError(f"found {quoted(token)}, {_OPERAND}", text, column)
     start = len(before) - 1
     while start > 0 and (before[start - 1].isalnum() or before[start - 1] in "_.") and before[-1] != ")":
         start -= 1
     left = before[start:]
     if token.type == "LPAR" and is_name(left) and left not in work.names:
-        call = f"found {shorten(left + '(')}, which looks like a function call"
+        call = f"found {quoted(left + '(')}, which looks like a function call"
         return ExpressionError(f"{call}: only + - * / ^ are available, and products are written with *", text, start)
     example = f"{left}*{token}" if len(left) + len(token) < 40 else "x*y"
-    found = f"found {shorten(token)} right after {shorten(left)}"
+    found = f"found {quoted(token)} right after {quoted(left)}"
     return ExpressionError(f"{found}, expected an operator between them: write {example}", text, column)
 
 
@@ -473,7 +473,7 @@ class _Arithmetic:
     def unknown(self, name: str, column: int | None) -> ExpressionError:
         known = list(self.names)
         if not known:
-            return ExpressionError(f"found the name {shorten(name)}, expected numbers only", self.text, column)
+            return ExpressionError(f"found the name {quoted(name)}, expected numbers only", self.text, column)
         meant = ""
         if len(name) <= 40:  # the search for a look-alike is quadratic
             folded = {other.lower(): other for other in known}
@@ -482,7 +482,7 @@ class _Arithmetic:
             meant = next(products, meant)
         hint = f"did you mean {meant}? " if meant else ""
         listed = ", ".join(known[:30]) + (", ..." if len(known) > 30 else "")
-        return ExpressionError(f"found the unknown name {shorten(name)}: {hint}known are {listed}", self.text, column)
+        return ExpressionError(f"found the unknown name {quoted(name)}: {hint}known are {listed}", self.text, column)
 
 
 def _total(values: list[_T], add: Callable[[_T, _T], _T]) -> _T:

@@ -12,7 +12,7 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 
 
 def ring(names: Sequence[str]) -> fmpq_mpoly_ctx:
@@ -23,7 +23,7 @@ def ring(names: Sequence[str]) -> fmpq_mpoly_ctx:
     """
     if len(set(names)) != len(names):
         twice = sorted({name for name in names if list(names).count(name) > 1})
-        raise InputError(f"found the variable {twice[0]!r} twice, expected distinct names")
+        raise InputError(f"found the variable {quoted(twice[0])} twice, expected distinct names")
     return fmpq_mpoly_ctx.get(tuple(names), Ordering.degrevlex)
 
 

@@ -21,7 +21,7 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly, fmpq_poly, fmpz
 
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
-from kahanmaps.errors import ExpressionError, InexactNumber, InputError
+from kahanmaps.errors import ExpressionError, InexactNumber, InputError, quoted
 
 
 @dataclass(frozen=True)
@@ -260,14 +260,14 @@ def check_names(names: Sequence[str]) -> None:
     kahanmaps.errors.InputError: found the name 'x' twice, expected distinct names
     """
     if isinstance(names, str):
-        raise InputError(f"found the text {shorten(names)}, expected a list of names such as ['x', 'y']")
+        raise InputError(f"found the text {quoted(names)}, expected a list of names such as ['x', 'y']")
     seen = set()
     for name in names:
         if not is_name(name):
-            found = shorten(name) if isinstance(name, str) else f"a {type(name).__name__}"
+            found = quoted(name) if isinstance(name, str) else f"a {type(name).__name__}"
             raise InputError(f"found {found}, expected a name: ASCII letters, digits and _, not starting with a digit")
         if name in seen:
-            raise InputError(f"found the name {name!r} twice, expected distinct names")
+            raise InputError(f"found the name {quoted(name)} twice, expected distinct names")
         seen.add(name)
 
 
@@ -286,7 +286,7 @@ def number_in(text: str, start: int, end: int, digits: int, limits: Limits) -> f
     if match is None or not (match[2] or match[4] or match[5]):
         prefix = _START_OF_NUMBER.match(text, start, end)
         column = start if prefix is None else prefix.end()
-        raise ExpressionError(f"found {shorten(text[start:end])}, {_EXPECTED}", text, column)
+        raise ExpressionError(f"found {quoted(text[start:end])}, {_EXPECTED}", text, column)
     sign, above, below, whole, fraction, power = match.groups()
     if max(len(above or ""), len(below or ""), len(whole or "") + len(fraction or "")) > digits:
         raise ExpressionError(f"found a number of more than {digits} digits, expected at most so many", text, start)
@@ -302,7 +302,7 @@ def number_in(text: str, start: int, end: int, digits: int, limits: Limits) -> f
             # The length first: Python's int() stops at 4300 digits.
             size = power.lstrip("+-").lstrip("0")
             if len(size) > 9 or int(size or "0") > limits.power_of_ten:
-                found = f"found the power of ten {shorten(power)}"
+                found = f"found the power of ten {quoted(power)}"
                 raise ExpressionError(f"{found}, expected at most {limits.power_of_ten} in size", text, match.start(6))
             shift += int(power)
         if shift:
@@ -315,11 +315,6 @@ def require_text(text: object, what: str, hint: str) -> None:
     """Raise `InputError` (for a float `InexactNumber`) unless `text` is a str."""
     if not isinstance(text, str):
         raise _wrong_kind(text, f"{what} as text", hint)
-
-
-def shorten(text: str, width: int = 40) -> str:
-    """`text` in quotes, safe to print, cut where it is long."""
-    return repr(str(text) if len(text) <= width else text[:width] + "...")
 
 
 def _term(coefficient: fmpq, monomial: Sequence[int], names: Sequence[str]) -> str:

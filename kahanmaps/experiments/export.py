@@ -30,7 +30,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.records import Row
 from kahanmaps.version import __version__
 
@@ -295,7 +295,7 @@ def _type(kinds: frozenset[str]) -> str:
 
 def _changed(row: Row, name: str) -> InputError:
     return InputError(
-        f"found the value {name!r} of task {row.number} changed while the table was written: "
+        f"found the value {quoted(name)} of task {row.number} changed while the table was written: "
         "export again when nobody works on the batch"
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -29,7 +30,7 @@ def file_system(path: Path, mounts: Path = _MOUNTS) -> str | None:
         lines = mounts.read_text(errors="surrogateescape").splitlines()
     except OSError:
         return None
-    path = path.resolve()
+    path = Path(os.path.realpath(path))
     best: tuple[int, str] | None = None
     for line in lines:
         fields = line.split(" ")

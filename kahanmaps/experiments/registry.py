@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from kahanmaps.errors import InputError, suggestion
+from kahanmaps.errors import InputError, quoted, suggestion
 from kahanmaps.experiments.options import OTHER, VOCABULARY, Option
 
 ENVIRONMENT = "KAHANMAPS_TASKS"
@@ -99,6 +99,6 @@ def task_kind(name: str) -> TaskKind:
     kinds = task_kinds()
     if name not in kinds:
         raise InputError(
-            f"there is no task {name!r}, expected one of {', '.join(kinds)}{suggestion(name, list(kinds))}"
+            f"there is no task {quoted(name)}, expected one of {', '.join(kinds)}{suggestion(name, list(kinds))}"
         )
     return kinds[name]

@@ -31,7 +31,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from kahanmaps.errors import InputError, SystemFileError
+from kahanmaps.errors import InputError, SystemFileError, reading
 from kahanmaps.experiments.experiment import Experiment
 from kahanmaps.experiments.experiment_reader import DEFAULT_LIMITS, read_experiment
 from kahanmaps.experiments.spec_document import SpecDocument
@@ -83,7 +83,8 @@ def read_spec(path: str | Path, *, max_tasks: int = MAX_TASKS) -> Spec:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"cannot read the spec {path}: {reason or error}") from error
-    return parse_spec(data, str(path), folder=Path(path).parent, max_tasks=max_tasks)
+    with reading(path):
+        return parse_spec(data, str(path), folder=Path(path).parent, max_tasks=max_tasks)
 
 
 def parse_spec(

@@ -17,7 +17,7 @@ from heapq import merge
 from math import inf, isfinite
 from typing import Any
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.export import NUMBER, Entry, entries, plain
 from kahanmaps.experiments.records import KEPT, Row, canonical
 from kahanmaps.experiments.shown import summary_html
@@ -397,7 +397,7 @@ def _must_exist(name: str, known: set[str], what: str) -> None:
     meant = f", did you mean {' or '.join(close)}?" if close else ";"
     listed = sorted(known)
     more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
-    raise InputError(f"found the unknown name {name!r}{meant} names {what}: {', '.join(listed[:_LISTED])}{more}")
+    raise InputError(f"found the unknown name {quoted(name)}{meant} names {what}: {', '.join(listed[:_LISTED])}{more}")
 
 
 def _place_of_verdict(verdict: str) -> tuple[int, str]:

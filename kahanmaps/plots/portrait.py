@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.float_numbers import FloatArray
 from kahanmaps.plots.level_sets import LevelCurves
 from kahanmaps.plots.point_functions import PointFunction
@@ -81,7 +81,7 @@ def portrait_of(
     elif colour == STEP:
         values, label = _steps(found), STEP
     elif colour != ORBIT:
-        raise InputError(f"found the colour {colour!r}, expected orbit, step or a function")
+        raise InputError(f"found the colour {quoted(colour)}, expected orbit, step or a function")
     there = ~np.isnan(found.points).any(axis=2)
     shown = ~np.isnan(points).any(axis=2)
     if values is not None:

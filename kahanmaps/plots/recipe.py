@@ -47,18 +47,26 @@ def read_recipe(path: str) -> Recipe:
     """
     with Path(path).open("rb") as file:
         content = file.read(_MAX_BYTES)
-    if content.startswith(b"\x89PNG\r\n\x1a\n"):
-        found = dict(_png_texts(content))
-        recipe = _from(found.get("Software"), found.get("Description"), found.get("Comment"))
-    elif content.startswith(b"%PDF"):
-        recipe = _from(*(_pdf_text(content, key) for key in ("Creator", "Subject", "Keywords")))
-    elif b"<svg" in content[:4000]:
-        recipe = _from(*(_svg_text(content, key) for key in ("creator", "description", "subject")))
-    else:
-        raise InputError(f"{path}: found neither PDF nor SVG nor PNG, expected a picture that kahanmaps wrote")
+    try:
+        recipe = _recipe_in(path, content)
+    except (ValueError, zlib.error) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path}: found a recipe that cannot be read ({error}): the picture is damaged") from error
     if recipe is None:
         raise InputError(f"{path}: found no recipe in it, expected a picture that kahanmaps wrote")
     return recipe
+
+
+def _recipe_in(path: str, content: bytes) -> Recipe | None:
+    if content.startswith(b"\x89PNG\r\n\x1a\n"):
+        found = dict(_png_texts(content))
+        return _from(found.get("Software"), found.get("Description"), found.get("Comment"))
+    if content.startswith(b"%PDF"):
+        return _from(*(_pdf_text(content, key) for key in ("Creator", "Subject", "Keywords")))
+    if b"<svg" in content[:4000]:
+        return _from(*(_svg_text(content, key) for key in ("creator", "description", "subject")))
+    raise InputError(f"{path}: found neither PDF nor SVG nor PNG, expected a picture that kahanmaps wrote")
 
 
 def _from(creator: str | None, command: str | None, system: str | None) -> Recipe | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 
 CENTIMETRES_PER_INCH = 2.54
 # black, blue, orange, green, sky blue, vermilion, purple
@@ -107,4 +107,6 @@ class Style:
 
 def _require(what: str, value: float, least: float, most: float) -> None:
     if not least <= value <= most:
-        raise InputError(f"found {what.format(f'{value:g}')}, expected {least:g} to {most:g}")
+        # An integer may be beyond the range of machine floats.
+        found = quoted(str(value)).strip("'") if isinstance(value, int) else f"{value:g}"
+        raise InputError(f"found {what.format(found)}, expected {least:g} to {most:g}")

@@ -19,9 +19,8 @@ from kahanmaps.algebra.text import (
     parse_constant,
     parse_polynomial,
     parse_rational_function,
-    shorten,
 )
-from kahanmaps.errors import InputError, SystemFileError, counted, suggestion
+from kahanmaps.errors import InputError, SystemFileError, counted, quoted, suggestion
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.sources import SOURCES
@@ -31,6 +30,7 @@ from kahanmaps.systems.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.systems.structured_facts import read_structured_facts
 
 KINDS = ("system", "hamiltonian", "family")
+_LONGEST_NAME = 1000
 _KEYS = {
     "": {"name", "variables", "parameters", *KINDS, "integrals", "density", "catalog"},
     "system": {"rhs"},
@@ -88,9 +88,11 @@ class DocumentReader:
             )
         self._read_parameters()
         name = self.document.get("name", self._default_name())
-        if not isinstance(name, str) or not name.isprintable():
+        if not isinstance(name, str) or not name.isprintable() or len(name) > _LONGEST_NAME:
             # It stands in the first line of many outputs, where nothing may break the line or colour the terminal.
-            self._mistake("name", f"found {_show(name)}, expected printable text on one line")
+            self._mistake(
+                "name", f"found {_show(name)}, expected printable text on one line, at most {_LONGEST_NAME} characters"
+            )
         kind = kinds[0] if len(kinds) == 1 else ""
         self._read_variables(kind)
         system, hamiltonian, member = None, None, None
@@ -117,7 +119,7 @@ class DocumentReader:
 
     def _mistake(self, key: str, sentence: str) -> None:
         # Keys come from the file: nothing in them may reach a terminal as an escape sequence.
-        self.mistakes.append((key if key.isprintable() and len(key) <= 100 else shorten(key, 100), sentence))
+        self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
 
     def _unknown_keys(self, section: str, table: Mapping[str, Any]) -> None:
         known = _KEYS[section]
@@ -160,7 +162,7 @@ class DocumentReader:
             if not isinstance(declared, dict) or name not in declared:
                 known = ", ".join(self.parameters) or "none"
                 hint = suggestion(name, list(self.parameters))
-                self._mistake("parameters", f"unknown parameter {name!r}, this system has: {known}{hint}")
+                self._mistake("parameters", f"unknown parameter {quoted(name)}, this system has: {known}{hint}")
 
     def _read_variables(self, kind: str) -> None:
         given = self.document.get("variables")
@@ -187,7 +189,7 @@ class DocumentReader:
         if "eps" in given:
             self._mistake("variables", "eps is the step of the map and cannot be a variable")
         elif clash:
-            self._mistake("variables", f"{clash[0]!r} is a parameter as well, expected distinct names")
+            self._mistake("variables", f"{quoted(clash[0])} is a parameter as well, expected distinct names")
         else:
             self.variables = tuple(given)
 
@@ -325,7 +327,7 @@ class DocumentReader:
         claims = {}
         for name, value in (self._table("integrals") or {}).items():
             if not name.isprintable():
-                self._mistake(f"integrals.{name!r}", "expected a printable name")
+                self._mistake(f"integrals.{quoted(name)}", "expected a printable name")
                 continue
             claim = self._claim(f"integrals.{name}", value)
             if claim is not None:
@@ -361,7 +363,9 @@ class DocumentReader:
             elif key == "sources":
                 for item in value:
                     if item not in SOURCES:
-                        self._mistake("catalog.sources", f"unknown source {item!r}, expected a key of sources.py")
+                        self._mistake(
+                            "catalog.sources", f"unknown source {quoted(str(item))}, expected a key of sources.py"
+                        )
         read_structured_facts(section, self.variables, self._mistake, _show)
 
     def _normalised(self) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import format_number, format_polynomial
-from kahanmaps.errors import InputError, SystemFileError
+from kahanmaps.errors import InputError, SystemFileError, reading
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.systems.document import KINDS, DocumentReader
@@ -130,7 +130,8 @@ def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -
         raise InputError(f"cannot read the system file {path}: {error.strerror or error}") from error
     except ValueError as error:  # a path with a NUL character
         raise InputError(f"cannot read the system file {str(path)!r}: {error}") from error
-    return parse_system(data, str(path), parameters)
+    with reading(path):
+        return parse_system(data, str(path), parameters)
 
 
 def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[str, Any] | None = None) -> SystemFile:

@@ -11,7 +11,7 @@ from flint import fmpq_mpoly
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.text import parse_polynomial
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 
@@ -51,7 +51,7 @@ class ParametricSystem:
         for name in symbols:
             if name not in file.parameters:
                 known = ", ".join(file.parameters) or "none"
-                raise InputError(f"found the symbol {name!r}, expected eps or a parameter of the system: {known}")
+                raise InputError(f"found the symbol {quoted(name)}, expected eps or a parameter of the system: {known}")
         names = (*file.variables, *symbols)
         if not symbols:
             return cls.of_system(file.system)

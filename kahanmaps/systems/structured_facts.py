@@ -25,7 +25,7 @@ from flint import fmpq, fmpq_mpoly, fmpq_poly
 
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.algebra.text import parse_polynomial
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 
 GROWTHS = ("bounded", "linear", "quadratic", "exponential")
 VERDICTS = ("integrable", "linearisable", "not integrable")
@@ -93,12 +93,12 @@ def relation_functions(given: str | Sequence[str], variables: Sequence[str]) -> 
 def _up_to(text: str, variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
     match = _UP_TO.fullmatch(text)
     if match is None:
-        raise InputError(f'found {text[:40]!r}, expected "degree <= d" or a list of polynomials')
+        raise InputError(f'found {quoted(text)}, expected "degree <= d" or a list of polynomials')
     top, count = int(match[1]), 1
     for k in range(len(variables)):
         count = count * (top + k + 1) // (k + 1)
     if count > MAX_MONOMIALS:
-        raise InputError(f"found {text!r}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
+        raise InputError(f"found {quoted(text)}, which is {count} monomials, expected at most {MAX_MONOMIALS}")
     context = ring(variables)
     exponents = chain.from_iterable(monomials(len(variables), d) for d in range(top + 1))
     return tuple(context.from_dict({exponent: fmpq(1)}) for exponent in exponents)

@@ -7,6 +7,8 @@ a sentence and an exit status, never a traceback.
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import click
@@ -157,6 +159,10 @@ def test_a_misspelt_system_is_recognised(kahanmaps, command, written, meant):
         (OSError(2, "No such file or directory", ""), 2, "Error: No such file or directory: ''"),
         (SingularStep("det(I - eps f'(x)) = 0"), 3, "Error: det(I - eps f'(x)) = 0"),
         (MemoryError(), 3, "out of memory"),
+        (OSError(12, "Cannot allocate memory"), 3, "out of memory"),
+        (ImportError("libx.so: failed to map segment from shared object", name="numpy"), 3, "out of memory"),
+        (ImportError("cannot import name 'nothing'", name="numpy"), 3, "numpy cannot be loaded: cannot import"),
+        (ImportError("cannot import name 'nothing'", name="kahanmaps.maps"), 70, "Internal error: ImportError"),
         (KeyboardInterrupt(), 130, "interrupted"),
         (RuntimeError("all wrong"), 70, "Internal error: RuntimeError: all wrong"),
         (RecursionError("too deep"), 70, "Internal error: RecursionError"),
@@ -175,6 +181,38 @@ def test_an_internal_error_says_that_it_is_a_bug_and_how_to_see_more(kahanmaps, 
     failing_with(monkeypatch, RuntimeError("all wrong"))
     outcome = kahanmaps("version")
     assert "This is a bug in kahanmaps. KAHANMAPS_DEBUG=1 shows where it happened." in outcome.err
+
+
+def test_an_internal_error_names_the_file_that_was_being_read(kahanmaps, monkeypatch, tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text('variables = ["x"]\n[system]\nrhs = ["x"]')
+    monkeypatch.setattr("kahanmaps.systems.files.DocumentReader", lambda *_: None)  # has no method `read`
+    outcome = kahanmaps("systems", path)
+    assert outcome.status == 70
+    assert f"Either {path}, which was being read, is damaged, or this is a bug in kahanmaps" in outcome.err
+
+
+def test_ctrl_c_while_libraries_are_loaded_is_told_without_a_traceback():
+    script = """
+import builtins, os, signal, sys
+from kahanmaps_cli import __main__
+load = builtins.__import__
+def pressed(name, *rest):
+    if name == "click":
+        os.kill(os.getpid(), signal.SIGINT)
+    return load(name, *rest)
+builtins.__import__ = pressed
+sys.argv = ["kahanmaps", "version"]
+sys.exit(__main__.main())
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
+def test_the_program_gives_the_status_of_the_command():
+    done = subprocess.run([sys.executable, "-m", "kahanmaps_cli", "nonsense"], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "There is no command 'nonsense'" in done.stderr
 
 
 def test_debugging_shows_where_an_error_happened(kahanmaps, monkeypatch):

@@ -35,7 +35,7 @@ def command(shell: str | None) -> None:
     name = shell or Path(os.environ.get("SHELL", "")).name
     found = get_completion_class(name) if name in _SHELLS else None
     if found is None:
-        raise click.UsageError(f"found the shell {name!r}, expected one of {', '.join(_SHELLS)}: name it as SHELL")
+        raise click.UsageError(f"found the shell {name[:40]!r}, expected one of {', '.join(_SHELLS)}: name it as SHELL")
     script = found(cli, {}, "kahanmaps", COMPLETION).source()
     if name == "bash":  # a folder and NAME= want to be continued: no blank after them
         offer = "COMPREPLY+=($value)"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Any
 
 import click
 
 from kahanmaps_cli.options import load_system, quiet_option, symbolic_option, system_options
+from kahanmaps_cli.pictures.output import as_typed
 from kahanmaps_cli.progress import say
 
 # Those of kahanmaps.languages.convert, which --help does not load.
@@ -93,4 +93,4 @@ def _command_line(system: str | None, language: str, options: dict[str, Any]) ->
     for key in ("symbolic", "name"):
         if options[key]:
             words += [f"--{key}", options[key]]
-    return shlex.join(words)
+    return as_typed(words)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from itertools import islice
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps.errors import counted
+from kahanmaps.errors import counted, quoted
 from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, FloatRun, ModularRun, Run, structure_for
 from kahanmaps_cli.ensemble_starts import drawn, read_starts
 from kahanmaps_cli.options import (
@@ -130,7 +130,7 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
     if (options["starts"] is None) == (options["count"] is None):
         raise click.UsageError("give --starts FILE or --random N, one of the two")
     files = [options["starts"], options["output"]]
-    if not {None, "-"} & set(files) and Path(files[0]).resolve() == Path(files[1]).resolve():
+    if not {None, "-"} & set(files) and os.path.realpath(files[0]) == os.path.realpath(files[1]):
         raise click.UsageError(f"found {files[1]} both as --starts and as -o: it would be written over")
     if options["starts"] is not None and (options["box"] is not None or options["seed"] is not None):
         raise click.UsageError("--box and --seed are for --random N")
@@ -149,7 +149,7 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
     if threads is not None and threads < 1:
         raise click.UsageError(f"found --threads {threads}, expected at least 1")
     if output is not None and not output.endswith(".npy"):
-        raise click.UsageError(f"found -o {output!r}, expected a name that ends with .npy")
+        raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
 
 
 def _require_map(file: SystemFile, eps: Any, kind: str, prime: int) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps.errors import quoted
 from kahanmaps.version import __version__
 from kahanmaps_cli.draw import draw_member, draw_options
 from kahanmaps_cli.groups import SuggestingGroup
@@ -68,7 +69,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
 
     output = None if output == "-" else output
     if name is not None and not name.isprintable():
-        raise click.UsageError(f"found --name {name!r}, expected printable text")
+        raise click.UsageError(f"found --name {quoted(name)}, expected printable text")
     member = _with_signs(draw_member(**options), signs)
     file = SystemFile.from_member(member, name or (_file_name(Path(output).stem) if output else "member"))
     _write(file, output)
@@ -289,7 +290,7 @@ def _with_signs(member: FamilyMember, signs: str | None) -> FamilyMember:
         return member
     pieces = [piece.strip() for piece in signs.split(",")]
     if any(piece not in ("1", "+1", "-1") for piece in pieces):
-        raise click.UsageError(f"found --signs {signs}, expected 1 and -1 separated by commas")
+        raise click.UsageError(f"found --signs {quoted(signs)}, expected 1 and -1 separated by commas")
     return FamilyMember(member.A, member.H, tuple(int(piece) for piece in pieces))
 
 

@@ -120,7 +120,7 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
 
 def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
     from kahanmaps.algebra.text import parse_polynomial
-    from kahanmaps.errors import InputError
+    from kahanmaps.errors import InputError, quoted
     from kahanmaps.laboratory.hirota_kimura import Basis, hirota_kimura_basis
     from kahanmaps.laboratory.integrals import closing_note
     from kahanmaps.laboratory.laboratory import Laboratory
@@ -134,15 +134,17 @@ def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
     for text in options["sets"]:
         parts = [part.strip() for part in text.split(",")]
         if not all(parts):
-            raise InputError(f"found the set {text!r}, expected polynomials with commas between them: 'x^2,y^2,1'")
+            raise InputError(
+                f"found the set {quoted(text)}, expected polynomials with commas between them: 'x^2,y^2,1'"
+            )
         functions = [parse_polynomial(part, file.variables, file.parameters) for part in parts]
         for k, function in enumerate(functions):
             if function.is_zero():
                 raise InputError(
-                    f"found 0 as function {k + 1} of the set {text!r}, expected polynomials that are not 0"
+                    f"found 0 as function {k + 1} of the set {quoted(text)}, expected polynomials that are not 0"
                 )
             if function in functions[:k]:
-                raise InputError(f"found function {k + 1} twice in the set {text!r}, expected different ones")
+                raise InputError(f"found function {k + 1} twice in the set {quoted(text)}, expected different ones")
         try:
             if not reason:
                 rows.append(hirota_kimura_basis(laboratory.maps, functions, parts))

@@ -125,6 +125,7 @@ def _option_name(name: str) -> str:
 def _require_output(path: str) -> None:
     """Refuse, before anything is computed, an output that cannot be written."""
     from kahanmaps.errors import InputError
+    from kahanmaps.whole_files import resolved
 
     if path == "-":
         if sys.stdout.isatty():
@@ -132,7 +133,7 @@ def _require_output(path: str) -> None:
         return
     if Path(path).is_dir():
         raise InputError(f"{path}: found a folder, expected the name of a file")
-    folder = Path(path).resolve().parent
+    folder = resolved(path).parent
     if not folder.is_dir():
         raise InputError(f"{path}: found no folder {folder}, expected an existing one")
     if not os.access(folder if Path(path).is_file() or not Path(path).exists() else path, os.W_OK):

@@ -8,7 +8,7 @@ import shlex
 import shutil
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -16,7 +16,7 @@ import click
 
 from kahanmaps_cli.options import stack
 from kahanmaps_cli.params import OptionType
-from kahanmaps_cli.progress import say
+from kahanmaps_cli.progress import printable, say
 from kahanmaps_cli.terminal import is_coloured
 
 if TYPE_CHECKING:
@@ -92,6 +92,7 @@ def require_output(options: dict[str, Any]) -> None:
     """Refuse, before anything is computed, an output that cannot be written."""
     from kahanmaps.errors import InputError
     from kahanmaps.plots.figures import format_of, require_matplotlib
+    from kahanmaps.whole_files import resolved
 
     require_matplotlib()
     style_from(options)
@@ -100,7 +101,7 @@ def require_output(options: dict[str, Any]) -> None:
         return
     if options["kind"] != "text":
         format_of(path, options["kind"])
-    folder = Path(path).resolve().parent
+    folder = resolved(path).parent
     if not folder.is_dir():
         raise InputError(f"{path}: found no folder {folder}, expected an existing one")
     if Path(path).is_dir():
@@ -118,7 +119,9 @@ def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = N
     if options["title"]:
         with drawing(style):
             size = style.font_size + 1
-            figure.suptitle(plain(wrapped(options["title"], 72 * figure.get_size_inches()[0], size)), fontsize=size)
+            figure.suptitle(
+                plain(wrapped(printable(options["title"]), 72 * figure.get_size_inches()[0], size)), fontsize=size
+            )
     if kind == "text" or (kind is None and path == "-"):
         _draw_in_terminal(figure, style, path)
         return
@@ -142,7 +145,20 @@ def command_line() -> str:
     """The command that is running, as one would type it; it has to be a PictureCommand."""
     context = click.get_current_context()
     words = context.command_path.split()[1:]  # the first one is the program, whatever it was called
-    return shlex.join(["kahanmaps", *words, *context.meta[_ARGUMENTS]])
+    return as_typed(["kahanmaps", *words, *context.meta[_ARGUMENTS]])
+
+
+def as_typed(words: Iterable[str]) -> str:
+    """The words of a command as one would type them, on one line of UTF-8."""
+    return " ".join(map(_typed, words))
+
+
+def _typed(word: str) -> str:
+    """A word as a shell reads it; what cannot be printed is spelt out, such as bytes that are not UTF-8."""
+    if word.isprintable():
+        return shlex.quote(word)
+    spelt = "".join(chr(b) if 32 <= b < 127 and chr(b) not in "'\\" else f"\\x{b:02x}" for b in os.fsencode(word))
+    return f"$'{spelt}'"
 
 
 def _draw_in_terminal(figure: Figure, style: Style, path: str) -> None:

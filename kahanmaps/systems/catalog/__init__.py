@@ -27,7 +27,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 
 if TYPE_CHECKING:
     from kahanmaps.systems.files import SystemFile
@@ -87,7 +87,7 @@ def _is_path(text: str) -> bool:
 
 def _unknown(name: str) -> InputError:
     if not name or len(name) > 60 or not name.isprintable():  # no name that anybody meant
-        return InputError(f"found {name[:60]!r}, expected the name of a system or a path: {_LIST_THEM}")
+        return InputError(f"found {quoted(name)}, expected the name of a system or a path: {_LIST_THEM}")
     close = _close_names(name)
     meant = f", did you mean {' or '.join(close)}?" if close else ":"
     return InputError(

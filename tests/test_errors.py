@@ -1,0 +1,65 @@
+"""Messages of errors: no more of a long text than anybody reads, and the name of the file that was being read."""
+
+from __future__ import annotations
+
+import errno
+
+import pytest
+
+from kahanmaps.errors import InputError, KahanmapsError, SystemFileError, bounded, is_out_of_memory, quoted, reading
+
+
+@pytest.mark.parametrize("text", ["x" * 200_000, "x " * 100_000, "x\n" * 200_000, "0" * 1001])
+def test_a_long_message_is_cut_and_its_length_is_told(text):
+    found = bounded(f"found {text}, expected less")
+    assert len(found) < 1200
+    assert max(map(len, found.split("\n"))) <= 1000
+    assert found.startswith("found ")
+    assert "characters)" in found or "more lines" in found
+
+
+@pytest.mark.parametrize("text", ["", "found 'x', expected 'y'", f"there is no file {'/folder' * 40}", "a\nb\n"])
+def test_what_can_be_read_is_left_alone(text):
+    assert bounded(text) == text
+
+
+@pytest.mark.parametrize("error", [KahanmapsError("x" * 9999), InputError("x" * 9999)])
+def test_every_error_of_ours_is_bounded(error):
+    assert len(str(error)) == 300
+
+
+def test_so_is_each_mistake_of_a_file():
+    error = SystemFileError("a.toml", [("name", "n" * 9999), ("variables", "v" * 9999)])
+    assert max(map(len, str(error).split("\n"))) < 400
+
+
+def test_a_text_is_quoted_so_that_nothing_in_it_is_obeyed():
+    assert quoted("\x1b[31m" + "y" * 100) == repr("\x1b[31m" + "y" * 35 + "...")
+
+
+def test_an_unexpected_error_carries_the_name_of_what_was_read():
+    with pytest.raises(TypeError) as caught, reading("a.toml"):
+        raise TypeError("a surprise")
+    assert caught.value.__notes__ == ["a.toml"]
+
+
+@pytest.mark.parametrize("error", [InputError("expected"), OSError(2, "no"), MemoryError()])
+def test_an_expected_one_says_it_itself(error):
+    with pytest.raises(type(error)) as caught, reading("a.toml"):
+        raise error
+    assert not hasattr(caught.value, "__notes__")
+
+
+@pytest.mark.parametrize(
+    ("error", "is_memory"),
+    [
+        (MemoryError(), True),
+        (OSError(errno.ENOMEM, "Cannot allocate memory"), True),
+        (ImportError("libopenblas.so: failed to map segment from shared object"), True),
+        (ImportError("libopenblas.so: cannot open shared object file"), False),
+        (OSError(errno.ENOENT, "No such file or directory"), False),
+        (ValueError("cannot allocate memory"), False),
+    ],
+)
+def test_a_library_that_finds_no_memory_is_told_from_one_that_is_broken(error, is_memory):
+    assert is_out_of_memory(error) is is_memory
