@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps.errors import counted, suggestion
+from kahanmaps.errors import counted, quoted, suggestion
 from kahanmaps_cli.batch_progress import BatchProgress, duration
 from kahanmaps_cli.batch_show import print_status, status_data
 from kahanmaps_cli.progress import say
@@ -79,7 +79,7 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     """Do what is missing; the exit status."""
     from kahanmaps.experiments.run import plan
     from kahanmaps.experiments.spec import MAX_TASKS, read_spec
-    from kahanmaps.experiments.store import Store, StoreError
+    from kahanmaps.experiments.store import Damaged, Store, StoreError
 
     spec = None if path is None else read_spec(path, max_tasks=options["max_tasks"] or MAX_TASKS)
     if spec is not None:
@@ -97,6 +97,8 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
                 jobs = store.pending(**which, retry_failed=options["retry_failed"])
                 try:
                     was_interrupted = _do(jobs, store, progress, options)
+                except Damaged:
+                    raise
                 except StoreError as error:  # the disk is full or the database gone: no wrong use, but the end
                     say(f"Error: {error}")
                     return 3
@@ -208,7 +210,7 @@ def _require_names(only: tuple[str, ...], spec: Spec) -> None:
     for name in only:
         if name not in known:
             raise InputError(
-                f"there is no experiment {name!r}, expected one of {', '.join(known)}{suggestion(name, known)}"
+                f"there is no experiment {quoted(name)}, expected one of {', '.join(known)}{suggestion(name, known)}"
             )
 
 

@@ -11,13 +11,15 @@ import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from math import isfinite
 from pathlib import Path
 from typing import Any, Self
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.journals import journal_for
 from kahanmaps.experiments.locks import Lock, LockedByAnother
 from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT, SCHEMA
+from kahanmaps.whole_files import resolved
 
 _BUSY_SECONDS = 30.0
 _SMALLEST = 512  # bytes, the smallest page that SQLite has
@@ -27,8 +29,15 @@ _CACHE, _LARGE_CACHE = 16 << 10, 128 << 10
 _LARGEST_JOURNAL = 64 << 20  # bytes: what is kept of the journal of a large plan
 
 
+_DEEPEST = 100  # brackets within brackets of a text that is read: what walks through it is recursive
+
+
 class StoreError(InputError):
     """A database that cannot be used, or not in this way: the message says what to do."""
+
+
+class Damaged(StoreError):
+    """A database in which something cannot be what was written."""
 
 
 class Database:
@@ -40,9 +49,12 @@ class Database:
     def __init__(self, path: str | os.PathLike[str], readonly: bool) -> None:
         self.name = os.fspath(path)
         # Resolved, or two names of one file would have two locks.
-        self.path = Path(self.name).resolve()
+        try:
+            self.path = resolved(self.name)
+        except OSError as error:
+            raise self._unopened(error) from error
         self._is_readonly = readonly
-        self._lock = Lock(self.path.with_name(f"{self.path.name}.lock"))
+        self._lock = Lock(Path(f"{self.path}.lock"))
         self._connection: sqlite3.Connection | None = None
         self._process = os.getpid()
         self._identity: tuple[int, int] | None = None
@@ -153,12 +165,30 @@ class Database:
         if self._is_readonly:
             raise StoreError(f"{self.name} has been opened for reading only: open it for writing")
 
-    def plain(self, text: str) -> Any:
-        """What a text in the file means, which is JSON unless it is damaged."""
+    def table(self, text: Any, what: str) -> dict[str, Any]:
+        """The dict that a text in the file spells, which is JSON unless it is damaged; `what` names it in messages."""
+        if not isinstance(text, str):
+            raise self.damaged(f"{what}: found {shown(text)}, expected text")
         try:
-            return json.loads(text)
-        except ValueError as error:
-            raise StoreError(self._damaged(f"a text is not JSON: {error}")) from error
+            found = _DECODER.decode(text)
+        except (ValueError, RecursionError) as error:
+            raise self.damaged(f"{what} is not JSON: {quoted(str(error), 100)}") from error
+        if not isinstance(found, dict) or _is_too_deep(text, found):
+            raise self.damaged(f"{what}: found {quoted(text)}, expected a table in JSON")
+        return found
+
+    def damaged(self, what: str) -> Damaged:
+        """The error that says what in the file cannot be what was written, and what to do."""
+        what = " ".join(what.split())
+        return Damaged(
+            f"{self.name} is damaged ({what}): take a copy from before, or save what can be read with "
+            f"`sqlite3 {self.name} .recover`"
+        )
+
+    def require(self, is_sound: bool, what: str, found: Any, expected: str) -> None:
+        """Raise `Damaged` unless what was found somewhere in the file is what it can be."""
+        if not is_sound:
+            raise self.damaged(f"{what}: found {shown(found)}, expected {expected}")
 
     # Opening
 
@@ -166,7 +196,7 @@ class Database:
         try:
             self._look_at_the_file(create)
         except OSError as error:
-            raise StoreError(f"{self.name} cannot be opened ({error.strerror}): check the name") from error
+            raise self._unopened(error) from error
         with self._errors():
             if self._is_readonly:
                 self._open_to_read()
@@ -182,6 +212,8 @@ class Database:
                 raise StoreError(f"there is no database {self.name}: check the name, or run the batch to make it")
             if not self.path.parent.is_dir():
                 raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; make it first")
+        elif not self.path.is_file():
+            raise StoreError(f"{self.name} is a pipe or a device, expected a file: check the name")
         elif not os.access(self.path, os.R_OK):
             raise StoreError(f"{self.name} may not be read: change the permissions of the file")
         elif 0 < self.path.stat().st_size < _SMALLEST:
@@ -278,7 +310,7 @@ class Database:
     def _check_pages(self) -> None:
         found = self.execute("PRAGMA quick_check(1)").fetchone()[0]
         if found != "ok":
-            raise StoreError(self._damaged(found))
+            raise self.damaged(found)
 
     # Errors
 
@@ -288,14 +320,20 @@ class Database:
         try:
             yield
         except sqlite3.Error as error:
+            # Errors of SQL itself, of our own statements: a table, a column or the meaning of a value is gone. Without
+            # a code they come from Python, where a text is not UTF-8.
+            damage = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_CONSTRAINT, sqlite3.SQLITE_MISMATCH)
+            if _primary_code(error) in (*damage, None):
+                raise self.damaged(quoted(str(error), 100)) from error
             raise StoreError(self._sentence(error)) from error
+
+    def _unopened(self, error: OSError) -> StoreError:
+        return StoreError(f"{self.name} cannot be opened ({error.strerror or error}): check the name")
 
     def _sentence(self, error: sqlite3.Error) -> str:
         match _primary_code(error):
             case sqlite3.SQLITE_NOTADB:
                 return self._foreign()
-            case sqlite3.SQLITE_CORRUPT:
-                return self._damaged(str(error))
             case sqlite3.SQLITE_FULL:
                 return f"{self.name} cannot grow: {error}; what was stored before is safe, make room and run it again"
             case sqlite3.SQLITE_IOERR:
@@ -325,12 +363,37 @@ class Database:
     def _foreign(self) -> str:
         return f"{self.name} is not an SQLite database: check the name"
 
-    def _damaged(self, what: str) -> str:
-        what = " ".join(what.split())
-        return (
-            f"{self.name} is damaged ({what}): take a copy from before, or save what can be read with "
-            f"`sqlite3 {self.name} .recover`"
-        )
+
+def _refuse(constant: str) -> Any:
+    raise ValueError(f"found {constant}")
+
+
+def _finite(text: str) -> float:
+    found = float(text)
+    return found if isfinite(found) else _refuse(text)
+
+
+_DECODER = json.JSONDecoder(parse_constant=_refuse, parse_float=_finite)  # what `canonical` writes, and no more
+
+
+def _is_too_deep(text: str, found: Any) -> bool:
+    """Whether brackets stand in brackets, too many to walk through; few brackets are not looked at."""
+    if text.count("{") + text.count("[") <= _DEEPEST:
+        return False
+    level = [found]
+    for _ in range(_DEEPEST):
+        level = [
+            inside
+            for one in level
+            for inside in (one.values() if isinstance(one, dict) else one)
+            if isinstance(inside, (dict, list))
+        ]
+    return bool(level)
+
+
+def shown(value: Any) -> str:
+    """A value of a cell for a message."""
+    return "nothing" if value is None else quoted(value) if isinstance(value, str) else quoted(repr(value)).strip("\"'")
 
 
 def _primary_code(error: sqlite3.Error) -> int | None:

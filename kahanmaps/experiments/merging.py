@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import closing
 from dataclasses import dataclass
+from typing import Any
 
 from kahanmaps.experiments.database import Database, StoreError
 from kahanmaps.experiments.plans import (
@@ -13,12 +14,15 @@ from kahanmaps.experiments.plans import (
     add_experiment,
     add_tasks,
     choose,
+    definition_of,
     document_of,
     fill_plan,
-    stretches,
+    task_of,
+    text_of_limits,
+    whole_stretches,
 )
 from kahanmaps.experiments.records import Outcome, digest
-from kahanmaps.experiments.results import RECORD, RESULT_CHUNK, find_result, put_result
+from kahanmaps.experiments.results import RECORD, RESULT_CHUNK, find_result, put_result, record_of
 
 CONFLICTS_SHOWN = 5
 
@@ -53,8 +57,7 @@ def _merge_plans(database: Database, source: Database) -> int:
     """How many tasks are new."""
     new = 0
     for experiment in choose(source, None):
-        rows = source.fetch("SELECT definition, limits FROM experiment WHERE id = ?", (experiment.id,))
-        definition, limits = rows[0]
+        definition = definition_of(source, experiment)
         mine = database.execute("SELECT digest FROM experiment WHERE name = ?", (experiment.name,)).fetchone()
         if mine is not None:
             if mine[0] != digest(definition):
@@ -65,12 +68,19 @@ def _merge_plans(database: Database, source: Database) -> int:
             continue
         id = add_experiment(database, experiment.name)
         sql = """
-            SELECT t.key, t.text FROM plan AS p JOIN task AS t ON t.id = p.task
+            SELECT p.number, t.key, t.text FROM plan AS p JOIN task AS t ON t.id = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
-        chunks = stretches(source, sql, experiment, PLAN_CHUNK)
-        _, _, added = fill_plan(database, id, definition, limits, (row for rows in chunks for row in rows))
+        chunks = whole_stretches(source, sql, experiment, PLAN_CHUNK)
+        tasks = (_checked(source, key, text) for rows in chunks for _, key, text in rows)
+        _, _, added = fill_plan(database, id, definition, text_of_limits(experiment.limits), tasks)
         new += added
     return new
+
+
+def _checked(source: Database, key: Any, text: Any) -> tuple[str, str]:
+    """Key and text of a task, which no damage has touched."""
+    task_of(source, key, text)
+    return key, text
 
 
 def _merge_documents(database: Database, source: Database) -> None:
@@ -87,8 +97,13 @@ def _merge_results(database: Database, source: Database, new: int) -> Merged:
         SELECT t.id, t.key, t.text, r.attempts, {RECORD} FROM result AS r JOIN task AS t ON t.id = r.task
         WHERE r.task > ? ORDER BY r.task LIMIT ?"""
     while rows := source.fetch(sql, (last, RESULT_CHUNK)):
-        last = rows[-1][0]
-        for _, key, text, attempts, *row in rows:
+        for id, key, text, attempts, *row in rows:
+            # Not so where pages are damaged, and then it would go round for ever.
+            source.require(id > last, "the table of results, task", id, f"more than {last}")
+            last = id
+            _checked(source, key, text)
+            source.require(isinstance(attempts, int), f"the record of task {key}, attempts", attempts, "a number")
+            source.require(record_of(source, key, row) is not None, f"the record of task {key}", None, "an outcome")
             found = find_result(database, key)
             if found is None:
                 new += add_tasks(database, [(key, text)])

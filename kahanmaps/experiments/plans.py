@@ -10,9 +10,11 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
-from kahanmaps.experiments.database import Database, StoreError
+from kahanmaps.errors import quoted
+from kahanmaps.experiments.database import Database, StoreError, shown
 from kahanmaps.experiments.records import Limits, Task, canonical, digest
 
+_LONGEST_NAME = 1000
 PLAN_CHUNK = 1000  # rows of the plan that one read takes: they are short
 
 
@@ -48,7 +50,23 @@ class Chosen:
 
 def choose(database: Database, experiments: Sequence[str] | None) -> list[Chosen]:
     """These experiments, or all, in their order in the database."""
-    rows = database.fetch("SELECT id, name, limits, total, tasks FROM experiment ORDER BY id")
+    # One statement, so that nobody plans in between.
+    rows = database.fetch(
+        "SELECT id, name, limits, total, tasks, (SELECT count(task) FROM plan WHERE experiment = e.id), "
+        "(SELECT min(number) FROM plan WHERE experiment = e.id), "
+        "(SELECT max(number) FROM plan WHERE experiment = e.id), "
+        "(SELECT min(task) FROM plan), (SELECT max(task) FROM plan), (SELECT max(id) FROM task) "
+        "FROM experiment AS e ORDER BY id"
+    )
+    for _, name, _, total, tasks, count, first, last, *ids in rows:
+        database.require(is_a_name(name), "the table of experiments, name", name, "a name")
+        what = f"the experiment {quoted(name)}"
+        database.require(isinstance(total, int) and total == count, f"{what}, total", total, str(count))
+        database.require(isinstance(tasks, int) and 0 <= tasks <= total, f"{what}, tasks", tasks, f"0 to {total}")
+        span = (0, total - 1) if total else (None, None)
+        database.require((first, last) == span, f"the plan of {quoted(name)}, number", [first, last], str(span))
+        is_known = ids[0] is None or (all(isinstance(id, int) for id in ids) and 0 < ids[0] <= ids[1] <= ids[2])
+        database.require(is_known, "the table of plans, task", ids[:2], f"1 to {ids[2]}")
     if experiments is not None:
         known = [row[1] for row in rows]
         for name in experiments:
@@ -58,11 +76,16 @@ def choose(database: Database, experiments: Sequence[str] | None) -> list[Chosen
                 )
     chosen: list[Chosen] = []
     offset = 0
-    for id, name, limits, total, tasks in rows:
+    for id, name, limits, total, tasks, *_ in rows:
         if experiments is None or name in experiments:
             chosen.append(Chosen(id, name, limits_of(database, limits), total, tasks, offset))
             offset += total
     return chosen
+
+
+def is_a_name(value: Any) -> bool:
+    """Whether it can be the name of an experiment."""
+    return isinstance(value, str) and len(value) <= _LONGEST_NAME
 
 
 def stretches(
@@ -73,15 +96,48 @@ def stretches(
         yield database.fetch(sql, (experiment.id, first, first + size - 1, *numbers))
 
 
-def limits_of(database: Database, text: str) -> Limits:
+def whole_stretches(database: Database, sql: str, experiment: Chosen, size: int) -> Iterator[list[Any]]:
+    """The same where `sql` finds every row of the plan, its number first; `Damaged` where one is missing."""
+    for first, rows in zip(range(0, experiment.total, size), stretches(database, sql, experiment, size), strict=True):
+        expected = range(first, min(first + size, experiment.total))
+        if [row[0] for row in rows] != list(expected):
+            raise database.damaged(
+                f"the plan of {quoted(experiment.name)} lacks tasks between {expected.start} and {expected.stop - 1}, "
+                "unless it was planned again while it was read"
+            )
+        yield rows
+
+
+def definition_of(database: Database, experiment: Chosen) -> str:
+    """What an experiment was made from."""
+    ((text, name),) = database.fetch("SELECT definition, digest FROM experiment WHERE id = ?", (experiment.id,))
+    is_sound = isinstance(text, str) and name == digest(text)
+    database.require(is_sound, f"the definition of {quoted(experiment.name)}", text, "the text of its digest")
+    return str(text)
+
+
+def limits_of(database: Database, text: Any) -> Limits:
     """The limits with this text."""
-    return Limits(**database.plain(text))
+    what = "the limits of an experiment"
+    found = database.table(text, what)
+    is_sound = found.keys() == {"time", "memory"} and all(
+        value is None or (isinstance(value, int | float) and not isinstance(value, bool) and value > 0)
+        for value in found.values()
+    )
+    database.require(is_sound, what, text, "time and memory, numbers or null")
+    return Limits(**found)
 
 
-def task_of(database: Database, text: str) -> Task:
-    """The task with this text."""
-    data = database.plain(text)
-    return Task(data["task"], data["system"], data["options"])
+def task_of(database: Database, key: Any, text: Any) -> Task:
+    """The task with this key and text."""
+    what = f"the task {key}"
+    if not isinstance(text, str) or key != digest(text):
+        raise database.damaged(f"{what}: found {shown(text)}, expected the text of its key")
+    data = database.table(text, what)
+    kind, system, options = data.get("task"), data.get("system"), data.get("options")
+    if not (isinstance(kind, str) and isinstance(system, dict | None) and isinstance(options, dict)):
+        raise database.damaged(f"{what}: found {shown(text)}, expected a task")
+    return Task(kind, system, options)
 
 
 def document_of(database: Database, name: str) -> str:
@@ -89,11 +145,18 @@ def document_of(database: Database, name: str) -> str:
     rows = database.fetch("SELECT text FROM document WHERE digest = ?", (name,))
     if not rows:
         raise StoreError(f"{database.name} has no document {name}: plan the experiment that needs it again")
-    text: str = rows[0][0]
-    return text
+    text = rows[0][0]
+    is_sound = isinstance(text, str) and name == digest(text)
+    database.require(is_sound, f"the document {name}", text, "the text of its digest")
+    return str(text)
 
 
 # Writing
+
+
+def text_of_limits(limits: Limits) -> str:
+    """The limits as they lie in a row."""
+    return canonical({"time": limits.time, "memory": limits.memory})
 
 
 def replace_plan(
@@ -105,7 +168,7 @@ def replace_plan(
     documents: Mapping[str, str],
 ) -> Planned:
     """Plan an experiment, new or with another definition than before; see `Store.plan`."""
-    limits_text = canonical({"time": limits.time, "memory": limits.memory})
+    limits_text = text_of_limits(limits)
     before = database.execute(
         "SELECT id, digest, total, tasks FROM experiment WHERE name = ?", (experiment,)
     ).fetchone()

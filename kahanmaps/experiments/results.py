@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from kahanmaps.experiments.database import Database
+from kahanmaps.experiments.database import Database, shown
 from kahanmaps.experiments.records import Outcome, Record, canonical
 
+_LONGEST_VERDICT = 200
 RESULT_CHUNK = 50  # rows with their results, which may be megabytes
 
 _COLUMNS = (
@@ -28,6 +29,32 @@ _PUT = f"""
     INSERT INTO result (task, attempts, {", ".join(_COLUMNS)}) VALUES (?, ?, {", ".join("?" * len(_COLUMNS))})
     ON CONFLICT (task) DO UPDATE SET attempts = attempts + excluded.attempts,
     {", ".join(f"{column} = excluded.{column}" for column in _COLUMNS)}"""
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def is_a_verdict(value: Any) -> bool:
+    """Whether it can be the verdict of a task, or that there is none."""
+    return value is None or (isinstance(value, str) and len(value) <= _LONGEST_VERDICT)
+
+
+def is_a_time(value: Any) -> bool:
+    """Whether it can be how long a task took, in seconds."""
+    return isinstance(value, int | float) and 0 <= value < math.inf
+
+
+_OUTCOMES = frozenset(Outcome)
+# What a cell of a row can hold: SQLite keeps anything in any column.
+_TEXT = (_is_text, "text")
+_SOUND: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "outcome": (lambda value: value in _OUTCOMES, f"one of {', '.join(Outcome)}"),
+    "verdict": (is_a_verdict, "a word or nothing"),
+    **dict.fromkeys(("message", "stderr", "host", "finished"), _TEXT),
+    "seconds": (is_a_time, "a number of seconds"),
+    "peak_memory": (lambda value: value is None or isinstance(value, int), "a number of bytes or nothing"),
+}
 
 
 def find_result(database: Database, key: str) -> tuple[Any, ...] | None:
@@ -65,22 +92,23 @@ def row_of(record: Record) -> tuple[Any, ...]:
 
 def record_of(database: Database, key: str, row: Sequence[Any]) -> Record | None:
     """The record that lies in a row like this; None if the task has no result."""
-    outcome, result, verdict, message, stderr, seconds, peak_memory, host, versions, finished = row
-    if outcome is None:
+    if all(value is None for value in row):
         return None
-    return Record(
-        key=key,
-        outcome=Outcome(outcome),
-        result=None if result is None else database.plain(result),
-        verdict=verdict,
-        message=message,
-        stderr=stderr,
-        seconds=seconds,
-        peak_memory=peak_memory,
-        host=host,
-        versions=database.plain(versions),
-        finished=finished,
-    )
+    known = dict(zip(_COLUMNS, row, strict=True))
+    what = f"the record of task {key}"
+    for column, (is_sound, expected) in _SOUND.items():
+        if not is_sound(known[column]):
+            raise database.damaged(f"{what}, {column}: found {shown(known[column])}, expected {expected}")
+    outcome = Outcome(known["outcome"])
+    is_ok, has_result = outcome is Outcome.OK, known["result"] is not None
+    if is_ok is not has_result:
+        raise database.damaged(f"{what}: the outcome is {outcome}, and there is {'a' if has_result else 'no'} result")
+    known["outcome"] = outcome
+    known["result"] = database.table(known["result"], f"{what}, result") if is_ok else None
+    known["versions"] = database.table(known["versions"], f"{what}, versions")
+    if not all(isinstance(version, str) for version in known["versions"].values()):
+        raise database.damaged(f"{what}, versions: expected texts")
+    return Record(key=key, **known)
 
 
 def _encodable(text: str) -> str:

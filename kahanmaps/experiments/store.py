@@ -23,28 +23,40 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import NamedTuple, NoReturn, Self
 
-from kahanmaps.experiments.database import Database, StoreError
+from kahanmaps.errors import note_source, quoted
+from kahanmaps.experiments.database import Damaged, Database, StoreError
 from kahanmaps.experiments.merging import Merged, merge
 from kahanmaps.experiments.plans import (
     PLAN_CHUNK,
     Chosen,
     Planned,
     choose,
+    definition_of,
     document_of,
-    limits_of,
     replace_plan,
     stretches,
     task_of,
+    whole_stretches,
 )
 from kahanmaps.experiments.records import KEY_LENGTH, Job, Limits, Outcome, Record, Row, Task
-from kahanmaps.experiments.results import RECORD, RESULT_CHUNK, find_result, put_result, record_of, row_of
+from kahanmaps.experiments.results import (
+    RECORD,
+    RESULT_CHUNK,
+    find_result,
+    is_a_time,
+    is_a_verdict,
+    put_result,
+    record_of,
+    row_of,
+)
 from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT
 from kahanmaps.experiments.shown import store_html
 
 __all__ = [
     "APPLICATION_ID",
+    "Damaged",
     "Experiment",
     "ExperimentStatus",
     "FORMAT",
@@ -128,6 +140,8 @@ class Store:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if error is not None:
+            note_source(error, self._database.name)
         self.close()
 
     def _repr_html_(self) -> str:
@@ -137,10 +151,9 @@ class Store:
 
     def experiments(self) -> list[Experiment]:
         """What is planned, in order."""
-        rows = self._database.fetch("SELECT name, definition, limits, total, tasks FROM experiment ORDER BY id")
         return [
-            Experiment(name, definition, limits_of(self._database, limits), total, tasks)
-            for name, definition, limits, total, tasks in rows
+            Experiment(one.name, definition_of(self._database, one), one.limits, one.total, one.tasks)
+            for one in choose(self._database, None)
         ]
 
     def plan(
@@ -178,14 +191,14 @@ class Store:
         With `retry_failed` also those that failed: each is looked at once, so one that fails again does not come back.
         `shard` (i, n) is the i-th part of n, counting rows of the plan of these experiments; no task is in two parts.
         """
-        sql, chosen, numbers = self._pending_query("t.text", experiments, retry_failed, shard)
+        sql, chosen, numbers = self._pending_query("t.key, t.text", experiments, retry_failed, shard)
         return self._pending_jobs(sql, chosen, numbers)
 
     def _pending_jobs(self, sql: str, chosen: list[Chosen], numbers: tuple[int, ...]) -> Iterator[Job]:
         for experiment in chosen:
             for rows in stretches(self._database, sql, experiment, PLAN_CHUNK, (experiment.offset, *numbers)):
-                for (text,) in rows:
-                    yield Job(task_of(self._database, text), experiment.limits)
+                for key, text in rows:
+                    yield Job(task_of(self._database, key, text), experiment.limits)
 
     def count_pending(
         self,
@@ -254,28 +267,31 @@ class Store:
         return self._rows(choose(self._database, experiments), missing)
 
     def _rows(self, chosen: list[Chosen], missing: bool) -> Iterator[Row]:
+        # All rows of the plan, so that what is missing is seen.
         sql = f"""
             SELECT p.number, t.key, t.text, {RECORD} FROM plan AS p JOIN task AS t ON t.id = p.task
-            {"LEFT JOIN" if missing else "JOIN"} result AS r ON r.task = p.task
+            LEFT JOIN result AS r ON r.task = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
         for experiment in chosen:
-            for rows in stretches(self._database, sql, experiment, RESULT_CHUNK):
-                for number, key, text, *record in rows:
-                    yield Row(
-                        experiment.name, number, task_of(self._database, text), record_of(self._database, key, record)
-                    )
+            for rows in whole_stretches(self._database, sql, experiment, RESULT_CHUNK):
+                for number, key, text, *cells in rows:
+                    record = record_of(self._database, key, cells)
+                    if record is not None or missing:
+                        yield Row(experiment.name, number, task_of(self._database, key, text), record)
 
     def unplanned(self) -> int:
         """How many results no plan asks for."""
-        last = self._database.fetch("SELECT max(task) FROM result")[0][0] or 0
-        return sum(
-            self._database.fetch(
-                "SELECT count(*) FROM result AS r INDEXED BY result_summary WHERE r.task BETWEEN ? AND ? "
-                "AND NOT EXISTS (SELECT 1 FROM plan AS p WHERE p.task = r.task)",
-                (first, first + COUNT_CHUNK - 1),
-            )[0][0]
-            for first in range(1, last + 1, COUNT_CHUNK)
-        )
+        found, last = 0, 0
+        while last is not None:
+            # By what comes next and not by number: a damaged file may have results of tasks with any number.
+            count, after = self._database.fetch(
+                "SELECT sum(NOT EXISTS (SELECT 1 FROM plan AS p WHERE p.task = r.task)), max(r.task) FROM "
+                "(SELECT task FROM result INDEXED BY result_summary WHERE task > ? ORDER BY task LIMIT ?) AS r",
+                (last, COUNT_CHUNK),
+            )[0]
+            self._database.require(after is None or after > last, "the table of results, task", after, "larger ones")
+            found, last = found + (count or 0), after
+        return found
 
     # Looking
 
@@ -289,7 +305,8 @@ class Store:
             SELECT 1 FROM plan AS q WHERE q.task = p.task AND q.experiment = p.experiment AND q.number < p.number
         )"""
         sql = f"""
-            SELECT r.outcome, r.verdict, count(*), sum(r.seconds) FROM plan AS p
+            SELECT r.outcome, r.verdict, count(*), sum(r.seconds), sum(typeof(r.seconds) NOT IN ('integer', 'real'))
+            FROM plan AS p
             JOIN result AS r INDEXED BY result_summary ON r.task = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? {once if experiment.tasks < experiment.total else ""}
             GROUP BY r.outcome, r.verdict"""
@@ -297,7 +314,9 @@ class Store:
         verdicts: Counter[str] = Counter()
         seconds = 0.0
         for rows in stretches(self._database, sql, experiment, COUNT_CHUNK):
-            for outcome, verdict, count, time in rows:
+            for outcome, verdict, count, time, without in rows:
+                if outcome not in set(Outcome) or not is_a_verdict(verdict) or without or not is_a_time(time):
+                    self._name_the_damage(experiment)
                 outcomes[Outcome(outcome)] += count
                 if verdict is not None:
                     verdicts[verdict] += count
@@ -307,21 +326,31 @@ class Store:
             experiment.name, experiment.total, experiment.tasks, missing, dict(outcomes), dict(verdicts), seconds
         )
 
+    def _name_the_damage(self, experiment: Chosen) -> NoReturn:
+        """What is counted says that something is damaged, but not which record."""
+        for _ in self._rows([experiment], missing=False):
+            pass
+        raise self._database.damaged(f"the outcomes of {quoted(experiment.name)} in its index")
+
     def find(self, prefix: str) -> list[Found]:
         """The tasks whose key begins like this, at most 20; the first 4 digits at least."""
         prefix = prefix.lower()
         if not re.fullmatch(f"[0-9a-f]{{4,{KEY_LENGTH}}}", prefix):
             raise StoreError(
-                f"{prefix!r} is not the beginning of a key: give at least 4 of its {KEY_LENGTH} hexadecimal digits"
+                f"{quoted(prefix)} is not the beginning of a key: give at least 4 of its {KEY_LENGTH} hexadecimal "
+                "digits"
             )
         rows = self._database.fetch(
             f"SELECT t.id, t.key, t.text, r.attempts, {RECORD} FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
             "WHERE t.key >= ? AND t.key < ? ORDER BY t.key LIMIT ?",
             (prefix, f"{prefix}g", FOUND_AT_MOST),  # g comes after every hexadecimal digit
         )
+        for _, key, _, attempts, *_ in rows:
+            self._database.require(isinstance(attempts, int | None), f"task {key}, attempts", attempts, "a number")
+        choose(self._database, None)  # what is damaged in the plans is told
         return [
             Found(
-                task_of(self._database, text),
+                task_of(self._database, key, text),
                 record_of(self._database, key, record),
                 self._database.fetch(
                     "SELECT e.name, p.number FROM plan AS p JOIN experiment AS e ON e.id = p.experiment "
@@ -338,7 +367,7 @@ class Store:
         rows = self._database.fetch("SELECT text FROM task WHERE key = ?", (key,))
         if not rows:
             raise StoreError(f"{self._database.name} has no task {key}: plan the experiment that has it")
-        return task_of(self._database, rows[0][0])
+        return task_of(self._database, key, rows[0][0])
 
     def document(self, digest: str) -> str:
         """The text of the document with this digest."""

@@ -124,11 +124,11 @@ def test_damage_met_while_reading_is_told_in_a_sentence(path):
         list(store.rows(missing=True))
 
 
-def test_a_text_that_is_no_longer_json_is_damage_too(path):
+def test_a_text_that_is_no_longer_that_of_its_key_is_damage_too(path):
     planned(path, 1)
     with closing(sqlite3.connect(path)) as other, other:
         other.execute("UPDATE task SET text = substr(text, 3)")
-    with Store.open(path) as store, pytest.raises(StoreError, match=r"is damaged .*not JSON"):
+    with Store.open(path) as store, pytest.raises(StoreError, match=r"is damaged \(the task .*text of its key"):
         list(store.pending())
 
 

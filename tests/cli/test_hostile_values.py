@@ -1,0 +1,213 @@
+"""Hostile values of every option and argument: a sentence and an exit status, whatever was written.
+
+The options are found from the commands themselves, so that a new one is covered by itself; `VALUES` has what is tried
+for each kind of them. No outcome is an internal error, none is a traceback, and no line repeats a long text.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import click
+import pytest
+from command_tree import all_commands
+from small_databases import ok, planned, task
+
+from kahanmaps_cli.colour_option import is_colour_option
+from kahanmaps_cli.main import main
+
+LEAVES = [(words, command) for words, command in all_commands() if not isinstance(command, click.Group)]
+STATUSES = (0, 1, 2, 3)
+LONGEST_LINE = 1000
+
+# The least that a command needs, as quick as it can be; what an option replaces is left out.
+LEAST = {
+    "systems": "euler_top",
+    "orbit": "harmonic --start 1,2 --eps 1/10 --steps 1",
+    "period": "paper_m2 --start 1,2,3,4 --eps 1/10 --arithmetic mod:7",
+    "ensemble": "harmonic --random 1 --eps 1/10 --steps 1",
+    "check-commute": "harmonic harmonic",
+    "check-integrals": "harmonic",
+    "check-measure": "harmonic",
+    "check-poisson": "harmonic",
+    "analyze": "harmonic --seconds 1",
+    "degrees": "harmonic --terms 3 --seconds 1",
+    "heights": "harmonic --steps 20 --seconds 1",
+    "find-integrals": "harmonic --seconds 1",
+    "find-density": "harmonic --seconds 1",
+    "find-symmetry": "harmonic --seconds 1",
+    "find-commuting": "harmonic --seconds 1",
+    "singularities": "harmonic --seconds 1",
+    "cycles": "harmonic --prime 5 --eps 1/3 --seconds 1",
+    "lyapunov": "harmonic --random 1 --eps 1/10 --steps 100 --seconds 1",
+    "verify": "--m 1 --section 2",
+    "family new": "--m 1",
+    "family show": "paper_m2",
+    "family space": "paper_m2",
+    "family associated": "paper_m2",
+    "batch run": "SPEC --dry-run",
+    "batch status": "--db DB",
+    "batch show": "0000 --db DB",
+    "batch export": "--csv --db DB",
+    "batch summary": "--db DB",
+    "batch merge": "OTHER DB",
+    "batch tasks": "",
+    "plot commute": "harmonic harmonic --start 1,2 --eps 1/10 --steps 1 --format text",
+    "plot degrees": "harmonic --terms 3 --seconds 1 --format text",
+    "plot drift": "harmonic --start 1,2 --eps 1/10 --steps 2 --format text",
+    "plot heights": "harmonic --start 1,2 --eps 1/10 --steps 3 --seconds 1 --format text",
+    "plot invariant-curves": "paper_m2 --start 1,2,3,4 --eps 1/100 --steps 2 --format text",
+    "plot portrait": "harmonic --start 1,2 --eps 1/10 --steps 2 --format text",
+    "plot batch": "DB --format text",
+    "plot recipe": "PICTURE",
+    "report": "harmonic --from checks --no-pictures",
+    "convert": "harmonic --to latex",
+    "schema": "",
+    "completion": "bash",
+    "manual": "",
+    "version": "",
+}
+
+# What is tried, by the kind of a value; {end} is the ending of the files that a command knows.
+LONG = "x" * 200_000
+VALUES = {
+    "integer": ["9" * 400, "-" + "9" * 400, "9" * 5000, "1e400", "nan", LONG],
+    "number of machine": ["nan", "inf", "1e400", "-1", "9" * 400, LONG],
+    "path": ["\udcff.{end}", "loop.{end}", "folder.{end}", "loop.{end}/x.{end}", "no/x.{end}", "x" * 5000, LONG],
+    "text": ["", "\udcff", "\x1b[31m", "9" * 400, LONG],
+}
+QUICK = {"integer": ["9" * 400, LONG], "number of machine": ["nan", "1e400"], "path": ["\udcff.{end}", "loop.{end}"]}
+TAKE_THEIR_TIME = ("plot", "report", "analyze", "verify")
+ENDINGS = {
+    "db": "db",
+    "database": "db",
+    "sources": "db",
+    "target": "db",
+    "output": "png",
+    "starts": "npy",
+    "record": "json",
+}
+PATHS = {"system", "other", "systems", "output", "db", "record", "name", "picture"}  # some are names as well
+KINDS = {
+    "integer": ("ShortInteger", "IntRange", "Whole"),
+    "number of machine": ("FloatParamType", "FloatRange", "Seconds"),
+    "path": ("Path",),
+}
+
+
+def kinds_of(parameter: click.Parameter) -> Iterator[str]:
+    """The kinds of values that a parameter is tried with."""
+    of_its_type = [kind for kind, types in KINDS.items() if type(parameter.type).__name__ in types]
+    yield from of_its_type
+    if parameter.name in PATHS and "path" not in of_its_type:
+        yield "path"
+    if not of_its_type:
+        yield "text"
+
+
+def line_with(words: str, parameter: click.Parameter, value: str) -> list[str]:
+    """The least line of a command with this value in the place of what it has."""
+    value = value.replace("{end}", ENDINGS.get(str(parameter.name), "toml"))
+    least = shlex.split(LEAST[words])
+    if isinstance(parameter, click.Option):
+        for k, word in enumerate(least):
+            if word in parameter.opts:
+                del least[k : k + 2]
+                break
+        name = parameter.opts[-1]
+        return [*words.split(), *least, *([f"{name}={value}"] if name.startswith("--") else [name, value])]
+    if least and not least[0].startswith("-"):
+        del least[0]
+    return [*words.split(), *least, "--", value]
+
+
+def cases(values: dict[str, list[str]]) -> list[tuple[str, str]]:
+    """Commands and their parameters by name."""
+    return [
+        (words, str(parameter.name))
+        for words, command in LEAVES
+        for parameter in command.params
+        if not is_colour_option(parameter) and not getattr(parameter, "is_flag", False)
+        if any(kind in values for kind in kinds_of(parameter))
+    ]
+
+
+def mistakes_of(words: str, name: str, values: dict[str, list[str]], capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """What a command should not have done with these values of one parameter."""
+    parameter = next(p for p in dict(LEAVES)[words].params if p.name == name)
+    found = []
+    for kind in kinds_of(parameter):
+        for value in values.get(kind, ()):
+            line = line_with(words, parameter, value)
+            status = main(line)
+            out, err = capsys.readouterr()
+            longest = max(map(len, err.split("\n")))
+            if (
+                status not in STATUSES
+                or "Traceback" in out + err
+                or longest > LONGEST_LINE
+                or (status == 2 and not err)
+            ):
+                found.append(f"{[word[:40] for word in line]}: {status}, {longest}: {err[:300]}")
+    return found
+
+
+@pytest.fixture
+def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the commands run: small files, and symbolic links that lead round in a circle."""
+    monkeypatch.chdir(tmp_path)
+    planned(tmp_path / "DB", 1, 2, records=[ok(1)])
+    Path("SPEC").write_text('[experiments.a]\ntask = "orbit"\nsystem = "harmonic"\naxes = {eps = "1/10"}\n')
+    Path("PICTURE").write_bytes(b"\x89PNG\r\n\x1a\n")
+    for end in {"toml", *ENDINGS.values()}:
+        Path(f"loop.{end}").symlink_to(f"loop.{end}")
+        Path(f"folder.{end}").mkdir()
+
+
+def test_every_command_has_its_least_line():
+    assert set(LEAST) == {words for words, _ in LEAVES}
+
+
+@pytest.mark.usefixtures("_folder")
+@pytest.mark.parametrize("words", list(LEAST))
+def test_numbers_and_paths_that_nobody_means_are_refused_in_a_sentence(words, capsys):
+    # Of the commands that take their time, only what ends before they begin.
+    values = {**QUICK, "path": QUICK["path"][1:]} if words.split()[0] in TAKE_THEIR_TIME else QUICK
+    names = [name for w, name in cases(QUICK) if w == words and (values is QUICK or name != "seed")]
+    assert [line for name in names for line in mistakes_of(words, name, values, capsys)] == []
+
+
+@pytest.mark.usefixtures("_folder")
+@pytest.mark.parametrize(
+    "line",
+    [
+        "batch export --csv --db DB",
+        "batch export --jsonl --db DB -o x.jsonl",
+        "batch summary --db DB",
+        "batch merge new.db DB",
+        "batch status --db DB",
+        "batch show KEY --db DB",
+        "batch run SPEC --dry-run --db DB",
+        "report --db DB -o x.html",
+        "plot batch DB --format text",
+    ],
+)
+def test_a_damaged_record_is_told_in_one_line_with_its_file_and_key(kahanmaps, line):
+    with closing(sqlite3.connect("DB")) as connection, connection:
+        connection.execute("UPDATE result SET result = NULL, seconds = 'soon'")
+    outcome = kahanmaps(line.replace("KEY", task(1).key[:6]))
+    assert outcome.status == 2
+    assert outcome.err.startswith("Error: DB is damaged (the record of task " + task(1).key)
+    assert "take a copy from before" in outcome.err
+    assert outcome.err.count("\n") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_folder")
+@pytest.mark.parametrize(("words", "name"), cases(VALUES))
+def test_no_value_of_any_option_ends_in_an_internal_error_or_is_repeated_at_length(words, name, capsys):
+    assert mistakes_of(words, name, VALUES, capsys) == []
