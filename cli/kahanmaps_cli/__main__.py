@@ -21,8 +21,10 @@ def main() -> int:
     """Run the command line and return its exit status."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # and is not ignored, as below nohup
         signal.signal(signal.SIGINT, _end)
+    from kahanmaps_cli.limited_memory import look_for_room
     from kahanmaps_cli.main import main as run
 
+    look_for_room()
     if signal.getsignal(signal.SIGINT) is _end:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     return run()

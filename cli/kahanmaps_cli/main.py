@@ -210,16 +210,18 @@ def _report(error: Exception) -> int:
         say(f"Error: {error}")
         return WRONG_USE if isinstance(error, InputError) else UNDECIDED
     if is_out_of_memory(error):
-        say("Error: out of memory: ask for fewer steps or a smaller --max-digits, or allow more memory (ulimit -v)")
+        why = f" ({error})" if str(error) else ""
+        remedy = "ask for fewer steps or a smaller --max-digits, or allow more memory (ulimit -v)"
+        say(bounded(f"Error: out of memory{why}: {remedy}"))
         return UNDECIDED
     if isinstance(error, OSError):
         where = f": {error.filename or repr('')}" if error.filename is not None else ""
         say(bounded(f"Error: {error.strerror or error}{where}{_missing_folder(error)}"))
         return WRONG_USE
-    if isinstance(error, ImportError) and not (error.name or "kahanmaps").startswith("kahanmaps"):
+    if isinstance(error, ImportError) and not (error.name or "").startswith("kahanmaps"):
         say(
             bounded(
-                f"Error: {error.name} cannot be loaded: {error}; install it again (kahanmaps version lists what is)"
+                f"Error: {error.name or 'a library'} cannot be loaded: {error}; install it again (kahanmaps version lists what is)"
             )
         )
         return UNDECIDED

@@ -319,18 +319,21 @@ class Database:
         """The one place where errors of SQLite become sentences."""
         try:
             yield
+        except (sqlite3.OperationalError, UnicodeDecodeError) as error:
+            # Our own statements are wrong only where a table or a column is gone; and what has no code comes from
+            # Python, where a text or a name is not UTF-8.
+            if _primary_code(error) in (sqlite3.SQLITE_ERROR, None):
+                raise self.damaged(quoted(str(error), 100)) from error
+            raise StoreError(self._sentence(error)) from error
         except sqlite3.Error as error:
-            # Errors of SQL itself, of our own statements: a table, a column or the meaning of a value is gone. Without
-            # a code they come from Python, where a text is not UTF-8.
-            damage = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_CONSTRAINT, sqlite3.SQLITE_MISMATCH)
-            if _primary_code(error) in (*damage, None):
+            if _primary_code(error) in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_CONSTRAINT, sqlite3.SQLITE_MISMATCH):
                 raise self.damaged(quoted(str(error), 100)) from error
             raise StoreError(self._sentence(error)) from error
 
     def _unopened(self, error: OSError) -> StoreError:
         return StoreError(f"{self.name} cannot be opened ({error.strerror or error}): check the name")
 
-    def _sentence(self, error: sqlite3.Error) -> str:
+    def _sentence(self, error: Exception) -> str:
         match _primary_code(error):
             case sqlite3.SQLITE_NOTADB:
                 return self._foreign()
@@ -396,7 +399,7 @@ def shown(value: Any) -> str:
     return "nothing" if value is None else quoted(value) if isinstance(value, str) else quoted(repr(value)).strip("\"'")
 
 
-def _primary_code(error: sqlite3.Error) -> int | None:
+def _primary_code(error: Exception) -> int | None:
     """13 for "disk is full" and so on; None if it comes from Python's module and not from SQLite."""
     code: int | None = getattr(error, "sqlite_errorcode", None)
     return None if code is None else code & 0xFF

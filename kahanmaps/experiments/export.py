@@ -190,7 +190,7 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
     """
     try:
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         raise InputError("Parquet files need pyarrow, which is not installed: pip install pyarrow") from error
     from kahanmaps.checks.settings import CONVENTION
 

@@ -42,7 +42,7 @@ def require_matplotlib() -> None:
     """Raise InputError with the remedy where matplotlib is missing."""
     try:
         import matplotlib.figure  # noqa: F401 (whether it is there)
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         raise InputError(f"pictures need matplotlib ({error}): pip install 'kahanmaps[plot]'") from error
 
 

@@ -162,6 +162,7 @@ def test_a_misspelt_system_is_recognised(kahanmaps, command, written, meant):
         (OSError(12, "Cannot allocate memory"), 3, "out of memory"),
         (ImportError("libx.so: failed to map segment from shared object", name="numpy"), 3, "out of memory"),
         (ImportError("cannot import name 'nothing'", name="numpy"), 3, "numpy cannot be loaded: cannot import"),
+        (ImportError("numpy is half there"), 3, "a library cannot be loaded: numpy is half there; install it again"),
         (ImportError("cannot import name 'nothing'", name="kahanmaps.maps"), 70, "Internal error: ImportError"),
         (KeyboardInterrupt(), 130, "interrupted"),
         (RuntimeError("all wrong"), 70, "Internal error: RuntimeError: all wrong"),
@@ -213,6 +214,19 @@ def test_the_program_gives_the_status_of_the_command():
     done = subprocess.run([sys.executable, "-m", "kahanmaps_cli", "nonsense"], capture_output=True, text=True)
     assert done.returncode == 2
     assert "There is no command 'nonsense'" in done.stderr
+
+
+@pytest.mark.parametrize("megabytes", [100, 150, 250])
+def test_want_of_memory_is_told_and_never_ends_with_the_status_of_a_refuted_claim(tmp_path, megabytes):
+    # OpenBLAS ends the process with 1 where it finds no memory; at 100 MB numpy itself cannot be loaded.
+    script = f"ulimit -v {megabytes * 1000}; $KAHANMAPS_PYTHON -m kahanmaps_cli orbit"
+    outcome = shell(f"{script} harmonic --start 1,2 --eps 1/10 --steps 1 --arithmetic float", tmp_path)
+    assert (outcome.status, outcome.err.startswith("Error: out of memory (numpy would have no room)")) == (3, True)
+
+
+def test_an_exact_orbit_needs_little_memory(tmp_path):
+    script = "ulimit -v 100000; $KAHANMAPS_PYTHON -m kahanmaps_cli orbit"
+    assert shell(f"{script} harmonic --start 1,2 --eps 1/10 --steps 1", tmp_path).status == 0
 
 
 def test_debugging_shows_where_an_error_happened(kahanmaps, monkeypatch):

@@ -21,6 +21,7 @@ from small_databases import LIMITS, killed, ok, output, planned, seed, seeds, sm
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments import database
+from kahanmaps.experiments.database import Database
 from kahanmaps.experiments.store import APPLICATION_ID, FORMAT, Store, StoreError
 
 # Files that cannot be used
@@ -456,3 +457,23 @@ def test_a_database_marked_as_wal_without_a_journal_is_read_where_nothing_may_be
     assert os.listdir(public) == ["results.db"]
     public.chmod(0o555)
     assert tried(public / "results.db", '{"readonly": true}') == "[1, 2]"
+
+
+def test_a_name_in_the_schema_that_is_not_utf_8_is_damage_too(path):
+    planned(path, 1)
+    path.write_bytes(path.read_bytes().replace(b"peak_memory INTEGER", b"peak_\xdd\xffmory INTEGER", 1))
+    with pytest.raises(StoreError, match="is damaged"), Store.open(path, readonly=True) as store:
+        list(store.rows(missing=True))
+
+
+def test_pages_that_lead_back_do_not_make_a_merge_endless(path, tmp_path, monkeypatch):
+    planned(path, 1, 2, 3, records=[ok(1), ok(2), ok(3)])
+    fetch = Database.fetch
+
+    def in_circles(self, sql, values=()):
+        found = fetch(self, sql, values)
+        return list(reversed(found)) if "FROM result AS r JOIN task" in sql else found
+
+    monkeypatch.setattr(Database, "fetch", in_circles)
+    with Store.open(tmp_path / "all.db", create=True) as store, pytest.raises(StoreError, match="more than 3"):
+        store.merge(path)
