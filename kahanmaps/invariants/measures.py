@@ -14,8 +14,8 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, primitive_part, substitute
-from kahanmaps.algebra.text import format_polynomial, format_rational_function, shorten
-from kahanmaps.errors import InputError
+from kahanmaps.algebra.text import format_polynomial, format_rational_function
+from kahanmaps.errors import InputError, quoted
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction
 from kahanmaps.invariants.sizes import Fraction, Size, determinant_size
 from kahanmaps.maps.kahan import KahanMap
@@ -84,7 +84,7 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None) -> str:
         text = format_rational_function(phi)
         where = f", which is identically 0 at eps = {eps}" if text != "0" else ""
         raise InputError(
-            f"found the density {shorten(text) if where else text}{where}, expected a function that is not zero: "
+            f"found the density {quoted(text) if where else text}{where}, expected a function that is not zero: "
             "the measure is dx/phi"
         )
     found = coefficients_in(above, dim)
