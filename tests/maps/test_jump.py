@@ -30,7 +30,7 @@ from kahanmaps.family.draw import draw_with_chi
 from kahanmaps.family.structure import structure_of
 from kahanmaps.maps import tau_table
 from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.jump import Jump
+from kahanmaps.maps.jump import Jump, special_start
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit
 from kahanmaps.maps.planes_point import PlanesPoint
@@ -404,4 +404,4 @@ def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(nam
         "a triple root": "on a singular level",
     }
     expected = next((f"the start is {kind} in the plane t = 1" for words, kind in kinds.items() if words in name), "")
-    assert jump.special_start(structure, fmpq(1, 2), start) == expected
+    assert special_start(structure, fmpq(1, 2), start) == expected
