@@ -224,11 +224,12 @@ def height_growth(
         raise InputError(f"found every = {every}, expected at least 1")
     require_steps(steps)
     at = range(0, steps + 1, every)
-    bits = max(kahan_map.eps.p.bit_length(), kahan_map.eps.q.bit_length())
-    if max_digits is not None and bits > max_digits * 100_000 // 30103:
+    first = height(kahan_map.point(start))
+    bits = max(first, kahan_map.eps.p.bit_length(), kahan_map.eps.q.bit_length())
+    if max_digits is not None and 0 < max_digits * 100_000 // 30103 < bits:
         # One step may take minutes then, and its numbers are that long as a rule.
-        end = OrbitEnd("budget", 0, f"eps has more digits than the budget of {max_digits} (--max-digits)")
-        return HeightGrowth((height(kahan_map.point(start)),), end, every)
+        end = OrbitEnd("budget", 0, f"eps or the start has more digits than the budget of {max_digits} (--max-digits)")
+        return HeightGrowth((first,), end, every)
     structure = _NOT_GIVEN if structure is None else structure
     method = choose_method(None, "exact", structure, None if every == 1 else at).name
     if method == "jump" and isinstance(structure, Structure):
