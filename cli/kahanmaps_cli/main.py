@@ -219,8 +219,7 @@ def _report(error: Exception) -> int:
         say(bounded(f"Error: {error.strerror or error}{where}{_missing_folder(error)}"))
         return WRONG_USE
     if isinstance(error, ImportError) and not (error.name or "").startswith("kahanmaps"):
-        name = error.name or "a library"
-        say(bounded(f"Error: {name} cannot be loaded: {error}; install it again (kahanmaps version lists what is)"))
+        say(bounded(f"Error: {error.name or 'a library'} cannot be loaded: {error}; install it again"))
         return UNDECIDED
     say(bounded(f"Internal error: {type(error).__name__}: {error}"))
     read = " and ".join(getattr(error, "__notes__", ()))
