@@ -1,23 +1,32 @@
 """What the lengths of cycles over a finite field are compatible with: three laws, and none of them is proved.
 
-Cycles of a map with an integral whose level curves have genus 1 or 0 are no longer than such a curve has points, p + 1
-+ 2 sqrt p. For a product of two random involutions the share of points on cycles of length at most x z tends to
-1 - e^-x (1 + x), where z = 2 N/(fixed points of both). A random permutation of N points has about log N cycles. Each
-comparison is evidence modulo one prime at one eps. Sources: roberts-jogia-vivaldi-2003 for the first law,
-roberts-vivaldi-2009 for the second.
+A map of the plane with an integral maps each level curve to itself, and if it has infinite order, these have genus 1 or
+0. An irreducible one has at most p + 1 + 2 sqrt p points, and no cycle on it is longer. A few are reducible: the Euler
+numbers of the singular fibres of a pencil of cubics, or of any rational elliptic surface, add up to 12, so that at most
+6 are. Their components are rational, at most 9 of them. A cycle that goes through k of them has k d points, where d is
+the order of a Moebius map over GF(p): a divisor of p - 1 or of p + 1, or p. So a longer cycle of any other length, at a
+prime of good reduction, tells that there is no such integral. In higher dimensions some are allowed for: special level
+sets may consist of other parts that are exchanged.
+
+For a product of two random involutions the share of points on cycles of length at most x z tends to 1 - e^-x (1 + x),
+where z = 2 N/(fixed points of both). A random permutation of N points has about log N cycles. Each comparison is
+evidence modulo one prime at one eps. Sources: roberts-jogia-vivaldi-2003 for the first law, roberts-vivaldi-2009 for
+the second.
 """
 
 from __future__ import annotations
 
 import math
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from kahanmaps.errors import counted
 from kahanmaps.laboratory.cycles import Census
 
 LAWS = ("integrable bound", "random reversible", "random permutation")
-_REDUCIBLE = 10  # so many level curves may be reducible
+_COMPONENTS = 9  # of a level curve, that of type II* or I_9
+_EXCEPTIONS = 0.05  # of the points, in dimensions above 2
 _ENOUGH = 0.05  # of all points have to be periodic before lengths say something of level curves
 _FEW = 20  # cycles, below which no distribution is compared
 _REPEATS = 200
@@ -30,12 +39,16 @@ class Comparison:
     Laws that are neither `compatible` nor `refused` could not be tried.
 
     `share_within` is the share of periodic points on cycles of at most `bound` = p + 1 + floor(2 sqrt p) points;
+    `longer` are the lengths above it, with the numbers of cycles (of points, for samples), and `unexplained` those of
+    them that no reducible level curve has;
     `distance` the largest distance of the distribution of scaled lengths from 1 - e^-x (1 + x), `critical` what so many
     cycles of a random reversible map stay below in 99 of 100 cases (None: not compared).
     """
 
     bound: int
     share_within: float | None
+    longer: Mapping[int, int]
+    unexplained: tuple[int, ...]
     scale: float | None
     model_scale: float | None
     distance: float | None
@@ -71,21 +84,33 @@ def compare(census: Census, seed: int = 0) -> Comparison:
     weight = sum((length if census.complete else 1) * n for length, n in lengths.items())
     if not weight:
         none = "no cycle with an affine point was seen"
-        return Comparison(bound, None, None, None, None, None, (), (), dict.fromkeys(LAWS, none))
-    within = sum((length if census.complete else 1) * n for length, n in lengths.items() if length <= bound)
-    share = within / (weight + census.open)
+        return Comparison(bound, None, {}, (), None, None, None, None, (), (), dict.fromkeys(LAWS, none))
+    longer = {length: n for length, n in lengths.items() if length > bound}
+    unexplained = tuple(length for length in longer if not _passes_components(length, census.prime))
+
+    def points_on(some: Iterable[int]) -> int:
+        return sum((length if census.complete else 1) * lengths[length] for length in some)
+
+    share = (weight - points_on(longer)) / (weight + census.open)
+    strange = (points_on(unexplained) + census.open) / (weight + census.open)
     settled = "affine periodic points" if census.complete else "sampled points that meet no indeterminacy"
     reasons[LAWS[0]] = (
         f"{100 * share:.1f}% of the {settled} lie on cycles of at most p + 1 + 2 sqrt p = {bound} points, "
         "as many as a curve of genus 1 may have"
     )
-    if weight < _ENOUGH * census.looked_at:
+    if longer:
+        odd, number = sum(longer[length] for length in unexplained), sum(longer.values())
+        what = "longer cycle" if census.complete else "sampled point"
+        more = "" if census.complete else " on longer cycles"
+        reasons[LAWS[0]] += f"; of {counted(number, what)}{more} {odd} cannot lie on a reducible curve"
+    if unexplained and census.dim == 2:
+        verdicts[LAWS[0]] = False
+    elif weight < _ENOUGH * census.looked_at:
         reasons[LAWS[0]] += f"; but only {weight} of {census.looked_at} points are periodic, too few to tell"
     elif census.open and census.steps < bound:
         reasons[LAWS[0]] += f"; but {census.open} were left after {census.steps} steps, too early to tell"
     else:
-        # A reducible curve is longer: some of the p level curves may be.
-        verdicts[LAWS[0]] = share >= max(0.95, 1 - _REDUCIBLE / census.prime)
+        verdicts[LAWS[0]] = strange <= _EXCEPTIONS
     scale, model, distance, critical = _reversible(census, seed, reasons)
     if distance is not None and critical is not None:
         verdicts[LAWS[1]] = distance <= critical
@@ -103,7 +128,7 @@ def compare(census: Census, seed: int = 0) -> Comparison:
             verdicts[LAWS[2]] = abs(cycles - expected) <= 3 * math.sqrt(expected)
     held = tuple(law for law in LAWS if verdicts.get(law) is True)
     refused = tuple(law for law in LAWS if verdicts.get(law) is False)
-    return Comparison(bound, share, scale, model, distance, critical, held, refused, reasons)
+    return Comparison(bound, share, longer, unexplained, scale, model, distance, critical, held, refused, reasons)
 
 
 def _reversible(
@@ -131,6 +156,15 @@ def _reversible(
         f"from 1 - e^-x (1 + x); of random maps 99 in 100 are less than {critical:.3f} away"
     )
     return scale, model, distance, critical
+
+
+def _passes_components(length: int, prime: int) -> bool:
+    """Whether a cycle of this length may go through the components of a reducible curve: k d, see above."""
+    for k in range(2, _COMPONENTS + 1):
+        d, rest = divmod(length, k)
+        if rest == 0 and (d == prime or (prime - 1) % d == 0 or (prime + 1) % d == 0):
+            return True
+    return False
 
 
 def _affine(census: Census) -> dict[int, int]:

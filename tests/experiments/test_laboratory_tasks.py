@@ -274,11 +274,11 @@ def test_singularities_at_one_eps_are_those_of_the_library():
 
 
 def test_the_cycles_of_an_integrable_map_are_short_and_those_of_others_are_not():
-    integrable, other = (perform("cycles", system, prime=101) for system in (WEIERSTRASS, RIVALS))
+    integrable, other = perform("cycles", WEIERSTRASS, prime=101), perform("cycles", RIVALS, prime=151)
     assert (integrable["integrable_bound"], other["integrable_bound"]) == ("compatible", "not compatible")
     assert integrable["least_share_within_bound"] == 1
     assert integrable["longest"] <= integrable["bound"] == 101 + 1 + 20
-    assert [run["eps"] for run in other["runs"]] == ["1/7", "2/11"]  # 1/10 is a fourth root of 1 modulo 101
+    assert [run["eps"] for run in integrable["runs"]] == ["1/7", "2/11"]  # 1/10 is a fourth root of 1 modulo 101
 
 
 def test_a_census_is_that_of_the_library():

@@ -197,6 +197,70 @@ def test_cycles_of_planar_integrable_maps_fit_on_curves_of_genus_one(name, prime
         assert found.share_within > 0.98  # some level curves are reducible
 
 
+MONOMIALS = [("x^3", "3*x^2", "0"), ("x^2*y", "2*x*y", "x^2"), ("x*y^2", "y^2", "2*x*y"), ("y^3", "0", "3*y^2")]
+MONOMIALS += [("x^2", "2*x", "0"), ("x*y", "y", "x"), ("y^2", "0", "2*y"), ("x", "1", "0"), ("y", "0", "1")]
+
+
+def hamiltonian(*coefficients: int) -> QuadraticSystem:
+    """f = J grad H for the cubic H with these coefficients of the monomials above."""
+    by_x = " + ".join(f"({c})*({m[1]})" for c, m in zip(coefficients, MONOMIALS, strict=True))
+    by_y = " + ".join(f"({c})*({m[2]})" for c, m in zip(coefficients, MONOMIALS, strict=True))
+    return system_of(by_y, f"-({by_x})")
+
+
+INTEGRABLE = {
+    "a triangle of lines, 150 = 3 (p - 1)/2": (system_of("2*x*y - 1", "-x^2 - y^2 - x"), 101, "1/7"),
+    "996 = 2 (p - 1)": (system_of("2*x*y - 1", "-x^2 - y^2 - x"), 499, "1/7"),
+    "90 = 3 (p - 1)/2": (load("weierstrass").system, 61, "1/7"),
+    "400 = 2 (p + 1)": (load("planar_cubic_hamiltonian").system, 199, "1/7"),
+    "a pencil of sextics, 50 = 5 (p - 1)/3": (load("nahm_icosahedral").system, 31, "1/7"),
+    "all cycles but few have 3 p points, on parallel lines": (hamiltonian(-3, 1, 0, 0, 1, 0, 0, 0, -3), 53, "1/7"),
+    "44 cycles of 69 points in space": (load("volterra_periodic_3").system, 47, "1/7"),
+}
+
+
+@pytest.mark.parametrize("name", INTEGRABLE)
+def test_cycles_on_reducible_level_curves_do_not_refuse_an_integral(name):
+    system, prime, eps = INTEGRABLE[name]
+    found = compare(cycle_census(system, eps, prime))
+    assert found.longer
+    assert all(length > hasse_weil(prime) for length in found.longer)
+    assert found.unexplained == ()
+    assert found.verdict("integrable bound") == "compatible"
+    assert "0 cannot lie on a reducible curve" in found.reasons["integrable bound"]
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.integers(-9, 9), min_size=9, max_size=9), st.sampled_from([23, 31, 47, 61, 83, 101]))
+def test_cubic_hamiltonians_of_the_plane_are_never_refused(coefficients, prime):
+    for eps in default_eps(prime):
+        assert "integrable bound" not in compare(cycle_census(hamiltonian(*coefficients), eps, prime)).refused
+
+
+@pytest.mark.parametrize(
+    ("system", "prime"),
+    [
+        (load("lotka_volterra").system, 101),
+        (load("lotka_volterra").system, 199),
+        (load("zander_120").system, 151),
+        (system_of("y", "y - x"), 41),  # a spiral: linear, and no rational function is conserved
+        (load("zhukovski_volterra_2").system, 31),  # one integral in dimension 3
+    ],
+)
+def test_maps_with_too_few_integrals_are_refused(system, prime):
+    found = [compare(cycle_census(system, eps, prime)) for eps in default_eps(prime)]
+    refused = [one for one in found if "integrable bound" in one.refused]
+    assert refused
+    assert all(one.unexplained and set(one.unexplained) <= set(one.longer) for one in refused)
+
+
+def test_one_cycle_of_a_length_that_no_reducible_curve_has_is_enough():
+    """158 = 2 * 79, and 79 divides none of 100, 102; the other long cycle has 136 = 4 * 34 points, 34 divides 102."""
+    found = compare(cycle_census(load("lotka_volterra").system, "1/7", 101))
+    assert (found.longer, found.unexplained) == ({136: 1, 158: 1}, (158,))
+    assert found.verdict("integrable bound") == "not compatible"
+
+
 def test_lotka_volterra_goes_like_a_random_reversible_map_and_not_along_curves():
     system = load("lotka_volterra").system
     R = find_reversor(system)

@@ -53,8 +53,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     A point is lost where the map has no value; where forms have a common factor it is divided out first (up to
     dimension 6). It falls if its orbit gets to a lost point, and is transient if its orbit gets to a cycle. The lengths
-    are held against the largest number of points of a curve of genus 1 (the fibres of integrable maps of the plane),
-    against the law of random reversible maps and against random permutations; "compatible" is no proof of anything.
+    are held against the largest number of points of a curve of genus 1 (the fibres of integrable maps of the plane;
+    a longer cycle must have a length that reducible fibres allow), against the law of random reversible maps and
+    against random permutations; "compatible" is no proof of anything.
 
     Exit status: 0 done, 2 wrong use, 3 samples stopped by the clock.
     """
@@ -223,6 +224,8 @@ def _record(
                 "fixed_points": census.fixed,
                 "bound": found.bound,
                 "share_within_bound": found.share_within,
+                "longer_than_bound": [[length, n] for length, n in found.longer.items()],
+                "unexplained": list(found.unexplained),
                 "scale": found.scale,
                 "model_scale": found.model_scale,
                 "distance": found.distance,
