@@ -14,6 +14,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.reversors import require_reversor
@@ -154,7 +155,7 @@ def cycle_census(
             *form,
         )
     wanted = DEFAULT_SAMPLES if samples is None else samples
-    starts = random_points(chart, wanted, seed)
+    starts = random_points(chart, wanted, seed_for(seed, system.rhs, exact_eps, prime))
     limit = 8 * hasse_weil(prime) if steps is None else steps
     end = time.monotonic() + seconds
     taken = limit
