@@ -15,7 +15,7 @@ else:
     OptionType = click.ParamType
 
 
-_MOST_DIGITS = 40  # of a number of steps, as in `Steps`
+_MOST_STEP_DIGITS, _MOST_DIGITS = 40, 100  # of a step number, of any other integer: floats go further
 
 
 class ExactNumber(OptionType):
@@ -160,9 +160,9 @@ class Steps(OptionType):
         steps = []
         for piece in value.split(","):
             piece = piece.strip()
-            if not (piece.isascii() and piece.isdigit()) or len(piece) > _MOST_DIGITS:
+            if not (piece.isascii() and piece.isdigit()) or len(piece) > _MOST_STEP_DIGITS:
                 self.fail(
-                    f"found {quoted(piece)}, expected step numbers of at most {_MOST_DIGITS} digits, separated by "
+                    f"found {quoted(piece)}, expected step numbers of at most {_MOST_STEP_DIGITS} digits, separated by "
                     "commas",
                     param,
                     ctx,
