@@ -154,6 +154,23 @@ def test_images_of_affine_points_obey_the_defining_equation(name):
     assert checked >= p**system.dim // 2
 
 
+def test_points_beyond_the_first_portion_have_their_own_images():
+    chart = ProjectiveMap(SYSTEMS["dense in the plane"], "2/11", 191)  # 36673 points, in portions of 32768
+    points = chart.points(np.arange(chart.count))
+    assert (chart.images(points)[:, 32_700:] == chart.images(points[:, 32_700:])).all()
+    assert (chart.table()[32_700:] == chart.numbers(chart.images(points[:, 32_700:]))).all()
+
+
+def test_the_common_factor_is_looked_for_up_to_dimension_six():
+    def chart(n):
+        names = [f"x{k}" for k in range(n)]
+        return ProjectiveMap(QuadraticSystem.from_text(names, names), "1/3", 7)
+
+    # x~ = x (1 + eps)/(1 - eps): n minors of degree n in common but for one factor.
+    assert (chart(6).degree, chart(6).factor.count("z")) == (1, 1)
+    assert (chart(7).degree, chart(7).factor) == (7, None)
+
+
 def test_points_with_one_coordinate_are_the_first_and_those_without_are_none():
     chart = ProjectiveMap(SYSTEMS["dense in space"], "1/3", 5)
     assert chart.points(np.array([0, 1, 5, 6, 31])).T.tolist() == [

@@ -1,0 +1,70 @@
+"""Which way an orbit is computed, for every arithmetic and wish, and what cannot be had."""
+
+from __future__ import annotations
+
+import pytest
+from planar_helpers import structure_and_system
+
+from kahanmaps.errors import InputError
+from kahanmaps.family.structure import NoStructure
+from kahanmaps.maps.methods import choose_method
+
+SPLIT, _ = structure_and_system("m = 2")
+UNSPLIT, _ = structure_and_system("m = 2, sqrt 2")
+NONE = NoStructure("H is not a homogeneous cubic")
+
+
+@pytest.mark.parametrize(
+    ("wish", "arithmetic", "structure", "at", "expected"),
+    [
+        (None, "exact", NONE, None, "generic"),
+        (None, "mod", NONE, (10**9,), "generic"),
+        ("generic", "exact", SPLIT, (10**9,), "generic"),
+        (None, "exact", SPLIT, None, "normal-form"),
+        (None, "exact", UNSPLIT, None, "generic"),  # no planes over Q
+        (None, "float", UNSPLIT, None, "normal-form"),
+        (None, "float", SPLIT, (10**9,), "normal-form"),
+        (None, "ball", UNSPLIT, None, "normal-form"),
+        (None, "mod", SPLIT, None, "generic"),
+        ("normal-form", "exact", SPLIT, None, "normal-form"),
+        ("normal-form", "ball", UNSPLIT, None, "normal-form"),
+        ("jump", "exact", UNSPLIT, (3,), "jump"),
+        ("jump", "mod", SPLIT, (3,), "jump"),
+        # Iterates wanted alone are jumped to from a certain step on, where they are few.
+        (None, "exact", SPLIT, (23,), "normal-form"),
+        (None, "exact", SPLIT, (24,), "jump"),
+        (None, "exact", SPLIT, (1, 2, 40), "jump"),
+        (None, "exact", SPLIT, (1, 2, 3, 4, 5, 40), "normal-form"),
+        (None, "exact", SPLIT, (1, 2, 3, 40), "jump"),
+        (None, "exact", UNSPLIT, (24,), "jump"),
+        (None, "exact", UNSPLIT, tuple(range(10, 25)), "generic"),
+        (None, "exact", UNSPLIT, tuple(range(14, 26)), "jump"),
+        (None, "mod", UNSPLIT, (9_999,), "generic"),
+        (None, "mod", UNSPLIT, (10_000,), "jump"),
+        (None, "mod", UNSPLIT, tuple(range(10_001)), "jump"),
+        (None, "ball", SPLIT, (0,), "normal-form"),
+        (None, "ball", SPLIT, (1,), "jump"),
+        (None, "exact", SPLIT, (), "normal-form"),
+    ],
+)
+def test_the_method_follows_from_what_is_asked_for(wish, arithmetic, structure, at, expected):
+    found = choose_method(wish, arithmetic, structure, at)
+    assert found.name == expected
+    assert found.text == f"method {expected}: {found.reason}"
+
+
+@pytest.mark.parametrize(
+    ("wish", "arithmetic", "structure", "at", "words"),
+    [
+        ("fastest", "exact", SPLIT, None, "expected one of generic, normal-form, jump"),
+        ("jump", "exact", NONE, (3,), "needs a normal form, and there is none: H is not"),
+        ("normal-form", "float", NONE, None, "needs a normal form"),
+        ("jump", "exact", SPLIT, None, "the method jump is for --at"),
+        ("jump", "float", SPLIT, (3,), "the method jump is for --at"),
+        ("normal-form", "exact", UNSPLIT, None, "a factor has degree 2"),
+        ("normal-form", "mod", SPLIT, None, "modulo P there are the methods generic and jump"),
+    ],
+)
+def test_what_cannot_be_had_is_refused(wish, arithmetic, structure, at, words):
+    with pytest.raises(InputError, match=words):
+        choose_method(wish, arithmetic, structure, at)
