@@ -228,8 +228,11 @@ def find_integrals(
     deadline = time.monotonic() + seconds
     primes = laboratory.primes
 
-    values = dict.fromkeys(map_.values for map_ in laboratory.maps)  # of the symbols; without symbols all the same
-    systems = {value: inherited_integrals(laboratory.system.at(value), seed=seed) for value in values}
+    # Without symbols the maps have the same values, none, and one system.
+    systems = {
+        values: inherited_integrals(laboratory.system.at(values), seed=seed)
+        for values in {map_.values for map_ in laboratory.maps}
+    }
     inherited = [systems[map_.values] for map_ in laboratory.maps]
     by_theorems = 0
 
@@ -237,7 +240,8 @@ def find_integrals(
         return inherited[laboratory.maps.index(map_)].gradients(map_, x)
 
     def result(integrals: Sequence[FoundIntegral], profile: Profile, reason: str) -> IntegralSearch:
-        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, inherited[0].text)
+        values = f", at random values of {', '.join(laboratory.symbols)}" if laboratory.symbols else ""
+        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, inherited[0].text + values)
         return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found)
 
     empty = Profile(file.system.dim, (), (), None, True, False)

@@ -124,7 +124,8 @@ def _integral_lines(found: Analysis) -> list[Statement]:
     profile = search.profile
     if search.by_theorems:
         number = counted(search.by_theorems, "independent integral")
-        lines.append(Statement(PROVED, f"{number} by theorems: {search.theorems}"))
+        status = MEASURED if search.symbols else PROVED  # of symbols random values are looked at
+        lines.append(Statement(status, f"{number} by theorems: {search.theorems}"))
     if not profile.nullities:
         lines.append(Statement(UNDECIDED, f"how many integrals there are was not measured: {search.reason}"))
     elif profile.period is not None:

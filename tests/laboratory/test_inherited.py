@@ -123,6 +123,7 @@ def test_with_symbols_theorems_are_asked_at_random_values():
     found = find_integrals(file, symbols=["a", "b"], max_degree=1)
     assert (found.by_theorems, found.codimension, found.integrals) == (1, 1, ())
     assert "1 of the 1 independent integrals has no closed form" in found.reason
+    assert "1 by theorems: 1 modified Hamiltonian, at random values of a, b" in found.count_text
     # x' has no y at a = 0: what holds there only is no theorem for every a
     special = system("x y", "x*y", "-x*y + a*x", a="0")
     assert find_integrals(special, symbols=["a"], max_degree=2).by_theorems == 0
