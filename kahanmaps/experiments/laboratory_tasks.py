@@ -71,7 +71,7 @@ def integrals(
         "verdict": _weakest(one.verdict for one in found.integrals),
         "status": _state_of_integrals(found),
         "integrals": len(found.integrals),
-        "codimension": found.codimension if found.profile.nullities else None,
+        "codimension": found.codimension if found.profile.nullities else found.by_theorems or None,
         "formulas": [one.text for one in found.integrals],
         "nullities": list(found.profile.nullities),
         "period": found.profile.period,
