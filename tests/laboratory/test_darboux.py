@@ -18,7 +18,7 @@ from kahanmaps.laboratory.darboux import darboux_polynomials
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.files import SystemFile, parse_system
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -114,3 +114,10 @@ def test_a_polynomial_that_is_one_only_where_eps_equals_a_coordinate_is_not_prov
     monkeypatch.setattr(Laboratory, "formulas", wrong)
     spaces = [space for space in darboux_polynomials(file, 1).spaces if space.cofactor == right.cofactor]
     assert all(space.verdict is not Verdict.PROVED for space in spaces)
+
+
+def test_a_symbol_in_dimension_one() -> None:
+    """x' = a x: x~ = x (1 + a eps)/(1 - a eps), so x is a Darboux polynomial for every a."""
+    file = parse_system('variables = ["x"]\n[parameters]\na = "2"\n[system]\nrhs = ["a*x"]\n', "growth")
+    (space,) = darboux_polynomials(file, 1, symbols=("a",)).spaces
+    assert ([format_polynomial(P) for P in space.polynomials], space.verdict) == (["x"], Verdict.PROVED)

@@ -59,6 +59,14 @@ def test_searches_can_be_repeated_on_another_map(name, kinds, independent):
     assert gradient_rank(second, again.all_spaces) == independent
 
 
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_so_many_further_maps_are_given_as_are_asked_for(count):
+    laboratory = Laboratory(load("euler_top"))
+    maps = list(laboratory.other_maps(count))
+    assert len(maps) == count
+    assert len({map_.prime for map_ in maps} | set(laboratory.primes)) == count + len(laboratory.primes)
+
+
 def test_another_system_does_not_repeat_a_search():
     _, known, found = searched(load("euler_top"))
     stranger = Laboratory(system("x1 x2 x3", "x2*x3 + x1", "-2*x3*x1", "x1*x2"))

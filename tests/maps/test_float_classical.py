@@ -10,7 +10,7 @@ import pytest
 from flint import fmpq_mat
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.float_classical import METHODS, ClassicalOrbit
+from kahanmaps.maps.float_classical import METHODS, ClassicalOrbit, _solve
 from kahanmaps.maps.float_numbers import exact, to_float
 from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -134,6 +134,21 @@ def test_midpoint_of_linear_equations_is_their_cayley_transform(rows):
     x, end = walk(QuadraticSystem.from_text(names, rhs), "1/2", [str(e) for e in start.entries()], 1, "midpoint")
     assert end.status == "completed"
     assert x[1].tolist() == pytest.approx([float(e.p) / float(e.q) for e in expected.entries()], rel=1e-12)
+
+
+@pytest.mark.parametrize("rows", [*CAYLEY, [[3]], [[0, 1], [2, 5]], [[1, 2, 3], [4, 5, 6], [7, 8, 10]]])
+def test_elimination_solves_linear_equations(rows):
+    n = len(rows)
+    right = [1, -2, 3, 5][:n]
+    found = [float(entry) for entry in right]
+    assert _solve([float(entry) for row in rows for entry in row], found)
+    expected = fmpq_mat(rows).solve(fmpq_mat(n, 1, right)).entries()
+    assert found == pytest.approx([float(e.p) / float(e.q) for e in expected], rel=1e-12)
+
+
+@pytest.mark.parametrize("rows", [[[0]], [[1, 2], [2, 4]], [[0, 1], [0, 3]]])
+def test_elimination_refuses_a_singular_matrix(rows):
+    assert not _solve([float(entry) for row in rows for entry in row], [1.0] * len(rows))
 
 
 def test_midpoint_solves_its_equation_in_space():

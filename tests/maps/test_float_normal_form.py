@@ -215,13 +215,16 @@ def test_orbits_of_general_blocks_do_not_depend_on_their_company(kernel):
     starts = starts_of(4, 40)
     starts[7] *= 1e200
     starts[8] = [5.0, 0.1, 0.1, 0.1]  # x1~ = x1/(1 - x1/5)
+    starts[9, 0] = 5.0 - 2.0**-40
     together = FloatEnsemble(member.chosen.system, EPS, starts, form=form, kernel=kernel)
     together.advance(70)
     assert together.status[7] != "completed"
     assert together.status[8] == "singular"
+    assert together.near_singular[9] > 0
     for orbit in (0, 6, 7, 8, 9, 39):
         alone = FloatEnsemble(member.chosen.system, EPS, starts[orbit : orbit + 1], form=form, kernel=kernel)
         alone.advance(70)
+        assert alone.near_singular[0] == together.near_singular[orbit]
         assert np.array_equal(alone.x[0], together.x[orbit], equal_nan=True)
         assert alone.end(0) == together.end(orbit)
 
