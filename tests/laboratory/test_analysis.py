@@ -115,6 +115,19 @@ def test_at_an_eps_where_the_map_is_periodic_nothing_is_said_of_others():
     assert generic.integrals.profile.period is None
 
 
+def test_no_density_is_measured_where_degrees_were_searched_and_undecided_where_they_were_not():
+    found = analyze(system("x", "1 + x^2"))
+
+    def status(reason):
+        none = replace(found, densities=replace(found.densities, densities=(), reason=reason))
+        (line,) = dict(none.sections)["measure"]
+        return line.status, line.text
+
+    searched, stopped = "no polynomial density of degree at most 4", "the time was over"
+    assert status(searched) == ("measured", searched)
+    assert status(stopped) == ("undecided", stopped)
+
+
 def test_dots_stand_where_more_degrees_are_known_than_shown():
     found = analyze(system("x", "1 + x^2"))
 

@@ -365,3 +365,32 @@ def test_a_system_of_too_many_variables_is_refused():
     names = [f"x{i}" for i in range(MAX_DIMENSION + 1)]
     with pytest.raises(InputError, match=f"expected at most {MAX_DIMENSION}"):
         QuadraticSystem.from_polynomials(ring(names).gens())
+
+
+@pytest.mark.parametrize("field", [QQ, GF(10007), GF(2**61 - 1)], ids=repr)
+@given(systems_with_points(dims=(1, 2, 3), entries=st.integers(-9, 9).map(fmpq), count=2), st.data())
+def test_a_constant_matrix_times_a_system_has_its_values_and_derivatives(field, drawn, data):
+    """(C f)(x) = C f(x), (C f)'(x) = C f'(x), and C f of two points, the right-hand side of the map."""
+    system, x, y = drawn
+    n = system.dim
+    C = fmpq_mat(n, n, [data.draw(st.integers(-5, 5)) for _ in range(n * n)])
+    local, matrix = system.over(field), field.convert_matrix(C)
+    moved = local.transformed(matrix)
+    here, there = [field.convert(entry) for entry in x], [field.convert(entry) for entry in y]
+    assert moved.value(here) == tuple((matrix * field.column(local.value(here))).entries())
+    assert moved.polarised(here, there) == tuple((matrix * field.column(local.polarised(here, there))).entries())
+    assert moved.jacobian(here) == matrix * local.jacobian(here)
+
+
+@pytest.mark.parametrize("field", [QQ, GF(10007)], ids=repr)
+@given(systems_with_points(dims=(1, 2, 3), entries=st.integers(-9, 9).map(fmpq), count=2))
+def test_values_differ_by_what_derivatives_say(field, drawn):
+    """f(x + v) = f(x) + f'(x) v + f''(v, v)/2 for f of degree 2, and f'(x + v) = f'(x) + f''(v)."""
+    system, x, v = drawn
+    local = system.over(field)
+    here, step = [field.convert(entry) for entry in x], [field.convert(entry) for entry in v]
+    there, column = [a + b for a, b in zip(here, step, strict=True)], field.column(step)
+    change = local.jacobian(here) * column + local.hessian_times(step) * column * field.convert(fmpq(1, 2))
+    assert local.value(there) == tuple((field.column(local.value(here)) + change).entries())
+    assert local.jacobian(there) == local.jacobian(here) + local.hessian_times(step)
+    assert local.polarised(here, here) == local.value(here)
