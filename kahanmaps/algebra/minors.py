@@ -14,10 +14,13 @@ def kernel_minors(rows: Sequence[Sequence[Any]], times: Product = operator.mul) 
 
     `rows` are n >= 1 rows of n + 1 elements of any commutative ring (numbers, polynomials, arrays): exact if the ring
     is. `times` multiplies two of them. All minors of the first k rows are kept, so that 2^(n+1) n/2 products are taken.
-    Returns the n + 1 minors, the k-th without column k and with the sign (-1)^k.
+    An entry None is a zero that costs nothing. Returns the n + 1 minors, the k-th without column k and with the sign
+    (-1)^k; None where all of its products have such a zero.
 
     >>> kernel_minors([[1, 2, 3], [4, 5, 6]])
     [-3, 6, -3]
+    >>> kernel_minors([[1, 2, None], [4, 5, None]])
+    [None, None, -3]
     """
     width = len(rows) + 1
     minors: dict[int, Any] = {1 << j: entry for j, entry in enumerate(rows[0])}
@@ -31,7 +34,11 @@ def kernel_minors(rows: Sequence[Sequence[Any]], times: Product = operator.mul) 
             for j in range(width):
                 if not mask >> j & 1:
                     continue
-                term = times(row[j], minors[mask ^ 1 << j])
+                entry, minor = row[j], minors[mask ^ 1 << j]
+                if entry is None or minor is None:
+                    place += 1
+                    continue
+                term = times(entry, minor)
                 if (k - 1 + place) % 2:
                     total = -term if total is None else total - term
                 else:
@@ -40,4 +47,5 @@ def kernel_minors(rows: Sequence[Sequence[Any]], times: Product = operator.mul) 
             larger[mask] = total
         minors = larger
     full = (1 << width) - 1
-    return [-minors[full ^ 1 << j] if j % 2 else minors[full ^ 1 << j] for j in range(width)]
+    found = (minors[full ^ 1 << j] for j in range(width))
+    return [-minor if j % 2 and minor is not None else minor for j, minor in enumerate(found)]

@@ -22,7 +22,12 @@ if TYPE_CHECKING:
 
 @task("singularities")
 def confinement(
-    system: SystemFile, eps: Any = None, steps: int = 12, seconds: int = 60, seed: int = 0, report: bool = False
+    system: SystemFile,
+    eps: Any = None,
+    steps: int | None = None,
+    seconds: int = 60,
+    seed: int = 0,
+    report: bool = False,
 ) -> Result:
     """Are singularities confined? The hypersurfaces that the map contracts; without eps two values are compared."""
     from kahanmaps.laboratory.fates import NOT_CONTRACTED, UNDECIDED
@@ -36,6 +41,7 @@ def confinement(
         "confinement": first.verdict if agree else UNDECIDED,
         "status": "time" if any(run.stopped for run in runs) else "complete" if agree else "eps differ",
         "tried": [format_number(run.eps) for run in runs],
+        "followed": first.followed,  # for so many steps, where something is not confined
         "map_degree": first.map_degree,
         "critical_degree": first.critical_degree,
         "contracted": sum(h.status != NOT_CONTRACTED for h in first.hypersurfaces),

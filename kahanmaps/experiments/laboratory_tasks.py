@@ -232,6 +232,8 @@ def _growth(found: DegreeGrowth) -> Result:
     return {
         "growth": str(found.growth),
         "looks_exponential": found.looks_exponential,  # an estimate, where there is no recurrence
+        "unconfirmed": found.unconfirmed,  # why a recurrence that fits is not given
+        "singularities": None if found.patterns is None else found.patterns.text,
         "dynamical_degree": None if rate is None else rate.digits,
         "minimal_polynomial": None if rate is None else format_univariate(fmpq_poly(rate.minimal_polynomial)),
         "power": None if recurrence is None else recurrence.power,

@@ -29,7 +29,13 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.report import Conclusion, Statement, conclude, sections
 from kahanmaps.laboratory.shown import analysis_html
 from kahanmaps.laboratory.singularities import MAX_DIMENSION as MAX_SINGULAR_DIMENSION
-from kahanmaps.laboratory.singularities import SingularityRun, default_eps, singularities
+from kahanmaps.laboratory.singularities import (
+    WRITTEN_DIMENSION,
+    SingularityRun,
+    default_eps,
+    patterns_of,
+    singularities,
+)
 from kahanmaps.laboratory.sparse_relations import SparseRelation, sparse_relations
 from kahanmaps.laboratory.symmetries import Symmetries, linear_symmetries
 from kahanmaps.systems.files import SystemFile
@@ -137,7 +143,10 @@ class Analysis:
             "densities": part(self.densities),
             "degrees": part(self.degrees),
             "heights": part(self.heights),
-            "singularities": [{"eps": format_number(run.eps), "verdict": run.verdict} for run in self.singularities],
+            "singularities": [
+                {"eps": format_number(run.eps), "verdict": run.verdict, "followed": run.followed, "text": run.text}
+                for run in self.singularities
+            ],
             "symmetries": part(self.symmetries),
             "commuting": part(self.commuting),
             "family": self.structure.text if isinstance(self.structure, Structure) else None,
@@ -215,12 +224,16 @@ def analyze(
         found.structure = structure_of(system)
 
     def degrees() -> None:
+        # Where they are known to the end and are those that `degrees` would ask for itself.
+        known = patterns_of(found.singularities) if found.singularities and system.dim <= WRITTEN_DIMENSION else None
+        patterns = None if known is None or known.running else known
         found.degrees = degree_growth(
             system,
             found.eps,
             seconds=share(0.25),
             max_degree=_MAX_DEGREE,
             seed=seed,
+            patterns=patterns,
             progress=told("degrees"),
         )
 
@@ -244,7 +257,7 @@ def analyze(
     def confinement() -> None:
         if system.dim <= MAX_SINGULAR_DIMENSION:
             values = default_eps(system, seed) if found.eps is None else (found.eps,)
-            part = share(0.1)
+            part = share(0.2 if system.dim <= WRITTEN_DIMENSION else 0.1)
             found.singularities = [
                 singularities(system, value, seed=seed, seconds=part / len(values), progress=told("singularities"))
                 for value in values
@@ -259,8 +272,9 @@ def analyze(
         ("symmetries", symmetries),
         ("commuting systems", commuting),
         ("heights", heights),
-        ("singularities", confinement),
     ]
+    # Where degrees make use of them singularities come first; in more dimensions they are slow, and come last.
+    parts.insert(2 if system.dim <= WRITTEN_DIMENSION else len(parts), ("singularities", confinement))
     for name, part in parts:
         if left() <= 0:
             found.skipped.append(f"{name}: the time was over")

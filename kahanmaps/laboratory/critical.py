@@ -8,7 +8,7 @@ Source: petrera-suris-2016, eq. (Jac).
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +22,10 @@ from kahanmaps.maps.projective import Forms
 
 @dataclass(frozen=True)
 class CriticalPoint:
-    """A point modulo p where the differential degenerates, how often it is a zero of E, and the gradient there."""
+    """A point modulo p where the differential degenerates, how often it is a zero of E, and the gradient there.
+
+    Or a pole: then E stands for det(I - eps f').
+    """
 
     point: tuple[int, ...]
     gradient: tuple[int, ...]
@@ -37,38 +40,72 @@ def critical_points(
     `forms` are the linear forms of the map at eps over the field, `inverse` those at -eps. Returns the points and, for
     each multiplicity, the number of zeros of E over the closure of GF(p): there may be zeros without points in GF(p).
     """
-    p, size = field.prime, len(forms) + 1
-    a, b = ([rng.randrange(p) for _ in range(size)] for _ in range(2))
-    line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
+    a, b, line = _random_line(forms, field, rng)
+    p = field.prime
     image = kernel_minors(_entries(forms, line, nmod_poly([], p)))
     common = nmod_poly([], p)
     for entry in image:
         common = common.gcd(entry)
     if common.degree() > 0:
         image = [entry // common for entry in image]
-    value = _denominator(inverse, image, nmod_poly([], p))
-    for forbidden in (image[-1] * common, line[-1]):  # poles, infinity
-        while (shared := value.gcd(forbidden)).degree() > 0:
+    value = _without(_denominator(inverse, image, nmod_poly([], p)), image[-1] * common, line[-1])
+
+    def E(X: Sequence[Any], zero: Any) -> Any:
+        return _denominator(inverse, kernel_minors(_entries(forms, X, zero)), zero)
+
+    return _zeros(value, E, a, b, field, rng)
+
+
+def pole_points(forms: Forms, field: PrimeField, rng: random.Random) -> tuple[list[CriticalPoint], dict[int, int]]:
+    """The poles modulo p on a random line that are not at infinity, as `critical_points` gives critical points."""
+    a, b, line = _random_line(forms, field, rng)
+    value = _without(_denominator(forms, line, nmod_poly([], field.prime)), line[-1])
+    return _zeros(value, lambda X, zero: _denominator(forms, X, zero), a, b, field, rng)
+
+
+def _random_line(forms: Forms, field: PrimeField, rng: random.Random) -> tuple[list[int], list[int], list[nmod_poly]]:
+    a, b = ([rng.randrange(field.prime) for _ in range(len(forms) + 1)] for _ in range(2))
+    return a, b, [nmod_poly([x, v], field.prime) for x, v in zip(a, b, strict=True)]
+
+
+def _without(value: nmod_poly, *others: nmod_poly) -> nmod_poly:
+    """What is left of a polynomial when the zeros of others are divided out."""
+    for other in others:
+        while (shared := value.gcd(other)).degree() > 0:
             value = value // shared
+    return value
+
+
+def _zeros(
+    value: nmod_poly,
+    function: Callable[[Sequence[Any], Any], Any],
+    a: Sequence[int],
+    b: Sequence[int],
+    field: PrimeField,
+    rng: random.Random,
+) -> tuple[list[CriticalPoint], dict[int, int]]:
+    """The zeros in GF(p) of a function that has the given value on the line, and how many there are in all."""
     if value.degree() < 1:
         return [], {}
-    found = []
-    factors = [(factor, int(power)) for factor, power in value.factor()[1]]
-    degrees: dict[int, int] = {}
-    for factor, power in factors:
+    found, degrees = [], dict[int, int]()
+    for factor, exponent in value.factor()[1]:
+        power = int(exponent)
         degrees[power] = degrees.get(power, 0) + int(factor.degree())
-    for factor, power in factors:
         if factor.degree() == 1:
             s = -int(factor[0])
-            point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
-            gradient = _gradient(forms, inverse, point, power, field, rng)
+            point = [(x + s * v) % field.prime for x, v in zip(a, b, strict=True)]
+            gradient = _gradient(function, point, power, field, rng)
             if any(gradient):
                 found.append(CriticalPoint(tuple(point), tuple(gradient), power))
     return found, degrees
 
 
 def _gradient(
-    forms: Forms, inverse: Forms, point: Sequence[int], power: int, field: PrimeField, rng: random.Random
+    function: Callable[[Sequence[Any], Any], Any],
+    point: Sequence[int],
+    power: int,
+    field: PrimeField,
+    rng: random.Random,
 ) -> list[int]:
     """The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is (t F_v + d F_w)^power G + ..."""
     p, size, n = field.prime, len(point), power + 1
@@ -77,8 +114,7 @@ def _gradient(
         Jet(nmod_poly([x, rng.randrange(p)], p), [one if i == k else zero for i in range(size)], n)
         for k, x in enumerate(point)
     ]
-    nothing = Jet(zero, [zero] * size, n)
-    value = _denominator(inverse, kernel_minors(_entries(forms, curve, nothing)), nothing)
+    value = function(curve, Jet(zero, [zero] * size, n))
     return [int(slope[power - 1]) for slope in value.slopes]
 
 

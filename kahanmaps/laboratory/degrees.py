@@ -5,6 +5,10 @@ and (where eps is not given) the residue of eps random. A line in special positi
 should not, can only make a degree too small. So two lines, each with a prime and an eps of its own, are compared, and
 where they differ the larger degree stands.
 
+A recurrence of the first degrees can be that of another map: nothing is seen of a hypersurface that is contracted until
+its image meets points without a value, perhaps a hundred steps later. So the fates of these hypersurfaces are asked
+(`singularities`), and a recurrence counts where there are terms enough beyond the last thing that happens to them.
+
 The growth of d_n measures complexity: lim d_n^(1/n), the dynamical degree, is 1 for integrable maps as far as is
 known, and its logarithm is the algebraic entropy (bellon-viallet-1999).
 """
@@ -28,12 +32,15 @@ from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.laboratory.curves import Line, Stopped
 from kahanmaps.laboratory.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence, rate_json
 from kahanmaps.laboratory.shown import degrees_html
+from kahanmaps.laboratory.singularities import MAX_STEPS, Patterns
+from kahanmaps.laboratory.singularities import patterns as patterns_of_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 DEFAULT_SECONDS = 10.0
 DEFAULT_MAX_DEGREE = 20_000
 _MOST_TERMS = 10_000
 _LINES = 2
+_OFTEN, _SELDOM = 64, 8  # up to so many terms a recurrence is looked for after each, then after so many
 _ENOUGH_QUOTIENTS = 6
 _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
 
@@ -44,8 +51,10 @@ class DegreeGrowth:
 
     `eps` is None for generic eps (a random residue for each line). `ended` is "recurrence" (one was found, with
     terms to spare), "terms" (as many as asked for), "time", "degree" (the next is over the limit), "constant" (the
-    iterate is a constant map), "singular" (the next iterate exists nowhere) or "lines" (the lines do not agree).
-    The degrees are measured: evidence, and no proof.
+    iterate is a constant map), "singular" (the next iterate exists nowhere), "lines" (the lines do not agree) or
+    "unconfirmed" (a recurrence fits, and the patterns of the singularities are not known to the end).
+    `patterns` is what the singularities say, None where they were not asked. The degrees are measured: evidence, and no
+    proof.
     """
 
     degrees: tuple[int, ...]
@@ -56,11 +65,34 @@ class DegreeGrowth:
     primes: tuple[int, ...]
     residues: tuple[int, ...]
     notes: tuple[str, ...] = ()
+    patterns: Patterns | None = None
 
     @cached_property
-    def recurrence(self) -> Recurrence | None:
-        """The shortest linear recurrence of the degrees with terms left to check it, or None."""
+    def fitted(self) -> Recurrence | None:
+        """The shortest linear recurrence of the degrees with terms left to check it, or None; see `unconfirmed`."""
         return find_recurrence(self.degrees)
+
+    @cached_property
+    def unconfirmed(self) -> str:
+        """Why the recurrence that fits may be that of other maps; empty where there is none, or it is confirmed."""
+        if self.fitted is None or self.patterns is None:
+            return ""
+        if self.patterns.running:
+            return self.patterns.running
+        if not self.patterns.lengths and any(d != self.degrees[1] ** n for n, d in enumerate(self.degrees)):
+            return "degrees drop where no contracted hypersurface meets points without a value (another --seed)"
+        if len(self.degrees) < (needed := self.patterns.terms_needed(self.fitted.order)):
+            last = max(self.patterns.lengths)
+            return f"after a pattern of {last} steps {needed - 1} iterates are needed (--seconds, --max-degree)"
+        return ""
+
+    @property
+    def recurrence(self) -> Recurrence | None:
+        """The shortest linear recurrence of the degrees with terms left to check it, or None.
+
+        None also where it is not confirmed by terms beyond the last confinement, or singularities are undecided.
+        """
+        return None if self.unconfirmed else self.fitted
 
     @property
     def growth(self) -> GrowthClass:
@@ -96,21 +128,37 @@ class DegreeGrowth:
         return c > 1.2 and all(abs(later / earlier - 1) < (c - 1) / (4 * n) for earlier, later in ((a, b), (b, c)))
 
     @property
-    def growth_text(self) -> str:
-        """The kind of growth with its power or rate: one phrase."""
-        found, rate = self.recurrence, self.dynamical_degree
+    def kind_text(self) -> str:
+        """The kind of growth with its power or rate, or what can be said without a confirmed recurrence: one phrase."""
         if self.growth is GrowthClass.ZERO:
             return "zero from some iterate on: that iterate is a constant map"
-        if found is None:
-            terms = counted(len(self.degrees), "term")
-            if self.looks_exponential:
-                return f"exponential growth by a factor of about {self.estimate} (estimated: no recurrence in {terms})"
-            estimate = f"; d_n/d_(n-1) is {self.estimate} at the end, an estimate only" if self.estimate else ""
-            return f"no recurrence found in {terms}{estimate}"
-        if found.growth is GrowthClass.EXPONENTIAL:
-            return "exponential growth" + (f", dynamical degree {rate.text}" if rate is not None else "")
-        power = f" of degree {found.power}" if found.growth is GrowthClass.POLYNOMIAL else ""
-        return f"{found.growth} growth{power}, dynamical degree 1"
+        if (found := self.recurrence) is not None:
+            if found.growth is GrowthClass.EXPONENTIAL:
+                return "exponential growth" + (
+                    f", dynamical degree {found.rate.text}" if found.rate is not None else ""
+                )
+            power = f" of degree {found.power}" if found.growth is GrowthClass.POLYNOMIAL else ""
+            return f"{found.growth} growth{power}, dynamical degree 1"
+        terms = counted(len(self.degrees), "term")
+        if self.looks_exponential:
+            why = self.unconfirmed or f"no recurrence in {terms}"
+            return f"exponential growth by a factor of about {self.estimate} (estimated: {why})"
+        if self.fitted is not None:
+            return f"{terms} fit {self.fitted.growth} growth, an estimate only: {self.unconfirmed}"
+        estimate = f"; d_n/d_(n-1) is {self.estimate} at the end, an estimate only" if self.estimate else ""
+        return f"no recurrence found in {terms}{estimate}"
+
+    @property
+    def basis(self) -> str:
+        """How the growth is known where there is a recurrence: measured, and with which limit."""
+        limit = self.patterns.limit if self.patterns is not None else ""
+        return f"measured: {limit}" if limit else "measured"
+
+    @property
+    def growth_text(self) -> str:
+        """The kind of growth with its power or rate, and how far confinement was looked for: one phrase."""
+        limited = self.recurrence is not None and self.basis != "measured"
+        return self.kind_text + (f" ({self.basis})" if limited else "")
 
     @property
     def text(self) -> str:
@@ -118,8 +166,10 @@ class DegreeGrowth:
         lines = [("degrees", ", ".join(map(str, self.degrees))), ("growth", self.growth_text)]
         if self.recurrence is not None:
             lines.append(("recurrence", self.recurrence.text))
-            if self.recurrence.closed_form:
-                lines.append(("closed form", self.recurrence.closed_form))
+            if self.recurrence.closed_form_text:
+                lines.append(("closed form", self.recurrence.closed_form_text))
+        if self.patterns is not None:
+            lines.append(("singularities", self.patterns.text))
         lines += [("ended", self.message), *(("note", note) for note in self.notes)]
         return "\n".join(f"{word}\t{rest}" for word, rest in lines)
 
@@ -144,6 +194,8 @@ class DegreeGrowth:
             "estimate": self.estimate,
             "looks_exponential": self.looks_exponential,
             "recurrence": None if self.recurrence is None else self.recurrence.to_json(),
+            "singularities": None if self.patterns is None else self.patterns.to_json(),
+            "unconfirmed": self.unconfirmed,
             "notes": list(self.notes),
         }
 
@@ -156,14 +208,18 @@ def degree_growth(
     max_terms: int | None = None,
     max_degree: int = DEFAULT_MAX_DEGREE,
     seed: int = 0,
+    steps: int | None = None,
+    patterns: Patterns | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DegreeGrowth:
     """The degrees of the iterates of the Kahan map of `system`, for one exact `eps` (time step 2 eps) or generic eps.
 
-    Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare; with `max_terms`
-    instead after the degrees d_1, ..., d_max_terms. Stops in any case after about `seconds`, or before a degree above
-    `max_degree`. Modulo random primes of 63 bits, so the answer is measured and not proved; the same for the same
-    `seed`, except for where the time ends it. Raises InputError for wrong values.
+    Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare, and with terms enough
+    beyond the last confinement; with `max_terms` instead after the degrees d_1, ..., d_max_terms. Stops in any case
+    after about `seconds`, or before a degree above `max_degree`. `patterns` are those of the singularities, which are
+    followed here, for `steps` steps, where they are not given. Modulo random primes of 63 bits, so the answer is
+    measured and not proved; the same for the same `seed`, except for where the time ends it. Raises InputError for
+    wrong values.
 
     Source: bellon-viallet-1999.
 
@@ -179,16 +235,29 @@ def degree_growth(
         raise InputError(f"found {seconds} seconds, expected a positive number")
     if max_terms is not None and not 0 <= max_terms <= _MOST_TERMS:
         raise InputError(f"found {max_terms} terms, expected 0 to {_MOST_TERMS}")
+    if steps is not None and not 1 <= steps <= MAX_STEPS:
+        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     if max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
-    return _Search(system, exact, time.monotonic() + seconds, max_degree, seed).run(max_terms, progress)
+    return _Search(system, exact, time.monotonic() + seconds, max_degree, seed, steps, patterns).run(
+        max_terms, progress
+    )
 
 
 class _Search:
     """The lines, and the degrees found on them so far."""
 
-    def __init__(self, system: QuadraticSystem, eps: fmpq | None, deadline: float, max_degree: int, seed: int) -> None:
-        self._system, self._eps = system, eps
+    def __init__(
+        self,
+        system: QuadraticSystem,
+        eps: fmpq | None,
+        deadline: float,
+        max_degree: int,
+        seed: int,
+        steps: int | None,
+        patterns: Patterns | None,
+    ) -> None:
+        self._system, self._eps, self._steps, self._patterns = system, eps, steps, patterns
         self._deadline, self._max_degree, self._seed = deadline, max_degree, seed
         self._rng = random.Random(f"degrees {seed_for(seed, system.rhs, eps)}")
         self._replaced = 0
@@ -200,9 +269,8 @@ class _Search:
         lines = [self._line() for _ in range(_LINES)]
         try:
             while True:
-                if max_terms is None:
-                    self._stop_if_certain()
-                elif len(self.degrees) > max_terms:
+                self._look_at_fit(max_terms is None)
+                if max_terms is not None and len(self.degrees) > max_terms:
                     raise Stopped("terms", f"{counted(max_terms, 'iterate')} asked for and measured")
                 if len(self.degrees) > _MOST_TERMS:
                     raise Stopped("terms", f"{_MOST_TERMS} iterates, and no more are worked out")
@@ -221,11 +289,28 @@ class _Search:
             tuple(line.prime for line in lines),
             tuple(line.eps for line in lines),
             tuple(self.notes),
+            self._patterns,
         )
 
-    def _stop_if_certain(self) -> None:
+    def _look_at_fit(self, may_stop: bool) -> None:
+        """Follow the singularities as soon as some recurrence fits, and stop where one is certain."""
+        size = len(self.degrees)
+        if size > _OFTEN and size % _SELDOM:
+            return
         found = find_recurrence(self.degrees)
-        if found is not None and found.checked >= max(6, found.order):
+        if found is None:
+            return
+        if self._patterns is None and max(self.degrees) > 1:  # an affine map contracts nothing
+            left = max(0.0, self._deadline - time.monotonic())
+            self._patterns = patterns_of_map(
+                self._system, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
+            )
+        known = self._patterns
+        if not may_stop or found.checked < max(6, found.order):
+            return
+        if known is not None and known.running:
+            raise Stopped("unconfirmed", f"a recurrence of order {found.order} fits, but {known.running}")
+        if known is None or size >= known.terms_needed(found.order):
             raise Stopped("recurrence", f"a recurrence of order {found.order} holds for {found.checked} terms to spare")
 
     def _line(self) -> Line:

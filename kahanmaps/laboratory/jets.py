@@ -6,14 +6,17 @@ A jet is a power series in t, known up to a power of t, with one slope a tangent
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
 from typing import Any
 
 from flint import nmod_mat, nmod_poly
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.maps.projective import Forms
+
+SparseForms = list[list[list[tuple[int, int]]]]
 
 
 class PrecisionTooLow(ArithmeticError):
@@ -75,13 +78,15 @@ class Step:
 
     `common` is the power of t divided out of all coordinates, `pole` the valuation of Z at the image when the least of
     all coordinates is 0 (the order of the pole), `denominator` that of det(I - eps f') at the point before the step,
-    `rank` the rank of the differential of the map from the hypersurface to the limits of its points.
+    `rank` the rank of the differential of the map from the hypersurface to the limits of its points, `limit` such a
+    point after the step.
     """
 
     common: int
     pole: int | None
     denominator: int | None
     rank: int
+    limit: tuple[int, ...] = field(repr=False)
 
 
 def follow(
@@ -98,6 +103,18 @@ def follow(
     `forms` are those of `linear_forms` over GF(p), points and vectors residues (X : Z); eps is in the forms.
     Raises PrecisionTooLow and NotGeneric.
     """
+    return list(islice(walk(sparse_forms(forms), point, direction, tangents, prime, precision), steps))
+
+
+def walk(
+    forms: SparseForms,
+    point: Sequence[int],
+    direction: Sequence[int],
+    tangents: Sequence[Sequence[int]],
+    prime: int,
+    precision: int,
+) -> Iterator[Step]:
+    """As `follow`, step after step without an end, for the forms of `sparse_forms`."""
     X = [
         Jet(
             nmod_poly([x, v], prime).truncate(precision),
@@ -106,21 +123,12 @@ def follow(
         )
         for k, (x, v) in enumerate(zip(point, direction, strict=True))
     ]
-    found = []
     zero = nmod_poly([], prime)
-    for _ in range(steps):
-        rows = []
-        for row in forms:
-            entries = []
-            for form in row:
-                total = Jet(zero, [zero] * len(tangents), X[0].precision)
-                for coefficient, x in zip(form, X, strict=True):
-                    if coefficient != 0:
-                        total = total + x.times(int(coefficient))
-                entries.append(total)
-            rows.append(entries)
-        image = kernel_minors(rows)
-        known = image[0].precision
+    while True:
+        nothing = Jet(zero, [zero] * len(tangents), X[0].precision)
+        minors = kernel_minors([[_value(form, X) for form in row] for row in forms])
+        image = [nothing if jet is None else jet for jet in minors]
+        known = min(jet.precision for jet in image)
         sizes = [valuation(jet.value, known) for jet in image]
         denominator = sizes[-1]
         seen = [size for size in sizes if size is not None]
@@ -129,8 +137,29 @@ def follow(
         common = min(seen)
         X = [jet.over_power(common) for jet in image]
         pole = None if denominator is None else denominator - common
-        found.append(Step(common, pole, denominator, _rank(X, prime)))
-    return found
+        yield Step(common, pole, denominator, _rank(X, prime), tuple(int(jet.value[0]) for jet in X))
+
+
+def image_of(forms: SparseForms, point: Sequence[int], prime: int) -> list[int] | None:
+    """The image of a point of projective space modulo p; None where all minors vanish: there only curves have one."""
+    size = len(point)
+    entries = [sum(c * point[k] for k, c in form) % prime for row in forms for form in row]
+    kernel, nullity = nmod_mat(size - 1, size, entries, prime).nullspace()
+    return [int(kernel[k, 0]) for k in range(size)] if nullity == 1 else None
+
+
+def sparse_forms(forms: Forms) -> SparseForms:
+    """The coefficients that are not zero, as pairs (index, coefficient)."""
+    return [[[(k, int(c)) for k, c in enumerate(form) if c != 0] for form in row] for row in forms]
+
+
+def _value(form: list[tuple[int, int]], X: Sequence[Jet]) -> Jet | None:
+    """The form at X; None where it vanishes identically."""
+    total = None
+    for k, coefficient in form:
+        term = X[k].times(coefficient)
+        total = term if total is None else total + term
+    return total
 
 
 def _rank(X: Sequence[Jet], prime: int) -> int:

@@ -161,6 +161,14 @@ class Recurrence:
         return "; ".join(f"{form} for n = {residue} mod {period}" for residue, form in enumerate(forms))
 
     @property
+    def closed_form_text(self) -> str | None:
+        """The closed form, with the first n that it holds for where this is not 0."""
+        after = f" for n >= {self.preperiod}"
+        if not self.closed_form or not self.preperiod:
+            return self.closed_form
+        return f"{self.closed_form}, all" + after if ";" in self.closed_form else self.closed_form + after
+
+    @property
     def text(self) -> str:
         """The recurrence as an equation, with what speaks for it."""
         terms = [f"{_signed(-self.characteristic[k])}*a(n-{self.order - k})" for k in range(self.order - 1, -1, -1)]

@@ -10,6 +10,7 @@ from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
 from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.commuting import CommutingField
+from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
 from kahanmaps.laboratory.recurrences import GrowthClass
 
 if TYPE_CHECKING:
@@ -45,7 +46,8 @@ def conclude(found: Analysis) -> Conclusion:
     """The verdict on what was found."""
     count = found.integral_count
     growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
-    phrase = found.degrees.growth_text if found.degrees is not None else "degrees not measured"
+    phrase = found.degrees.kind_text if found.degrees is not None else "degrees not measured"
+    measured = f" ({found.degrees.basis})" if found.degrees is not None else ""
     integrals = _count_text(found) if found.integrals_were_counted else "the integrals were not counted"
     period = found.integrals.profile.period if found.integrals is not None else None
     suffix = "" if found.eps is None else f" All this at eps = {found.eps} only: other eps may differ."
@@ -61,6 +63,10 @@ def conclude(found: Analysis) -> Conclusion:
     if _is_affine(found):
         closes = "" if period is None else f"; orbits close after {counted(period, 'step')} (measured)"
         return verdict("linear", f"The system is linear, and so is its Kahan map; {integrals}{closes}.")
+    if said := contradictions(found):
+        return verdict(
+            "undecided", f"The findings do not agree: {'; '.join(said)}. {integrals[0].upper()}{integrals[1:]}."
+        )
     if period is not None:
         closes = f"Orbits close after {counted(period, 'step')} (measured)"
         return verdict("linearisable", f"{closes}: the map is periodic there; {phrase}.")
@@ -69,11 +75,15 @@ def conclude(found: Analysis) -> Conclusion:
     if growth is GrowthClass.BOUNDED:
         return verdict(
             "linearisable",
-            f"The degrees of the iterates are bounded (measured): the map is linearisable in the sense of "
+            f"The degrees of the iterates are bounded{measured}: the map is linearisable in the sense of "
             f"complexity; {integrals}.",
         )
+    if growth is GrowthClass.UNKNOWN and orbits_lie_on_curves(found):
+        return verdict(
+            "integrable", f"Integrable: {integrals}, so that orbits lie on curves; of the degrees: {phrase}."
+        )
     if growth is GrowthClass.EXPONENTIAL or (found.degrees is not None and found.degrees.looks_exponential):
-        measured = " (measured)" if growth is GrowthClass.EXPONENTIAL else ""  # the phrase says that it is estimated
+        measured = measured if growth is GrowthClass.EXPONENTIAL else ""  # the phrase says that it is estimated
         growth = GrowthClass.EXPONENTIAL
         return verdict(
             "not integrable",
@@ -81,7 +91,7 @@ def conclude(found: Analysis) -> Conclusion:
             + (f", although there {'is' if count == 1 else 'are'} {integrals}." if count else f"; {integrals}."),
         )
     if growth in (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL):
-        return verdict("integrable", f"Integrable in the sense of complexity: {phrase} (measured); {integrals}.")
+        return verdict("integrable", f"Integrable in the sense of complexity: {phrase}{measured}; {integrals}.")
     return verdict("undecided", f"The growth is undecided: {phrase}; {integrals}.")
 
 
@@ -90,7 +100,7 @@ def _count_text(found: Analysis) -> str:
     count, search = found.integral_count, found.integrals
     where = f" in dimension {found.dim}"
     if count == 0 and search is not None and not found.count_is_exact:
-        return f"no integral{where}, as far as relations of degree up to {search.profile.degree} along orbits show"
+        return f"no integral{where} up to degree {search.profile.degree} (relations along orbits)"
     number = "no integral" if count == 0 else counted(count, "independent integral")
     return number + where if found.count_is_exact else f"at least {number}{where}"
 
@@ -132,14 +142,13 @@ def _integral_lines(found: Analysis) -> list[Statement]:
         lines.append(Statement(MEASURED, f"all orbits tried close after {counted(profile.period, 'step')}"))
     else:
         nullities = ", ".join(map(str, profile.nullities))
-        lines.append(
-            Statement(
-                MEASURED,
-                f"generic orbits lie on varieties of codimension {'' if search.is_exact else 'at least '}"
-                f"{search.codimension}; relations along an orbit, of degree at most 1, 2, ...: spaces of dimension "
-                f"{nullities}",
-            )
-        )
+        relations = f"relations along an orbit, of degree at most 1, 2, ...: spaces of dimension {nullities}"
+        if search.codimension:
+            seen = "" if search.is_exact else "at least "
+            text = f"generic orbits lie on varieties of codimension {seen}{search.codimension}; {relations}"
+        else:
+            text = f"orbits show no integral up to degree {profile.degree}; {relations}"
+        lines.append(Statement(MEASURED, text))
         if not profile.agree:
             lines.append(Statement(NOTE, "the orbits that were compared do not agree"))
     lines += [Statement(MEASURED, f"along orbits {relation.text}") for relation in found.relations]
@@ -180,11 +189,13 @@ def _growth_lines(found: Analysis) -> list[Statement]:
         recurrence = found.degrees.recurrence
         if recurrence is not None:
             lines.append(Statement(MEASURED, f"recurrence: {recurrence.text}"))
-            if recurrence.closed_form:
-                lines.append(Statement(MEASURED, f"d_n = {recurrence.closed_form}"))
+            if recurrence.closed_form_text:
+                lines.append(Statement(MEASURED, f"d_n = {recurrence.closed_form_text}"))
     if found.heights is not None:
-        status = UNDECIDED if found.heights.text.startswith("undecided") else MEASURED
-        lines.append(Statement(status, f"heights of exact orbits: {found.heights.text}"))
+        doubt = doubt_of_heights(found)
+        status = UNDECIDED if doubt or found.heights.text.startswith("undecided") else MEASURED
+        text = f"heights of exact orbits: {found.heights.text}"
+        lines.append(Statement(status, f"{text}, but {doubt}" if doubt else text))
     return lines
 
 
@@ -195,8 +206,12 @@ def _singularity_lines(found: Analysis) -> list[Statement]:
     values = ", ".join(format_number(run.eps) for run in found.singularities)
     if len(verdicts) > 1:
         return [Statement(UNDECIDED, f"the eps {values} disagree: {', '.join(sorted(verdicts))}")]
-    verdict = verdicts.pop()
-    return [Statement(UNDECIDED if verdict == "undecided" else MEASURED, f"{verdict} (eps = {values})")]
+    first = min(found.singularities, key=lambda run: run.followed or 0)
+    lines = [Statement(UNDECIDED if first.verdict == "undecided" else MEASURED, f"{first.text} (eps = {values})")]
+    ends = [h.confined_at for run in found.singularities for h in run.hypersurfaces if h.confined_at is not None]
+    if ends:
+        lines.append(Statement(MEASURED, f"the last confinement comes after {counted(max(ends), 'step')}"))
+    return lines
 
 
 def _symmetry_lines(found: Analysis) -> list[Statement]:

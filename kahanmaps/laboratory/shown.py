@@ -130,7 +130,7 @@ def singularities_html(run: SingularityRun) -> str:
     ]
     inside = markup.table(["hypersurface", "fate", "contracted at step", "confined at step"], rows) if rows else ""
     inside += _notes([_rest(run.hypersurfaces)])
-    return markup.titled(f"singularities: {run.verdict}", inside, eps_sentence(run.eps))
+    return markup.titled(f"singularities: {run.text}", inside, eps_sentence(run.eps))
 
 
 def symmetries_html(found: Symmetries) -> str:

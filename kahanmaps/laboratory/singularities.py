@@ -13,7 +13,7 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb
 from typing import Any
 
@@ -24,17 +24,34 @@ from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.text import format_polynomial
-from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.laboratory.fates import NOT_CONTRACTED, UNDECIDED, Hypersurface, fate_of, unwritten
+from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.errors import InputError, SingularStep, counted
+from kahanmaps.laboratory.fates import (
+    CONFINED,
+    FIRST_STEPS,
+    NOT_CONFINED,
+    NOT_CONTRACTED,
+    UNDECIDED,
+    Hypersurface,
+    Range,
+    fate_of,
+    fates_at_random,
+    unwritten,
+)
 from kahanmaps.laboratory.shown import singularities_html
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 6
-MAX_STEPS = 200
-DEFAULT_STEPS = 12
+MAX_STEPS = 10_000
+_REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the least
+_LEAST_REACH = 100
+_ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
+_LEAST_ALONG = 30
+_MOST_SHOWN = 200
+_DRAWS = 2  # of two values of eps, where the first ones are special
+WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
 _POINTS = 3  # random ones, where det dPhi is looked at
 _MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
 
@@ -82,6 +99,20 @@ class SingularityRun:
         return "some confined" if len(states) > 1 else states.pop()
 
     @property
+    def followed(self) -> int | None:
+        """For how many steps those hypersurfaces were followed that are not confined; None where all are."""
+        steps = [h.followed for h in self.hypersurfaces if h.status == NOT_CONFINED]
+        return min(steps, default=None)
+
+    @property
+    def text(self) -> str:
+        """The verdict, with the number of steps after which confinement was no longer looked for."""
+        if self.followed is None or self.verdict not in (NOT_CONFINED, "some confined"):
+            return self.verdict
+        others = ", others not" if self.verdict == "some confined" else ""
+        return f"{self.verdict}{others} within {counted(self.followed, 'step')}"
+
+    @property
     def shape(self) -> tuple[Any, ...]:
         """What does not depend on eps if eps is generic: degrees, kinds and patterns."""
         patterns = sorted(
@@ -95,15 +126,16 @@ def singularities(
     system: QuadraticSystem,
     eps: Any,
     *,
-    steps: int = DEFAULT_STEPS,
+    steps: int | None = None,
     seed: int = 0,
     seconds: float = 60.0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> SingularityRun:
     """The contracted hypersurfaces and poles of a Kahan map at one exact eps (half the time step), and their fate.
 
-    They are followed for `steps` steps. Hypersurfaces are exact, their fate is that of two random points modulo two
-    random primes; "not confined" means within so many steps. Stops after about `seconds` seconds. Returns a
+    They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
+    above, fewer where series are needed all the way. Hypersurfaces are exact, their fate is that of two random points
+    modulo two random primes; "not confined" means within so many steps. Stops after about `seconds` seconds. Returns a
     SingularityRun; raises InputError for dimensions above 6 and a wrong number of steps.
     Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
 
@@ -114,9 +146,9 @@ def singularities(
     exact_eps = rational(eps)
     if system.dim > MAX_DIMENSION:
         raise InputError(f"found a system of dimension {system.dim}, expected at most {MAX_DIMENSION}")
-    if not 1 <= steps <= MAX_STEPS:
+    if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
-    end = time.monotonic() + seconds
+    limits = _range(system.dim, steps, time.monotonic() + seconds)
     forms, common = homogeneous_map(system, exact_eps, QQ)
     degree = max(int(form.total_degree()) for form in forms)
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
@@ -144,18 +176,142 @@ def singularities(
     rng = random.Random(f"singularities {seed_for(seed, system.rhs, exact_eps)}")
     found, stopped = [], False
     for factor, pole, multiplicity in factors.values():
-        if time.monotonic() > end:
+        if limits.is_over:
             stopped = True
             break
         text = "Z" if _is_infinity(factor) else _affine(factor, system)
         progress(f"following {text[:40]}")
-        fate = fate_of(system, exact_eps, factor, steps, rng, end)
-        found.append(Hypersurface(text, int(factor.total_degree()), pole, multiplicity, *fate))
+        found.append(fate_of(system, exact_eps, factor, text, pole, multiplicity, rng, limits))
     if critical_degree is None and not stopped:
         progress("following critical points")
-        found += unwritten(system, exact_eps, steps, rng, end)
-        stopped = time.monotonic() > end
+        found += unwritten(system, exact_eps, rng, limits)
+        stopped = limits.is_over
     return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
+
+
+@dataclass(frozen=True)
+class Patterns:
+    """What the fates of contracted hypersurfaces say of degrees: how many of them tell how they go on.
+
+    Degrees drop below powers of the first only where the images of contracted hypersurfaces meet points without a
+    value, so that nothing new can be seen in them before the last pattern has come to its end. `lengths` are the
+    different numbers of steps after which patterns had settled, `searched` is the number of steps those were followed
+    for that are not confined (None if all are), `some_confined` tells whether others are. `running` is empty, or says
+    why the patterns are not known to the end.
+    """
+
+    lengths: tuple[int, ...]
+    searched: int | None
+    some_confined: bool
+    running: str = ""
+
+    def terms_needed(self, order: int) -> int:
+        """The number of terms, d_0 included, from which a recurrence of this order can be told from all others.
+
+        With two rational generating functions of degrees r and R that agree in r + R + 1 terms they are the same; R is
+        at most 1 more than the sum of the lengths of different patterns (hypersurfaces of the same pattern count once).
+        """
+        return order + sum(self.lengths) + 2
+
+    @property
+    def limit(self) -> str:
+        """What was not seen, and how far it was looked for; empty where everything is confined."""
+        if self.searched is None:
+            return ""
+        return f"{'no other' if self.some_confined else 'no'} confinement within {counted(self.searched, 'step')}"
+
+    @property
+    def text(self) -> str:
+        """One line: the longest pattern, and how far others were followed."""
+        if self.running:
+            return self.running
+        longest = max(self.lengths, default=0)
+        ends = f"nothing new after step {longest}" if longest else "none that lowers degrees"
+        return f"{ends}; {self.limit}" if self.limit else ends
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "lengths": list(self.lengths),
+            "searched": self.searched,
+            "some_confined": self.some_confined,
+            "running": self.running,
+            "text": self.text,
+        }
+
+
+def patterns_of(runs: Sequence[SingularityRun]) -> Patterns:
+    """What runs at one eps, or at two that stand for all, say together."""
+    return _one_of({_refused(run.eps, run.is_dominant, run.stopped) or _patterns(run.hypersurfaces) for run in runs})
+
+
+def patterns(
+    system: QuadraticSystem, eps: fmpq | None, *, steps: int | None = None, seed: int = 0, seconds: float = 60.0
+) -> Patterns:
+    """The patterns of the Kahan map at one exact eps (half the time step) or, where none is given, at two.
+
+    Up to dimension 4 those of `singularities`; above it random points stand for hypersurfaces.
+    """
+    end = time.monotonic() + seconds
+    found = _unknown("")
+    for again in range(_DRAWS if eps is None else 1):
+        if again and (not found.running or time.monotonic() > end):
+            break
+        values = default_eps(system, seed + again) if eps is None else (eps,)
+        part = max(0.0, end - time.monotonic()) / len(values)
+        if system.dim <= WRITTEN_DIMENSION:
+            runs = [singularities(system, value, steps=steps, seed=seed, seconds=part) for value in values]
+            found = patterns_of(runs)
+        else:
+            found = _one_of({_at_random(system, value, steps, seed, part) for value in values})
+    return found
+
+
+def _at_random(system: QuadraticSystem, eps: fmpq, steps: int | None, seed: int, seconds: float) -> Patterns:
+    limits = _range(system.dim, steps, time.monotonic() + seconds)
+    limits = replace(limits, shown=min(limits.shown, FIRST_STEPS), briefly=True)
+    if not _is_dominant(system, eps):
+        return _refused(eps, False, False) or _unknown("")
+    found = fates_at_random(system, eps, random.Random(f"patterns {seed_for(seed, system.rhs, eps)}"), limits)
+    return _refused(eps, True, limits.is_over) or _patterns(found)
+
+
+def _one_of(several: set[Patterns]) -> Patterns:
+    return several.pop() if len(several) == 1 else _unknown("the singularities at two values of eps differ (--eps)")
+
+
+def _refused(eps: fmpq, is_dominant: bool, stopped: bool) -> Patterns | None:
+    if not is_dominant:
+        return _unknown(f"the map is not dominant at eps = {format_number(eps)}, and no singularity is followed")
+    return _unknown("the time was over before all singularities were followed (--seconds)") if stopped else None
+
+
+def _unknown(reason: str) -> Patterns:
+    return Patterns((), None, False, reason)
+
+
+def _patterns(hypersurfaces: Sequence[Hypersurface]) -> Patterns:
+    # A pole of multiplicity 0 is no critical hypersurface: what it becomes lowers no degree.
+    contracted = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
+    for h in contracted:
+        name = "a hypersurface" if h.polynomial == "?" else f"{h.polynomial[:60]} = 0"
+        if h.status == UNDECIDED:
+            return _unknown(f"what becomes of {name} is undecided: {h.note or 'its series ended'}")
+        if h.settled_at is None:
+            return _unknown(f"the pattern of {name} is still running after {h.followed} steps (--steps)")
+    lengths = {h.settled_at for h in contracted if h.settled_at}
+    open_ones = [h.followed for h in contracted if h.status != CONFINED]
+    return Patterns(tuple(sorted(lengths)), min(open_ones, default=None), len(open_ones) < len(contracted))
+
+
+def steps_by_default(dim: int) -> int:
+    """For how many steps hypersurfaces are followed in this dimension unless told otherwise."""
+    return _REACH.get(dim, _LEAST_REACH)
+
+
+def _range(dim: int, steps: int | None, end: float) -> Range:
+    reach = steps or steps_by_default(dim)
+    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, steps or _ALONG.get(dim, _LEAST_ALONG), end)
 
 
 def symbolic_denominator(system: QuadraticSystem) -> list[tuple[str, int]] | None:

@@ -8,6 +8,7 @@ from typing import Any
 from kahanmaps.algebra.text import parse_number
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.degrees import DegreeGrowth
+from kahanmaps.laboratory.singularities import Patterns
 
 _MOST_TERMS = 10_000
 _LARGEST = 10**15
@@ -16,7 +17,8 @@ _LARGEST = 10**15
 def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGrowth]:
     """The name of the system, and the degrees, in the JSON object that `kahanmaps degrees --json` writes.
 
-    The recurrence is looked for anew. Raises InputError for anything else.
+    The recurrence is looked for anew; records of older versions have no patterns of singularities.
+    Raises InputError for anything else.
 
     >>> record = {"command": "degrees", "system": "top", "degrees": [1, 3, 9, 19, 33, 51, 73, 99], "eps": "generic"}
     >>> name, growth = degrees_of_record({**record, "ended": "terms", "message": "8 terms", "seed": 0, "lines": []})
@@ -42,7 +44,20 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
             int(record["seed"]),
             tuple(int(line["prime"]) for line in record["lines"]),
             tuple(int(line["eps_residue"]) for line in record["lines"]),
+            patterns=_patterns(record.get("singularities")),
         )
         return str(record["system"]), growth
     except (KeyError, TypeError, ValueError, AttributeError, InputError) as error:
         raise InputError(f"{where}: found degrees that cannot be read ({error}), expected those of degrees") from error
+
+
+def _patterns(record: Any) -> Patterns | None:
+    if record is None:
+        return None
+    searched = record["searched"]
+    return Patterns(
+        tuple(int(length) for length in record["lengths"]),
+        None if searched is None else int(searched),
+        bool(record["some_confined"]),
+        str(record["running"]),
+    )

@@ -16,6 +16,7 @@ def test_the_degrees_of_the_euler_top(kahanmaps):
         "growth\tquadratic growth, dynamical degree 1",
         "recurrence\ta(n) = 3*a(n-1)-3*a(n-2)+a(n-3) for n >= 3, from 12 terms of which 6 were not needed to find it",
         "closed form\t2*n^2 + 1",
+        "singularities\tnothing new after step 3",
         "ended\ta recurrence of order 3 holds for 6 terms to spare",
     ]
 
@@ -83,3 +84,12 @@ def test_wrong_use_gives_2(kahanmaps, command, words):
     outcome = kahanmaps(command)
     assert (outcome.status, outcome.out) == (2, "")
     assert words in outcome.err
+
+
+def test_a_recurrence_that_fits_without_terms_enough_beyond_the_patterns_is_undecided(kahanmaps):
+    """The lines x, y, x + 2 y with exponents (1, 3, 3): 2^n up to n = 7, and 255 after that."""
+    outcome = kahanmaps("degrees --vars x,y --rhs 3*x*(x+2*y)+6*x*y --rhs=-(y*(x+2*y)+3*x*y) --max-degree 150")
+    assert outcome.status == 3
+    assert outcome.err == "undecided: after a pattern of 8 steps 10 iterates are needed (--seconds, --max-degree)\n"
+    assert "dynamical degree" not in outcome.out
+    assert "growth\texponential growth by a factor of about 2 (estimated: after a pattern of 8 steps" in outcome.out

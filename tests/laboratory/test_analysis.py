@@ -180,7 +180,7 @@ def test_quadratic_growth_without_integrals():
         "quadratic",
     )
     assert found.conclusion.sentence.endswith(
-        "(measured); no integral in dimension 3, as far as relations of degree up to 10 along orbits show."
+        "(measured); no integral in dimension 3 up to degree 10 (relations along orbits)."
     )
 
 

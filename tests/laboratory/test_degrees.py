@@ -9,7 +9,8 @@ from __future__ import annotations
 import random
 
 import pytest
-from flint import fmpz_poly, nmod_poly
+from degree_helpers import polynomial_degrees
+from flint import fmpz_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.errors import InputError
@@ -63,48 +64,6 @@ def lagrange_top() -> QuadraticSystem:
 def zander() -> QuadraticSystem:
     """gamma = (1, 2, 0) for the lines x, y, x + 2 y: (x + 2 y)/y times J grad (x y^2)."""
     return QuadraticSystem.from_text(["x", "y"], ["2*x*(x + 2*y)", "-y*(x + 2*y)"])
-
-
-def polynomial_degrees(system: QuadraticSystem, count: int, seed: int) -> list[int]:
-    """The degrees by Cramer's rule on homogeneous coordinates, common factors divided out: no power series."""
-    rng = random.Random(seed)
-    field = GF(2**61 - 1)
-    p, n = field.prime, system.dim
-    eps, local = field.random(rng), system.over(field)
-    zero, one = nmod_poly([0], p), field.one
-    X = [nmod_poly([1], p), *(nmod_poly([rng.randrange(p), rng.randrange(p)], p) for _ in range(n))]
-    found = []
-    for _ in range(count):
-        matrix = [
-            [
-                X[0] * ((i == j) * one - eps * local.B[i, j])
-                - sum((X[k + 1] * (eps * local.tensor[i * n + j, k]) for k in range(n)), zero)
-                for j in range(n)
-            ]
-            for i in range(n)
-        ]
-        right = [
-            sum((X[j + 1] * ((i == j) * one + eps * local.B[i, j]) for j in range(n)), X[0] * (2 * eps * local.c[i, 0]))
-            for i in range(n)
-        ]
-        image = [determinant(matrix)]
-        for j in range(n):
-            image.append(determinant([[*row[:j], b, *row[j + 1 :]] for row, b in zip(matrix, right, strict=True)]))
-        common = image[0]
-        for entry in image[1:]:
-            common = common.gcd(entry)
-        X = [entry // common for entry in image]
-        found.append(max(entry.degree() for entry in X))
-    return found
-
-
-def determinant(rows: list[list[nmod_poly]]) -> nmod_poly:
-    """By expansion along the first row."""
-    if len(rows) == 1:
-        return rows[0][0]
-    minors = (determinant([[*row[:j], *row[j + 1 :]] for row in rows[1:]]) for j in range(len(rows)))
-    signed = (entry * minor * (-1) ** j for j, (entry, minor) in enumerate(zip(rows[0], minors, strict=True)))
-    return sum(signed, nmod_poly([0], rows[0][0].modulus()))
 
 
 @pytest.mark.parametrize("name", CATALOG)

@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 @click.option(
     "--max-degree", type=int, metavar="D", default=20_000, show_default=True, help="Work out no larger degree."
 )
+@click.option(
+    "--steps", type=int, metavar="N", help="Steps to follow singularities for (default: as singularities does)."
+)
 @seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
@@ -48,10 +51,12 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 63 bits, two of
     each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
 
-    A recurrence is accepted where it holds for at least 2 terms more than determine it; how many is told.
+    A recurrence is accepted where it holds for at least 2 terms more than determine it, how many is told, and where
+    there are terms enough beyond the last confinement: singularities are followed, and as long as they may lower
+    degrees later on there is an estimate only. "no confinement" is said with the number of steps that were tried.
 
     Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
-    vary; 2 wrong use; 3 stopped early.
+    vary; 2 wrong use; 3 undecided, or stopped early.
     """
     from kahanmaps.laboratory.degrees import degree_growth
 
@@ -65,6 +70,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             max_terms=options["terms"],
             max_degree=options["max_degree"],
             seed=options["seed"],
+            steps=options["steps"],
             progress=progress,
         )
     if as_json:
@@ -77,12 +83,12 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if _is_done(found, options["terms"]):
         return 0
     if not quiet:
-        say(f"stopped early: {found.message}")
+        say(f"undecided: {found.unconfirmed}" if found.unconfirmed else f"stopped early: {found.message}")
     return 3
 
 
 def _is_done(found: DegreeGrowth, terms: int | None) -> bool:
-    if found.ended in ("recurrence", "terms", "constant", "singular"):
+    if found.ended in ("terms", "constant", "singular"):
         return True
     return terms is None and found.recurrence is not None
 

@@ -29,7 +29,10 @@ if TYPE_CHECKING:
 @system_options
 @eps_options
 @click.option(
-    "--steps", type=int, metavar="N", default=12, show_default=True, help="Steps to follow each hypersurface for."
+    "--steps",
+    type=int,
+    metavar="N",
+    help="Steps to follow each hypersurface for (default: 1000 in the plane, 500, 250, 100 in dimension 3, 4, more).",
 )
 @seconds_option(60.0, "Time for each eps.")
 @seed_option
@@ -46,10 +49,11 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     along power series modulo large primes: what dimension do their images have, and when is it full again? Without
     --eps two values are tried and compared.
 
-    "ranks" are the dimensions of the images after 1, 2, ... steps, "poles" the orders of their poles. Z is the
-    hyperplane at infinity. Confined singularities are evidence for, and no proof of integrability: those of
-    henon_heiles are confined, and its degrees grow exponentially. "not confined" means within so many steps. Where the
-    map is not dominant, that is, where its image lies in a hypersurface, nothing is followed.
+    "ranks" are the dimensions of the images after 1, 2, ... steps, "poles" the orders of their poles, for the first
+    steps. Z is the hyperplane at infinity. Confined singularities are evidence for, and no proof of integrability:
+    those of henon_heiles are confined, and its degrees grow exponentially. "not confined" is said with the number of
+    steps that were tried. Where the map is not dominant, that is, where its image lies in a hypersurface, nothing is
+    followed.
 
     Where the polynomials are too large, ? stands for all hypersurfaces that share their multiplicity and their fate,
     known by random points.
@@ -79,7 +83,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if as_json:
         print_json(_record(file, options, runs, symbolic, verdict))
     else:
-        _print(file, runs, symbolic, verdict, options["steps"])
+        _print(file, runs, symbolic, runs[0].text if agree else verdict)
     if verdict == UNDECIDED and not quiet:
         say(f"undecided: {_why(runs, agree)}")
     return 3 if verdict == UNDECIDED else 0
@@ -101,17 +105,15 @@ def _poles(found: Hypersurface) -> str:
     return " ".join("?" if step.pole is None else str(step.pole) for step in found.steps)
 
 
-def _told(found: Hypersurface, steps: int) -> str:
+def _told(found: Hypersurface) -> str:
     if found.status == "confined":
         return f"contracted by step {found.contracted_at}, confined after {found.confined_at} steps"
     if found.status == "not confined":
-        return f"contracted by step {found.contracted_at}, not confined within {steps} steps"
+        return f"contracted by step {found.contracted_at}, not confined within {found.followed} steps"
     return found.status + (f": {found.note}" if found.note else "")
 
 
-def _print(
-    file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str, steps: int
-) -> None:
+def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str) -> None:
     from kahanmaps.algebra.text import format_number
 
     def cut(text: str) -> str:
@@ -122,12 +124,12 @@ def _print(
         factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
         tell(f"factors of det(I - eps f')\t{cut(factors) or 'none'}")
     for run in runs:
-        tell(f"\n# eps = {format_number(run.eps)}: map of degree {run.map_degree}, {run.verdict}")
+        tell(f"\n# eps = {format_number(run.eps)}: map of degree {run.map_degree}, {run.text}")
         tell(f"det(I - eps f')\t{cut(run.denominator)}")
         for found in run.hypersurfaces:
             kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
             kind += " in all" if found.polynomial == "?" else ""
-            tell(f"{cut(found.polynomial)}\t{kind}\t{_told(found, steps)}")
+            tell(f"{cut(found.polynomial)}\t{kind}\t{_told(found)}")
             if found.steps:
                 tell(f"  ranks {_ranks(found)}\tpoles {_poles(found)}")
     tell(f"\n# {verdict}")
@@ -142,6 +144,7 @@ def _record(
 ) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
     from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.laboratory.singularities import steps_by_default
     from kahanmaps.version import __version__
 
     return {
@@ -151,7 +154,7 @@ def _record(
         "convention": CONVENTION,
         "arithmetic": "exact; series modulo primes",
         "seed": options["seed"],
-        "steps": options["steps"],
+        "steps": options["steps"] or steps_by_default(file.system.dim),
         "seconds": options["seconds"],
         "verdict": verdict,
         "symbolic_denominator": symbolic,
@@ -166,6 +169,8 @@ def _record(
                 "stopped": run.stopped,
                 "singular_everywhere": run.is_undefined,
                 "dominant": run.is_dominant,
+                "followed": run.followed,
+                "text": run.text,
                 "hypersurfaces": [
                     {
                         "polynomial": found.polynomial,
@@ -175,6 +180,8 @@ def _record(
                         "status": found.status,
                         "contracted_at": found.contracted_at,
                         "confined_at": found.confined_at,
+                        "followed": found.followed,
+                        "settled_at": found.settled_at,
                         "ranks": [step.rank for step in found.steps],
                         "poles": [step.pole for step in found.steps],
                         "denominators": [step.denominator for step in found.steps],

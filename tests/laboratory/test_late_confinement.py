@@ -1,0 +1,289 @@
+"""Maps whose first degrees are those of another map: what is said of them is true of the degrees far beyond.
+
+A contracted hypersurface may come back only after dozens of steps, and no degree shows it before. The degrees of the
+tables are computed here once more, with polynomials and gcds, for as long as the statements reach.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from degree_helpers import polynomial_degrees
+from search_helpers import system as file_from
+
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.analysis import Analysis, analyze
+from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights
+from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
+from kahanmaps.laboratory.fates import CONFINED, NOT_CONFINED, _settled
+from kahanmaps.laboratory.recurrences import GrowthClass
+from kahanmaps.laboratory.singularities import Patterns, patterns, patterns_of, singularities
+from kahanmaps.systems.catalog import load
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def planar(*rhs: str) -> QuadraticSystem:
+    return QuadraticSystem.from_text(["x", "y"], rhs)
+
+
+def resonant(k: object) -> QuadraticSystem:
+    """x' = x^2, y' = k x y: 1/x moves by -2 eps, and the poles of y are cancelled after k steps for integers k."""
+    return planar("x^2", f"{k}*x*y")
+
+
+def three_lines(*exponents: int) -> QuadraticSystem:
+    """x' = l1^(1-g1) l2^(1-g2) l3^(1-g3) J grad l1^g1 l2^g2 l3^g3 for the lines x, y, x + 2 y."""
+    a, b, c = exponents
+    return planar(f"{b}*x*(x + 2*y) + 2*{c}*x*y", f"-({a}*y*(x + 2*y) + {c}*x*y)")
+
+
+# System, eps, growth and closed form of its degrees, and for how many steps the latter has to be tried.
+SLOW_GROWTH = [
+    *((resonant(k), None, "bounded", f"{k} for n >= {k - 1}", 40) for k in range(12, 26)),
+    (resonant("41/2"), None, "linear", "n + 1", 60),
+    (planar("1", "x*y"), "1/10", "bounded", "102 for n >= 101", 110),
+    (planar("1", "x*y"), "1/7", "bounded", "51 for n >= 50", 60),
+    (planar("1", "x*y"), None, "linear", "n + 1", 60),
+    (
+        QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "15*x*y", "y*z"]),
+        None,
+        "linear",
+        "15*n - 90 for n >= 13",
+        40,
+    ),
+    (
+        QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "12*x*y", "y*z"]),
+        None,
+        "linear",
+        "12*n - 54 for n >= 10",
+        30,
+    ),
+]
+# Systems whose first d_n are 2^n, and the first n with fewer.
+THREE_LINES = [((1, 3, 3), 8), ((1, 2, 6), 10), ((1, 3, 6), 11), ((1, 2, 5), 5), ((1, 4, 2), 8), ((2, 5, 3), 3)]
+
+
+@pytest.mark.parametrize(("system", "eps", "growth", "closed_form", "steps"), SLOW_GROWTH)
+def test_where_growth_is_slow_the_law_holds_far_beyond_the_last_confinement(system, eps, growth, closed_form, steps):
+    found = degree_growth(system, eps, seconds=60)
+    assert (str(found.growth), found.recurrence.closed_form_text) == (growth, closed_form)
+    true = [1, *polynomial_degrees(system, steps, 5, eps)]
+    assert [found.recurrence.predict(n) for n in range(steps + 1)] == true
+    assert len(found.degrees) > 2 * max(found.patterns.lengths)
+
+
+@pytest.mark.parametrize(("exponents", "first"), THREE_LINES)
+def test_three_lines_of_late_confinement_have_no_dynamical_degree_2(exponents, first):
+    system = three_lines(*exponents)
+    found = degree_growth(system, max_degree=3000)
+    true = polynomial_degrees(system, 11, 5)
+    assert next(n for n, d in enumerate(true, 1) if d < 2**n) == first
+    assert list(found.degrees[1:12]) == true[: len(found.degrees) - 1]
+    assert found.recurrence is None or found.recurrence.predict(11) == true[10]
+    assert found.dynamical_degree is None or found.dynamical_degree.text != "2"
+
+
+@pytest.mark.parametrize("exponents", [(1, 3, 3), (1, 2, 6), (1, 3, 6)])
+def test_while_a_pattern_is_longer_than_the_degrees_there_is_an_estimate_only(exponents):
+    """So few terms are all 2^n; the pattern that will lower them is seen by the singularities."""
+    found = degree_growth(three_lines(*exponents), max_terms=7)
+    assert found.degrees == tuple(2**n for n in range(8))
+    assert (found.recurrence, found.dynamical_degree, found.growth) == (None, None, GrowthClass.UNKNOWN)
+    length = max(found.patterns.lengths)
+    assert found.growth_text == (
+        f"exponential growth by a factor of about 2 (estimated: after a pattern of {length} steps {length + 2} "
+        "iterates are needed (--seconds, --max-degree))"
+    )
+    assert found.to_json()["unconfirmed"] == found.unconfirmed != ""
+
+
+def test_the_issue_of_ten_terms():
+    system = planar("x*(7*x + 24*y)", "-y*(20*x + 3*y)")
+    found = degree_growth(system, max_degree=2000)
+    assert found.degrees[9:11] == (512, 1023)
+    assert (found.recurrence, found.looks_exponential) == (None, True)
+
+
+def test_a_map_that_confines_nothing_is_said_to_do_so_within_the_steps_that_were_tried():
+    found = degree_growth(load("lotka_volterra").system)
+    assert found.growth_text == ("exponential growth, dynamical degree 2 (measured: no confinement within 1000 steps)")
+    assert degree_growth(load("lotka_volterra").system, steps=30).basis == "measured: no confinement within 30 steps"
+    assert degree_growth(load("zander_120").system).basis == "measured: no other confinement within 1000 steps"
+    assert degree_growth(load("euler_top").system).basis == "measured"
+    with pytest.raises(InputError, match="found 0 steps"):
+        degree_growth(load("euler_top").system, steps=0)
+
+
+def test_steps_too_few_for_a_pattern_are_named_with_what_they_missed():
+    """With 10 steps nothing is seen of what comes after 20, and nothing else is claimed."""
+    found = degree_growth(resonant(20), steps=10, max_terms=15)
+    assert found.basis == "measured: no confinement within 10 steps"
+    assert degree_growth(resonant(20), max_terms=15).unconfirmed.startswith("after a pattern of 20 steps")
+
+
+# The patterns themselves
+
+
+@pytest.mark.parametrize("k", [13, 20, 31])
+def test_the_pole_of_a_resonant_system_is_confined_after_k_steps(k):
+    run = singularities(resonant(k), "1/7")
+    ends = [(h.confined_at, h.settled_at) for h in run.hypersurfaces if h.status == CONFINED]
+    assert ends == [(k, k)]
+    assert run.text == "some confined, others not within 1000 steps"
+    assert singularities(resonant(k), "1/7", steps=k - 1).text == f"not confined within {k - 1} steps"
+    assert len(next(h for h in run.hypersurfaces if h.status == CONFINED).steps) == k + 2
+
+
+def test_a_hypersurface_that_is_followed_as_a_point_comes_back():
+    """Nothing is divided out before step 51, so that only the orbit of a point is computed until then."""
+    run = singularities(planar("1", "x*y"), "1/7")
+    (late,) = [h for h in run.hypersurfaces if h.status == CONFINED]
+    assert (late.confined_at, [step.common for step in late.steps[:50]]) == (51, [0] * 50)
+
+
+@pytest.mark.parametrize(
+    ("name", "lengths", "searched"),
+    [
+        ("euler_top", (3,), None),
+        ("nahm_icosahedral", (3, 4, 7), None),
+        ("weierstrass", (2, 4, 6), None),
+        ("lotka_volterra", (), 1000),
+        ("zander_120", (4,), 1000),
+        ("riccati", (), None),
+        ("volterra_periodic_5", (2,), 100),
+    ],
+)
+def test_the_lengths_of_patterns_in_the_catalogue(name, lengths, searched):
+    found = patterns(load(name).system, None)
+    assert (found.lengths, found.searched, found.running) == (lengths, searched, "")
+
+
+@pytest.mark.parametrize("name", ["henon_heiles", "volterra_periodic_4", "paper_m2"])
+def test_random_points_have_the_patterns_of_polynomials(name, monkeypatch):
+    system = load(name).system
+    written = patterns(system, None)
+    monkeypatch.setattr("kahanmaps.laboratory.singularities.WRITTEN_DIMENSION", 1)
+    assert patterns(system, None) == written
+
+
+def test_two_eps_that_differ_leave_the_patterns_open():
+    runs = [singularities(planar("1", "x*y"), eps) for eps in ("1/7", "2/7")]
+    assert patterns_of(runs).running == "the singularities at two values of eps differ (--eps)"
+    assert patterns_of(runs[:1]).running == ""
+
+
+def test_a_pattern_that_goes_on_changing_is_running():
+    assert _settled([k * k for k in range(12)]) == 3
+    assert _settled([int(k in (3, 11, 19, 20, 33)) for k in range(40)]) is None
+    run = singularities(resonant(20), "1/7")
+    one = next(h for h in run.hypersurfaces if h.status == CONFINED)
+    open_run = replace(run, hypersurfaces=(replace(one, status=NOT_CONFINED, settled_at=None, followed=40),))
+    assert patterns_of([open_run]).running == (
+        f"the pattern of {one.polynomial} = 0 is still running after 40 steps (--steps)"
+    )
+    assert "was over" in patterns_of([replace(run, stopped=True)]).running
+    assert "not dominant" in patterns_of([replace(run, is_dominant=False)]).running
+
+
+def growth_with(known: Patterns | None, *degrees: int) -> DegreeGrowth:
+    return DegreeGrowth(degrees, None, "terms", "", 0, (), (), patterns=known)
+
+
+def test_a_recurrence_needs_terms_beyond_all_patterns():
+    linear = tuple(range(1, 14))
+    assert growth_with(None, *linear).recurrence.closed_form == "n + 1"
+    assert growth_with(Patterns((9,), None, True), *linear).recurrence.closed_form == "n + 1"
+    for known in (Patterns((10,), None, True), Patterns((4, 6), 100, True), Patterns((), None, False, "no time")):
+        found = growth_with(known, *linear)
+        assert (found.recurrence, found.growth) == (None, GrowthClass.UNKNOWN)
+        assert found.growth_text.startswith("13 terms fit linear growth, an estimate only: ")
+    # 13 terms, no hypersurface that could lower a degree, and yet the degrees are not 2^n
+    assert "degrees drop where" in growth_with(Patterns((), 100, False), *linear).unconfirmed
+    assert growth_with(Patterns((), 100, False), *(2**n for n in range(8))).dynamical_degree.text == "2"
+
+
+# The report
+
+
+LATE = {
+    "resonant 20": (("x y", "x^2", "20*x*y"), None, "linearisable", "bounded"),
+    "resonant 17": (("x y", "x^2", "17*x*y"), None, "linearisable", "bounded"),
+    "step 101": (("x y", "1", "x*y"), "1/10", "linearisable", "bounded"),
+    "space": (("x y z", "x^2", "15*x*y", "y*z"), None, "integrable", "linear"),
+}
+LATE |= {
+    f"lines {exponents}": (("x y", *rhs), None, "not integrable", "exponential")
+    for exponents, rhs in {
+        (1, 3, 3): ("3*x*(x + 2*y) + 6*x*y", "-(y*(x + 2*y) + 3*x*y)"),
+        (1, 2, 6): ("2*x*(x + 2*y) + 12*x*y", "-(y*(x + 2*y) + 6*x*y)"),
+        (1, 2, 5): ("2*x*(x + 2*y) + 10*x*y", "-(y*(x + 2*y) + 5*x*y)"),
+        (1, 4, 2): ("4*x*(x + 2*y) + 4*x*y", "-(y*(x + 2*y) + 2*x*y)"),
+        (2, 5, 3): ("5*x*(x + 2*y) + 6*x*y", "-(2*y*(x + 2*y) + 3*x*y)"),
+    }.items()
+}
+
+
+@cache
+def analysed(name: str) -> Analysis:
+    given, eps, _, _ = LATE[name]
+    return analyze(file_from(*given), eps=eps, seconds=20)
+
+
+@pytest.mark.parametrize(
+    "name", [n if n.startswith("resonant") else pytest.param(n, marks=pytest.mark.slow) for n in LATE]
+)
+def test_the_parts_of_a_report_do_not_contradict_each_other(name):
+    found, (_, eps, kind, growth) = analysed(name), LATE[name]
+    assert (found.conclusion.kind, found.conclusion.growth) == (kind, growth)
+    assert contradictions(found) == []
+    true = polynomial_degrees(found.file.system, 14 if growth == "exponential" else 30, 3, eps)
+    law = found.degrees.recurrence
+    assert law is None or [law.predict(n) for n in range(1, len(true) + 1)] == true
+    assert "estimated" in found.conclusion.sentence or law is not None
+    assert found.degrees.patterns == patterns_of(found.singularities)
+    lines = [line for _, section in found.sections for line in section]
+    for text in (found.conclusion.sentence, *(line.text for line in lines)):
+        assert "no integral" not in text or "up to degree" in text
+        assert "not confined" not in text or "within" in text
+        assert "confinement" not in text or "within" in text or "the last confinement" in text
+    last = max(h.confined_at or 0 for run in found.singularities for h in run.hypersurfaces)
+    assert f"the last confinement comes after {last} steps" in [line.text for line in lines]
+    assert last < len(found.degrees.degrees) - 1
+
+
+def test_heights_of_orbits_shorter_than_the_last_pattern_are_no_finding():
+    found = analyze(load("weierstrass"))
+    assert doubt_of_heights(found) == ""
+    late = replace(found.degrees, patterns=Patterns((50,), None, True))
+    assert doubt_of_heights(replace(found, degrees=late)).startswith("the last confinement comes after 50 steps and")
+    for degrees, words in (((20,) * 30, "are bounded"), (tuple(2**n for n in range(12)), "grow exponentially")):
+        other = replace(found, degrees=replace(found.degrees, degrees=degrees, patterns=None))
+        assert words in doubt_of_heights(other)
+        (line,) = [line for line in dict(other.sections)["growth"] if line.text.startswith("heights")]
+        assert line.status == "undecided"
+
+
+def test_what_excludes_each_other_is_undecided():
+    found = analyze(load("weierstrass"))
+    exponential = replace(found.degrees, degrees=tuple(2**n for n in range(12)), patterns=None)
+    both = replace(found, degrees=exponential)
+    assert (both.conclusion.kind, contradictions(both)) == (
+        "undecided",
+        ["the degrees seem to grow exponentially, which they cannot where integrals leave curves only"],
+    )
+    # An estimate gives way to what is proved.
+    estimate = replace(found, degrees=replace(exponential, patterns=Patterns((30,), None, True)))
+    assert estimate.conclusion.kind == "integrable"
+    closed = replace(found.integrals, profile=replace(found.integrals.profile, period=4))
+    assert contradictions(replace(found, integrals=closed)) == [
+        "orbits close after 4 steps, but the degrees seem to grow"
+    ]
+
+
+def test_patterns_that_are_open_end_the_search_without_a_recurrence():
+    found = degree_growth(load("euler_top").system, patterns=Patterns((), None, False, "the time was over"))
+    assert (found.ended, found.recurrence, found.growth) == ("unconfirmed", None, GrowthClass.UNKNOWN)
+    assert found.message == "a recurrence of order 3 fits, but the time was over"
+    assert found.growth_text == "12 terms fit quadratic growth, an estimate only: the time was over"
