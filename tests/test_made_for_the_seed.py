@@ -22,6 +22,7 @@ from kahanmaps import (
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.checks.settings import Settings
+from kahanmaps.laboratory import affine_functions
 from kahanmaps.laboratory.degrees import degree_growth
 from kahanmaps.laboratory.densities import find_densities
 
@@ -64,6 +65,25 @@ def test_densities_are_not_those_of_a_system_made_for_its_primes():
         counts.append(bool(found.densities))
         N = prod(found.primes)
     assert counts == [True] + [False] * ROUNDS
+
+
+def test_no_invariant_line_hides_parallel_to_the_line_that_was_drawn_for_another_system(monkeypatch):
+    # Invariant lines are read off from where a random line meets them; a x + b y = 7 is invariant here.
+    directions = []
+
+    def watched(local, start, direction, free, known=affine_functions._determinant_along):
+        directions.append(direction)
+        return known(local, start, direction, free)
+
+    monkeypatch.setattr(affine_functions, "_determinant_along", watched)
+    a, b = 2, 3
+    for _ in range(ROUNDS + 1):
+        line, first = f"({a}*x + ({b})*y - 7)", "(y^2 + x + 1)"
+        system = QuadraticSystem.from_text(["x", "y"], [first, f"({line}*(x + 1) - ({a})*{first})/({b})"])
+        found = affine_functions.affine_darboux(system)
+        assert [one.function.degrees() for one in found.functions] == [(1, 1)]
+        assert found.complete
+        a, b = directions[-1][1], -directions[-1][0]
 
 
 def primes_of(report) -> int:

@@ -22,6 +22,7 @@ from itertools import pairwise
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
 from kahanmaps.algebra.polynomials import degree, primitive_part
@@ -145,7 +146,8 @@ def affine_darboux(system: QuadraticSystem, *, seed: int = 0) -> AffineDarbouxLi
         found = _factors_that_are(system, coordinates)
         return AffineDarbouxList(found, False, f"more than {MAX_EXTACTIC_DIMENSION} variables: {only}")
     local = system.over(QQ)
-    rng = random.Random(seed)
+    # A hyperplane parallel to the line is not met by it, so the line must not be known to who writes the system.
+    rng = random.Random(f"affine {seed_for(seed, system.rhs)}")
     start, direction = ([fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)] for _ in range(2))
     along = _determinant_along(local, start, direction, quotient.free)
     if along.degree() < 0:

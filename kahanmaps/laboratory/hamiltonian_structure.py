@@ -17,9 +17,11 @@ from itertools import product
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz, nmod_mat
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals import ModifiedHamiltonian
 from kahanmaps.invariants.measures import DeterminantDensity
@@ -30,7 +32,6 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 30  # n (n - 1)/2 unknowns: a few seconds for 435 of them
 _GRID = 2000  # points at which a Pfaffian is shown to vanish identically
-_LARGE = 2**61 - 1  # a prime
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,7 @@ def constant_structures(system: QuadraticSystem, *, seed: int = 0) -> ConstantSt
         raise InputError(
             f"found a system of dimension {n}, expected at most {MAX_DIMENSION}: the structure has n (n - 1)/2 unknowns"
         )
-    rng = random.Random(seed)
+    rng = random.Random(f"structure {seed_for(seed, system.rhs)}")
     everything = quotient_by((), n)
     forms = closed_forms(system, everything, rng)
     functions = tuple(hamiltonian_function(system, everything, K) for K in forms)
@@ -201,12 +202,12 @@ def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[
     vectors = [K.entries() for K in forms]
     if fmpq_mat([*vectors, standard.entries()]).rank() == len(vectors):
         return standard * -1, True
-    field = GF(_LARGE)
+    field = GF(random_prime(rng))
     modular = [field.convert_matrix(K) for K in forms]
     for _ in range(3):
-        generic = nmod_mat(m, m, _LARGE)
+        generic = nmod_mat(m, m, field.characteristic)
         for K in modular:
-            generic = generic + K * rng.randrange(_LARGE)
+            generic = generic + K * rng.randrange(field.characteristic)
         if int(generic.det()):
             # Random small integers end it: the Pfaffian is a polynomial of degree m/2 that is not zero.
             return next(K for K in (_combination(c, forms) for c in _small(len(forms), rng)) if K.det() != 0), True
