@@ -82,7 +82,7 @@ def check_integrals(
     for name, function in (extra or {}).items():
         file.require_claim(f"the integral {name}", function)
     for name, function in {**file.integrals, **(extra or {})}.items():
-        candidates.append((ClaimedIntegral(name, function), None, ""))
+        candidates.append((ClaimedIntegral(name, function, settings.eps), None, ""))
     if not candidates:
         raise InputError(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "
@@ -100,7 +100,7 @@ def check_integrals(
             continue
         findings.append(
             judge(
-                f"{integral.name} is conserved",
+                f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}",
                 conservation(file.system, integral, settings.eps),
                 settings,
                 proof,

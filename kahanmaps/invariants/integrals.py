@@ -13,12 +13,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from flint import fmpq, fmpq_mat
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import Field
-from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction
+from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
 from kahanmaps.invariants.sizes import Fraction, Size, polynomial_size, step_size
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
@@ -119,4 +119,46 @@ class CommutantIntegral(PhaseFunction):
 
 
 class ClaimedIntegral(ClaimedFunction):
-    """A rational function of the variables and eps that somebody claims is conserved."""
+    """A rational function of the variables and eps that somebody claims is conserved at `eps`, or (None) at every eps.
+
+    `condition` says for which eps it has values, and that it is a constant where it is one.
+    """
+
+    def __init__(self, name: str, function: RationalFunction, eps: fmpq | None = None) -> None:
+        super().__init__(name, function)
+        self.condition = integral_condition(function, len(function.names) - 1, eps)
+
+
+def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None) -> str:
+    """For which symbols and eps I = P/Q has values, and that it is a constant if it is: such are always conserved.
+
+    Args:
+        integral: a function of `dim` variables, then of symbols and eps.
+        dim: the dimension.
+        eps: an exact number, or None for every eps.
+
+    Returns:
+        This in words; empty where I is no constant and has values at all of them, or at none.
+
+    >>> from kahanmaps.algebra.text import parse_rational_function
+    >>> for text in ("x/((10*eps - 1)*y)", "(2*x + 2*y)/(x + y)", "x/y"):
+    ...     print([integral_condition(parse_rational_function(text, ["x", "y", "eps"]), 2, None)])
+    ['where 10*eps - 1 is not 0']
+    ['being a constant']
+    ['']
+    """
+    above, below = at_eps(integral, eps)
+    if below.is_zero():
+        return ""
+    monomial = below.monoms()[0][:dim]
+    P, Q = (_coefficient(part, monomial) for part in (above, below))
+    if above * Q == below * P:
+        return "being a constant" if eps is None else f"being a constant at eps = {eps}"
+    return where(dim, below)
+
+
+def _coefficient(polynomial: fmpq_mpoly, monomial: tuple[int, ...]) -> fmpq_mpoly:
+    """That of a monomial in the first variables, a polynomial in the others, in the same ring."""
+    n = len(monomial)
+    terms = {(*(0,) * n, *m[n:]): value for m, value in polynomial.terms() if m[:n] == monomial}
+    return polynomial.context().from_dict(terms)

@@ -7,21 +7,18 @@ For Hamiltonian f with constant J the density is phi = det(I - eps f'(x)). Sourc
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
 from typing import Any
 
 from flint import fmpq
 
 from kahanmaps.algebra.fields import Field
-from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, primitive_part, substitute
-from kahanmaps.algebra.text import format_polynomial, format_rational_function
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction
+from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
 from kahanmaps.invariants.sizes import Fraction, Size, determinant_size
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
-
-_LONGEST_CONDITION = 200  # characters
 
 
 class DeterminantDensity(PhaseFunction):
@@ -29,7 +26,7 @@ class DeterminantDensity(PhaseFunction):
 
     name = "phi"
     formula = "phi = det(I - eps f'(x))"
-    condition = ""  # it is 1 at eps = 0, and where it is 0 at an eps, the map has no value and nothing is claimed
+    # No condition: it is 1 at eps = 0, and where it is 0 at an eps, the map has no value and nothing is claimed.
 
     def __init__(self, system: QuadraticSystem) -> None:
         self.system = system
@@ -58,7 +55,7 @@ class ClaimedDensity(ClaimedFunction):
 
 
 def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None) -> str:
-    """The hypothesis that phi is not the function 0, of which every law for dx/phi holds for no reason.
+    """The hypothesis that phi is a function other than 0, of which every law for dx/phi holds for no reason.
 
     Args:
         phi: a function of `dim` variables, then of symbols and eps.
@@ -66,38 +63,31 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None) -> str:
         eps: an exact number, or None for every eps.
 
     Returns:
-        For which symbols and eps phi is not identically 0, in words; empty where it is so for all of them.
+        For which symbols and eps neither phi nor its denominator is identically 0, in words; empty where it is so
+        for all of them.
 
     Raises:
-        InputError: where phi is identically 0, for that eps if one is given.
+        InputError: where phi is identically 0 or 0/0, for that eps if one is given.
 
     >>> from kahanmaps.algebra.text import parse_rational_function
-    >>> for text in ("a*x + b*y", "(10*eps - 1)*x", "a*x + y"):
+    >>> for text in ("a*x + b*y", "(10*eps - 1)*x", "x/(a*y)", "a*x + y"):
     ...     phi = parse_rational_function(text, ["x", "y", "a", "b", "eps"])
     ...     print([density_condition(phi, 2, None)])
     ['where a, b are not all 0']
     ['where 10*eps - 1 is not 0']
+    ['where a is not 0']
     ['']
     """
-    above = phi.numerator if eps is None else substitute(phi.numerator, {"eps": eps})
+    above, below = at_eps(phi, eps)
     if above.is_zero():
         text = format_rational_function(phi)
-        where = f", which is identically 0 at eps = {eps}" if text != "0" else ""
+        what = "0/0" if below.is_zero() else "identically 0"
+        which = f", which is {what} at eps = {eps}" if text != "0" else ""
         raise InputError(
-            f"found the density {quoted(text) if where else text}{where}, expected a function that is not zero: "
+            f"found the density {quoted(text) if which else text}{which}, expected a function that is not zero: "
             "the measure is dx/phi"
         )
-    found = coefficients_in(above, dim)
-    symbols = {name for c in found for name in above.context().names() if name not in c.unused_gens()}
-    if len(symbols) == 1:
-        # In one symbol the common zeros are those of the greatest common divisor.
-        found = [reduce(lambda common, c: common.gcd(c), found)]
-    if any(c.is_constant() for c in found):
-        return ""
-    texts = list(dict.fromkeys(format_polynomial(primitive_part(c)[1]) for c in found))
-    if sum(map(len, texts)) > _LONGEST_CONDITION:
-        return "where phi is not identically 0"
-    return f"where {', '.join(texts)} {'is not' if len(texts) == 1 else 'are not all'} 0"
+    return where(dim, above) if below.is_zero() else where(dim, above, below)
 
 
 def jacobian_determinant_sides(kahan: KahanMap, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:

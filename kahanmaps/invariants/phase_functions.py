@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
+from flint import fmpq, fmpq_mpoly
+
 from kahanmaps.algebra.fields import Field
-from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import format_rational_function
+from kahanmaps.algebra.polynomials import (
+    RationalFunction,
+    coefficients_in,
+    names_of,
+    primitive_part,
+    substitute,
+)
+from kahanmaps.algebra.text import format_polynomial, format_rational_function
 from kahanmaps.invariants.sizes import Fraction, Size, function_size
+
+_LONGEST_CONDITION = 200  # characters
 
 
 class PhaseFunction(ABC):
@@ -17,6 +28,7 @@ class PhaseFunction(ABC):
 
     name: str
     formula: str
+    condition: str = ""  # for which eps it means something, as `where`
 
     @abstractmethod
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
@@ -50,3 +62,47 @@ class ClaimedFunction(PhaseFunction):
 
     def size(self, eps: Size, point: Size) -> Fraction:
         return function_size(self.function, len(self.function.names) - 1, eps, point)
+
+
+def at_eps(function: RationalFunction, eps: fmpq | None) -> tuple[fmpq_mpoly, fmpq_mpoly]:
+    """Numerator and denominator, with the number for eps if one is given; the denominator may then be 0."""
+    if eps is None:
+        return function.numerator, function.denominator
+    return substitute(function.numerator, {"eps": eps}), substitute(function.denominator, {"eps": eps})
+
+
+def where(dim: int, *polynomials: fmpq_mpoly) -> str:
+    """For which symbols and eps none of the polynomials is identically 0, in words; empty where it is so for all.
+
+    Args:
+        dim: the dimension; variables of the polynomials beyond so many are symbols, or eps, which is not 0.
+        polynomials: none of them 0.
+
+    >>> from kahanmaps.algebra.polynomials import ring
+    >>> x, y, a, b, eps = ring(["x", "y", "a", "b", "eps"]).gens()
+    >>> where(2, a*x + b*y), where(2, (10*eps - 1)*eps*x, a*y), where(2, a*x + eps)
+    ('where a, b are not all 0', 'where 10*eps - 1 is not 0 and a is not 0', '')
+    """
+    found = list(dict.fromkeys(filter(None, (_not_zero(polynomial, dim) for polynomial in polynomials))))
+    text = f"where {' and '.join(found)}" if found else ""
+    return text if len(text) <= _LONGEST_CONDITION else "where it has a value and is not identically 0"
+
+
+def _not_zero(polynomial: fmpq_mpoly, dim: int) -> str:
+    names = names_of(polynomial)
+    found = [_without_eps(c) if "eps" in names[dim:] else c for c in coefficients_in(polynomial, dim)]
+    symbols = {name for c in found for name in names if name not in c.unused_gens()}
+    if len(symbols) == 1:
+        # In one symbol the common zeros are those of the greatest common divisor.
+        found = [reduce(lambda common, c: common.gcd(c), found)]
+    if any(c.is_constant() for c in found):
+        return ""
+    texts = list(dict.fromkeys(format_polynomial(primitive_part(c)[1]) for c in found))
+    return f"{', '.join(texts)} {'is not' if len(texts) == 1 else 'are not all'} 0"
+
+
+def _without_eps(polynomial: fmpq_mpoly) -> fmpq_mpoly:
+    """Divided by the highest power of eps, its last variable, that divides it."""
+    least = min(int(monomial[-1]) for monomial in polynomial.monoms())
+    terms = {(*monomial[:-1], int(monomial[-1]) - least): value for monomial, value in polynomial.terms()}
+    return polynomial.context().from_dict(terms)

@@ -23,7 +23,7 @@ from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.decide import decide
 from kahanmaps.checks.preserve import density_identity
 from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep
-from kahanmaps.invariants.integrals import ClaimedIntegral
+from kahanmaps.invariants.integrals import ClaimedIntegral, integral_condition
 from kahanmaps.invariants.measures import ClaimedDensity, density_condition
 from kahanmaps.maps.kahan import KahanMapOver
 from kahanmaps.systems.parametric import ParametricSystem
@@ -90,10 +90,8 @@ def density_verdict(
 def _verdict(
     system: ParametricSystem, function: RationalFunction, eps: fmpq | None, seed: int, is_density: bool
 ) -> tuple[Verdict, Evidence]:
-    scope = _scope(system, eps)
-    if is_density:
-        condition = density_condition(function, system.dim, eps)
-        scope = f"{scope} {condition}".strip()
+    condition = (density_condition if is_density else integral_condition)(function, system.dim, eps)
+    scope = f"{_scope(system, eps)} {condition}".strip()
     holds = _holds_at_points(system, function, eps, seed, is_density)
     if holds is None:
         return Verdict.UNDECIDED, Evidence("random points over GF(p)", f"has no value at random points, {scope}")

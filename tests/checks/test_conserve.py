@@ -382,6 +382,25 @@ def test_claims_of_the_file_and_of_the_caller_are_both_checked():
     assert verdicts(report) == [REFUTED] * 3
 
 
+@pytest.mark.parametrize(
+    ("text", "eps", "condition"),
+    [
+        ("x/((10*eps - 1)*y)", None, ", where 10*eps - 1 is not 0"),
+        ("x/((10*eps - 1)*y)", "1/9", ""),
+        ("eps*x/((10*eps - 1)*y + eps*x)", "1/10", ", being a constant at eps = 1/10"),
+        ("eps*x/((10*eps - 1)*y + eps*x)", None, ""),
+        ("(10*eps - 1)*y/x + 3", "1/10", ", being a constant at eps = 1/10"),
+        ("(10*eps - 1)*y/x + 3", None, ""),
+        ("(x - y)/(2*y - 2*x)", None, ", being a constant"),
+        ("0", None, ", being a constant"),
+    ],
+)
+def test_the_claim_says_where_an_integral_has_values_and_when_it_is_a_constant(text, eps, condition):
+    file = file_of(QuadraticSystem.from_text(["x", "y"], ["x^2", "x*y"]))
+    found = only(check_integrals(file, Settings(eps=eps, steps=1), {"I": claim(text, "x y")}))
+    assert (found.verdict, found.claim) == (SUPPORTED, f"I is conserved{condition}")
+
+
 def test_a_claim_is_shown_by_its_formula():
     function = claim("(x^2 + y)/(1 - eps)", "x y")
     found = only(check_integrals(file_of(LOTKA_VOLTERRA, I="(x^2 + y)/(1 - eps)"), QUICK))

@@ -240,6 +240,21 @@ def test_a_density_without_a_value_at_the_eps_in_force_is_undecided():
     assert check_measure(file_of(LOTKA_VOLTERRA), Settings(eps="1/10", steps=1), phi).verdict is UNDECIDED
 
 
+def test_a_density_that_is_0_over_0_at_the_eps_in_force_is_refused():
+    phi = claim("(10*eps - 1)*x*y/(10*eps - 1)", "x y")
+    with pytest.raises(InputError, match="which is 0/0 at eps = 1/10"):
+        check_measure(file_of(LOTKA_VOLTERRA), Settings(eps="1/10", steps=1), phi)
+
+
+def test_a_density_with_a_denominator_that_some_eps_makes_0_is_for_the_others():
+    phi = claim("(eps - 3)*x*y*eps/(10*eps - 1)", "x y")
+    found = only(check_measure(file_of(LOTKA_VOLTERRA), Settings(steps=1), phi))
+    assert (found.verdict, found.claim) == (
+        SUPPORTED,
+        "the measure dx/phi is invariant, where eps - 3 is not 0 and 10*eps - 1 is not 0",
+    )
+
+
 @pytest.mark.parametrize("names", [("x", "y"), ("y", "x", "eps")])
 def test_a_density_in_other_variables_is_wrong_use(names):
     with pytest.raises(InputError, match="expected a rational function of x, y, eps"):

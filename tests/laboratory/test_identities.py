@@ -76,6 +76,14 @@ def test_a_density_with_symbols_is_for_those_at_which_it_is_not_zero():
     assert found.evidence.summary.endswith("for every eps and every a")
 
 
+def test_an_integral_with_symbols_is_for_those_at_which_it_has_values():
+    system = ParametricSystem.of(file_with('["a*y", "-a*x"]', a="1"), ["a"])
+    I = parse_rational_function("(x^2 + y^2)/((a^2 - 1)*eps)", ["x", "y", "a", "eps"])
+    verdict, evidence = integral_verdict(system, I, None)
+    assert verdict is Verdict.PROVED
+    assert evidence.summary.endswith("for every eps and every a where a^2 - 1 is not 0")
+
+
 def test_a_darboux_polynomial_that_expansion_refutes_is_left_out(monkeypatch):
     formulas = Laboratory.formulas
 
