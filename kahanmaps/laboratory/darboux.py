@@ -127,6 +127,9 @@ def darboux_polynomials(
     """
     laboratory = Laboratory(file, symbols, eps, seed)
     found = DarbouxSearch(file, laboratory.symbols, laboratory.eps, degree, seed, laboratory.primes)
+    if laboratory.defect:  # all multiples of what vanishes on the image have the cofactor 0
+        found.reason = laboratory.defect
+        return found
     deadline = time.monotonic() + seconds
     cofactors = laboratory.cofactors()
     found.cofactors = tuple(one.name for one in cofactors)

@@ -121,3 +121,11 @@ def test_a_symbol_in_dimension_one() -> None:
     file = parse_system('variables = ["x"]\n[parameters]\na = "2"\n[system]\nrhs = ["a*x"]\n', "growth")
     (space,) = darboux_polynomials(file, 1, symbols=("a",)).spaces
     assert ([format_polynomial(P) for P in space.polynomials], space.verdict) == (["x"], Verdict.PROVED)
+
+
+@pytest.mark.parametrize(("rhs", "eps"), [(["x", "y"], -1), (["x", "x*y"], -1), (["x", "y"], 1)])
+def test_a_map_that_is_not_birational_at_the_eps_in_force_has_no_darboux_polynomials(rhs, eps):
+    # At eps = -1 every point goes to x = 0, and all multiples of x would have the cofactor 0.
+    found = darboux_polynomials(SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], rhs)), 2, eps=eps)
+    assert found.spaces == []
+    assert f"at eps = {eps} the map" in found.reason
