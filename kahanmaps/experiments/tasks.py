@@ -11,6 +11,9 @@ from collections.abc import Callable
 from hashlib import sha256
 from typing import Any
 
+from flint import fmpq
+
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.claims import Report, Verdict
@@ -145,7 +148,7 @@ def orbit(
     seed: int = 0,
 ) -> Result:
     """A summary of an orbit: how it ended, its period, how long its numbers are, its last point."""
-    point = start if start is not None else next(random_starts(system.system.dim, seed))
+    point = start if start is not None else _drawn(system, seed)
     kind, _, number = arithmetic.partition(":")
     if kind == "float":
         if at is not None:
@@ -247,7 +250,7 @@ def heights(
     seed: int = 0,
 ) -> Result:
     """How fast the numbers of an orbit grow: the kind of growth, and its constant."""
-    point = start if start is not None else next(random_starts(system.system.dim, seed))
+    point = start if start is not None else _drawn(system, seed)
     structure = _structure(system)
     growth = height_growth(
         KahanMap(system.system, eps), point, steps, structure=structure, every=every, max_digits=max_digits
@@ -268,7 +271,7 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
     structure = _structure(system)
     if isinstance(structure, NoStructure):
         raise InputError(f"no period of {system.name} can be computed: {structure.reason}")
-    point = start if start is not None else next(random_starts(system.system.dim, seed))
+    point = start if start is not None else _drawn(system, seed)
     found = period_of(structure, eps, point, prime)
     return {
         "start": _text(point),
@@ -277,6 +280,11 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
         "meets_pole": found.meets_pole,
         "planes": [plane.text for plane in found.planes],
     }
+
+
+def _drawn(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
+    """A start for the system: one of the seed alone could lie on a curve on which the system is made to be special."""
+    return next(random_starts(system.system.dim, seed_for(seed, system.system.rhs)))
 
 
 def _settings(eps: Any, start: Any, steps: int, seed: int, error_bits: int, max_digits: int | None) -> Settings:

@@ -13,6 +13,7 @@ import pytest
 from flint import fmpq
 from task_helpers import made, member, perform
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
 from kahanmaps.checks.claims import Report, Verdict
 from kahanmaps.checks.commute import check_commute
@@ -51,7 +52,7 @@ MEMBER, LORENZ, TOP, RIVALS, WRONG = member(), *map(made, map(load, ["lorenz", "
 
 
 def start_of(system: SystemFile, seed: int = 0) -> Any:
-    return next(random_starts(system.system.dim, seed))
+    return next(random_starts(system.system.dim, seed_for(seed, system.system.rhs)))
 
 
 def structure(system: SystemFile) -> Any:
@@ -272,6 +273,10 @@ def test_a_start_is_drawn_from_the_seed_unless_given(name):
     point = ",".join(map(str, start_of(MEMBER, 5)))
     assert drawn["start"] == point
     assert perform(name, MEMBER, eps="1/10", start=point) == drawn
+
+
+def test_starts_of_the_same_seed_for_different_systems_differ():
+    assert len({perform("heights", system, eps="1/10", steps=2)["start"] for system in (LORENZ, TOP)}) == 2
 
 
 # Heights and periods
