@@ -28,10 +28,10 @@ from kahanmaps.laboratory.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.report import Conclusion, Statement, conclude, sections
 from kahanmaps.laboratory.shown import analysis_html
-from kahanmaps.laboratory.singularities import MAX_DIMENSION as MAX_SINGULAR_DIMENSION
 from kahanmaps.laboratory.singularities import (
     WRITTEN_DIMENSION,
     SingularityRun,
+    can_be_written,
     default_eps,
     patterns_of,
     singularities,
@@ -255,7 +255,7 @@ def analyze(
             found.commuting = commuting_systems(system, seed=seed, seconds=share(0.1), progress=told("commuting"))
 
     def confinement() -> None:
-        if system.dim <= MAX_SINGULAR_DIMENSION:
+        if can_be_written(system, found.eps):
             values = default_eps(system, seed) if found.eps is None else (found.eps,)
             part = share(0.2 if system.dim <= WRITTEN_DIMENSION else 0.1)
             found.singularities = [

@@ -45,6 +45,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
+MAX_DIGITS = 10_000  # of eps, in whose numbers hypersurfaces are written: seconds in dimension 3
 _REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the least
 _LEAST_REACH = 100
 _ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
@@ -136,8 +137,8 @@ def singularities(
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
     above, fewer where series are needed all the way. Hypersurfaces are exact, their fate is that of two random points
     modulo two random primes; "not confined" means within so many steps. Stops after about `seconds` seconds. Returns a
-    SingularityRun; raises InputError for dimensions above 6 and a wrong number of steps.
-    Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
+    SingularityRun; raises InputError for dimensions above 6, an eps of more than 10,000 digits and a wrong number of
+    steps. Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
     >>> run.denominator, run.verdict
@@ -146,6 +147,10 @@ def singularities(
     exact_eps = rational(eps)
     if system.dim > MAX_DIMENSION:
         raise InputError(f"found a system of dimension {system.dim}, expected at most {MAX_DIMENSION}")
+    if not _is_short(exact_eps):
+        raise InputError(
+            f"found an eps of more than {MAX_DIGITS} digits, expected one in which formulas can be written"
+        )
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     limits = _range(system.dim, steps, time.monotonic() + seconds)
@@ -250,7 +255,8 @@ def patterns(
 ) -> Patterns:
     """The patterns of the Kahan map at one exact eps (half the time step) or, where none is given, at two.
 
-    Up to dimension 4 those of `singularities`; above it random points stand for hypersurfaces.
+    Up to dimension 4 those of `singularities`; above it, and for an eps too long for formulas, random points stand for
+    hypersurfaces.
     """
     end = time.monotonic() + seconds
     found = _unknown("")
@@ -259,7 +265,7 @@ def patterns(
             break
         values = default_eps(system, seed + again) if eps is None else (eps,)
         part = max(0.0, end - time.monotonic()) / len(values)
-        if system.dim <= WRITTEN_DIMENSION:
+        if system.dim <= WRITTEN_DIMENSION and all(map(_is_short, values)):
             runs = [singularities(system, value, steps=steps, seed=seed, seconds=part) for value in values]
             found = patterns_of(runs)
         else:
@@ -274,6 +280,15 @@ def _at_random(system: QuadraticSystem, eps: fmpq, steps: int | None, seed: int,
         return _refused(eps, False, False) or _unknown("")
     found = fates_at_random(system, eps, random.Random(f"patterns {seed_for(seed, system.rhs, eps)}"), limits)
     return _refused(eps, True, limits.is_over) or _patterns(found)
+
+
+def _is_short(eps: fmpq) -> bool:
+    return bool(max(abs(eps.p), eps.q) < 10**MAX_DIGITS)
+
+
+def can_be_written(system: QuadraticSystem, eps: fmpq | None) -> bool:
+    """Whether `singularities` takes a system and eps."""
+    return system.dim <= MAX_DIMENSION and (eps is None or _is_short(eps))
 
 
 def _one_of(several: set[Patterns]) -> Patterns:

@@ -11,6 +11,7 @@ from functools import cache
 
 import pytest
 from degree_helpers import polynomial_degrees
+from flint import fmpq
 from search_helpers import system as file_from
 
 from kahanmaps.errors import InputError
@@ -19,7 +20,7 @@ from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights
 from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.fates import CONFINED, NOT_CONFINED, _settled
 from kahanmaps.laboratory.recurrences import GrowthClass
-from kahanmaps.laboratory.singularities import Patterns, patterns, patterns_of, singularities
+from kahanmaps.laboratory.singularities import MAX_DIGITS, Patterns, patterns, patterns_of, singularities
 from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -287,3 +288,13 @@ def test_patterns_that_are_open_end_the_search_without_a_recurrence():
     assert (found.ended, found.recurrence, found.growth) == ("unconfirmed", None, GrowthClass.UNKNOWN)
     assert found.message == "a recurrence of order 3 fits, but the time was over"
     assert found.growth_text == "12 terms fit quadratic growth, an estimate only: the time was over"
+
+
+def test_an_eps_too_long_for_formulas_is_refused_or_followed_at_random_points():
+    eps = fmpq(1, 7 * 10**MAX_DIGITS + 1)
+    top = load("euler_top").system
+    with pytest.raises(InputError, match="found an eps of more than 10000 digits"):
+        singularities(top, eps)
+    found = degree_growth(top, eps, seconds=20)
+    assert (found.patterns.lengths, found.patterns.running) == ((3,), "")
+    assert [found.recurrence.predict(n) for n in (5, 50)] == [51, 5001]
