@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Mapping
 from typing import Any
 
 from flint import fmpq
 
+from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
-from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.checks.decide import Identity, Sides, random_prime_field
+from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings, run_orbit
-from kahanmaps.errors import InputError
+from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.invariants.integrals import (
     ClaimedIntegral,
     CommutantIntegral,
     ModifiedHamiltonian,
     PaperIntegral,
+    constancy,
+    is_constant,
 )
 from kahanmaps.invariants.phase_functions import PhaseFunction
 from kahanmaps.invariants.sizes import VARIABLE, eps_size, step_size
@@ -88,6 +94,9 @@ def check_integrals(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "
             "or give --integral 'NAME=EXPRESSION'"
         )
+    for integral, _, _ in candidates:
+        if isinstance(integral, ModifiedHamiltonian):
+            integral.condition = _constant(integral, settings)
     claimed = [integral.subject for integral, _, _ in candidates]
     orbit = run_orbit(file.system, settings, claimed, file.member is not None)
     findings = []
@@ -114,6 +123,32 @@ def check_integrals(
         notes.append(f"of the proved integrals the first {tried} were also tried along an orbit")
     context = settings.context([file], orbit=orbit.to_json())
     return Report("integrals", tuple(findings), context, notes, ended_early=settings.cut_short(orbit))
+
+
+def _constant(integral: ModifiedHamiltonian, settings: Settings) -> str:
+    """That the modified H is a constant where it is one, as that of 3 q^2 + p^2 is at eps = 1/2; otherwise "".
+
+    For a homogeneous cubic H it begins with H and is none. Equal values at points mean little; expanded it is exact.
+    """
+    H = integral.hamiltonian
+    if (H.is_homogeneous and not H.H.is_zero()) or H.dim > MAX_DIMENSION:
+        return ""
+    rng = random.Random(f"constant {seed_for(settings.seed, integral.subject, settings.eps)}")
+    field = random_prime_field(rng)
+    try:
+        eps = field.random(rng) if settings.eps is None else field.convert(settings.eps)
+        first, second = (integral.value(field, eps, tuple(field.random(rng) for _ in range(H.dim))) for _ in range(2))
+    except (BadPrime, SingularMatrix, SingularStep):
+        return ""
+    if not field.equal(first, second):
+        return ""
+    functions = FunctionField([*H.system.variables, "eps"])
+    *point, symbol = functions.variables
+    try:
+        value = integral.value(functions, symbol if settings.eps is None else settings.eps, tuple(point))
+    except BudgetExceeded:
+        return ""
+    return constancy(settings.eps) if is_constant(value.above, value.below, H.dim) else ""
 
 
 def _family_integrals(member: FamilyMember) -> list[tuple[PhaseFunction, Evidence | None, str]]:

@@ -4,8 +4,9 @@ The identity is a polynomial equation P(x, eps) = 0 over the integers once denom
 a prime p is drawn from [2^62, 2^63) and then a point over GF(p), by a hash of the identity and a seed, so that nobody
 can write an identity for given points (algebra/chance.py). If P is not the zero polynomial, the
 trial passes only if p divides all its coefficients (at most bits/62 of more than 2^55 primes do) or the point is a
-root (probability at most degree/(p - 1), and p - 1 >= 2^62). Points where a denominator vanishes are drawn again; since that happens less
-than half of the time, the sum of both is doubled. Trials are independent, so the bounds multiply. Sources:
+root (probability at most degree/(p - 1), and p - 1 >= 2^62). Points where a denominator vanishes are drawn again;
+since that happens less than half of the time, the sum of both is doubled. Trials are independent, so the bounds
+multiply. Sources:
 schwartz-1980; rosser-schoenfeld-1962 (more than 3N/(5 ln N) primes from N to 2N).
 
 A trial that fails refutes the identity; a small rational point is then found at which both sides differ.

@@ -150,11 +150,19 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None) -
     above, below = at_eps(integral, eps)
     if below.is_zero():
         return ""
+    return constancy(eps) if is_constant(above, below, dim) else where(dim, below)
+
+
+def constancy(eps: fmpq | None) -> str:
+    """What is said of an integral that is a constant."""
+    return "being a constant" if eps is None else f"being a constant at eps = {eps}"
+
+
+def is_constant(above: fmpq_mpoly, below: fmpq_mpoly, dim: int) -> bool:
+    """Whether the quotient of two polynomials does not depend on the first `dim` variables; `below` is not 0."""
     monomial = below.monoms()[0][:dim]
     P, Q = (_coefficient(part, monomial) for part in (above, below))
-    if above * Q == below * P:
-        return "being a constant" if eps is None else f"being a constant at eps = {eps}"
-    return where(dim, below)
+    return bool(above * Q == below * P)
 
 
 def _coefficient(polynomial: fmpq_mpoly, monomial: tuple[int, ...]) -> fmpq_mpoly:

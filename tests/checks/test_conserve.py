@@ -401,6 +401,24 @@ def test_the_claim_says_where_an_integral_has_values_and_when_it_is_a_constant(t
     assert (found.verdict, found.claim) == (SUPPORTED, f"I is conserved{condition}")
 
 
+@pytest.mark.parametrize(
+    ("H", "eps", "condition"),
+    [
+        ("3*q^2 + p^2", "1/2", ", being a constant at eps = 1/2"),
+        ("3/2*q^2 + 1/2*p^2", "-1", ", being a constant at eps = -1"),
+        ("3*q^2 + p^2", None, ""),
+        ("3*q^2 + p^2", "1/3", ""),
+        ("3*q^2 + p^2 + q^3", "1/2", ""),
+        ("5", None, ", being a constant"),
+    ],
+)
+def test_a_modified_hamiltonian_that_is_a_constant_is_told_as_such(H, eps, condition):
+    # f is linear with f'^2 = -w^2, and H + grad H . (x~ - x)/3 = (3 - w^2 eps^2)/(1 + w^2 eps^2) H/3.
+    file = parse_system(f'variables = ["q", "p"]\n[hamiltonian]\nH = "{H}"\nJ = "standard"\n')
+    found = check_integrals(file, Settings(eps=eps, steps=1)).findings[0]
+    assert (found.verdict, found.claim) == (PROVED, f"modified H is conserved{condition}")
+
+
 def test_a_claim_is_shown_by_its_formula():
     function = claim("(x^2 + y)/(1 - eps)", "x y")
     found = only(check_integrals(file_of(LOTKA_VOLTERRA, I="(x^2 + y)/(1 - eps)"), QUICK))
