@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import itertools
 import random
+from types import SimpleNamespace
 
 import pytest
 from flint import fmpq, fmpq_mat
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from invariants.test_sizes import Written, within
 
 from kahanmaps import KahanMap, draw_with_eigenvalues
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import degree, ring
 from kahanmaps.algebra.small_systems import Component, independent
 from kahanmaps.checks.settings import Settings
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.laboratory.commuting import commuting_systems
 from kahanmaps.laboratory.commuting_equations import coefficients_of, combination, commutator_equations, system_of
-from kahanmaps.laboratory.commuting_proofs import affine, judge_family, judge_field, splitting
+from kahanmaps.laboratory.commuting_proofs import _family_identity, affine, judge_family, judge_field, splitting
 from kahanmaps.laboratory.commuting_space import bracket_vanishes, commuting_space, field_at
 from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -314,3 +316,23 @@ def test_combinations_of_the_basis():
 def test_wrong_use(options):
     with pytest.raises(InputError, match="expected"):
         commuting_systems(system("x", "x^2"), **options)
+
+
+@pytest.mark.parametrize("below", [1, 2**20 + 7])
+@pytest.mark.parametrize(
+    ("f", "g"),
+    [(["y", "x"], ["x", "0"]), (["x*y", "-x^2"], ["y^2", "x"]), (["x^2 - y^2", "2*x*y"], ["x^2 + 1", "y - 3*x*y"])],
+)
+def test_the_identity_of_a_family_is_bounded(f, g, below):
+    """Both compositions over one denominator, written out for the member g/d of the family of multiples of g."""
+    first, second = (QuadraticSystem.from_text(["x", "y"], rhs) for rhs in (f, g))
+    divided = second.scaled(fmpq(1, below))
+    family = Component((ring(["b"]).constant(fmpq(1, below)),))
+    identity = _family_identity(first, SimpleNamespace(fields=[second]), family)
+    of_f, of_g = Written(first, None), Written(divided, None)
+    after_f, after_g = of_f.step(of_f.x, of_f.one), of_g.step(of_f.x, of_f.one)
+    left, below_left = of_g.step(*after_f)
+    right, below_right = of_f.step(*after_g)
+    for a, b in zip(left, right, strict=True):
+        within(a * below_right - b * below_left, identity.equation)
+    assert degree(below_left * below_right * after_f[1] * after_g[1]) <= identity.poles

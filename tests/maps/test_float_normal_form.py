@@ -194,6 +194,25 @@ def test_kernels_give_the_same_numbers(name, threads):
     same(one, other)
 
 
+@pytest.mark.parametrize("name", ["a complex pair", "real and complex", "two complex pairs", "three real roots"])
+def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
+    """In the coordinates of a block of kind LINES w = 1 - (U^2 + U V + V^2), so U = 1, V = 0 is a pole."""
+    pytest.importorskip("numba")
+    blocks = planar_blocks(FORMS[name], EPS)
+    starts = starts_of(blocks.rows, 300) / 5
+    for r, kind in enumerate(blocks.kinds):
+        if kind == LINES:
+            at, size = (2 * r, 2) if r < blocks.reals else (4 * r - 2 * blocks.reals, 4)
+            rows = blocks.into @ starts[20 + r]
+            rows[at : at + size] = [1 - 2.0**-43, *[0.0] * (size - 1)]
+            starts[20 + r] = blocks.out @ rows
+    one, other = (ensemble(name, starts, kernel=kernel, sampled=10) for kernel in ("numpy", "numba"))
+    for it in (one, other):
+        it.advance(40)
+    same(one, other)
+    assert (one.near_singular[20 : 20 + len(blocks.kinds)] > 0).tolist() == [kind == LINES for kind in blocks.kinds]
+
+
 @over_kernels
 @over_members
 def test_orbits_do_not_depend_on_their_company(name, kernel):

@@ -12,7 +12,7 @@ from math import lcm
 
 import pytest
 from flint import fmpq, fmpq_poly, fmpz, fq_default_ctx
-from planar_helpers import structure_and_system
+from planar_helpers import STARTS, structure_and_system
 
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import GF, QQ
@@ -430,6 +430,24 @@ def test_the_orbit_next_to_it_does_not_come_back():
     found = plane_period_over_rationals(PlanarBlock(*(fmpq(c) for c in h)), (*map(QQ.convert, start), fmpq(1)))
     assert found.status == "aperiodic"
     assert plane_orbit(h, start, 14).end.status == "completed"
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_a_period_of_a_plane_over_q_is_what_walking_shows(name):
+    cubic, (U, V, W) = STARTS[name]
+    block = PlanarBlock(*(fmpq(c) for c in cubic))
+    start = point = (fmpq(U, W), fmpq(V, W), fmpq(1))
+    found = plane_period_over_rationals(block, start)
+    met = False
+    for step in range(1, 13):  # Mazur: no torsion point of a cubic over Q has an order above 12
+        point = block.image(point)
+        if not any(point):
+            break
+        met = met or point[2] == 0
+        if same_point(point, start):
+            assert (found.status, found.period, found.meets_pole) == ("periodic", step, met)
+            return
+    assert found.status in ("aperiodic", "undefined") or (met and found.meets_pole)
 
 
 def test_an_element_of_a_number_field_is_torsion_or_not_as_over_q():

@@ -7,13 +7,17 @@ names has to refute it on every one of these members, but for m = 1, where some 
 
 from __future__ import annotations
 
+import random
 from collections import Counter
 from itertools import pairwise
 
 import pytest
 from paper.members import LARGE_SPECTRA, SPECTRA, member, point, values
 
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import SingularMatrix, SingularStep
+from kahanmaps.family.draw import draw_with_eigenvalues
+from kahanmaps.paper import realise
 from kahanmaps.paper.controls import CONTROLS, broken
 from kahanmaps.paper.registry import SECTIONS, Claim, Kind, claim, claims
 
@@ -206,3 +210,23 @@ def test_a_control_leaves_the_unbroken_objects_as_they_were():
     for control in CONTROLS:
         broken(control, o)
     assert (o.A, o.J, o.third, o.eps, o.roots, o.step_eps, o.minus, o.method) == before
+
+
+@pytest.mark.parametrize(
+    ("key", "values_"),
+    [
+        ("brackets-as-printed", [(0, 1), (0, 1), (1, 1)]),  # {p0,q0} = {q0,q0} = 0 and one that is as printed
+        ("independence-for-non-scalar-A", [(2, 3)]),  # the gradients for A = B_1, whose minimal polynomial has degree 2
+        (
+            "dimension-of-the-cubics-for-any-A",
+            [(24, 12)],
+        ),  # two equal roots of three: 20 cubics in four variables and 4
+    ],
+)
+def test_misprints_fail_by_these_numbers(key, values_):
+    drawn = draw_with_eigenvalues([1, -2, 3], seed=7)
+    roots = realise.rational_roots(drawn)
+    for seed in range(2):
+        objects = realise.point_over(drawn, QQ, roots, None, random.Random(seed), 3)
+        (misprint,) = [claim for claim in claims() if claim.key == key]
+        assert list(misprint.function(objects)) == values_
