@@ -26,6 +26,7 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import belongs, default_variables, third_derivatives
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.hidden import (
+    _variants,
     darboux_coordinates,
     hidden_hamiltonian,
     hidden_member,
@@ -478,3 +479,24 @@ def test_a_member_of_another_system_is_refused():
         replace(found, T=2 * found.T)
     with pytest.raises(HypothesisError, match="sign -1"):
         replace(found, member=replace(found.member, signs=(1, -1)))
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ([-12, 0, 1], [-3, 0, 1]),  # t^2 = 12, so that X/2 has the square 3
+        ([-18, 0, 1], [-2, 0, 1]),
+        ([7, 6, 1], [-2, 0, 1]),  # (t + 3)^2 = 2: X + 3
+        ([-54, 0, 0, 1], [-2, 0, 0, 1]),
+        ([-2, 0, 1], [-2, 0, 1]),
+    ],
+)
+def test_an_element_is_made_simpler_by_an_integer_shift_and_divisor(before, after):
+    n = len(before) - 1
+    X = fmpq_mat(n, n, [-before[i] if j == n - 1 else int(i == j + 1) for i in range(n) for j in range(n)])
+    E = fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+    first, second = _variants(X, E, fmpq_poly(before))
+    assert first == (X, fmpq_poly(before))
+    assert second[1] == fmpq_poly(after)
+    for matrix, polynomial in (first, second):
+        assert evaluate_at_matrix(polynomial, matrix) == 0 * E

@@ -29,7 +29,16 @@ CHAIN = QuadraticSystem.from_text(
     [f"x{i}" for i in range(12)],
     [f"x{(i + 1) % 12}*x{i - 1 if i else 11} - x{i}" + (" + 1/2" if i == 0 else "") for i in range(12)],
 )
-SYSTEMS = {**NAMED_SYSTEMS, "chain": CHAIN, "member": draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system}
+# At eps = 1/50 all elements of the diagonal of I - eps f'(x) are small: rows have to be exchanged.
+PIVOTS = QuadraticSystem.from_text(
+    ["x", "y", "z"], ["50*x + 30*y + x*z", "20*x + 50*y + 10*z + y^2", "15*y + 40*x + 50*z - x*y"]
+)
+SYSTEMS = {
+    **NAMED_SYSTEMS,
+    "chain": CHAIN,
+    "pivots": PIVOTS,
+    "member": draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system,
+}
 over_systems = pytest.mark.parametrize("system", SYSTEMS.values(), ids=SYSTEMS.keys())
 
 

@@ -48,6 +48,12 @@ def member_of_repeated_factor():
     return FamilyMember(A, parse_polynomial("x1^2*x3 + x2^3", ["x1", "x2", "x3", "x4"]))
 
 
+def complex_member_of_repeated_factor():
+    """chi = t^2 + 1 and the planar cubic u^2 v at i: twice the real part of (x1 + i x2)^2 (x3 - i x4)/2."""
+    A = fmpq_mat(4, 4, [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0])
+    return FamilyMember(A, parse_polynomial("(x1^2 - x2^2)*x3 + 2*x1*x2*x4", ["x1", "x2", "x3", "x4"]))
+
+
 def start_of(dim: int, scale: int = 20) -> list[fmpq]:
     return [fmpq((-1) ** k * (k + 2), scale * (k + 1)) for k in range(dim)]
 
@@ -244,6 +250,31 @@ def test_orbits_of_general_blocks_do_not_depend_on_their_company(kernel):
         alone = FloatEnsemble(member.chosen.system, EPS, starts[orbit : orbit + 1], form=form, kernel=kernel)
         alone.advance(70)
         assert alone.near_singular[0] == together.near_singular[orbit]
+        assert np.array_equal(alone.x[0], together.x[orbit], equal_nan=True)
+        assert alone.end(0) == together.end(orbit)
+
+
+@over_kernels
+def test_orbits_of_complex_general_blocks_do_not_depend_on_their_company(kernel):
+    member = complex_member_of_repeated_factor()
+    form = normal_form(member)
+    blocks = planar_blocks(form, EPS)
+    assert (blocks.kinds.tolist(), blocks.reals) == ([GENERAL], 0)
+    starts = starts_of(4, 300)
+    starts[7] *= 1e200
+    together = FloatEnsemble(member.chosen.system, EPS, starts, form=form, kernel=kernel)
+    exact = Orbit(KahanMap(member.chosen.system, EPS), [fmpq(k, 9) for k in (1, -2, 3, 4)], 5)
+    *_, (_, x) = FloatOrbit(member.chosen.system, EPS, ["1/9", "-2/9", "3/9", "4/9"], 5, form=form, kernel=kernel)
+    *_, last = exact
+    assert x == pytest.approx(to_floats(last.x), rel=1e-13)  # numbers of size 1, a few roundings each step
+    # In the rows of a block (U, V) U~ = U (1 - b U)/w or alike: at w = 0 to 13 digits the lane is walked alone.
+    for k, scale in enumerate(np.linspace(0.5, 20, 40)):
+        starts[20 + k] = [scale, 0.0, 0.0, 0.0]
+    together = FloatEnsemble(member.chosen.system, EPS, starts, form=form, kernel=kernel)
+    together.advance(30)
+    for orbit in (0, 7, 20, 30, 45, 59, 299):
+        alone = FloatEnsemble(member.chosen.system, EPS, starts[orbit : orbit + 1], form=form, kernel=kernel)
+        alone.advance(30)
         assert np.array_equal(alone.x[0], together.x[orbit], equal_nan=True)
         assert alone.end(0) == together.end(orbit)
 
