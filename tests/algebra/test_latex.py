@@ -10,7 +10,14 @@ from helpers import rationals
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.latex import latex_name, latex_number, latex_polynomial, latex_rational_function
+from kahanmaps.algebra.latex import (
+    latex_aligned,
+    latex_cut,
+    latex_name,
+    latex_number,
+    latex_polynomial,
+    latex_rational_function,
+)
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
 from kahanmaps.errors import InputError
@@ -146,3 +153,20 @@ def test_what_cannot_be_printed_is_no_name(wrong):
 
 def test_numbers():
     assert [latex_number(fmpq(*pair)) for pair in ((-1, 2), (0, 1), (5, 1))] == [r"-\frac{1}{2}", "0", "5"]
+
+
+def test_what_fits_is_shown_whole_and_what_does_not_is_cut_between_terms():
+    square, long = parse_polynomial("x^2 + 2*x*y + y^2", ["x", "y"]), parse_polynomial("(x + y)^30", ["x", "y"])
+    assert latex_cut(square, 300) == latex_polynomial(square)
+    shown, more = latex_cut(long, 60).split(r" + \cdots\ ")
+    assert latex_polynomial(long).startswith(shown + " + ")
+    assert more == r"\text{(31 terms)}"
+    assert latex_cut(long, 3) == r"\text{(31 terms, not shown)}"
+
+
+@pytest.mark.parametrize(("count", "dots"), [(11, False), (12, False), (13, True)])
+def test_dots_stand_below_twelve_equations(count, dots):
+    found = latex_aligned([(f"x_{k}", "1") for k in range(count)])
+    assert (rf"({count} equations)" in found) == dots
+    assert found.count("&=") == min(count, 12)
+    assert latex_aligned([("x", "1"), ("y", "2")], most=1).count("&=") == 1

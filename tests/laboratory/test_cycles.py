@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import pytest
 from flint import fmpq_mat
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.errors import BadPrime, InputError, SingularStep
-from kahanmaps.laboratory.cycle_laws import LAWS, _critical, _distance, compare
+from kahanmaps.laboratory.cycle_laws import LAWS, _critical, _distance, _reversible, compare
 from kahanmaps.laboratory.cycles import cycle_census, default_eps
 from kahanmaps.laboratory.reversors import find_reversor, is_reversor
 from kahanmaps.maps.kahan import KahanMap
@@ -307,6 +308,22 @@ def test_the_critical_distance_shrinks_like_that_of_a_mean():
     # Kolmogorov: 1.63/sqrt(count) for a law without parameters; points count by the lengths of their cycles, which
     # makes it larger, and the mean is fitted, which makes it smaller.
     assert 0.5 < _critical(400, 3) * 20 < 2.5
+
+
+def test_from_twenty_symmetric_cycles_on_lengths_are_compared():
+    def compared(count):
+        census = SimpleNamespace(points=10_000, fixed=(60, 40), symmetric={5: count}, complete=True)
+        reasons = {}
+        return _reversible(census, 0, reasons), reasons["random reversible"]
+
+    (scale, model, distance, critical), why = compared(19)
+    assert (scale, model, distance, critical) == (None, 200, None, None)
+    assert why == "19 symmetric cycles, too few to compare"
+    (scale, model, distance, critical), why = compared(20)
+    assert (scale, model) == (5, 200)
+    assert distance == pytest.approx(2 / math.e)  # all lengths are the mean
+    assert critical < distance
+    assert why.startswith("scaled by their mean 5.0, where 2 N/(fixed points) = 200.0, the lengths of 20 symmetric")
 
 
 def test_a_moebius_map_is_one_rotation_of_the_projective_line():

@@ -136,7 +136,7 @@ def test_degenerate_input() -> None:
     constant = checked(QuadraticSystem.from_text(["x", "y"], ["1", "2"]))
     assert constant.hamiltonian is not None
     names = [f"x{i}" for i in range(31)]
-    with pytest.raises(InputError, match="dimension 31"):
+    with pytest.raises(InputError, match="dimension 31, expected at most 30"):
         constant_structures(QuadraticSystem.from_text(names, names))
 
 

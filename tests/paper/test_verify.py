@@ -343,6 +343,10 @@ def test_the_zero_hamiltonian_refutes_nothing():
     told = {key: finding.evidence.summary for key, finding in by_key(report).items()}
     assert "both sides agree at 4 random points" in told["associated-fields-are-pairwise-different"]
     assert "not attained at 4 random points" in told["hamiltonians-are-independent"]
+    silent = [finding for finding in report.findings if "the misprint does not show" in finding.evidence.summary]
+    special = [finding for finding in report.findings if finding.evidence.method == "special member"]
+    assert silent
+    assert not any(finding.applies for finding in [*silent, *special])
 
 
 # Systems of files
