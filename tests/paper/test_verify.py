@@ -19,7 +19,7 @@ from paper.members import LARGE_SPECTRA, SPECTRA, file, member
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import Settings
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.paper import realise
@@ -310,6 +310,18 @@ def test_what_is_said_in_general_only_is_not_refuted_by_a_special_member():
     evidence = by_key(report)["hamiltonians-are-independent"].evidence
     assert (evidence.method, evidence.data["points"]) == ("special member", 4)
     assert "H vanishes on the eigenspaces of the roots of t - 2" in evidence.summary
+
+
+def test_a_rank_that_is_defined_nowhere_is_undecided(monkeypatch):
+    def nowhere(claim, objects):
+        raise SingularStep("made up")
+
+    monkeypatch.setattr("kahanmaps.paper.examiner.evaluate", nowhere)
+    examiner = verify_module._MemberExaminer(special_member(), Settings(), VerifyOptions())
+    (ranks,) = [claim for claim in claims() if claim.key == "hamiltonians-are-independent"]
+    found = examiner.examine(ranks)
+    assert found.verdict is UNDECIDED
+    assert found.evidence.summary == "the claim is not defined at any of 40 random points"
 
 
 @pytest.mark.parametrize(
