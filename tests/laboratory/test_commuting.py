@@ -103,6 +103,16 @@ def test_most_systems_commute_with_nothing(name, shape):
     assert (found.families, found.complete, str(found.verdict)) == ([], True, "proved")
 
 
+def test_moebius_maps_commute_by_their_lemma_where_the_fields_are_proportional():
+    f = system("x", "x^2 + 1")
+    assert judge_field(f, system("x", "3*x^2 + 3"), Settings()).evidence.data["theorem"] == "the lemma of Moebius maps"
+    for other in ("x", "3*x^2 + 2"):
+        assert str(judge_field(f, system("x", other), Settings()).verdict) == "refuted"
+    # In dimension 2 proportional fields need not commute.
+    f, g = system("x y", "x^2 + y", "x*y - 1"), system("x y", "3*x^2 + 3*y", "3*x*y - 3")
+    assert str(judge_field(f, g, Settings()).verdict) == "refuted"
+
+
 def test_the_second_flow_of_an_integrable_system_need_not_commute():
     """volterra_periodic_4 has a second quadratic field that commutes with it; its Kahan map does not."""
     f = load("volterra_periodic_4", {}).system
