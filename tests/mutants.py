@@ -385,6 +385,8 @@ class Copy:
                     os.killpg(process.pid, signal.SIGKILL)
         if process.returncode == 0:
             return ""
+        if "not found: " in told:
+            raise SystemExit("a test on record is not there any more: --measure")
         failed = re.search(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", told, re.MULTILINE)
         return failed.group(1) if failed else f"status {process.returncode}"
 
@@ -433,6 +435,8 @@ def main() -> int:
         for k in range(options.jobs):
             copies.put(Copy(Path(folder) / str(k)))
 
+        seen_by: set[str] = set()
+
         def outcome(mutant: Mutant) -> tuple[str, str]:
             if mutant.key in equivalent:
                 return "equivalent", equivalent[mutant.key]
@@ -443,16 +447,17 @@ def main() -> int:
             start = time.monotonic()
             seen = copy.tried(mutant, tests, record.seconds, options.most)
             copies.put(copy)
-            return (
-                ("killed", f"by {seen}")
-                if seen
-                else ("SURVIVED", f"{len(tests)} tests, {time.monotonic() - start:.0f} s")
-            )
+            seen_by.add(seen)
+            took = f"{time.monotonic() - start:.0f} s"
+            return ("killed", f"by {seen}, {took}") if seen else ("SURVIVED", f"{len(tests)} tests, {took}")
 
         counts: dict[str, int] = defaultdict(int)
         for mutant, (result, why) in zip(chosen, pool.map(outcome, chosen), strict=True):
             counts[result] += 1
             print(f"{result:10}  {mutant}\n{'':12}{mutant.old!r} -> {mutant.new!r}  {why}", flush=True)
+        copy, witnesses = copies.get(), sorted(seen_by & set(record.seconds))
+        if witnesses and (fails := copy.run(witnesses, record.seconds, copy.environment)):
+            raise SystemExit(f"{fails} fails without any change, so that it tells nothing")
     alive = counts["SURVIVED"]
     ratio = counts["killed"] / max(1, counts["killed"] + alive)
     print(f"{counts['killed']} killed, {alive} survived, {counts['equivalent']} equivalent: {100 * ratio:.1f} % seen")

@@ -321,6 +321,7 @@ def test_a_start_beyond_the_budget_is_delivered_and_nothing_else():
     orbit = Orbit(KahanMap(RICCATI, "1/2"), [fmpq(1, 10**30)], 5, max_digits=20)
     assert [point.x for point in orbit] == [(fmpq(1, 10**30),)]
     assert (orbit.end.status, orbit.end.steps) == ("budget", 0)
+    assert orbit.end.message.startswith("step 0 has numbers of 31 digits, more than the budget of 20")
 
 
 def test_without_word_the_budget_protects_a_non_integrable_orbit():

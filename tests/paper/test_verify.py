@@ -312,6 +312,15 @@ def test_what_is_said_in_general_only_is_not_refuted_by_a_special_member():
     assert "H vanishes on the eigenspaces of the roots of t - 2" in evidence.summary
 
 
+def test_statements_that_something_differs_are_proved_where_the_roots_are_irrational():
+    """chi = t^2 - 2: what needs the roots is shown at a point over a prime field in which chi splits."""
+    examiner = verify_module._MemberExaminer(draw_with_chi(fmpq_poly([-2, 0, 1]), 1), Settings(), VerifyOptions())
+    found = [examiner.examine(claim) for claim in claims() if claim.kind is not Kind.EQUAL and claim.makes_sense(2)]
+    assert len(found) > 10
+    assert {finding.verdict for finding in found} == {PROVED}
+    assert {finding.evidence.method for finding in found} == {"exact rational point", "point over GF(p)"}
+
+
 def test_a_rank_that_is_defined_nowhere_is_undecided(monkeypatch):
     def nowhere(claim, objects):
         raise SingularStep("made up")
