@@ -148,3 +148,13 @@ def test_planes_of_cubics_are_decoupled():
 @pytest.mark.parametrize("form", [x**3 + y**3 + z**3 + x * y * z, x**3 + x * y**2 + y * z**2 + 3 * x**2 * z])
 def test_a_cubic_that_is_no_sum_over_blocks_is_not_decoupled(form):
     assert decoupling([form], 3) is None
+
+
+def test_two_cubes_in_the_plane_are_decoupled_and_one_variable_cannot_be():
+    plane = ring(["x", "y"])
+    a, b = plane.gens()
+    mixed = [(a + 2 * b) ** 3 + (3 * a - b) ** 3, (a + 2 * b) ** 3 - 5 * (3 * a - b) ** 3]
+    T = decoupling(mixed, 2)
+    moved = [a * T[i, 0] + b * T[i, 1] for i in range(2)]
+    assert [len(p) for p in independent(p.compose(*moved, ctx=plane) for p in mixed)] == [1, 1]
+    assert decoupling([ring(["x"]).gens()[0] ** 3], 1) is None
