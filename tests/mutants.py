@@ -419,8 +419,8 @@ def main() -> int:
     parser.add_argument("--list", action="store_true", help="print the sample and try nothing")
     parser.add_argument("--measure", nargs="*", metavar="FILE", help="run all tests, or new ones, to see their lines")
     options = parser.parse_args()
-    chosen = [m for m in all_mutants() if options.only in f"{m.path}:{m.line}:"]
-    chosen = sample(chosen, options.count, options.seed)
+    every = all_mutants()
+    chosen = sample([m for m in every if options.only in f"{m.path}:{m.line}:"], options.count, options.seed)
     if options.list:
         print(*chosen, sep="\n")
         return 0
@@ -458,6 +458,8 @@ def main() -> int:
         copy, witnesses = copies.get(), sorted(seen_by & set(record.seconds))
         if witnesses and (fails := copy.run(witnesses, record.seconds, copy.environment)):
             raise SystemExit(f"{fails} fails without any change, so that it tells nothing")
+    for key in sorted(set(equivalent) - {mutant.key for mutant in every}):
+        print("listed as equivalent, and not in the code any more:", *key)
     alive = counts["SURVIVED"]
     ratio = counts["killed"] / max(1, counts["killed"] + alive)
     print(f"{counts['killed']} killed, {alive} survived, {counts['equivalent']} equivalent: {100 * ratio:.1f} % seen")
