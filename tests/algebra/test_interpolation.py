@@ -19,6 +19,7 @@ from kahanmaps.algebra.interpolation import (
     rational_vector,
     reconstruct,
 )
+from kahanmaps.algebra.modular_fit import Quotient, Shape
 from kahanmaps.algebra.polynomials import RationalFunction, monomials, ring
 from kahanmaps.algebra.residues import chinese, random_prime
 from kahanmaps.algebra.text import parse_rational_function
@@ -285,3 +286,13 @@ def test_residues_without_simple_numbers() -> None:
 def test_chinese_remainders() -> None:
     assert chinese([2, 0], 3, [3, 4], 5) == [8, 9]
     assert random_prime(random.Random(1), 2) in (2, 3)
+
+
+@pytest.mark.parametrize("prime", [7, 101, 2**61 - 1])
+def test_numerators_up_to_a_factor_are_equal_where_they_are_multiples(prime: int) -> None:
+    shape = Shape(((1, 0), (0, 1), (0, 0)), ((0, 0),))
+    numerators = [tuple(c * factor % prime for c in (3, 5, 2)) for factor in (1, 2, 6, prime - 1)]
+    found = {Quotient(shape, above, (1,)).numerator_up_to_factor(prime) for above in numerators}
+    (only,) = found
+    assert (only[0], only[1] * 3 % prime, only[2] * 3 % prime) == (1, 5, 2)
+    assert Quotient(Shape((), ((0, 0),)), (), (1,)).numerator_up_to_factor(prime) == ()

@@ -68,6 +68,10 @@ def test_a_small_budget_ends_without_an_answer():
     assert expansion(identity(CONSERVED, None), budget=100) is None
 
 
+def test_sides_that_are_not_defined_prove_nothing():
+    assert expansion(Identity(1, lambda field, x, eps: None, Size(1, 0.0), 0, None, subject=())) is None
+
+
 def test_expansion_agrees_with_the_value_at_a_point():
     left, right = identity(CONSERVED, None).at(QQ, (fmpq(1, 2), fmpq(-1, 3), fmpq(2)), fmpq(1, 7))
     assert left == right

@@ -331,7 +331,13 @@ def test_wrong_use(options):
 @pytest.mark.parametrize("below", [1, 2**20 + 7])
 @pytest.mark.parametrize(
     ("f", "g"),
-    [(["y", "x"], ["x", "0"]), (["x*y", "-x^2"], ["y^2", "x"]), (["x^2 - y^2", "2*x*y"], ["x^2 + 1", "y - 3*x*y"])],
+    [
+        (["y", "x"], ["x", "0"]),
+        (["x*y", "-x^2"], ["y^2", "x"]),
+        (["x^2 - y^2", "2*x*y"], ["x^2 + 1", "y - 3*x*y"]),
+        (["y", "x"], ["10^20*x", "10^20*y + x^2"]),
+        (["y", "x"], ["10^20", "10^20*x*y"]),
+    ],
 )
 def test_the_identity_of_a_family_is_bounded(f, g, below):
     """Both compositions over one denominator, written out for the member g/d of the family of multiples of g."""

@@ -146,6 +146,7 @@ def test_simple_systems(rhs, verdict):
     run = singularities(system, "1/7", steps=6)
     if verdict in ("no singularities",):
         assert run.hypersurfaces == ()
+        assert (run.map_degree, run.critical_degree) == (1, 0)
     if rhs[0] == "y^2":
         assert run.denominator == "1"
         assert all(h.polynomial == "Z" for h in run.hypersurfaces)
