@@ -31,9 +31,8 @@ from kahanmaps.algebra.text import (
     parse_point,
     parse_polynomial,
     parse_rational_function,
-    shorten,
 )
-from kahanmaps.errors import ExpressionError, InexactNumber, InputError
+from kahanmaps.errors import ExpressionError, InexactNumber, InputError, quoted
 
 NAMES = ["x", "y", "z"]
 RING = ring(NAMES)
@@ -622,7 +621,7 @@ def test_numbers_do_not_load_the_parser_of_expressions() -> None:
     [("x" * 40, "'" + "x" * 40 + "'"), ("x" * 41, "'" + "x" * 40 + "...'"), ("a\nb", r"'a\nb'")],
 )
 def test_what_is_longer_than_40_characters_is_cut_and_what_is_not_is_shown_whole(text, shown):
-    assert shorten(text) == shown
+    assert quoted(text) == shown
 
 
 @pytest.mark.parametrize(("text", "sign"), [("--x", 1), ("---x", -1), ("-+-x", 1), ("+-x", -1), ("-(-(-x))", -1)])
