@@ -321,6 +321,22 @@ def test_statements_that_something_differs_are_proved_where_the_roots_are_irrati
     assert {finding.evidence.method for finding in found} == {"exact rational point", "point over GF(p)"}
 
 
+@pytest.mark.parametrize(
+    ("chi", "degrees"),
+    [
+        ([2, -3, 1], (1, 1)),  # the roots are rational
+        ([-2, 0, 1], (1, 2)),
+        ([-2, 0, 0, 1], (1, 6)),
+        ([2, 0, -3, 0, 1], (1, 2)),  # (t^2 - 1)(t^2 - 2)
+        ([6, 0, -5, 0, 1], (1, 4)),  # (t^2 - 2)(t^2 - 3)
+    ],
+)
+def test_the_degree_of_the_splitting_field_counts_where_roots_are_needed(chi, degrees):
+    member = draw_with_chi(fmpq_poly(chi), 1)
+    examiner = verify_module._MemberExaminer(member, Settings(), VerifyOptions())
+    assert (examiner.conjugates(False), examiner.conjugates(True)) == degrees
+
+
 def test_a_rank_that_is_defined_nowhere_is_undecided(monkeypatch):
     def nowhere(claim, objects):
         raise SingularStep("made up")
