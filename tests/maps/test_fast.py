@@ -290,3 +290,11 @@ def test_a_rational_function_is_evaluated_in_doubles():
 @pytest.mark.parametrize("point", [[1.0, 1.0], [ldexp(1.0, 1000), 0.0]], ids=["zero denominator", "overflow"])
 def test_a_rational_function_without_value_in_doubles_is_none(point):
     assert float_function(parse_rational_function("x^2/(1 - y)", ["x", "y"]))(point) is None
+
+
+@pytest.mark.parametrize("rhs", ["10^300*x^2", "10^300*x", "10^300"])
+def test_eps_times_a_coefficient_beyond_the_range_is_refused(rhs):
+    system = QuadraticSystem.from_text(["x"], [rhs])
+    FloatKahanMap(system, "1/10")
+    with pytest.raises(InputError, match="eps times a coefficient leaves the range of machine floats"):
+        FloatKahanMap(system, "1000000000")
