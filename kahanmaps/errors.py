@@ -123,7 +123,7 @@ def bounded(message: str) -> str:
     What somebody wrote is shortened where a message is made; this holds for what was forgotten.
 
     >>> len(bounded("there is no file " + "x" * 200_000))
-    332
+    317
     """
     lines = message.split("\n")
     shown = [

@@ -187,7 +187,7 @@ def summarise(
     Rows are read once. Exact quantiles need all values, so these are kept: 8 bytes for a float, some hundred for any
     other value, equal ones once. A million rows are well within reach.
 
-    >>> from kahanmaps.experiments.records import Record, Task
+    >>> from kahanmaps.experiments.records import Outcome, Record, Task
     >>> def row(number, m, height):
     ...     task = Task("orbit", {"family": {"m": m}}, {})
     ...     return Row("e", number, task, Record(task.key, Outcome.OK, {"height": height}))

@@ -66,7 +66,7 @@ def test_the_time_ends_it(kahanmaps):
     assert outcome.err == "stopped early: the time was over before all orbits were finished\n"
 
 
-@pytest.mark.parametrize("steps", [10**26, 10**400], ids=["10^26", "10^400"])
+@pytest.mark.parametrize("steps", [10**26, 10**99], ids=["10^26", "10^99"])
 def test_the_time_ends_an_orbit_whose_numbers_stay_short(kahanmaps, steps):
     outcome = kahanmaps(f"heights riccati --eps 1/10 --start 1 --steps {steps} --seconds 0.2")
     assert outcome.status == 3

@@ -11,7 +11,7 @@ from cli_helpers import Outcome
 from jsonschema import Draft202012Validator
 
 from kahanmaps.checks.claims import Verdict
-from kahanmaps.experiments.records import Outcome as TaskOutcome
+from kahanmaps.experiments.records import KEPT
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.cycle_laws import LAWS
 from kahanmaps.laboratory.recurrences import GrowthClass
@@ -102,7 +102,7 @@ def test_the_words_of_a_schema_are_those_of_the_code(part: str, words: list[str]
 def test_further_words_are_those_of_the_code() -> None:
     planes = schema("period")["properties"]["planes"]["items"]["properties"]
     assert planes["kind"]["enum"] == [kind.name.lower() for kind in Kind]
-    assert schema("batch-run")["$defs"]["outcome"]["enum"] == [str(outcome) for outcome in TaskOutcome]
+    assert schema("batch-run")["$defs"]["outcome"]["enum"] == [str(outcome) for outcome in KEPT]
     runs = schema("cycles")["properties"]["runs"]["items"]["properties"]
     assert runs["compatible"]["items"]["enum"] == list(LAWS)
     facts = schema("system-file")["$defs"]["catalog_section"]["properties"]
