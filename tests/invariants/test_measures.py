@@ -27,8 +27,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import ring
 from kahanmaps.errors import SingularStep
 from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity, jacobian_determinant_sides
+from kahanmaps.invariants.phase_functions import where
 from kahanmaps.maps.kahan import KahanMap
 
 some = settings(max_examples=40)
@@ -136,3 +138,26 @@ def test_a_claimed_density_has_the_value_that_its_text_says(text, x, eps):
 def test_the_formula_of_a_density_says_phi():
     assert DeterminantDensity(LOTKA_VOLTERRA).formula == "phi = det(I - eps f'(x))"
     assert ClaimedDensity(claim("x*y", "x y")).formula == "phi = x*y"
+
+
+@pytest.mark.parametrize(
+    ("texts", "expected"),
+    [
+        (["(a - 1)*(a - 2)*x + (a - 1)*y"], "where a - 1 is not 0"),  # both vanish at a = 1 alone
+        (["(a - 1)*x + (a - 2)*y"], ""),  # nowhere both
+        (["(a - 1)*x + b*y"], "where a - 1, b are not all 0"),
+        (["a*x", "2*a*y"], "where a is not 0"),
+        (["eps^2*a*x - 3*eps*a*y"], "where a is not 0"),  # eps is not 0
+    ],
+)
+def test_a_condition_names_the_common_zeros_of_the_coefficients(texts, expected):
+    assert where(2, *(claim(text, "x y a b").numerator for text in texts)) == expected
+
+
+@pytest.mark.parametrize(("letters", "is_shown"), [(185, True), (186, False)])
+def test_a_condition_of_more_than_200_characters_is_not_written_out(letters, is_shown):
+    name = "a" * letters
+    x, a = ring(["x", name]).gens()
+    assert where(1, a * x) == (
+        f"where {name} is not 0" if is_shown else "where it has a value and is not identically 0"
+    )

@@ -287,6 +287,13 @@ def test_the_size_of_a_function_is_that_of_its_numerator_and_denominator(text, a
         assert bound.bits == pytest.approx(bits, abs=ROUNDING)
 
 
+def test_eps_as_a_number_adds_nothing_to_the_degree_of_a_claimed_function():
+    # x^2 y eps^3 at (X, Y)/W and 2/3: degree 3 in X, Y, W; numbers 2^3 and 3^3, of which the larger counts
+    found = ClaimedDensity(claim("x^2*y*eps^3", "x y")).size(eps_size(fmpq(2, 3)), VARIABLE)
+    assert (found.above.degree, found.below.degree) == (3, 3)
+    assert found.above.bits == found.below.bits == pytest.approx(3 * math.log2(3), abs=ROUNDING)
+
+
 @pytest.mark.parametrize("eps", [None, fmpq(2, 3)])
 def test_a_generic_system_attains_the_degree_of_a_step(eps):
     written, size = Written(GENERIC, eps), eps_size(eps)

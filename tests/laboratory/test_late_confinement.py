@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import pytest
 from degree_helpers import polynomial_degrees
@@ -15,8 +16,9 @@ from flint import fmpq
 from search_helpers import system as file_from
 
 from kahanmaps.errors import InputError
+from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.analysis import Analysis, analyze
-from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights
+from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
 from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.fates import CONFINED, NOT_CONFINED, _settled
 from kahanmaps.laboratory.recurrences import GrowthClass
@@ -281,6 +283,45 @@ def test_what_excludes_each_other_is_undecided():
     assert contradictions(replace(found, integrals=closed)) == [
         "orbits close after 4 steps, but the degrees seem to grow"
     ]
+
+
+@pytest.mark.parametrize(
+    ("dim", "integrals", "expected"),
+    [(1, None, False), (1, 0, False), (2, None, False), (2, 0, False), (2, 1, True), (3, 1, False), (3, 2, True)],
+)
+def test_orbits_lie_on_curves_where_one_integral_less_than_the_dimension_is_known(dim, integrals, expected):
+    known = None if integrals is None else SimpleNamespace(integrals=(0,) * integrals)
+    assert orbits_lie_on_curves(SimpleNamespace(dim=dim, integrals=known)) == expected
+
+
+def beside(kind, growth, lengths=None, heights=(21, 5)):
+    """The doubt of heights of this kind, of orbits with so many heights, beside degrees with such patterns."""
+    orbits = [SimpleNamespace(growth=SimpleNamespace(heights=(0,) * count)) for count in heights]
+    patterns = None if lengths is None else SimpleNamespace(lengths=lengths)
+    degrees = SimpleNamespace(growth=growth, patterns=patterns)
+    return doubt_of_heights(SimpleNamespace(heights=SimpleNamespace(kind=kind, orbits=orbits), degrees=degrees))
+
+
+def test_heights_and_degrees_that_do_not_go_together_are_told():
+    exponential, quadratic = Growth.EXPONENTIAL, Growth.QUADRATIC
+    assert beside(exponential, GrowthClass.LINEAR) == "the degrees grow linearly"
+    assert beside(exponential, GrowthClass.QUADRATIC) == "the degrees grow polynomially"
+    assert beside(quadratic, GrowthClass.QUADRATIC) == beside(exponential, GrowthClass.EXPONENTIAL) == ""
+    assert beside(quadratic, GrowthClass.BOUNDED) == beside(quadratic, GrowthClass.ZERO) == "the degrees are bounded"
+    assert beside(exponential, GrowthClass.UNKNOWN) == beside(Growth.UNDECIDED, GrowthClass.EXPONENTIAL) == ""
+    for one in ({"heights": None, "degrees": 0}, {"heights": 0, "degrees": None}):
+        assert doubt_of_heights(SimpleNamespace(**one)) == ""
+
+
+def test_half_of_the_longest_orbit_has_to_reach_beyond_the_last_pattern():
+    # 21 heights are those of 20 steps.
+    kind, growth = Growth.QUADRATIC, GrowthClass.QUADRATIC
+    late = "the last confinement comes after 11 steps and the orbits have 20"
+    assert beside(kind, growth, (4, 10)) == ""
+    assert beside(kind, growth, (4, 11)) == late
+    assert beside(kind, GrowthClass.BOUNDED, (4, 11)) == f"the degrees are bounded: {late}"
+    assert beside(Growth.UNDECIDED, growth, (4, 11)) == ""
+    assert beside(kind, growth, (), (2,)) == beside(kind, growth, None, (2,)) == ""
 
 
 def test_patterns_that_are_open_end_the_search_without_a_recurrence():
