@@ -147,7 +147,7 @@ def _cramer(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
         ]
     if denominator == 0:
         return None
-    common = denominator if denominator > 0 else -denominator
+    common = denominator  # of any sign: a gcd is positive
     for numerator in numerators:
         if common == 1:
             break

@@ -593,6 +593,13 @@ def test_the_estimated_size_never_falls_short(left: RationalFunction, right: Rat
             assert all(c.q == 1 and abs(c.p) <= fmpz(2) ** part.bits for c in integers)
 
 
+def test_the_scale_of_a_product_makes_its_coefficients_integers() -> None:
+    work = expressions._Arithmetic("(x/2 + 1)*(x/3 + 1)", RING, {}, Limits(), quotients=True)
+    value = expressions._parse(work)
+    assert isinstance(value, tuple)
+    assert (value[0].scale, value[0].scale * value[0].value) == (6, (x + 2) * (x + 3))
+
+
 # Manners
 
 
