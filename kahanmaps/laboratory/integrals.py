@@ -95,8 +95,8 @@ class IntegralSearch:
     reason: str
     primes: tuple[int, ...]
     seed: int
-    by_theorems: int = 0
-    theorems: str = ""
+    by_theorems: int
+    theorems: str
 
     @property
     def note(self) -> str:
