@@ -169,6 +169,16 @@ def test_exponential_growth_does(rate, n):
     assert with_degrees(*(1 + round(10 * rate**k) for k in range(n + 1))).looks_exponential
 
 
+@pytest.mark.parametrize("largest", [0, 5])
+def test_the_largest_degree_is_reached_exactly_by_series_and_by_minors(largest, monkeypatch):
+    """Degrees 1, 3, 7, 17: a bound of 17 admits the last one and a bound of 16 does not."""
+    monkeypatch.setattr(curves, "_MINORS", largest)
+    system = load("henon_heiles").system
+    assert degree_growth(system, max_terms=3, max_degree=17).degrees == (1, 3, 7, 17)
+    found = degree_growth(system, max_terms=3, max_degree=16)
+    assert (found.degrees, found.ended) == ((1, 3, 7), "degree")
+
+
 @pytest.mark.slow
 def test_planar_integrable_maps_go_far():
     found = degree_growth(load("planar_cubic_hamiltonian").system, max_terms=60, seconds=60)

@@ -5,14 +5,22 @@ from __future__ import annotations
 import random
 
 import pytest
-from flint import fmpq
+from flint import fmpq, nmod_poly
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.fates import CONFINED, NOT_CONFINED
-from kahanmaps.laboratory.jets import NotGeneric, PrecisionTooLow, follow
+from kahanmaps.laboratory.jets import (
+    Jet,
+    NotGeneric,
+    PrecisionTooLow,
+    follow,
+    image_of,
+    sparse_forms,
+    valuation,
+)
 from kahanmaps.laboratory.singularities import default_eps, singularities, symbolic_denominator
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map, linear_forms
@@ -252,6 +260,64 @@ def test_series_too_short_say_so_and_special_points_too():
     assert [s.rank for s in follow(forms, [third, 5, 1], [1, 1, 0], [[0, 1, 0]], PRIME, 4, 16)] == [0, 0, 0, 1]
     with pytest.raises((PrecisionTooLow, NotGeneric)):
         follow(forms, [third, 5, 1], [0, 1, 0], [[1, 0, 0]], PRIME, 4, 16)
+
+
+def power_of(number: fmpq, prime: int) -> int | None:
+    """The exponent of the prime in a rational number, None for 0."""
+    power = 0
+    while number and number.p % prime == 0:
+        number, power = number / prime, power + 1
+    while number.q % prime == 0:
+        number, power = number * prime, power - 1
+    return power if number else None
+
+
+@pytest.mark.parametrize(
+    ("name", "eps", "point", "steps"),
+    [("weierstrass", "1/2", ("1/3", 5), 6), ("lorenz", "1/7", (3, 5, 7), 3), ("riccati", "1/2", (2,), 2)],
+)
+def test_a_series_divides_as_rational_numbers_at_a_large_prime_do(name, eps, point, steps):
+    """With t = p the curve is one rational point, which exact arithmetic carries on: its powers of p are those of t."""
+    system, field = load(name).system, GF(PRIME)
+    start, direction = [*map(fmpq, point), fmpq(1)], [*range(1, system.dim + 1), 0]
+    X = [x + PRIME * v for x, v in zip(start, direction, strict=True)]
+    forms, _ = homogeneous_map(system, eps, QQ)
+    residues = [int(field.convert(x)) for x in start]
+    for step in follow(linear_forms(system, eps, field), residues, direction, [], PRIME, steps, 32):
+        image = [form(*X) for form in forms]
+        powers = [power_of(entry, PRIME) for entry in image]
+        common = min(power for power in powers if power is not None)
+        X = [entry / fmpq(PRIME) ** common for entry in image]
+        pole = None if powers[-1] is None else powers[-1] - common
+        assert (step.common, step.pole, step.denominator) == (common, pole, powers[-1])
+        limit = [int(field.convert(x)) for x in X]
+        assert [a * limit[0] % PRIME for a in step.limit] == [b * step.limit[0] % PRIME for b in limit]
+
+
+def test_a_point_has_the_image_of_the_map_and_none_where_all_minors_vanish():
+    system = load("lorenz").system
+    forms = sparse_forms(linear_forms(system, "1/7", GF(PRIME)))
+    image = image_of(forms, [3, 5, 7, 1], PRIME)
+    inverse = pow(image[-1], -1, PRIME)
+    expected = KahanMap(system, "1/7", GF(PRIME)).step([GF(PRIME).convert(c) for c in (3, 5, 7)])
+    assert [c * inverse % PRIME for c in image[:-1]] == [int(c) for c in expected]
+    # x' = x^2, y' = x y at eps = 1: x (Z - x) : y (Z - x) : (Z - 2 x) (Z - x), 0 on a line where curves have images
+    special = sparse_forms(linear_forms(QuadraticSystem.from_text(["x", "y"], ["x^2", "x*y"]), 1, GF(PRIME)))
+    assert [image_of(special, [1, y, 1], PRIME) for y in (0, 5)] == [None, None]
+    assert image_of(special, [0, 5, 1], PRIME) is not None
+
+
+def test_jets_keep_the_lower_precision_and_lose_what_is_divided_out():
+    t, one = nmod_poly([0, 1], 7), nmod_poly([1], 7)
+    short, long = Jet(one, [t], 3), Jet(t, [one], 5)
+    for left, right in ((short, long), (long, short)):
+        assert (left + right).precision == (left - right).precision == (left * right).precision == 3
+    divided = Jet(t**3, [t**2], 5).over_power(2)
+    assert (divided.value, divided.slopes, divided.precision) == (t, [one], 3)
+    with pytest.raises(NotGeneric):
+        Jet(t**3, [t], 5).over_power(2)
+    assert [valuation(3 * t**2, n) for n in (1, 2, 3, 9)] == [None, None, 2, 2]
+    assert valuation(nmod_poly([], 7), 4) is None
 
 
 @pytest.mark.parametrize(

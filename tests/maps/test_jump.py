@@ -28,11 +28,12 @@ from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi
 from kahanmaps.family.structure import structure_of
-from kahanmaps.maps import tau_table
+from kahanmaps.maps import jump, tau_table
 from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.jump import Jump, special_start
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.planar_block import PlanarBlock, same_point
 from kahanmaps.maps.planes_point import PlanesPoint
 from kahanmaps.maps.rational_jump import OverBudget
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -405,3 +406,21 @@ def test_starts_on_singular_levels_and_at_rest_are_special_and_no_others_are(nam
     }
     expected = next((f"the start is {kind} in the plane t = 1" for words, kind in kinds.items() if words in name), "")
     assert special_start(structure, fmpq(1, 2), start) == expected
+
+
+@pytest.mark.parametrize(("block", "start", "period"), [((0, 0, 0, 1), (0, 1, 1), 5)])
+def test_around_a_cycle_only_the_rest_of_the_steps_is_walked(block, start, period, monkeypatch):
+    field = GF(5)
+    cubic, point = PlanarBlock(*map(field.convert, block)), tuple(map(field.convert, start))
+    orbit = [point]
+    for _ in range(period):
+        orbit.append(cubic.image(orbit[-1]))
+    assert [same_point(P, point) for P in orbit] == [True, *[False] * (period - 1), True]
+    monkeypatch.setattr(jump, "_CYCLE", period)
+    for n in range(2 * period):
+        assert same_point(jump._around_cycle(cubic, point, n), orbit[n % period])
+        assert same_point(jump._around_cycle(cubic, point, 10**30 + n), orbit[n % period])
+    monkeypatch.setattr(jump, "_CYCLE", period - 1)
+    assert same_point(jump._around_cycle(cubic, point, period - 1), orbit[period - 1])
+    with pytest.raises(InputError, match="cannot be reached directly"):
+        jump._around_cycle(cubic, point, period)
