@@ -109,3 +109,11 @@ def test_starts_given_and_random_do_not_go_together(kahanmaps):
     outcome = kahanmaps("heights weierstrass --start 1,2 --starts 2")
     assert outcome.status == 2
     assert "not both" in outcome.err
+
+
+def test_random_starts_have_prime_numerators_and_lie_on_both_sides_of_0():
+    """A coordinate is then no simple multiple of 1/eps, where many maps have invariant curves."""
+    survey = height_survey(load("euler_top").system, starts=6, steps=2)
+    coordinates = [x for orbit in survey.orbits for x in orbit.start]
+    assert all(abs(x.p).is_prime() and abs(x.p) >= 13 for x in coordinates)
+    assert {x > 0 for x in coordinates} == {True, False}

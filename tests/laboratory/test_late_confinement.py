@@ -339,3 +339,8 @@ def test_an_eps_too_long_for_formulas_is_refused_or_followed_at_random_points():
     found = degree_growth(top, eps, seconds=20)
     assert (found.patterns.lengths, found.patterns.running) == ((3,), "")
     assert [found.recurrence.predict(n) for n in (5, 50)] == [51, 5001]
+
+
+def test_what_still_runs_is_said_before_what_was_found():
+    assert Patterns((3,), None, True).text == "nothing new after step 3"
+    assert Patterns((3,), None, True, "x = 0 is undecided").text == "x = 0 is undecided"

@@ -33,10 +33,24 @@ CHAIN = QuadraticSystem.from_text(
 PIVOTS = QuadraticSystem.from_text(
     ["x", "y", "z"], ["50*x + 30*y + x*z", "20*x + 50*y + 10*z + y^2", "15*y + 40*x + 50*z - x*y"]
 )
+# The same four times: in a dimension beyond those for which kernels are written out.
+MANY_PIVOTS = QuadraticSystem.from_text(
+    [f"{name}{k}" for k in range(4) for name in "xyz"],
+    [
+        text.format(k=k)
+        for k in range(4)
+        for text in (
+            "50*x{k} + 30*y{k} + x{k}*z{k}",
+            "20*x{k} + 50*y{k} + 10*z{k} + y{k}^2",
+            "15*y{k} + 40*x{k} + 50*z{k} - x{k}*y{k}",
+        )
+    ],
+)
 SYSTEMS = {
     **NAMED_SYSTEMS,
     "chain": CHAIN,
     "pivots": PIVOTS,
+    "many pivots": MANY_PIVOTS,
     "member": draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system,
 }
 over_systems = pytest.mark.parametrize("system", SYSTEMS.values(), ids=SYSTEMS.keys())

@@ -413,6 +413,25 @@ def test_block_integrals_are_those_of_the_exact_normal_form():
     assert drift.initial[0] == pytest.approx(to_floats([value])[0], rel=1e-11)
 
 
+def test_block_integrals_at_a_complex_root_are_those_of_the_exact_normal_form():
+    name = next(name for name, form in FORMS.items() if "complex" in name)
+    form, start = FORMS[name], start_of(FORMS[name].dim)
+    X, Y = form.coordinates(start)
+    eps = fmpq(1, 10)
+    drifts = ensemble(name, [start], kernel="numpy").drift
+    found = [drift.initial[0] for drift in drifts if np.iscomplexobj(drift.initial)]
+    assert found
+
+    def at(element, root):
+        return sum(float(c.p) / float(c.q) * root**k for k, c in enumerate(element.coeffs()))
+
+    h, D = form.h(X, Y), form.D(X, Y)
+    roots = [complex(root) for root, _ in form.chi.complex_roots()]
+    values = [at(h, root) / (1 + float(eps.p) ** 2 / float(eps.q) ** 2 * at(D, root)) for root in roots if root.imag]
+    for one in found:
+        assert min(abs(one - value) for value in values) <= 1e-11 * abs(one)
+
+
 @over_kernels
 def test_a_function_that_is_no_integral_drifts_and_one_that_is_does_not(kernel):
     names = ["x", "y", "z"]

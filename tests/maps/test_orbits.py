@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import signal
 from itertools import islice, product
+from threading import get_ident
 
 import pytest
 from flint import fmpq
@@ -529,6 +530,20 @@ def test_an_orbit_in_normal_form_is_interrupted_like_any_other():
 
 
 # Iterates reached directly.
+
+
+def test_iterates_given_up_within_the_first_jump_end_after_step_0(monkeypatch):
+    structure, system = structure_and_system("m = 2")
+    iterates = Iterates(KahanMap(system, "1/10"), [1, 2, 3, 4], [30, 60], structure=structure)
+
+    def points():
+        iterates._busy_in = get_ident()
+        iterates.interrupt()  # as a signal does in the middle of a jump
+        yield
+
+    monkeypatch.setattr(iterates, "_points", points)
+    assert list(iterates) == []
+    assert iterates.end == OrbitEnd("interrupted", 0, "interrupted after step 0")
 
 
 @pytest.mark.parametrize("field", [QQ, GF(10007), GF(2**89 - 1)], ids=repr)
