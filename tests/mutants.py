@@ -266,10 +266,10 @@ class Coverage:
         lines = self.data.contexts_by_lineno(str(ROOT / mutant.path))
         wanted = self._lines(mutant, lines)
         contexts = {c for line in wanted for c in lines.get(line, [])} - {""}
-        if not contexts and _is_compiled(mutant.path):  # nobody sees its lines
+        if _is_compiled(mutant.path):  # its lines are seen only where a test runs them uncompiled
             own = "float" if "float" in mutant.path else "modular"
             lines = self.data.contexts_by_lineno(str(ROOT / f"kahanmaps/maps/{own}_numba.py"))
-            contexts = {c for line in lines for c in lines[line]} - {""}
+            contexts |= {c for line in lines for c in lines[line]} - {""}
         tests = set()
         for context in contexts:
             tests |= {context} if context in self.seconds else set(self.by_file.get(context, ()))
