@@ -17,7 +17,7 @@ from kahanmaps.algebra.polynomials import degree, ring
 from kahanmaps.algebra.small_systems import Component, independent
 from kahanmaps.checks.settings import Settings
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.laboratory.commuting import commuting_systems
+from kahanmaps.laboratory.commuting import _Search, commuting_systems
 from kahanmaps.laboratory.commuting_equations import coefficients_of, combination, commutator_equations, system_of
 from kahanmaps.laboratory.commuting_proofs import _family_identity, affine, judge_family, judge_field, splitting
 from kahanmaps.laboratory.commuting_space import bracket_vanishes, commuting_space, field_at
@@ -283,6 +283,17 @@ def test_too_large_is_undecided_with_a_reason():
     assert (found.dimension, found.complete) == (31, False)
     found = commuting_systems(system("a b c d e f", "a^2", "0", "0", "0", "0", "0"), "quadratic")
     assert (found.dimension, len(found.basis), found.complete) == (None, 1, False)
+
+
+def test_of_many_equations_that_were_not_solved_six_are_told():
+    search = _Search(system("x", "x^2"), "quadratic", Settings(), 0.0)
+    gens = ring([f"b{k}" for k in range(1, 10)]).gens()
+    for b in gens:
+        for _ in range(2):  # the same once
+            search._leave(Component(gens, (b**2 - 2,)), "why")
+    told = search.found.undecided
+    assert [text.endswith(f"(why): b{k}^2 - 2 = 0") for k, text in enumerate(told[:6], 1)] == [True] * 6
+    assert told[6:] == ["and more equations that were not solved"]
 
 
 def test_no_time_is_undecided_and_never_complete():

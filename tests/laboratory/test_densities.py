@@ -233,3 +233,17 @@ def test_dimensions_five_and_six(name):
 
 def test_the_check_by_definition_tells_a_wrong_density():
     assert not holds_exactly(load("lotka_volterra"), "x*y + x", "1/10")
+
+
+def test_the_theorem_needs_a_determinant_that_is_a_polynomial_and_not_0(monkeypatch):
+    saddle = system("x y", "x", "-y")  # det(I - eps f') = 1 - eps^2
+    assert module._theorem(Laboratory(saddle, (), fmpq(1))) is None
+    found = module._theorem(Laboratory(load("henon_heiles"), (), fmpq(1, 2)))
+    assert (found.verdict, found.function.denominator) == (Verdict.PROVED, 1)
+    point = (fmpq(3), fmpq(-2), fmpq(5), fmpq(7))
+    determinants = [KahanMap(load("henon_heiles").system, "1/2").determinant(x) for x in (point, (fmpq(0),) * 4)]
+    values = [found.function.numerator(*x, fmpq(1, 2)) for x in (point, (fmpq(0),) * 4)]
+    assert values[0] * determinants[1] == values[1] * determinants[0] != 0
+    assert module._theorem(Laboratory(load("lorenz"), (), fmpq(1, 2))) is None
+    monkeypatch.setattr(module, "determinant_polynomial", lambda _: None)
+    assert module._theorem(Laboratory(load("henon_heiles"), (), fmpq(1, 2))) is None

@@ -6,6 +6,8 @@ tables are computed here once more, with polynomials and gcds, for as long as th
 
 from __future__ import annotations
 
+import random
+import time
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -15,12 +17,25 @@ from degree_helpers import polynomial_degrees
 from flint import fmpq
 from search_helpers import system as file_from
 
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.polynomials import ring
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.analysis import Analysis, analyze
 from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
 from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
-from kahanmaps.laboratory.fates import CONFINED, NOT_CONFINED, _settled
+from kahanmaps.laboratory.fates import (
+    CONFINED,
+    NO_TIME,
+    NOT_CONFINED,
+    NOT_CONTRACTED,
+    UNDECIDED,
+    Range,
+    _settled,
+    _tangents,
+    fate_of,
+)
+from kahanmaps.laboratory.modular_points import rank
 from kahanmaps.laboratory.recurrences import GrowthClass
 from kahanmaps.laboratory.singularities import MAX_DIGITS, Patterns, patterns, patterns_of, singularities
 from kahanmaps.systems.catalog import load
@@ -322,6 +337,43 @@ def test_half_of_the_longest_orbit_has_to_reach_beyond_the_last_pattern():
     assert beside(kind, GrowthClass.BOUNDED, (4, 11)) == f"the degrees are bounded: {late}"
     assert beside(Growth.UNDECIDED, growth, (4, 11)) == ""
     assert beside(kind, growth, (), (2,)) == beside(kind, growth, None, (2,)) == ""
+
+
+def lorenz_along(seed, limits):
+    """What becomes of x^2 = 2 z^2, which has points in GF(p) for every other prime only."""
+    x, _, z, _ = ring(["x", "y", "z", "w"]).gens()
+    return fate_of(load("lorenz").system, fmpq(1, 7), x**2 - 2 * z**2, "?", False, None, random.Random(seed), limits)
+
+
+def test_a_surface_without_points_modulo_some_primes_is_followed_modulo_others():
+    for seed in range(4):
+        found = lorenz_along(seed, Range(4, 4, 4, time.monotonic() + 20))
+        assert (found.status, found.degree, len(set(found.primes))) == (NOT_CONTRACTED, 2, 2)
+        assert [(step.common, step.rank) for step in found.steps] == [(0, 2)] * 4
+    late = lorenz_along(0, Range(4, 4, 4, time.monotonic() - 1))
+    assert (late.status, late.note) == (UNDECIDED, NO_TIME)
+
+
+def test_hypersurfaces_are_followed_at_length_unless_it_is_said():
+    assert not Range(1, 1, 1, 0.0).briefly
+
+
+@pytest.mark.parametrize("gradient", [[0, 3, 5, 0], [2, 0, 0, 7], [0, 0, 0, 4]])
+@pytest.mark.parametrize("point", [[1, 2, 3, 4], [0, 5, 96, 0], [3, 0, 0, 1]])
+def test_tangents_annihilate_the_gradient_and_span_the_tangent_space_with_the_point(gradient, point):
+    p = 101
+    on = [*point]
+    pivot = next(k for k in range(4) if gradient[k])
+    rest = sum(g * x for k, (g, x) in enumerate(zip(gradient, on, strict=True)) if k != pivot)
+    on[pivot] = -rest * pow(gradient[pivot], -1, p) % p
+    tangents = _tangents(on, gradient, GF(p))
+    assert len(tangents) == 2
+    assert all(sum(g * x for g, x in zip(gradient, vector, strict=True)) % p == 0 for vector in [on, *tangents])
+    assert rank([on, *tangents], p) == 3
+
+
+def test_only_the_pivot_leaves_no_tangents():
+    assert _tangents([0, 5, 0], [0, 7, 0], GF(101)) is None
 
 
 def test_patterns_that_are_open_end_the_search_without_a_recurrence():

@@ -291,6 +291,7 @@ def test_a_series_divides_as_rational_numbers_at_a_large_prime_do(name, eps, poi
         pole = None if powers[-1] is None else powers[-1] - common
         assert (step.common, step.pole, step.denominator) == (common, pole, powers[-1])
         limit = [int(field.convert(x)) for x in X]
+        assert any(step.limit)
         assert [a * limit[0] % PRIME for a in step.limit] == [b * step.limit[0] % PRIME for b in limit]
 
 
@@ -312,6 +313,7 @@ def test_jets_keep_the_lower_precision_and_lose_what_is_divided_out():
     short, long = Jet(one, [t], 3), Jet(t, [one], 5)
     for left, right in ((short, long), (long, short)):
         assert (left + right).precision == (left - right).precision == (left * right).precision == 3
+    assert ((-long).slopes, (short - long).slopes, (short * long).slopes) == ([-one], [t - one], [t**2 + one])
     divided = Jet(t**3, [t**2], 5).over_power(2)
     assert (divided.value, divided.slopes, divided.precision) == (t, [one], 3)
     with pytest.raises(NotGeneric):
