@@ -294,6 +294,9 @@ def test_of_many_equations_that_were_not_solved_six_are_told():
     told = search.found.undecided
     assert [text.endswith(f"(why): b{k}^2 - 2 = 0") for k, text in enumerate(told[:6], 1)] == [True] * 6
     assert told[6:] == ["and more equations that were not solved"]
+    other = _Search(system("x", "x^2"), "quadratic", Settings(), 0.0)
+    other._leave(Component(gens, tuple(b**2 - 2 for b in gens)), "why")
+    assert other.found.undecided[0].endswith("(why): " + "; ".join(f"b{k}^2 - 2 = 0" for k in range(1, 7)))
 
 
 def test_no_time_is_undecided_and_never_complete():

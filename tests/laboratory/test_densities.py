@@ -247,3 +247,16 @@ def test_the_theorem_needs_a_determinant_that_is_a_polynomial_and_not_0(monkeypa
     assert module._theorem(Laboratory(load("lorenz"), (), fmpq(1, 2))) is None
     monkeypatch.setattr(module, "determinant_polynomial", lambda _: None)
     assert module._theorem(Laboratory(load("henon_heiles"), (), fmpq(1, 2))) is None
+
+
+def test_the_theorem_leaves_out_factors_without_variables_and_wants_numbers_in_few_dimensions(monkeypatch):
+    file = system("x y z w", "x", "-y", "w", "z^2")  # det(I - eps f') = (1 - eps^2) (1 - 2 eps^2 z)
+    found = module._theorem(Laboratory(file, ()))
+    assert found.function == parse_rational_function("2*eps^2*z - 1", ["x", "y", "z", "w", "eps"])
+    with_symbol = system("x y", "a*x", "-a*y + x^2", a="2")
+    assert module._theorem(Laboratory(with_symbol, ())) is not None
+    assert module._theorem(Laboratory(with_symbol, ("a",))) is None
+    monkeypatch.setattr(module, "MAX_DIMENSION", 4)
+    assert module._theorem(Laboratory(file, ())) is not None
+    monkeypatch.setattr(module, "MAX_DIMENSION", 3)
+    assert module._theorem(Laboratory(file, ())) is None

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 from flint import nmod
 from search_helpers import random_system, system
 
 from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.laboratory import search as module
 from kahanmaps.laboratory.closed_forms import closed_forms
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.hirota_kimura import orbit_profile
@@ -84,6 +87,46 @@ def test_progress_is_told():
     said = []
     search(laboratory.maps[0], orbit_profile(laboratory.maps), laboratory.cofactors(), 30.0, said.append)
     assert any("known cofactors" in text for text in said)
+
+
+def calls_of_a_search(monkeypatch, nullities, wanted=1, by_relations=0, by_cofactors=0):
+    """The degrees whose relations are taken, the relations unresolved and what is told, with stand-ins for the work."""
+    taken, told, independent = [], [], [0]
+
+    def relations(map_, degree, *_):
+        taken.append(degree)
+        independent[0] += by_relations
+        return 1
+
+    def cofactors(*_):
+        independent[0] += by_cofactors
+        return iter(())
+
+    monkeypatch.setattr(module, "_take_relations", relations)
+    monkeypatch.setattr(module, "search_cofactors", cofactors)
+    monkeypatch.setattr(module, "gradient_rank", lambda *_: independent[0])
+    profile = SimpleNamespace(nullities=nullities, codimension=wanted)
+    found = search(Laboratory(load("lorenz")).maps[0], profile, [], 30.0, told.append)
+    return taken, found.unresolved, [text for text in told if "cofactors" in text]
+
+
+def test_degrees_with_many_relations_come_after_the_cofactors_and_none_after_what_is_wanted(monkeypatch):
+    terms = ["polynomials of degree up to 7 with 120 terms and known cofactors"]
+    many = module.LARGEST_SPAN
+    assert calls_of_a_search(monkeypatch, (0, 3, 21, 20)) == ([2, 4, 3], 3, terms)
+    assert calls_of_a_search(monkeypatch, (1, many - 1, 1)) == ([1, 3, 2], 3, terms)
+    assert calls_of_a_search(monkeypatch, (1, many, 1)) == ([1], 1, terms)
+    assert calls_of_a_search(monkeypatch, (1, 1, 30), by_relations=1) == ([1], 1, [])
+    assert calls_of_a_search(monkeypatch, (1, 30, 30), by_cofactors=1) == ([1], 1, terms)
+    assert calls_of_a_search(monkeypatch, (30, 30), by_relations=1) == ([1], 1, terms)
+    assert calls_of_a_search(monkeypatch, (1, 30), wanted=0) == ([], 0, [])
+
+
+@pytest.mark.parametrize(("most", "degree", "terms"), [(120, 7, 120), (119, 6, 84), (10, 2, 10), (9, 1, 4)])
+def test_cofactors_are_tried_up_to_so_many_terms(most, degree, terms, monkeypatch):
+    monkeypatch.setattr(module, "_MOST_TERMS", most)
+    (told,) = calls_of_a_search(monkeypatch, ())[2]
+    assert told == f"polynomials of degree up to {degree} with {terms} terms and known cofactors"
 
 
 # The pencil of 1 + a^2 x/(3 eps - 1) and y^2, as if it had been found at each value of a and eps.

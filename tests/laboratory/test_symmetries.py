@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import random
+import time
 
 import pytest
 from flint import fmpq, fmpq_mat
@@ -14,6 +15,7 @@ from kahanmaps import KahanMap
 from kahanmaps.algebra.small_systems import Component
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import InputError, SingularStep
+from kahanmaps.laboratory.signed_permutations import signed_permutations
 from kahanmaps.laboratory.symmetries import linear_symmetries
 from kahanmaps.laboratory.symmetry_equations import is_singular, is_symmetry
 from kahanmaps.systems.catalog import load
@@ -107,6 +109,34 @@ def test_signed_permutations_agree_with_brute_force(seed):
     assert {(str(t.S), t.reversing) for t in found.signed if not any(e != 0 for e in t.r)} == wanted
     for t in found.symmetries + found.reversing:
         assert is_symmetry(f, t.S, t.r, -1 if t.reversing else 1)
+
+
+@pytest.mark.parametrize(
+    ("names", "highest", "lower"),
+    [
+        ("x y", ("x^2", "y^2"), ("1", "x")),
+        ("x y", ("x*y", "-x*y"), ("y", "0")),
+        ("x y z", ("y*z", "z*x", "x*y"), ("x", "0", "1")),
+        ("x y z", ("x*y", "y*z", "z*x"), ("0", "1", "0")),
+        ("x y z", ("x^2 - y*z", "y^2 + x*z", "0"), ("x", "y", "z")),
+        ("x y", ("y", "-x"), ("0", "0")),
+        ("x y z", ("y", "z", "x"), ("1", "0", "0")),
+        ("x y z", ("x + y", "y", "z - x"), ("0", "0", "2")),
+    ],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_signed_permutations_are_those_that_keep_the_terms_of_highest_degree(names, highest, lower, sign):
+    n = len(highest)
+    alone, whole = system(names, *highest), system(names, *(f"{a} + {b}" for a, b in zip(highest, lower, strict=True)))
+    wanted = set()
+    for order, signs in itertools.product(itertools.permutations(range(n)), itertools.product((1, -1), repeat=n)):
+        S = fmpq_mat(n, n)
+        for i, (place, s) in enumerate(zip(order, signs, strict=True)):
+            S[place, i] = fmpq(s)
+        if is_symmetry(alone, S, [fmpq(0)] * n, sign):
+            wanted.add(str(S))
+    found, are_all = signed_permutations(whole, sign, time.monotonic() + 20)
+    assert (sorted(map(str, found)), are_all) == (sorted(wanted), True)
 
 
 def test_a_translation_is_found_where_it_is_needed():
