@@ -359,3 +359,18 @@ def test_an_orbit_from_another_start_agrees_too(always_eliminate):
     for _ in range(5):
         point, x = IntegerSteps(system, fmpq(-3, 7)).step(point), rational_step(system, fmpq(-3, 7), x)
     assert point.rationals() == x
+
+
+@pytest.mark.parametrize(
+    ("matrix", "right", "numerators", "denominator"),
+    [
+        ([[1, 0], [0, 2]], [1, 1], (2, 1), 2),
+        ([[0, 1], [1, 0]], [3, 5], (5, 3), 1),  # determinant -1
+        ([[-2, 0], [0, 3]], [2, 6], (-1, 2), 1),
+        ([[-2]], [3], (-3,), 2),
+        ([[0, 1, 0], [1, 0, 0], [0, 0, 2]], [4, 6, 1], (12, 8, 1), 2),
+    ],
+)
+def test_cramers_rule_gives_lowest_terms_over_a_positive_denominator(matrix, right, numerators, denominator):
+    found = integer_steps._cramer(fmpz_mat(matrix), fmpz_mat([[entry] for entry in right]))
+    assert (found.numerators, found.denominator) == (numerators, denominator)
