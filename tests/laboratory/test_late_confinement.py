@@ -30,7 +30,9 @@ from kahanmaps.laboratory.fates import (
     NOT_CONFINED,
     NOT_CONTRACTED,
     UNDECIDED,
+    Hypersurface,
     Range,
+    _joined,
     _settled,
     _tangents,
     fate_of,
@@ -396,3 +398,20 @@ def test_an_eps_too_long_for_formulas_is_refused_or_followed_at_random_points():
 def test_what_still_runs_is_said_before_what_was_found():
     assert Patterns((3,), None, True).text == "nothing new after step 3"
     assert Patterns((3,), None, True, "x = 0 is undecided").text == "x = 0 is undecided"
+
+
+def test_a_map_into_a_hypersurface_is_defined_and_one_without_values_is_not():
+    # At eps = -1 the first coordinate of all images is 0; at eps = 1 det(I - eps f') = 0.
+    system = QuadraticSystem.from_text(["x", "y"], ["x", "y^2"])
+    runs = [singularities(system, eps, steps=3) for eps in (-1, 1)]
+    assert [(run.is_dominant, run.is_undefined) for run in runs] == [(False, False), (False, True)]
+
+
+def test_of_two_points_on_one_hypersurface_the_one_that_was_followed_less_counts():
+    near, far = (
+        replace(Hypersurface("?", 1, False, 1, NOT_CONFINED, 1, None, (), (p,), ""), followed=steps)
+        for p, steps in ((5, 40), (7, 90))
+    )
+    for one, other in ((near, far), (far, near)):
+        joined = _joined(one, other)
+        assert (joined.followed, set(joined.primes)) == (40, {5, 7})

@@ -284,3 +284,11 @@ def test_an_interrupted_ensemble_stops_between_portions_and_can_go_on():
     reached = orbits.step
     orbits.advance(3)
     assert orbits.step == reached + 3
+
+
+def test_records_of_an_ensemble_under_way_begin_behind_the_points_it_has_reached():
+    starts = starts_of(LORENZ, 3) / 4
+    orbits = FloatEnsemble(LORENZ, "1/200", starts, kernel="numpy")
+    assert np.array_equal(next(orbits.records(2, 1)), starts[None])
+    orbits.advance(4)
+    assert next(orbits.records(2, 1)).shape == (0, 3, 3)

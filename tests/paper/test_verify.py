@@ -7,6 +7,7 @@ undecided and say why; nothing is refuted there but misprints.
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -16,6 +17,7 @@ from flint import fmpq_mat, fmpq_poly
 from helpers import LORENZ
 from paper.members import LARGE_SPECTRA, SPECTRA, file, member
 
+from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import Settings
@@ -476,3 +478,19 @@ def test_the_witness_of_the_misprint_in_the_two_forms_is_a_rational_point_with_b
     assert witness.field == "QQ"
     assert set(witness.vectors) == {"linear", "u1", "u2", "u3"}
     assert Fraction(witness.left[0]) != Fraction(witness.right[0])
+
+
+def test_a_control_that_makes_all_systems_f_replaces_given_matrices_too():
+    """Objects for derivatives are given the matrices B_i; drawn ones have none and compute them from the sign."""
+    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1))
+    trivial = CONTROLS["B=I"].function
+    given = objects.changed(associate_matrices=(objects.I * objects.number(5),))
+    assert trivial(given).associate_matrices == (objects.I,)
+    assert not trivial(objects).associate_matrices
+
+
+def test_a_quadratic_system_without_structure_is_drawn_with_terms_of_all_degrees():
+    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1))
+    drawn, homogeneous = objects.arbitrary_system(), objects.arbitrary_system(homogeneous=True)
+    zero = objects.vector("x") * objects.number(0)
+    assert drawn.value(zero.entries()) != homogeneous.value(zero.entries())
