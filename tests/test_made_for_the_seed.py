@@ -7,9 +7,11 @@ the same command drew, with the same seed, for the system before.
 
 from __future__ import annotations
 
+from itertools import product
 from math import prod
 
 import pytest
+from flint import fmpq
 
 from kahanmaps import (
     QuadraticSystem,
@@ -21,10 +23,17 @@ from kahanmaps import (
 )
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.checks.commute import commutativity
+from kahanmaps.checks.conserve import conservation
+from kahanmaps.checks.preserve import density_identity, jacobi_identity, transformation_identity
 from kahanmaps.checks.settings import Settings
+from kahanmaps.invariants.integrals import ClaimedIntegral, ModifiedHamiltonian
+from kahanmaps.invariants.measures import ClaimedDensity
 from kahanmaps.laboratory import affine_functions
 from kahanmaps.laboratory.degrees import degree_growth
 from kahanmaps.laboratory.densities import find_densities
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 ROUNDS = 2
 
@@ -129,6 +138,44 @@ def test_an_integral_that_is_one_only_at_the_eps_of_another_orbit_is_refuted_alo
 
 def claim_at(eps: str):
     return parse_rational_function(f"(eps - {eps})*x", ["x", "y", "eps"])
+
+
+# What the hash is of
+
+
+def claimed(text: str) -> ClaimedIntegral:
+    return ClaimedIntegral("I", parse_rational_function(text, ["x", "y", "eps"]))
+
+
+def plane(first: str, second: str) -> QuadraticSystem:
+    return QuadraticSystem.from_text(["x", "y"], [first, second])
+
+
+F, G, EPS = plane("x^2 + y", "y^2"), plane("x^2 + 2*y", "y^2"), fmpq(1, 10)
+J = standard_structure(2)
+H, K = (CubicHamiltonian(parse_polynomial(text, ["x", "y"]), J) for text in ("x^3 + y^2", "x^3 + 2*y^2"))
+NAMES = ("f", "g")
+LIKE_EACH_OTHER = {
+    "integrals": [
+        conservation(system, integral, eps)
+        for system, integral, eps in product((F, G), (claimed("x"), claimed("x + eps")), (None, EPS))
+    ],
+    "modified Hamiltonians": [conservation(F, ModifiedHamiltonian(h), None) for h in (H, K)],
+    "densities": [
+        density_identity(system, ClaimedDensity(claimed(text).function), eps)
+        for system, text, eps in product((F, G), ("x", "1/x"), (None, EPS))
+    ],
+    "maps": [commutativity(f, g, eps, NAMES) for f, g, eps in product((F, G), (F, G), (None, EPS))],
+    "Poisson tensors": [transformation_identity(h, eps) for h, eps in product((H, K), (None, EPS))],
+    "Jacobi": [jacobi_identity(h, eps) for h, eps in product((H, K), (None, EPS))],
+}
+
+
+@pytest.mark.parametrize("kind", LIKE_EACH_OTHER)
+def test_identities_that_differ_in_anything_have_points_of_their_own(kind):
+    identities = LIKE_EACH_OTHER[kind]
+    assert len({identity.seed(0) for identity in identities}) == len(identities)
+    assert identities[0].seed(0) != identities[0].seed(1)
 
 
 # The hash itself
