@@ -1,38 +1,62 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and on the disk before anything relies on them."""
 
 from __future__ import annotations
 
 import errno
 import os
-from contextlib import suppress
+import shutil
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import NamedTemporaryFile, TemporaryFile
+from typing import IO, Any
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file beside its place and put it there when it is complete; what stood there stays until then.
+@contextmanager
+def whole_file(path: str | os.PathLike[str]) -> Iterator[IO[bytes]]:
+    """A stream to a file beside `path`, which takes its place at the end of the block; if that raises, it goes.
 
-    Raises OSError where it cannot be written.
+    What stood there stays until then: whoever looks, at any moment and after any end, finds the old file or the new
+    one. A pipe or a device cannot be replaced: it gets everything at the end. Raises OSError that names `path`.
     """
-    if path.exists() and not path.is_file():  # /dev/stdout and its relatives take bytes, but cannot be replaced
-        path.write_bytes(content)
-        return
-    target = resolved(path)
-    mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
     try:
-        part = NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False)  # noqa: SIM115
-    except OSError as error:  # about the file that was asked for, not about the one beside it
-        raise type(error)(error.errno, error.strerror, str(path)) from None
-    with part:
-        try:
-            part.write(content)
-            part.flush()
-            os.chmod(part.name, mode)
-            os.replace(part.name, target)
-        except BaseException:
-            with suppress(OSError):
-                os.unlink(part.name)
-            raise
+        if os.path.exists(path) and not os.path.isfile(path):
+            with TemporaryFile() as held:
+                yield held
+                held.seek(0)
+                with open(path, "wb") as stream:
+                    shutil.copyfileobj(held, stream)
+            return
+        target = resolved(path)
+        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
+        with _beside(target, path) as part:
+            try:
+                yield part
+                os.chmod(part.name, mode)
+                sync(part)
+                os.replace(part.name, target)
+            except BaseException:
+                with suppress(OSError):
+                    os.unlink(part.name)
+                raise
+        _sync_folder(target.parent)
+    except OSError as error:  # a full disk comes without a name
+        error.filename = os.fspath(path) if error.filename is None else error.filename
+        raise
+
+
+def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file as `whole_file` does. Raises OSError where it cannot be written."""
+    with whole_file(path) as stream:
+        stream.write(content)
+
+
+def sync(stream: IO[Any]) -> None:
+    """Have on the disk what was written, where it goes to one: not only with the operating system."""
+    stream.flush()
+    if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+        os.fsync(stream.fileno())
 
 
 def resolved(path: str | os.PathLike[str]) -> Path:
@@ -41,6 +65,23 @@ def resolved(path: str | os.PathLike[str]) -> Path:
     if os.path.islink(found):
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), os.fspath(path))
     return Path(found)
+
+
+def _beside(target: Path, path: str | os.PathLike[str]) -> Any:
+    try:
+        return NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}"[:100] + ".", delete=False)
+    except OSError as error:  # about the file that was asked for, not about the one beside it
+        raise type(error)(error.errno, error.strerror, os.fspath(path)) from None
+
+
+def _sync_folder(folder: Path) -> None:
+    """The new name is on the disk, too; some file systems know no such thing, and have it anyway."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def _umask() -> int:

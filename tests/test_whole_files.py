@@ -5,11 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from pathlib import Path
 
 import pytest
 
 from kahanmaps import whole_files
-from kahanmaps.whole_files import write_whole
+from kahanmaps.whole_files import whole_file, write_whole
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
@@ -67,3 +68,45 @@ def test_a_file_that_cannot_be_written_is_named_as_it_was_asked_for(tmp_path):
     with pytest.raises(FileNotFoundError) as error:
         write_whole(wanted, b"")
     assert error.value.filename == str(wanted)
+
+
+def test_a_file_is_on_the_disk_before_it_has_its_name_and_its_name_before_the_end(tmp_path, monkeypatch):
+    done: list[str] = []
+
+    def noted(name, path_of):
+        real = getattr(os, name)
+
+        def call(*arguments):
+            done.append(f"{name} {path_of(arguments[0])}")
+            return real(*arguments)
+
+        monkeypatch.setattr(whole_files.os, name, call)
+
+    noted("fsync", lambda descriptor: "folder" if stat.S_ISDIR(os.fstat(descriptor).st_mode) else "file")
+    noted("replace", lambda path: "file" if Path(path).read_bytes() == b"new" else "a part of it")
+    write_whole(tmp_path / "x", b"new")
+    assert done == ["fsync file", "replace file", "fsync folder"]
+
+
+def test_what_fails_within_leaves_the_old_file_alone(tmp_path):
+    (tmp_path / "x").write_bytes(b"before")
+
+    def fail():
+        with whole_file(tmp_path / "x") as stream:
+            stream.write(b"half of it")
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError, match="No space") as caught:
+        fail()
+    assert caught.value.filename == str(tmp_path / "x")
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"before"]
+
+
+def test_a_pipe_gets_everything_at_the_end_and_stays_a_pipe(tmp_path):
+    os.mkfifo(tmp_path / "p")
+    reader = os.open(tmp_path / "p", os.O_RDONLY | os.O_NONBLOCK)
+    with whole_file(tmp_path / "p") as stream:
+        stream.write(b"new")
+    found = os.read(reader, 100)
+    os.close(reader)
+    assert (found, (tmp_path / "p").is_fifo(), list(tmp_path.iterdir())) == (b"new", True, [tmp_path / "p"])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
 import json
-import os
 import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -148,37 +148,19 @@ def print_summary(
             click.echo(line)
 
 
-def export_rows(store: Store, db: str, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:
-    """Write the results; a file is complete or is not there. `output` is another file than `db`."""
-    from kahanmaps.errors import InputError
+def export_rows(store: Store, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:
+    """Write the results; a file is complete or is not there."""
     from kahanmaps.experiments.export import write_parquet
-    from kahanmaps.whole_files import resolved
+    from kahanmaps.whole_files import whole_file
 
     if output is None or output == "-":
         _write(store, form, sys.stdout, stable, only)
         return
-    target = resolved(output)
-    if target == resolved(db) or (target.exists() and target.samefile(db)):
-        raise InputError(f"{output} is the database itself: name another file for the export")
-    if not target.parent.is_dir():
-        raise InputError(f"{output} cannot be made: there is no folder {target.parent}; make it first")
-    is_special = os.path.exists(output) and not os.path.isfile(output)  # a pipe, a device
     if form == "parquet":
-        if is_special:
-            raise InputError(f"{output} is not a file: Parquet needs one")
-        write_parquet(lambda: store.rows(only), target, stable=stable)
+        write_parquet(lambda: store.rows(only), output, stable=stable)
         return
-    if is_special:
-        with open(output, "w", encoding="utf-8", newline="") as stream:
-            _write(store, form, stream, stable, only)
-        return
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with open(part, "w", encoding="utf-8", newline="") as stream:
-            _write(store, form, stream, stable, only)
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
+    with whole_file(output) as stream:
+        _write(store, form, codecs.getwriter("utf-8")(stream), stable, only)
 
 
 def _write(store: Store, form: str, stream: Any, stable: bool, only: list[str] | None) -> None:

@@ -257,14 +257,16 @@ class ModularRun(Run):
         return len(self.ensemble), self.ensemble.system.dim
 
     def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
+        from kahanmaps.maps.float_stream import NpyFile
+
         if output is None:
             self._advance(steps, told)
             return
         every = every or max(1, steps)
-        with ResidueFile(output, self.shape) as file:
-            file.append(self.ensemble.x)
+        with NpyFile(output, self.shape, "<i8") as file:
+            file.append(self.ensemble.x[None])
             while self.reached + every <= steps and self._advance(self.reached + every, told):
-                file.append(self.ensemble.x)
+                file.append(self.ensemble.x[None])
             self._advance(steps, told)
             self.records = file.rows
 
@@ -321,44 +323,3 @@ class ModularRun(Run):
             first = f", the first of them orbit {record['orbit']}" if record["changed"] else ""
             lines.append(f"{record['name']}\tchanged in {record['changed']} of {record['orbits']} orbits{first}")
         return lines
-
-
-class ResidueFile:
-    """A .npy file of 64-bit integers of shape (rows, *shape) whose rows are appended one by one, valid after each."""
-
-    def __init__(self, path: str, shape: tuple[int, ...]) -> None:
-        self.shape = shape
-        self.rows = 0
-        self._stream = open(path, "wb", buffering=0)  # noqa: SIM115 (closed by __exit__)
-        try:
-            self._stream.write(self._header())
-        except OSError:
-            self._stream.close()
-            raise
-
-    def append(self, row: NDArray[Any]) -> None:
-        """First the numbers, then the header that counts them."""
-        self._stream.seek(0, 2)
-        left = memoryview(row.astype("<i8").tobytes())
-        while left:
-            left = left[self._stream.write(left) :]
-        self.rows += 1
-        self._stream.seek(0)
-        self._stream.write(self._header())
-
-    def _header(self) -> bytes:
-        """numpy pads it so that its length does not depend on the number of rows."""
-        import io
-
-        import numpy as np
-
-        stream = io.BytesIO()
-        what = {"descr": "<i8", "fortran_order": False, "shape": (self.rows, *self.shape)}
-        np.lib.format.write_array_header_1_0(stream, what)
-        return stream.getvalue()
-
-    def __enter__(self) -> ResidueFile:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._stream.close()

@@ -1,6 +1,6 @@
-"""The formats of an orbit: text for people, jsonl and csv streamed line by line, npz in one piece at the end.
+"""The formats of an orbit: text for people, jsonl and csv streamed line by line, npz whole at the end.
 
-All but npz are valid after every record, so that an interrupted orbit leaves a file that can be read.
+All but npz are valid after every record, so that whatever ends an orbit leaves a file that can be read.
 """
 
 from __future__ import annotations
@@ -9,13 +9,16 @@ import json
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from itertools import islice
 from typing import IO, Any
+from zipfile import ZIP_DEFLATED, ZipFile
 
 from kahanmaps_cli.render import ending
 from kahanmaps_cli.terminal import tell
 
 # An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
 MAX_PADDED_BYTES = 512_000_000
+_ROWS = 10_000  # of an npz file that are held in memory
 _NARROWEST = 9  # a column of numbers with the middle left out
 
 
@@ -148,58 +151,75 @@ class Npz(Writer):
     """Arrays `step`, `x` and one `integral_k` a column, and the header and end as JSON text.
 
     Floats and residues below 2^63 are machine numbers; exact numbers and balls are text, for a float
-    would no longer be exact.
+    would no longer be exact. An array begins with its length: until that is known, rows wait in `rows` as text.
     """
 
-    def __init__(self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str], kind: str) -> None:
+    def __init__(
+        self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str], kind: str, rows: IO[str]
+    ) -> None:
         super().__init__(stream, columns, integrals)
         self.kind = kind  # "float", "int" or "text"
-        self._steps: list[int] = []
-        self._rows: list[list[str]] = []
-        self._longest = 1
+        n = len(self.columns)
+        self._parts = {"step": slice(0, 1), "x": slice(1, 1 + n)}
+        if self.integrals:
+            self._parts["integrals"] = slice(1 + n, None)
+        self._longest = dict.fromkeys(self._parts, 1)
+        self._has_pole = False
+        self._rows = rows
+        self._count = 0
+        self._last = 0
 
     def header(self, header: dict[str, Any]) -> None:
         self._header = header
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
-        row = [*x, *("nan" if value is None and self.kind == "float" else value or "" for value in values)]
+        row = [str(step), *x, *("nan" if value is None and self.kind == "float" else value or "" for value in values)]
+        longest = {name: max(self._longest[name], *map(len, row[part])) for name, part in self._parts.items()}
         if self.kind == "text":
-            self._longest = max(self._longest, *(len(cell) for cell in row))
-            if self._longest * len(row) * (len(self._rows) + 1) > MAX_PADDED_BYTES:
+            width = max(longest[name] for name in self._parts if name != "step")
+            if width * (len(row) - 1) * (self._count + 1) > MAX_PADDED_BYTES:
                 raise OutputFull(
                     f"with step {step} an npz file of exact numbers would exceed {MAX_PADDED_BYTES} bytes: "
                     "take --format jsonl, fewer steps or --every",
-                    self._steps[-1] if self._steps else 0,
+                    self._last,
                 )
-        self._steps.append(step)
-        self._rows.append(row)
+        self._longest = longest
+        self._has_pole = self._has_pole or "" in row
+        self._rows.write("\t".join(row) + "\n")
+        self._count, self._last = self._count + 1, step
 
     def end(self, end: dict[str, Any]) -> None:
         import numpy as np
 
-        n = len(self.columns)
-        dtypes: dict[str, Any] = {"float": np.float64, "int": np.int64, "text": np.bytes_}
-
-        def array(part: list[list[str]], width: int) -> Any:
-            pole = any(cell == "" for row in part for cell in row)
-            kind = "text" if pole else self.kind
-            convert: Any = {"float": float, "int": int, "text": str.encode}[kind]
-            cells = [[convert(cell) for cell in row] for row in part]
-            return np.array(cells, dtype=dtypes[kind]).reshape(len(part), width)
-
-        # Steps that were jumped to may be longer than machine integers.
-        steps = (
-            np.array(self._steps) if max(self._steps, default=0) < 2**63 else np.array([b"%d" % k for k in self._steps])
-        )
-        arrays = {
-            "step": steps.astype(np.int64) if steps.dtype.kind in "if" else steps,
-            "x": array([row[:n] for row in self._rows], n),
-        }
-        if self.integrals:
-            arrays["integrals"] = array([row[n:] for row in self._rows], len(self.integrals))
         meta = {"header": self._header, "columns": self.columns, "integrals": self.integrals, "end": end}
-        np.savez_compressed(self.stream, allow_pickle=False, meta=np.array(json.dumps(meta)), **arrays)
-        self.stream.flush()
+        kinds = {
+            # Steps that were jumped to may be longer than machine integers.
+            "step": "int" if self._last < 2**63 else "text",
+            "x": self.kind,
+            "integrals": "text" if self._has_pole else self.kind,
+        }
+        with ZipFile(self.stream, "w", ZIP_DEFLATED) as archive:
+            with archive.open("meta.npy", "w") as member:
+                np.lib.format.write_array(member, np.array(json.dumps(meta)), allow_pickle=False)
+            for name in self._parts:
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                    self._write(name, kinds[name], member)
+
+    def _write(self, name: str, kind: str, member: IO[bytes]) -> None:
+        """One array, some rows at a time."""
+        import numpy as np
+
+        part = self._parts[name]
+        width = 1 + len(self.columns) + len(self.integrals)
+        shape = (self._count,) if name == "step" else (self._count, len(range(width)[part]))
+        dtype = {"float": "<f8", "int": "<i8", "text": f"|S{self._longest[name]}"}[kind]
+        convert: Any = {"float": float, "int": int, "text": str.encode}[kind]
+        what = {"descr": dtype, "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(member, what)
+        self._rows.seek(0)
+        while lines := list(islice(self._rows, _ROWS)):
+            cells = [[convert(cell) for cell in line[:-1].split("\t")[part]] for line in lines]
+            member.write(np.array(cells, dtype=dtype).tobytes())
 
 
 def _quoted(name: str) -> str:

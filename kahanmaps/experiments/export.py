@@ -25,14 +25,13 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from importlib import import_module
-from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.records import Row
 from kahanmaps.version import __version__
+from kahanmaps.whole_files import whole_file
 
 BEFORE = ("experiment", "number", "key", "task")
 BETWEEN = ("outcome", "verdict")
@@ -199,18 +198,10 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
     metadata = {"convention": CONVENTION} if stable else {"convention": CONVENTION, "version": __version__}
     fields = [arrow.field(plain(name), types[kind]) for name, kind in zip(layout.names, layout.types, strict=True)]
     schema = arrow.schema(fields, metadata=metadata)
-    target = Path(path)
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with open(beside, "wb") as stream, parquet.ParquetWriter(stream, schema) as writer:
-            for columns in _row_groups(layout, rows()):
-                arrays = [arrow.array(values, field.type) for values, field in zip(columns, fields, strict=True)]
-                writer.write_table(arrow.Table.from_arrays(arrays, schema=schema), row_group_size=_ROW_GROUP)
-        os.replace(beside, target)
-    except BaseException:
-        with suppress(OSError):
-            beside.unlink()
-        raise
+    with whole_file(path) as stream, parquet.ParquetWriter(stream, schema) as writer:
+        for columns in _row_groups(layout, rows()):
+            arrays = [arrow.array(values, field.type) for values, field in zip(columns, fields, strict=True)]
+            writer.write_table(arrow.Table.from_arrays(arrays, schema=schema), row_group_size=_ROW_GROUP)
 
 
 class _NewlineEnds:

@@ -5,8 +5,8 @@ grow, so a portion is appended in two writes: first the numbers, then the header
 reads in between, or after the program was killed, finds a file that is complete up to the last portion (a few numbers
 may follow that the header does not count yet, and readers ignore them). Compared with a file of full size filled with
 NaN beforehand there is nothing to fill, no disk used for steps that are never taken, and no doubt about what was
-computed: the length says it. Memory needed is that of a portion. Against a crash of the machine itself nothing is done
-(fsync).
+computed: the length says it. Memory needed is that of a portion. A file that has been closed is on the disk (fsync); if
+the machine itself crashes before, the last portions may be missing, or be zeros that the header counts already.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ import io
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.float_numbers import FloatArray
+from kahanmaps.whole_files import sync
 
 if TYPE_CHECKING:
     from kahanmaps.maps.fast import FloatOrbit
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class NpyFile:
-    """A .npy file of doubles of shape (rows, *shape) whose rows are appended; `rows` counts them.
+    """A .npy file of shape (rows, *shape), of doubles or 64-bit integers, whose rows are appended; `rows` counts them.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder, NpyFile(Path(folder) / "x.npy", (2,)) as file:
@@ -38,26 +39,29 @@ class NpyFile:
     (2, 2)
     """
 
-    def __init__(self, path: str | Path, shape: tuple[int, ...]) -> None:
+    def __init__(self, path: str | Path, shape: tuple[int, ...], kind: Literal["<f8", "<i8"] = "<f8") -> None:
+        if Path(path).is_fifo():  # to open it would wait for a reader, and it could not grow
+            raise InputError(f"{path}: found a pipe, expected a file: a .npy file is written to in several places")
         self.shape = shape
         self.rows = 0
-        self._room = len(_header(0, shape))
+        self.kind = kind
+        self._room = len(self._header(0))
         self._stream: IO[bytes] = open(path, "wb", buffering=0)  # noqa: SIM115 (closed by `close`)
         try:
-            self._stream.write(_header(0, shape))
+            self._stream.write(self._header(0))
         except BaseException:
             self._stream.close()
             raise
 
-    def append(self, rows: FloatArray) -> None:
+    def append(self, rows: NDArray[Any]) -> None:
         """Write more rows (count, *shape), and count them in the header when they are there."""
         if rows.shape[1:] != self.shape:
             raise InputError(f"found rows of shape {rows.shape[1:]}, expected {self.shape}")
-        header = _header(self.rows + len(rows), self.shape)
+        header = self._header(self.rows + len(rows))
         if len(header) != self._room:
             raise InputError(f"{self.rows + len(rows)} rows are more than the header of a .npy file has room for")
         self._stream.seek(0, io.SEEK_END)
-        left = memoryview(np.ascontiguousarray(rows, dtype="<f8").tobytes())
+        left = memoryview(np.ascontiguousarray(rows, dtype=self.kind).tobytes())
         while left:  # a single write may take less than everything
             left = left[self._stream.write(left) :]
         self._stream.seek(0)
@@ -65,8 +69,19 @@ class NpyFile:
         self.rows += len(rows)
 
     def close(self) -> None:
-        """Close the file."""
-        self._stream.close()
+        """Close the file, which is on the disk then."""
+        try:
+            if not self._stream.closed:
+                sync(self._stream)
+        finally:
+            self._stream.close()
+
+    def _header(self, rows: int) -> bytes:
+        """The header; numpy pads it so that its length does not depend on the number of rows."""
+        stream = io.BytesIO()
+        what = {"descr": self.kind, "fortran_order": False, "shape": (rows, *self.shape)}
+        np.lib.format.write_array_header_1_0(stream, what)
+        return stream.getvalue()
 
     def __enter__(self) -> NpyFile:
         return self
@@ -109,11 +124,3 @@ def stream_ensemble(
         for x in ensemble.records(steps, every, progress=progress):
             file.append(x)
         return file.rows
-
-
-def _header(rows: int, shape: tuple[int, ...]) -> bytes:
-    """The header of a .npy file; numpy pads it so that its length does not depend on the number of rows."""
-    stream = io.BytesIO()
-    what = {"descr": "<f8", "fortran_order": False, "shape": (rows, *shape)}
-    np.lib.format.write_array_header_1_0(stream, what)
-    return stream.getvalue()

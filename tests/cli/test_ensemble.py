@@ -20,10 +20,10 @@ import pytest
 from cli_helpers import COMMAND, shell, terminal
 
 from kahanmaps.maps.fast import FloatEnsemble
+from kahanmaps.maps.float_stream import NpyFile
 from kahanmaps.systems.catalog import load
 from kahanmaps.version import __version__
 from kahanmaps_cli import ensemble_starts
-from kahanmaps_cli.ensemble_run import ResidueFile
 
 TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
 SQUARE = "ensemble --vars x --rhs x^2 --eps 1/2 --kernel numpy"  # the Kahan map x/(1 - x)
@@ -345,10 +345,10 @@ def test_a_file_is_not_written_over_by_the_orbits_of_its_starts(kahanmaps, tmp_p
 
 
 def test_a_file_of_residues_is_valid_after_every_row(tmp_path):
-    with ResidueFile(str(tmp_path / "r.npy"), (2, 1)) as file:
+    with NpyFile(tmp_path / "r.npy", (2, 1), "<i8") as file:
         assert np.load(tmp_path / "r.npy").shape == (0, 2, 1)
         for k in range(12):
-            file.append(np.array([[k], [PRIME]]))
+            file.append(np.array([[[k], [PRIME]]]))
             assert np.load(tmp_path / "r.npy").tolist() == [[[j], [PRIME]] for j in range(k + 1)]
 
 

@@ -82,8 +82,8 @@ def test_a_batch(kahanmaps, tmp_path):
         ("euler_top --by m", "--by is for --db"),
         ("--db does-not-exist.db", "does-not-exist.db"),
         ("euler_top --eps 0", "eps = 0"),
-        ("euler_top -o no/such/folder/a.html", "expected an existing one"),
-        ("euler_top -o .", "found a folder"),
+        ("euler_top -o no/such/folder/a.html", "there is no folder no/such/folder"),
+        ("euler_top -o .", "is a directory"),
         ("--from checks --vars x --rhs x", "no check applies"),
         ("--from verify --m 1 -p a=1", "a member that is drawn has no parameters"),
         ("--from verify -p a=1", "a member that is drawn has no parameters"),
@@ -101,7 +101,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(kahanmaps, tmp_
     monkeypatch.setattr("kahanmaps.laboratory.analysis.analyze", lambda *_, **__: pytest.fail("it was analysed"))
     outcome = kahanmaps(SMALL, "-o", tmp_path / "a.html")
     assert (outcome.status, outcome.out) == (2, "")
-    assert "no permission" in outcome.err
+    assert "Permission denied: " in outcome.err
 
 
 def test_a_terminal_is_no_place_for_a_page():

@@ -12,6 +12,7 @@ import click
 from kahanmaps_cli.complete import complete_task, complete_toml
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options
+from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import OptionType
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json
@@ -186,7 +187,7 @@ def show(key: str, db: str, as_json: bool) -> None:
 @click.option("--csv", "form", flag_value="csv", help="A table, a column for each option and each entry of results.")
 @click.option("--jsonl", "form", flag_value="jsonl", help="One JSON object a line, everything in it.")
 @click.option("--parquet", "form", flag_value="parquet", help="The table of --csv with types; needs pyarrow and -o.")
-@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
 @click.option("--stable", is_flag=True, help="Leave out times, memory, hosts and versions: the same work, same bytes.")
 @_ONLY
 def export(db: str, form: str | None, output: str | None, stable: bool, only: tuple[str, ...]) -> None:
@@ -207,7 +208,7 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
     if form == "parquet" and output in (None, "-"):
         raise click.UsageError("--parquet needs -o FILE: it is no text")
     with _open(db) as store:
-        export_rows(store, db, form, output, stable, list(only) or None)
+        export_rows(store, form, output, stable, list(only) or None)
 
 
 @command.command("summary", short_help="Counts and quantiles for groups of tasks.")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
 
 from kahanmaps_cli.options import load_system, quiet_option, symbolic_option, system_options
+from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.pictures.output import as_typed
 from kahanmaps_cli.progress import say
 
@@ -35,7 +35,7 @@ _LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia")
 )
 @symbolic_option
 @click.option("--name", default="", metavar="NAME", help="Put before the names of all functions.")
-@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
 @quiet_option
 def command(system: str | None, language: str, output: str | None, quiet: bool, **options: Any) -> None:
     """Write SYSTEM, its Kahan map and what is known of it for another program.
@@ -48,12 +48,8 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
 
     The output is a file that runs as it stands. eps is an argument of the map: the time step is 2 eps.
     """
-    from kahanmaps.errors import InputError
     from kahanmaps.languages.convert import convert
 
-    paths = [Path(text) for text in (system, output) if text is not None]
-    if len(paths) == 2 and all(path.is_file() for path in paths) and paths[0].samefile(paths[1]):
-        raise InputError(f"found -o {output}, which is the file of the system itself, expected another file")
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
@@ -70,7 +66,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
         return
     from kahanmaps.whole_files import write_whole
 
-    write_whole(Path(output), text.encode())
+    write_whole(output, text.encode())
     if not quiet:
         say(f"{output}: {file.name} for {language}, {len(text.splitlines())} lines")
 

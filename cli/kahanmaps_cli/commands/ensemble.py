@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +20,7 @@ from kahanmaps_cli.options import (
     system_options,
     the_eps,
 )
+from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
@@ -49,7 +49,7 @@ _MAX_BITS = 61
     show_default=True,
     help="float or mod:P, P < 2^61.",
 )
-@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE.npy", help="Write the points there.")
+@click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points there.")
 @click.option("--every", type=int, metavar="K", help="Write every K-th iterate (default: the start and the last one).")
 @integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
 @click.option("--method", type=click.Choice(("generic", "normal-form")), help="Chosen by itself unless given.")
@@ -129,9 +129,6 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         )
     if (options["starts"] is None) == (options["count"] is None):
         raise click.UsageError("give --starts FILE or --random N, one of the two")
-    files = [options["starts"], options["output"]]
-    if not {None, "-"} & set(files) and os.path.realpath(files[0]) == os.path.realpath(files[1]):
-        raise click.UsageError(f"found {files[1]} both as --starts and as -o: it would be written over")
     if options["starts"] is not None and (options["box"] is not None or options["seed"] is not None):
         raise click.UsageError("--box and --seed are for --random N")
     if options["starts"] == "-" and system == "-":

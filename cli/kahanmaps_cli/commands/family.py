@@ -21,6 +21,7 @@ from kahanmaps_cli.options import (
     system_argument,
     system_options,
 )
+from kahanmaps_cli.outputs import OutputFile, OutputFolder, will_write
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import on_terminal, shorten, tell
@@ -51,7 +52,7 @@ def command() -> None:
 @click.option("--signs", metavar="S1,S2,...", help="Pick an associated system: 1 or -1 for each factor of chi.")
 @seed_option
 @click.option("--name", help="The name in the file.")
-@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
 @quiet_option
 def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **options: Any) -> None:
     """Draw a member at random and write it as a system file.
@@ -191,7 +192,7 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
 @command.command("associated")
 @system_argument
 @parameter_option
-@click.option("--write-to", type=click.Path(file_okay=False), metavar="DIR", help="Write each as a system file to DIR.")
+@click.option("--write-to", type=OutputFolder(), metavar="DIR", help="Write each as a system file to DIR.")
 @json_option
 def associated(
     system: str | None, parameters: tuple[tuple[str, str], ...], write_to: str | None, as_json: bool
@@ -208,6 +209,7 @@ def associated(
 
     file, member = _member(system, parameters)
     rows = []
+    written: dict[str, SystemFile] = {}
     for associate in member.associated():
         row: dict[str, Any] = {
             "label": associate.label,
@@ -217,13 +219,17 @@ def associated(
             "K": format_polynomial(associate.K),
         }
         if write_to is not None:
-            Path(write_to).mkdir(parents=True, exist_ok=True)
             text = "".join("p" if sign > 0 else "m" for sign in associate.signs)
             path = Path(write_to) / f"{_file_name(file.name)}-{text}.toml"
             one = FamilyMember(member.A, member.H, associate.signs)
-            _write(SystemFile.from_member(one, path.stem), str(path))
+            written[str(path)] = SystemFile.from_member(one, path.stem)
+            will_write(str(path))
             row["file"] = str(path)
         rows.append(row)
+    if write_to is not None:
+        Path(write_to).mkdir(parents=True, exist_ok=True)
+    for name, associate_file in written.items():
+        _write(associate_file, name)
     if as_json:
         print_json(
             {
@@ -354,7 +360,7 @@ def _write(file: SystemFile, output: str | None) -> None:
     if output is None:
         click.echo(text, nl=False)
         return
-    write_whole(Path(output), text.encode())
+    write_whole(output, text.encode())
 
 
 def _file_name(name: str) -> str:

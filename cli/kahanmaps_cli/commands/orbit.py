@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from shutil import get_terminal_size
+from shutil import copyfileobj, get_terminal_size
+from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, Any
 
 import click
@@ -23,6 +25,7 @@ from kahanmaps_cli.options import (
 )
 from kahanmaps_cli.orbit_formats import Csv, JsonLines, Npz, OutputFull, Text, Writer
 from kahanmaps_cli.orbit_run import OrbitRun
+from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic, PointText, Steps
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import ending
@@ -64,7 +67,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 )
 @click.option("--max-digits", type=int, metavar="N", help="Digit budget (exact arithmetic; default 200000).")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="Default text, or what the name of FILE says.")
-@click.option("-o", "--output", type=click.Path(dir_okay=False), metavar="FILE", help="Write to FILE.")
+@click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE.")
 @click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
 @quiet_option
 def command(
@@ -125,8 +128,13 @@ def command(
         say(run.method.text)
     if form == "npy" and output is not None:
         return _stream(run, output, quiet)
-    with _opened(output, form) as stream, interruptible(run.interrupt), Progress(hidden) as progress:
-        writer = _writer(form, stream, run, to_file=output is not None)
+    with (
+        _opened(output, form) as stream,
+        _waiting(form, stream) as rows,
+        interruptible(run.interrupt),
+        Progress(hidden) as progress,
+    ):
+        writer = _writer(form, stream, rows, run, to_file=output is not None)
         writer.header(run.header())
         try:
             for step, texts, values in run.points():
@@ -191,14 +199,14 @@ def _end_record(end: OrbitEnd, run: OrbitRun) -> dict[str, Any]:
     return record
 
 
-def _writer(form: str, stream: IO[Any], run: OrbitRun, to_file: bool) -> Writer:
+def _writer(form: str, stream: IO[Any], rows: IO[str] | None, run: OrbitRun, to_file: bool) -> Writer:
     columns, integrals = run.file.variables, [name for name, _ in run.columns]
     if form == "jsonl":
         return JsonLines(stream, columns, integrals)
     if form == "csv":
         return Csv(stream, columns, integrals)
-    if form == "npz":
-        return Npz(stream, columns, integrals, run.storage)
+    if rows is not None:
+        return Npz(stream, columns, integrals, run.storage, rows)
     on_terminal = not to_file and sys.stdout.isatty()
     return Text(stream, columns, integrals, get_terminal_size().columns if on_terminal else None)
 
@@ -210,12 +218,16 @@ def _form_from_name(output: str | None) -> str:
 
 @contextmanager
 def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
-    if output is not None:
-        binary = form == "npz"
-        encoding, errors = (None, None) if binary else ("utf-8", "backslashreplace")
+    from kahanmaps.whole_files import sync, whole_file
+
+    if output is not None and form == "npz":
+        with whole_file(output) as stream:
+            yield stream
+    elif output is not None:
         try:
-            with open(output, "wb" if binary else "w", encoding=encoding, errors=errors) as stream:
+            with open(output, "w", encoding="utf-8", errors="backslashreplace") as stream:
                 yield stream
+                sync(stream)
         except OSError as error:  # a full disk comes without a name
             error.filename = error.filename or output
             raise
@@ -224,8 +236,18 @@ def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
     elif sys.stdout.isatty():
         raise click.UsageError("npz is not for a terminal: add -o FILE")
     else:
-        import io
+        with TemporaryFile() as held:  # a zip archive needs a stream that can seek
+            yield held
+            held.seek(0)
+            copyfileobj(held, sys.stdout.buffer)
 
-        buffer = io.BytesIO()  # a zip archive needs a stream that can seek
-        yield buffer
-        sys.stdout.buffer.write(buffer.getvalue())
+
+@contextmanager
+def _waiting(form: str, stream: IO[Any]) -> Iterator[IO[str] | None]:
+    """Where the rows of an npz file wait for their number, on the same disk; it has no name, and goes in any case."""
+    if form != "npz":
+        yield None
+        return
+    folder = os.path.dirname(stream.name) if isinstance(stream.name, str) else None
+    with TemporaryFile("w+", dir=folder, encoding="ascii") as rows:
+        yield rows

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -20,6 +18,7 @@ from kahanmaps_cli.options import (
     system_options,
     the_eps,
 )
+from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.pictures.output import PictureCommand, command_line
 from kahanmaps_cli.progress import Progress, say
 
@@ -58,7 +57,15 @@ _ONLY_FOR = {
 @seed_option
 @draw_options
 @click.option("--section", "sections", type=int, multiple=True, metavar="N", help="With verify: only this section.")
-@click.option("-o", "--output", default="-", show_default=True, metavar="FILE", help="FILE.html; - is standard output.")
+@click.option(
+    "-o",
+    "--output",
+    type=OutputFile(),
+    default="-",
+    show_default=True,
+    metavar="FILE",
+    help="FILE.html; - is standard output.",
+)
 @click.option("--title", help="The title of the page (default: the name of the system).")
 @click.option("--no-pictures", is_flag=True, help="Formulas and tables only.")
 @quiet_option
@@ -78,7 +85,8 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: as the command that the page is made of, and 0 for a batch.
     """
     _require_consistent(system, options)
-    _require_output(options["output"])
+    if options["output"] == "-" and sys.stdout.isatty():
+        raise click.UsageError("a terminal cannot show a page: give -o FILE.html")
     with Progress(options["quiet"]) as progress:
         html, status = _page(system, options, progress)
     _write(html, options)
@@ -122,24 +130,6 @@ def _option_name(name: str) -> str:
     }.get(name, "--" + name.replace("_", "-"))
 
 
-def _require_output(path: str) -> None:
-    """Refuse, before anything is computed, an output that cannot be written."""
-    from kahanmaps.errors import InputError
-    from kahanmaps.whole_files import resolved
-
-    if path == "-":
-        if sys.stdout.isatty():
-            raise click.UsageError("a terminal cannot show a page: give -o FILE.html")
-        return
-    if Path(path).is_dir():
-        raise InputError(f"{path}: found a folder, expected the name of a file")
-    folder = resolved(path).parent
-    if not folder.is_dir():
-        raise InputError(f"{path}: found no folder {folder}, expected an existing one")
-    if not os.access(folder if Path(path).is_file() or not Path(path).exists() else path, os.W_OK):
-        raise InputError(f"{path}: found no permission to write there, expected a folder that can be written")
-
-
 def _write(html: str, options: dict[str, Any]) -> None:
     from kahanmaps.whole_files import write_whole
 
@@ -148,7 +138,7 @@ def _write(html: str, options: dict[str, Any]) -> None:
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
         return
-    write_whole(Path(options["output"]), content)
+    write_whole(options["output"], content)
     if not options["quiet"]:
         say(f"{options['output']}: {len(content)} bytes")
 

@@ -58,7 +58,6 @@ def command(systems: tuple[str, ...], **options: Any) -> int:
 
     require_output(options)
     growths: dict[str, DegreeGrowth] = {}
-    files: list[SystemFile] = []
     early: list[str] = []
     for path in options["records"]:
         _from_record(path, growths)
@@ -71,12 +70,11 @@ def command(systems: tuple[str, ...], **options: Any) -> int:
         raise click.UsageError("give SYSTEMs or an inline one (--vars and --rhs), not both")
     if len(asked) > 1 and options["parameters"]:
         raise click.UsageError("-p is for one system: write several as files, or draw --from records")
+    files = [load_system(name, options["variables"], options["rhs"], options["parameters"]) for name in asked]
     with Progress(options["quiet"]) as progress:
-        for reference in asked:
-            file = load_system(reference, options["variables"], options["rhs"], options["parameters"])
+        for file in files:
             found = _measured(file, eps, options, progress)
             _add(growths, file.name, found)
-            files.append(file)
             if found.recurrence is None and found.ended not in ("terms", "constant", "singular"):
                 early.append(f"{file.name}: stopped early: {found.message}")
     figure = draw_degrees(growths, style_from(options), scale=options["scale"])

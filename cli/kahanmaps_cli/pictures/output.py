@@ -9,12 +9,12 @@ import shutil
 import sys
 import warnings
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from kahanmaps_cli.options import stack
+from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import OptionType
 from kahanmaps_cli.progress import printable, say
 from kahanmaps_cli.terminal import is_coloured
@@ -59,6 +59,7 @@ picture_options: Callable[[F], F] = stack(
     click.option(
         "-o",
         "--output",
+        type=OutputFile(),
         default="-",
         show_default=True,
         metavar="FILE",
@@ -89,23 +90,13 @@ def style_from(options: dict[str, Any]) -> Style:
 
 
 def require_output(options: dict[str, Any]) -> None:
-    """Refuse, before anything is computed, an output that cannot be written."""
-    from kahanmaps.errors import InputError
+    """Refuse, before anything is computed, a picture of no known kind."""
     from kahanmaps.plots.figures import format_of, require_matplotlib
-    from kahanmaps.whole_files import resolved
 
     require_matplotlib()
     style_from(options)
-    path = options["output"]
-    if path == "-":
-        return
-    if options["kind"] != "text":
-        format_of(path, options["kind"])
-    folder = resolved(path).parent
-    if not folder.is_dir():
-        raise InputError(f"{path}: found no folder {folder}, expected an existing one")
-    if Path(path).is_dir():
-        raise InputError(f"{path}: found a folder, expected the name of a file")
+    if options["output"] != "-" and options["kind"] != "text":
+        format_of(options["output"], options["kind"])
 
 
 def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = None) -> None:
@@ -135,7 +126,7 @@ def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = N
         sys.stdout.buffer.write(content)
         sys.stdout.buffer.flush()
         return
-    write_whole(Path(path), content)
+    write_whole(path, content)
     if not options["quiet"]:
         width, height = figure.get_size_inches() * 2.54
         say(f"{path}: {width:.1f} x {height:.1f} cm, {len(content)} bytes")
@@ -181,7 +172,7 @@ def _draw_in_terminal(figure: Figure, style: Style, path: str) -> None:
     if path == "-":
         click.echo(text, nl=False)
     else:
-        write_whole(Path(path), text.encode())
+        write_whole(path, text.encode())
 
 
 def _print_in_colour(cells: list[list[Cell]]) -> None:

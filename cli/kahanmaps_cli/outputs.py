@@ -1,0 +1,137 @@
+"""The door to files that a command writes: those that it reads or cannot write are refused before anything is computed.
+
+What a command reads is known from Python itself, which tells every file before it is opened: no command has to say so,
+and none can forget to. A file counts by what it is, not by its name, so links are seen through.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import click
+
+_KEY = "kahanmaps_cli.files"
+
+Identity = tuple[int, int]
+
+
+class _Files:
+    """Which files a command has read, and which it is going to write, by what they are."""
+
+    def __init__(self) -> None:
+        self.read: set[Identity] = set()
+        self.written: dict[Identity, str] = {}
+        self._note_standard_input()
+
+    def reads(self, path: Any) -> None:
+        """Note a file that is about to be read."""
+        found = _identity(path)
+        if found in self.written:
+            self._refuse(self.written[found])
+        if found is not None:
+            self.read.add(found)
+
+    def writes(self, path: str) -> None:
+        """Note a file that is going to be written."""
+        found = _identity(path)
+        if found in self.read:
+            self._refuse(path)
+        if found is not None:
+            self.written[found] = path
+
+    def _note_standard_input(self) -> None:
+        try:
+            self.reads(sys.stdin.fileno())
+        except (OSError, ValueError, AttributeError):  # closed, or none
+            return
+
+    def _refuse(self, path: str) -> None:
+        raise click.UsageError(f"found {path} both to be read and to be written (-o): it would be written over")
+
+
+class OutputFile(click.Path):
+    """A file to write to, `-` for standard output. With `grows` it is written in its place, else one beside it."""
+
+    name = "file"
+
+    def __init__(self, grows: bool = False) -> None:
+        super().__init__(dir_okay=False)
+        self.grows = grows
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        path = os.fsdecode(super().convert(value, param, ctx))
+        if path != "-" and ctx is not None and not ctx.resilient_parsing:
+            _require_place(path, self.grows)
+            _files(ctx).writes(path)
+        return path
+
+
+class OutputFolder(click.Path):
+    """A folder to write files to: each has to be announced by `will_write` before the first is written."""
+
+    def __init__(self) -> None:
+        super().__init__(file_okay=False)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if ctx is not None:
+            _files(ctx)  # notes from now on what is read
+        return super().convert(value, param, ctx)
+
+
+def will_write(path: str) -> None:
+    """Refuse a file that this command has read."""
+    _files(click.get_current_context()).writes(path)
+
+
+def _files(context: click.Context) -> _Files:
+    _listen()
+    found = context.meta.get(_KEY)
+    if not isinstance(found, _Files):
+        found = context.meta[_KEY] = _Files()
+    return found
+
+
+@cache  # a hook stays as long as the process
+def _listen() -> None:
+    sys.addaudithook(_hear)
+
+
+def _hear(event: str, arguments: tuple[Any, ...]) -> None:
+    """Tell the command that is running of every file that is opened to be read, databases of results among them."""
+    if event == "open" and (arguments[2] or 0) & os.O_ACCMODE == os.O_RDONLY and not isinstance(arguments[0], int):
+        path = arguments[0]
+    elif event == "sqlite3.connect":
+        path = unquote(os.fsdecode(arguments[0]).removeprefix("file:").partition("?")[0])
+    else:
+        return
+    context = click.get_current_context(silent=True)
+    if context is not None and _KEY in context.meta:
+        context.meta[_KEY].reads(path)
+
+
+def _identity(path: Any) -> Identity | None:
+    """What a name stands for, where that is a file that holds something."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None
+
+
+def _require_place(path: str, grows: bool) -> None:
+    """Raise OSError where there is no place for the file, before anything is computed."""
+    from kahanmaps.whole_files import resolved
+
+    folder = resolved(path).parent
+    if not path or not folder.is_dir():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
+    is_there = Path(path).exists()
+    if not os.access(path if is_there and (grows or not Path(path).is_file()) else folder, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), path)

@@ -1,0 +1,239 @@
+"""Files that commands write: never what they read, whole or not at all, and told where they cannot be written.
+
+The commands and their options are found from the tree of commands, so that a new one has to be entered in `READS`.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shlex
+import signal
+import subprocess
+import time
+import tracemalloc
+from contextlib import redirect_stdout
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+from cli_helpers import COMMAND, shell
+from command_tree import all_commands
+from small_databases import ok, planned
+
+from kahanmaps_cli import orbit_formats
+from kahanmaps_cli.main import main
+from kahanmaps_cli.outputs import OutputFile, OutputFolder
+
+ORBIT = "--start 1,2 --eps 1/10 --steps 1"
+
+# Commands with -o, the ending of their files, and a line for each way to hand them a file: IN is its name.
+READS = {
+    "orbit": (".csv", {"system": f"orbit IN {ORBIT}"}),
+    "ensemble": (
+        ".npy",
+        {
+            "system": "ensemble IN --random 1 --eps 1/10 --steps 1",
+            "starts": "ensemble harmonic --starts IN --eps 1/10 --steps 1",
+        },
+    ),
+    "family new": (".toml", {}),
+    "batch export": (".csv", {"db": "batch export --db IN"}),
+    "report": (".html", {"system": "report IN --from checks --no-pictures", "db": "report --db IN"}),
+    "convert": (".tex", {"system": "convert IN --to latex"}),
+    "plot commute": (
+        ".svg",
+        {"system": f"plot commute IN harmonic {ORBIT}", "other": f"plot commute harmonic IN {ORBIT}"},
+    ),
+    "plot degrees": (
+        ".svg",
+        {
+            "systems": "plot degrees harmonic IN --terms 3 --seconds 1",
+            "records": "plot degrees --from degrees.json --from IN",
+        },
+    ),
+    "plot drift": (".svg", {"system": f"plot drift IN {ORBIT}"}),
+    "plot heights": (
+        ".svg",
+        {"system": "plot heights IN --start 1,2 --eps 1/10 --steps 3", "record": "plot heights --from IN"},
+    ),
+    "plot invariant-curves": (".svg", {"system": "plot invariant-curves IN --start 1,2 --eps 1/100 --steps 2"}),
+    "plot portrait": (
+        ".npz",
+        {
+            "system": f"plot portrait IN {ORBIT} --format svg",
+            "starts": "plot portrait harmonic --starts IN --eps 1/10 --steps 1 --format svg",
+            "stored": "plot portrait --from IN --format svg",
+        },
+    ),
+    "plot batch": (".svg", {"database": "plot batch IN", "db": "plot batch --db IN"}),
+}
+# Made before each test: what is in the file, by the name of what takes it.
+CONTENT = {
+    "starts": "starts.npy",
+    "stored": "orbit.npz",
+    "record": "heights.json",
+    "records": "degrees.json",
+    "db": "study.db",
+    "database": "study.db",
+}
+CASES = [(words, name) for words, (_, lines) in READS.items() for name in lines]
+COMMANDS = {words: command for words, command in all_commands() if not isinstance(command, click.Group)}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of every kind that a command reads."""
+    folder = tmp_path_factory.mktemp("made")
+    planned(folder / "study.db", 1, records=[ok(1)])
+    np.save(folder / "starts.npy", np.ones((1, 2)))
+    assert main([*shlex.split(f"orbit harmonic {ORBIT} -q -o"), str(folder / "orbit.npz")]) == 0
+    for name, line in {
+        "system.toml": "systems harmonic --toml",
+        "heights.json": "heights harmonic --steps 3 --json -q",
+        "degrees.json": "degrees harmonic --terms 3 --json -q",
+    }.items():
+        with redirect_stdout(io.StringIO()) as out:
+            assert main(shlex.split(line)) == 0
+        (folder / name).write_text(out.getvalue())
+    return folder
+
+
+@pytest.fixture
+def given(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder that commands run in, with copies of these files."""
+    monkeypatch.chdir(tmp_path)
+    for path in made.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    return tmp_path
+
+
+def test_every_output_goes_through_the_one_door_and_every_input_is_tried():
+    outputs = {w for w, c in COMMANDS.items() if any(isinstance(p.type, OutputFile) for p in c.params)}
+    assert outputs == set(READS)
+    for words, command in COMMANDS.items():
+        for parameter in command.params:
+            is_named = {"-o", "--output", "--write-to"} & set(parameter.opts)
+            assert bool(is_named) == isinstance(parameter.type, OutputFile | OutputFolder), (words, parameter.name)
+            is_text = isinstance(parameter.type, click.types.StringParamType)
+            is_input = is_text and parameter.name in ("system", "other", "systems", *CONTENT)
+            if words in READS and (is_input or type(parameter.type) is click.Path):
+                assert parameter.name in READS[words][1], (words, parameter.name)
+
+
+@pytest.mark.parametrize("way", ["the same", "hard link", "symbolic link"])
+@pytest.mark.parametrize(("words", "name"), CASES)
+def test_no_file_is_written_over_that_is_read(kahanmaps, given, words, name, way):
+    ending, lines = READS[words]
+    source = Path("in" + ending)
+    source.write_bytes(Path(CONTENT.get(name, "system.toml")).read_bytes())
+    before = source.read_bytes()
+    target = Path("./in" + ending) if way == "the same" else Path("out" + ending)
+    if way == "hard link":
+        target.hardlink_to(source)
+    elif way == "symbolic link":
+        target.symlink_to(source)
+    outcome = kahanmaps(lines[name].replace("IN", str(source)), "-o", target)
+    assert (outcome.status, outcome.out, source.read_bytes()) == (2, "", before)
+    assert "it would be written over" in outcome.err
+
+
+@pytest.mark.parametrize("words", ["orbit", "convert", "ensemble", "batch export"])
+def test_any_other_file_is_written_over(kahanmaps, given, words):
+    ending, lines = READS[words]
+    source, target = Path("in" + ending), Path("out" + ending)
+    name = next(reversed(lines))
+    source.write_bytes(Path(CONTENT.get(name, "system.toml")).read_bytes())
+    target.write_bytes(before := source.read_bytes())
+    assert kahanmaps(lines[name].replace("IN", str(source)), "-o", target).status == 0
+    assert (source.read_bytes(), target.read_bytes() == before) == (before, False)
+
+
+def test_standard_input_is_not_written_over(given):
+    before = Path("system.toml").read_bytes()
+    outcome = shell("kahanmaps convert - --to latex -o system.toml < system.toml", given)
+    assert (outcome.status, Path("system.toml").read_bytes()) == (2, before)
+    assert shell("kahanmaps convert - --to latex -q -o other.tex < system.toml", given).status == 0
+
+
+def test_nothing_is_computed_before_the_output_is_refused(kahanmaps, given, monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.degrees.degree_growth", lambda *_, **__: pytest.fail("it was computed"))
+    Path("system.svg").write_bytes(Path("system.toml").read_bytes())
+    assert kahanmaps("plot degrees harmonic ./system.svg -o system.svg").status == 2
+
+
+def test_associated_systems_are_not_written_over_the_one_they_belong_to(kahanmaps, tmp_path):
+    kahanmaps("family new --m 2 --seed 1 --name a -q -o", tmp_path / "a.toml")
+    assert kahanmaps("family associated --write-to", tmp_path, tmp_path / "a.toml").status == 0
+    (one, *_) = written = sorted(tmp_path.glob("a-*.toml"))
+    one.unlink()
+    one.hardlink_to(tmp_path / "a.toml")
+    before = {path: path.read_bytes() for path in written}
+    outcome = kahanmaps("family associated --write-to", tmp_path, tmp_path / "a.toml")
+    assert (outcome.status, {path: path.read_bytes() for path in written}) == (2, before)
+    assert "it would be written over" in outcome.err
+
+
+# Whole files
+
+
+def test_the_rows_of_an_npz_file_are_not_held_in_memory(monkeypatch, tmp_path):
+    monkeypatch.setattr(orbit_formats, "_ROWS", 100)
+    with open(tmp_path / "x.npz", "wb") as stream, open(tmp_path / "rows", "w+") as rows:
+        writer = orbit_formats.Npz(stream, ["x", "y"], [], "float", rows)
+        writer.header({})
+        tracemalloc.start()
+        for step in range(5_000):
+            writer.point(step, ["0.1", "1e-300"], [])
+        writer.end({})
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert np.load(tmp_path / "x.npz")["x"].tolist() == [[0.1, 1e-300]] * 5_000
+    assert peak < 500_000  # of what the rows would take as texts a tenth
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_an_npz_file_is_the_old_one_or_the_new_one_whatever_ends_the_orbit(tmp_path, number):
+    target = tmp_path / "orbit.npz"
+    target.write_bytes(b"before")
+    words = f"orbit harmonic --start 1,2 --eps 1/10 --steps {10**12} --arithmetic mod:10007 --every 100 -q -o {target}"
+    process = subprocess.Popen([*COMMAND, *shlex.split(words)])
+    while len(list(tmp_path.iterdir())) == 1:  # the new one, beside it
+        time.sleep(0.01)
+    time.sleep(0.3)
+    process.send_signal(number)
+    process.wait(30)
+    if number == signal.SIGKILL:
+        assert target.read_bytes() == b"before"
+    else:
+        assert list(tmp_path.iterdir()) == [target]
+        assert json.loads(str(np.load(target)["meta"]))["end"]["status"] == "interrupted"
+
+
+def test_a_device_takes_an_npz_file(kahanmaps):
+    assert kahanmaps(f"orbit harmonic {ORBIT} --format npz -o /dev/null").status == 0
+
+
+def test_a_pipe_takes_an_npz_file(tmp_path):
+    script = f"mkfifo p; cat p > x.npz & kahanmaps orbit harmonic {ORBIT} -q --format npz -o p; echo $?; wait"
+    assert shell(script, tmp_path).out == "0\n"
+    assert np.load(tmp_path / "x.npz")["x"].shape == (2, 2)
+
+
+@pytest.mark.parametrize("command", [f"orbit harmonic {ORBIT} --arithmetic float", READS["ensemble"][1]["system"]])
+def test_a_pipe_is_no_place_for_a_file_that_grows(kahanmaps, tmp_path, command):
+    os.mkfifo(tmp_path / "p.npy")
+    outcome = kahanmaps(command.replace("IN", "harmonic"), "-o", tmp_path / "p.npy")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "found a pipe, expected a file" in outcome.err
+
+
+@pytest.mark.parametrize("ending", ["csv", "jsonl", "npz", "npy", "txt"])
+def test_links_in_a_circle_are_no_place(kahanmaps, tmp_path, ending):
+    loop = tmp_path / f"loop.{ending}"
+    loop.symlink_to(loop.name)
+    outcome = kahanmaps(f"orbit harmonic {ORBIT} --arithmetic float -o", loop)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err == f"Error: Too many levels of symbolic links: {loop}\n"
