@@ -10,7 +10,6 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -21,6 +20,7 @@ from kahanmaps_cli.colour_option import colour_option, with_colour_option
 from kahanmaps_cli.groups import SuggestingGroup, in_our_words
 from kahanmaps_cli.params import with_short_integers
 from kahanmaps_cli.progress import say
+from kahanmaps_cli.streams import have_standard_streams, leave_nothing_to_flush
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -174,16 +174,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return _run(argv)
     finally:
-        _leave_nothing_to_flush()
+        leave_nothing_to_flush()
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    status = HOLDS
     try:
-        _have_standard_streams()
+        have_standard_streams()
         result = cli.main(args=None if argv is None else list(argv), prog_name="kahanmaps", standalone_mode=False)
-        status = result if isinstance(result, int) else HOLDS
         sys.stdout.flush()
+        return result if isinstance(result, int) else HOLDS
     except click.exceptions.Exit as stop:
         return stop.exit_code
     except click.ClickException as error:
@@ -195,10 +194,9 @@ def _run(argv: Sequence[str] | None) -> int:
         say("interrupted")
         return INTERRUPTED
     except (BrokenPipeError, SystemExit):  # click turns the one into the other
-        pass  # the reader (head, say) has what it wanted
+        return UNDECIDED  # nobody reads the pipe that -o names any longer
     except Exception as error:
         return INTERNAL if os.environ.get(COMPLETION) else _report(error)  # no traceback in the middle of a line
-    return status
 
 
 def _report(error: Exception) -> int:
@@ -233,29 +231,6 @@ def _missing_folder(error: OSError) -> str:
     folder = os.path.dirname(error.filename) if isinstance(error.filename, str) else ""
     is_missing = isinstance(error, FileNotFoundError) and bool(folder) and not os.path.isdir(folder)
     return f" (there is no folder {folder}: make it first, or check the name)" if is_missing else ""
-
-
-def _leave_nothing_to_flush() -> None:
-    """Let go of what a stream still holds and cannot write: Python would fail on it once more, and exit with 120."""
-    for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except (OSError, ValueError):
-            with suppress(OSError, ValueError):
-                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def _have_standard_streams() -> None:
-    """Put the null device where a standard stream is closed (`>&-`), or the next file opened would take its place.
-
-    Where the encoding of a stream lacks a character, the character is spelt out.
-    """
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115 (open for as long as the process lives)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -26,13 +25,12 @@ def print_json(data: Mapping[str, Any]) -> None:
 
 def print_report(report: Report, as_json: bool, verbose: bool = False, quiet: bool = False) -> int:
     """Print a report and return the exit status that its verdict stands for; in a pipe everything is printed."""
-    with suppress(BrokenPipeError):  # a reader that has seen enough changes no verdict
-        if as_json:
-            print_json(report.to_json())
-        elif on_terminal():
-            _print_terminal(report, verbose)
-        else:
-            _print_plain(report)
+    if as_json:
+        print_json(report.to_json())
+    elif on_terminal():
+        _print_terminal(report, verbose)
+    else:
+        _print_plain(report)
     status = exit_status(report)
     if status == 3 and report.ended_early and not quiet:
         say(f"the orbit that was asked for ended early: {report.context['orbit']['message']}")

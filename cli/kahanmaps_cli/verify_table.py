@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -44,13 +43,11 @@ _LEGEND = {
 def print_verification(report: Report, as_json: bool, as_markdown: bool, verbose: bool, quiet: bool) -> int:
     """Print the report and return the exit status."""
     if as_markdown:
-        with suppress(BrokenPipeError):
-            click.echo(markdown(report))
+        click.echo(markdown(report))
         return exit_status(report)
     if as_json or not on_terminal():
         return print_report(report, as_json, verbose, quiet)
-    with suppress(BrokenPipeError):
-        _print_terminal(report, verbose)
+    _print_terminal(report, verbose)
     return exit_status(report)
 
 

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 from cli_helpers import Outcome
+from small_databases import ok, planned
 
 from kahanmaps_cli.main import main
 
@@ -35,6 +36,16 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("family") / "pair.toml"
     assert main(["family", "new", "--eigenvalues", "1,-2", "--seed", "7", "-q", "-o", str(path)]) == 0
     return path
+
+
+@pytest.fixture
+def least_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the lines of `LEAST` run: with a database, a spec and a picture."""
+    monkeypatch.chdir(tmp_path)
+    planned(tmp_path / "DB", 1, 2, records=[ok(1)])
+    Path("SPEC").write_text('[experiments.a]\ntask = "orbit"\nsystem = "harmonic"\naxes = {eps = "1/10"}\n')
+    Path("PICTURE").write_bytes(b"\x89PNG\r\n\x1a\n")
+    return tmp_path
 
 
 @pytest.fixture

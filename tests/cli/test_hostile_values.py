@@ -14,8 +14,8 @@ from pathlib import Path
 
 import click
 import pytest
-from command_tree import all_commands
-from small_databases import ok, planned, task
+from command_tree import LEAST, all_commands
+from small_databases import task
 
 from kahanmaps_cli.colour_option import is_colour_option
 from kahanmaps_cli.main import main
@@ -23,54 +23,6 @@ from kahanmaps_cli.main import main
 LEAVES = [(words, command) for words, command in all_commands() if not isinstance(command, click.Group)]
 STATUSES = (0, 1, 2, 3)
 LONGEST_LINE = 1000
-
-# The least that a command needs, as quick as it can be; what an option replaces is left out.
-LEAST = {
-    "systems": "euler_top",
-    "orbit": "harmonic --start 1,2 --eps 1/10 --steps 1",
-    "period": "paper_m2 --start 1,2,3,4 --eps 1/10 --arithmetic mod:7",
-    "ensemble": "harmonic --random 1 --eps 1/10 --steps 1",
-    "check-commute": "harmonic harmonic",
-    "check-integrals": "harmonic",
-    "check-measure": "harmonic",
-    "check-poisson": "harmonic",
-    "analyze": "harmonic --seconds 1",
-    "degrees": "harmonic --terms 3 --seconds 1",
-    "heights": "harmonic --steps 20 --seconds 1",
-    "find-integrals": "harmonic --seconds 1",
-    "find-density": "harmonic --seconds 1",
-    "find-symmetry": "harmonic --seconds 1",
-    "find-commuting": "harmonic --seconds 1",
-    "singularities": "harmonic --seconds 1",
-    "cycles": "harmonic --prime 5 --eps 1/3 --seconds 1",
-    "lyapunov": "harmonic --random 1 --eps 1/10 --steps 100 --seconds 1",
-    "verify": "--m 1 --section 2",
-    "family new": "--m 1",
-    "family show": "paper_m2",
-    "family space": "paper_m2",
-    "family associated": "paper_m2",
-    "batch run": "SPEC --dry-run",
-    "batch status": "--db DB",
-    "batch show": "0000 --db DB",
-    "batch export": "--csv --db DB",
-    "batch summary": "--db DB",
-    "batch merge": "OTHER DB",
-    "batch tasks": "",
-    "plot commute": "harmonic harmonic --start 1,2 --eps 1/10 --steps 1 --format text",
-    "plot degrees": "harmonic --terms 3 --seconds 1 --format text",
-    "plot drift": "harmonic --start 1,2 --eps 1/10 --steps 2 --format text",
-    "plot heights": "harmonic --start 1,2 --eps 1/10 --steps 3 --seconds 1 --format text",
-    "plot invariant-curves": "paper_m2 --start 1,2,3,4 --eps 1/100 --steps 2 --format text",
-    "plot portrait": "harmonic --start 1,2 --eps 1/10 --steps 2 --format text",
-    "plot batch": "DB --format text",
-    "plot recipe": "PICTURE",
-    "report": "harmonic --from checks --no-pictures",
-    "convert": "harmonic --to latex",
-    "schema": "",
-    "completion": "bash",
-    "manual": "",
-    "version": "",
-}
 
 # What is tried, by the kind of a value; {end} is the ending of the files that a command knows.
 LONG = "x" * 200_000
@@ -157,12 +109,8 @@ def mistakes_of(words: str, name: str, values: dict[str, list[str]], capsys: pyt
 
 
 @pytest.fixture
-def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _folder(least_folder: Path) -> None:
     """Where the commands run: small files, and symbolic links that lead round in a circle."""
-    monkeypatch.chdir(tmp_path)
-    planned(tmp_path / "DB", 1, 2, records=[ok(1)])
-    Path("SPEC").write_text('[experiments.a]\ntask = "orbit"\nsystem = "harmonic"\naxes = {eps = "1/10"}\n')
-    Path("PICTURE").write_bytes(b"\x89PNG\r\n\x1a\n")
     for end in {"toml", *ENDINGS.values()}:
         Path(f"loop.{end}").symlink_to(f"loop.{end}")
         Path(f"folder.{end}").mkdir()

@@ -253,13 +253,13 @@ def test_main_takes_its_arguments_from_the_command_line_when_given_none(monkeypa
 # Standard streams
 
 
-def test_a_reader_that_has_seen_enough_ends_the_command_quietly(tmp_path):
+def test_a_reader_that_has_seen_enough_ends_an_orbit_quietly_and_early(tmp_path):
     script = """
-    kahanmaps orbit lotka_volterra --start 1,2 --eps 1/10 --steps 20000 --arithmetic float | head -n 2
+    kahanmaps orbit lotka_volterra --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic float | head -n 2
     echo "${PIPESTATUS[0]}"
     """
     outcome = shell(script, tmp_path)
-    assert outcome.out.splitlines()[1:] == ["step\tx\ty", "0"]
+    assert outcome.out.splitlines()[1:] == ["step\tx\ty", "3"]
     assert outcome.err == ""
 
 

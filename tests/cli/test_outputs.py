@@ -13,6 +13,7 @@ import signal
 import subprocess
 import time
 import tracemalloc
+from collections.abc import Callable
 from contextlib import redirect_stdout
 from pathlib import Path
 
@@ -20,7 +21,7 @@ import click
 import numpy as np
 import pytest
 from cli_helpers import COMMAND, shell
-from command_tree import all_commands
+from command_tree import LEAST, all_commands
 from small_databases import ok, planned
 
 from kahanmaps_cli import orbit_formats
@@ -237,3 +238,63 @@ def test_links_in_a_circle_are_no_place(kahanmaps, tmp_path, ending):
     outcome = kahanmaps(f"orbit harmonic {ORBIT} --arithmetic float -o", loop)
     assert (outcome.status, outcome.out) == (2, "")
     assert outcome.err == f"Error: Too many levels of symbolic links: {loop}\n"
+
+
+# Readers that leave
+
+
+@pytest.fixture
+def unread(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], int]:
+    """Run a command whose standard output is a pipe that nobody reads any longer: its exit status."""
+
+    def run(line: str) -> int:
+        ours, theirs = os.pipe()
+        os.close(ours)
+        with monkeypatch.context() as patch, open(theirs, "w") as pipe:
+            patch.setattr("sys.stdout", pipe)
+            return main(shlex.split(line))
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("line", "status"),
+    [
+        ("check-integrals euler_top --integral x1", 1),
+        ("orbit --vars x --rhs x^2 --start 1 --eps 1/2 --steps 2", 3),
+        ("find-density lorenz --seconds 0.001", 3),
+        ("heights harmonic --seconds 0.001", 3),
+        ("degrees lorenz --seconds 0.001", 3),
+        ("batch run FAILS --jsonl -q", 3),
+        ("batch export --db DB --jsonl", 0),
+        ("convert harmonic --to latex", 0),
+        ("--help", 0),
+        ("orbit --help", 0),
+        ("nonsense", 2),
+    ],
+)
+def test_a_reader_that_has_left_changes_no_exit_status(kahanmaps, unread, least_folder, line, status):
+    Path("FAILS").write_text('[experiments.a]\ntask = "check-integrals"\nsystem = "lorenz"\n')
+    assert (kahanmaps(line).status, unread(line)) == (status, status)
+
+
+def test_a_batch_goes_on_when_nobody_reads_its_records(unread, kahanmaps, least_folder):
+    assert unread("batch run SPEC --db new.db --jsonl -q") == 0
+    assert kahanmaps("batch status --db new.db --json").json["experiments"][0]["missing"] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [words for words in LEAST if words not in ("version", "manual")])
+def test_a_reader_that_has_left_changes_the_exit_status_of_no_command(kahanmaps, unread, least_folder, words):
+    line = f"{words} {LEAST[words]}"
+    assert unread(line) == kahanmaps(line).status
+
+
+def test_an_orbit_ends_early_when_its_reader_leaves(unread):
+    assert unread("orbit harmonic --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007") == 3
+
+
+def test_a_command_ends_early_when_the_reader_of_its_pipe_leaves(tmp_path):
+    words = "orbit harmonic --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007 -q -o p"
+    outcome = shell(f"mkfifo p; head -n 1 p > /dev/null & kahanmaps {words}", tmp_path)
+    assert (outcome.status, outcome.err) == (3, "")

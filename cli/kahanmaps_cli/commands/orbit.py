@@ -30,6 +30,7 @@ from kahanmaps_cli.params import Arithmetic, PointText, Steps
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import ending
 from kahanmaps_cli.signals import interruptible
+from kahanmaps_cli.streams import is_read
 
 if TYPE_CHECKING:
     from kahanmaps.maps.orbits import OrbitEnd
@@ -141,6 +142,8 @@ def command(
                 progress(f"step {step} of {run.steps}")
                 if texts is not None:
                     writer.point(step, texts, values)
+                if output is None and not is_read():
+                    return 3  # the reader (head, say) has what it wanted, and the orbit may be long
             end = run.end
         except OutputFull as full:
             end = OrbitEnd("budget", full.steps, str(full))

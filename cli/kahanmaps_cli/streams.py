@@ -1,0 +1,71 @@
+"""Standard streams: never in the place of a file, and without a reader no reason to fail."""
+
+from __future__ import annotations
+
+import io
+import os
+import stat
+import sys
+from contextlib import suppress
+from typing import Any, TextIO
+
+
+class _Pipe(io.FileIO):
+    """A pipe to write to; when its reader has gone (head, say), what is written is dropped."""
+
+    is_read = True
+
+    def write(self, data: Any) -> int:
+        if self.is_read:
+            try:
+                return super().write(data)
+            except BrokenPipeError:
+                self.is_read = False
+        return memoryview(data).nbytes
+
+
+def have_standard_streams() -> None:
+    """Have all three of them, and the status of a command not depend on who reads what it prints.
+
+    Where one is closed (`>&-`) the null device takes its place, or the next file opened would. Where the encoding of a
+    stream lacks a character, the character is spelt out.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115 (open for as long as the process lives)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    if _is_pipe(sys.stdout) and isinstance(sys.stdout, io.TextIOWrapper) and _pipe_below(sys.stdout) is None:
+        sys.stdout.flush()
+        pipe = io.BufferedWriter(_Pipe(sys.stdout.fileno(), "w", closefd=False))
+        sys.stdout = io.TextIOWrapper(pipe, encoding=sys.stdout.encoding, errors="backslashreplace")
+
+
+def is_read() -> bool:
+    """Whether somebody may still read what is printed; it is known when a buffer was full, or has been flushed."""
+    pipe = _pipe_below(sys.stdout)
+    return pipe is None or pipe.is_read
+
+
+def leave_nothing_to_flush() -> None:
+    """Let go of what a stream still holds and cannot write: Python would fail on it once more, and exit with 120."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def _is_pipe(stream: TextIO) -> bool:
+    try:
+        mode = os.fstat(stream.fileno()).st_mode
+    except (OSError, ValueError):
+        return False
+    return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode)
+
+
+def _pipe_below(stream: TextIO) -> _Pipe | None:
+    raw = getattr(getattr(stream, "buffer", None), "raw", None)
+    return raw if isinstance(raw, _Pipe) else None
