@@ -117,6 +117,15 @@ def quoted(text: str, width: int = 40) -> str:
     return repr(str(text) if len(text) <= width else text[:width] + "...")
 
 
+def printable(text: str) -> str:
+    """The text with nothing in it that a terminal would obey, but for ends of lines and tabs.
+
+    >>> len(printable(chr(27) + "[31m")) - len("[31m")
+    4
+    """
+    return "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
+
+
 def bounded(message: str) -> str:
     """A message without the middle of words and lines that nobody would read to their end; their length is told.
 

@@ -7,7 +7,10 @@ such as *proved* carry a mark beside their colour, so that they can be told apar
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Iterable, Sequence
+
+from kahanmaps.errors import printable
 
 # A mark, and a colour to be mixed with that of the text: with a contrast above 4.5 : 1 on white and on near black.
 _WORDS = {
@@ -30,8 +33,29 @@ def escape(text: object) -> str:
     >>> escape("a" + chr(0) + chr(27))
     'a\\\\x00\\\\x1b'
     """
-    shown = "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in str(text))
-    return html.escape(shown, quote=True)
+    return html.escape(printable(str(text)), quote=True)
+
+
+def markdown(text: object) -> str:
+    """Text as Markdown that shows it and nothing else, on one line.
+
+    >>> markdown("<b>2*x*y|[a](b)</b>")
+    '&lt;b>2\\\\*x\\\\*y\\\\|\\\\[a\\\\](b)&lt;/b>'
+    """
+    marked = re.sub(r"[\\`*\[\]|]", r"\\\g<0>", " ".join(printable(str(text)).split()))
+    return marked.replace("&", "&amp;").replace("<", "&lt;")
+
+
+def code(text: object) -> str:
+    """Text as a span of code in Markdown, fenced by more backticks than it has in a row.
+
+    >>> code("x < y"), code("`a`")
+    ('`x < y`', '`` `a` ``')
+    """
+    line = re.sub(r"\s", " ", printable(str(text)))
+    fence = "`" * (1 + max(map(len, re.findall("`+", line)), default=0))
+    margin = " " if len(fence) > 1 else ""
+    return f"{fence}{margin}{line}{margin}{fence}"
 
 
 def shortened(text: object, width: int = _SHORTENED) -> str:

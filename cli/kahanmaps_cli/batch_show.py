@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.batch_progress import duration
-from kahanmaps_cli.progress import printable
 from kahanmaps_cli.render import print_json
-from kahanmaps_cli.terminal import on_terminal, print_table, shorten, tell, tell_entry
+from kahanmaps_cli.terminal import echo, on_terminal, print_table, shorten, tell, tell_entry
 
 if TYPE_CHECKING:
     from kahanmaps.experiments.store import Found, Store
@@ -116,7 +115,6 @@ def print_found(data: Sequence[Mapping[str, Any]]) -> None:
             versions = ", ".join(f"{name} {number}" for name, number in one["versions"].items())
             lines.append(("where", f"{one['host']}, {one['finished']}, {versions}"))
         for name, text in lines:
-            text = printable(text)
             tell(f"{name}\t" + (shorten(text, _VALUE_WIDTH) if on_terminal() else text).replace("\n", "\n\t"))
 
 
@@ -139,13 +137,13 @@ def print_summary(
     if as_json:
         print_json({"command": "batch summary", "version": __version__, "convention": CONVENTION, **found.to_json()})
     elif as_markdown:
-        click.echo(found.markdown(), nl=False)
+        echo(found.markdown(), end="")
     elif on_terminal():
         for table in found.tables(digits=4):
             print_table([table.columns, *table.rows], words=table.words)
     else:
         for line in found.lines():
-            click.echo(line)
+            echo(line)
 
 
 def export_rows(store: Store, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:

@@ -6,6 +6,7 @@ All but npz are valid after every record, so that whatever ends an orbit leaves 
 from __future__ import annotations
 
 import json
+import re
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -81,14 +82,16 @@ class Csv(Writer):
     """Comma-separated values below a row of names; header and end are comment lines that start with #."""
 
     def header(self, header: dict[str, Any]) -> None:
-        self._line("# " + json.dumps(header))
-        self._line(",".join(["step", *self.columns, *map(_quoted, self.integrals)]))
+        from kahanmaps.experiments.export import cell
+
+        self._line(_comment(header))
+        self._line(",".join(["step", *self.columns, *(_quoted(cell(name)) for name in self.integrals)]))
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line(",".join([str(step), *x, *("" if value is None else value for value in values)]))
 
     def end(self, end: dict[str, Any]) -> None:
-        self._line("# " + json.dumps(end))
+        self._line(_comment(end))
         self.stream.flush()
 
 
@@ -220,6 +223,13 @@ class Npz(Writer):
         while lines := list(islice(self._rows, _ROWS)):
             cells = [[convert(cell) for cell in line[:-1].split("\t")[part]] for line in lines]
             member.write(np.array(cells, dtype=dtype).tobytes())
+
+
+def _comment(data: dict[str, Any]) -> str:
+    """JSON behind a #. To a spreadsheet a comma in its texts begins a cell, and what it would run there is no formula
+    when that comma is spelt out; commas between the entries have a blank behind them.
+    """
+    return "# " + re.sub(r"([,;])(?=[=+\-@])", lambda mark: f"\\u{ord(mark[0]):04x}", json.dumps(data))
 
 
 def _quoted(name: str) -> str:

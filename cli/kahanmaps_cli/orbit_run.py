@@ -246,7 +246,7 @@ class OrbitRun:
             if text in self.file.integrals:
                 name, function = name or text, self.file.integrals[text]
             else:
-                name = name or (text if len(text) <= 30 else f"I{k}")
+                name = name or (" ".join(text.split()) if len(text) <= 30 else f"I{k}")
                 function = parse_rational_function(text, (*self.file.variables, "eps"), self.file.parameters)
             self._add_function(name, function)
 

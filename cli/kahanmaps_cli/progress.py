@@ -14,17 +14,14 @@ from types import TracebackType
 
 import click
 
+from kahanmaps.errors import printable
+
 
 def say(message: str) -> None:
     """Print a message, with nothing in it that a terminal would obey; a terminal gets lines broken at words."""
     text = printable(message)
     with suppress(OSError):
         click.echo(_fitted(text) if sys.stderr.isatty() else text, err=True)
-
-
-def printable(text: str) -> str:
-    """The text with nothing in it that a terminal would obey, but for ends of lines and tabs."""
-    return "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
 
 
 class Progress:
@@ -41,7 +38,7 @@ class Progress:
         if self._quiet or now - self._start < 1 or now - self._last < (0.1 if self._terminal else 10):
             return
         self._last = now
-        text = f"{sentence} ({now - self._start:.0f} s)"
+        text = f"{printable(sentence)} ({now - self._start:.0f} s)"
         if self._terminal:
             text = text[: _width() - 1]
             _write("\r" + text.ljust(self._shown))

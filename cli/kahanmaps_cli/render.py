@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.terminal import COLOURS, NARROW, NUMBER_WIDTH, columns, console, on_terminal, shorten, tell
+from kahanmaps_cli.terminal import COLOURS, NARROW, NUMBER_WIDTH, columns, console, on_terminal, shorten, styled, tell
 
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Evidence, Finding, Report, Witness
@@ -121,7 +121,6 @@ def _print_list(report: Report, shown: list[Finding], verbose: bool) -> None:
 
 def _print_table(report: Report, shown: list[Finding], verbose: bool) -> None:
     from rich.table import Table
-    from rich.text import Text
 
     table = Table(header_style="bold", show_lines=verbose)
     table.add_column("verdict", no_wrap=True)
@@ -130,16 +129,16 @@ def _print_table(report: Report, shown: list[Finding], verbose: bool) -> None:
         table.add_column("decided by", overflow="fold")
     told: set[str] = set()
     for finding in shown:
-        claim = Text(finding.claim)
-        verdict = Text(_verdict_text(finding).replace(" (", "\n("), style=verdict_style(finding))
+        claim = finding.claim
+        verdict = styled(_verdict_text(finding).replace(" (", "\n("), verdict_style(finding))
         if verbose:
             for line in _details(finding, told, NUMBER_WIDTH):
-                claim.append("\n  " + line)
-            table.add_row(verdict, claim)
+                claim += "\n  " + line
+            table.add_row(verdict, styled(claim))
         else:
             if report.check != "commute" and finding.formula not in finding.claim:
-                claim.append("\n  " + shorten(finding.formula, 300))
-            table.add_row(verdict, claim, _short(finding.evidence))
+                claim += "\n  " + shorten(finding.formula, 300)
+            table.add_row(verdict, styled(claim), styled(_short(finding.evidence)))
     console().print(table)
 
 

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from kahanmaps_cli.progress import printable
+from kahanmaps.errors import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.text import Text
 
 COLOURS = {"proved": "green", "supported": "cyan", "refuted": "red", "undecided": "magenta"}
 # On a terminal long numbers are shortened to this many characters.
@@ -92,8 +93,8 @@ def tell(text: str, hang: int = _LABEL, style: str = "") -> None:
 
     Verdicts are coloured, lines that start with # are headings. `hang` is the column of what stands beside a label.
     """
-    for line in text.split("\n"):
-        cells = (printable(line) if on_terminal() else line).split("\t")
+    for line in printable(text).split("\n"):
+        cells = line.split("\t")
         shown = _laid_out(cells, hang) if on_terminal() else line
         if style or line.startswith("# "):
             shown = "\n".join(paint(piece, style or "bold") if piece else "" for piece in shown.split("\n"))
@@ -103,8 +104,21 @@ def tell(text: str, hang: int = _LABEL, style: str = "") -> None:
         click.echo(shown, color=is_coloured())
 
 
+def echo(text: str, end: str = "\n") -> None:
+    """Print text on standard output as it is, but for what a terminal would obey; others may have written it."""
+    click.echo(printable(text) + end, nl=False)
+
+
+def styled(text: str, style: str = "") -> Text:
+    """Text for a table of rich, with nothing in it that a terminal would obey."""
+    from rich.text import Text
+
+    return Text(printable(text), style=style)
+
+
 def tell_entry(head: str, text: str, style: str = "") -> None:
     """Print an entry of a list whose heads have the same length; on a terminal its text goes on below itself."""
+    head, text = printable(head), printable(text)
     lines = [head + text]
     if on_terminal():
         lines = wrapped(text, columns(), head, " " * (len(head) if columns() >= NARROW else 4))
@@ -119,10 +133,9 @@ def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
     """
     if not on_terminal():
         for row in rows:
-            click.echo("\t".join(row))
+            echo("\t".join(row))
         return
     from rich.table import Table
-    from rich.text import Text
 
     screen = console()
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -136,13 +149,13 @@ def print_table(rows: Sequence[Sequence[str]], words: int = 1) -> None:
     table = Table(header_style="bold", padding=(0, padding))
     for k, heading in enumerate(rows[0]):
         table.add_column(
-            Text(heading, style=COLOURS.get(heading, "")),
+            styled(heading, COLOURS.get(heading, "")),
             justify="left" if k < words else "right",
             overflow="fold",
             no_wrap=k >= words,
         )
     for row in rows[1:]:
-        table.add_row(*(Text(printable(cell)) for cell in row))
+        table.add_row(*map(styled, row))
     screen.print(table)
 
 
@@ -152,7 +165,7 @@ def _print_cells(rows: Sequence[Sequence[str]]) -> None:
     width = max(map(len, headings))
     for row in others:
         for heading, cell in zip(headings, row, strict=True):
-            click.echo("\n".join(wrapped(printable(cell), columns(), heading.ljust(width) + "  ", " " * 4)))
+            echo("\n".join(wrapped(cell, columns(), heading.ljust(width) + "  ", " " * 4)))
         click.echo()
 
 

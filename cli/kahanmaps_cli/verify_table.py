@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
-import click
-
+from kahanmaps import markup
 from kahanmaps_cli.render import exit_status, headline, print_report, verdict_style, witness_lines
-from kahanmaps_cli.terminal import NARROW, NUMBER_WIDTH, columns, console, on_terminal, shorten, tell
+from kahanmaps_cli.terminal import NARROW, NUMBER_WIDTH, columns, console, echo, on_terminal, shorten, styled, tell
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -43,7 +42,7 @@ _LEGEND = {
 def print_verification(report: Report, as_json: bool, as_markdown: bool, verbose: bool, quiet: bool) -> int:
     """Print the report and return the exit status."""
     if as_markdown:
-        click.echo(markdown(report))
+        echo(markdown(report))
         return exit_status(report)
     if as_json or not on_terminal():
         return print_report(report, as_json, verbose, quiet)
@@ -53,7 +52,7 @@ def print_verification(report: Report, as_json: bool, as_markdown: bool, verbose
 
 def markdown(report: Report) -> str:
     """The table in Markdown; docs/audit.md is made of it."""
-    lines = [headline(report)]
+    lines = [markup.markdown(headline(report))]
     section = None
     for finding in report.findings:
         if finding.place.get("section") != section:
@@ -64,7 +63,7 @@ def markdown(report: Report) -> str:
         verdict = str(finding.verdict) + (" as printed" if finding.place.get("misprint") else "")
         cells = (
             finding.place.get("place", ""),
-            f"`{finding.formula or finding.claim}`",
+            markup.code(finding.formula or finding.claim),
             _how(finding.evidence),
             verdict,
         )
@@ -129,7 +128,6 @@ def _print_list(name: str, findings: list[Finding], verbose: bool, controls: boo
 def _table(name: str, findings: list[Finding], verbose: bool, controls: bool) -> Table:
     from rich import box
     from rich.table import Table
-    from rich.text import Text
 
     table = Table(
         title=name, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, show_lines=verbose, expand=True
@@ -142,10 +140,10 @@ def _table(name: str, findings: list[Finding], verbose: bool, controls: bool) ->
         formula, *more = _rows(finding, verbose)
         verdict = f"{finding.verdict}\nas printed" if finding.place.get("misprint") else str(finding.verdict)
         table.add_row(
-            finding.place["place"],
-            Text("\n  ".join([formula, *more])),
-            _decided(finding, controls),
-            Text(verdict, style=verdict_style(finding)),
+            styled(finding.place["place"]),
+            styled("\n  ".join([formula, *more])),
+            styled(_decided(finding, controls)),
+            styled(verdict, verdict_style(finding)),
         )
     return table
 

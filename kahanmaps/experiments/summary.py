@@ -21,6 +21,7 @@ from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.export import NUMBER, Entry, entries, plain
 from kahanmaps.experiments.records import KEPT, Row, canonical
 from kahanmaps.experiments.shown import summary_html
+from kahanmaps.markup import markdown
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
 VERDICTS = ("proved", "supported", "refuted", "undecided")
@@ -85,7 +86,7 @@ class Table:
         """The table for a Markdown file."""
         rule = ["---"] * self.words + ["---:"] * (len(self.columns) - self.words)
         rows = (self.columns, rule, *self.rows)
-        return "".join("| " + " | ".join(map(_markdown_cell, row)) + " |\n" for row in rows)
+        return "".join("| " + " | ".join(map(markdown, row)) + " |\n" for row in rows)
 
 
 @dataclass(frozen=True)
@@ -424,7 +425,3 @@ def _shortened(value: Any, digits: int) -> str:
     if is_number and 0 < abs(approximation := _approximate(Fraction(value))) < inf:
         return f"~{approximation:.{digits}g}"
     return text[: longest - 3] + "..."
-
-
-def _markdown_cell(text: str) -> str:
-    return " ".join(text.replace("\\", "\\\\").replace("|", "\\|").split())

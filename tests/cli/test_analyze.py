@@ -110,7 +110,7 @@ def test_text_json_and_markdown_say_the_same(kahanmaps):
     markdown = kahanmaps("analyze nahm_tetrahedral --markdown").out
     assert [(line["section"], line["status"], line["text"]) for line in found["statements"]] == lines
     assert (found["verdict"]["integrability"], found["verdict"]["sentence"]) == verdict
-    assert all(text in markdown for _, _, text in lines)
+    assert all(text in markdown.replace("\\", "") for _, _, text in lines)
 
 
 def test_symbolic_parameters_stay_in_the_formulas(kahanmaps):

@@ -18,7 +18,7 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.search import formula, symbols_and_eps
-from kahanmaps_cli.terminal import on_terminal, tell
+from kahanmaps_cli.terminal import echo, on_terminal, tell
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
@@ -92,15 +92,14 @@ def _print(found: Analysis) -> None:
 
 def _print_markdown(found: Analysis) -> None:
     from kahanmaps.algebra.text import format_polynomial
+    from kahanmaps.markup import code, markdown
 
-    click.echo(f"# {_title(found)}\n")
-    click.echo("```")
-    for name, polynomial in zip(found.file.variables, found.file.system.rhs, strict=True):
-        click.echo(f"{name}' = {format_polynomial(polynomial)}")
-    click.echo("```\n")
-    click.echo(f"**{found.conclusion.sentence}**\n")
-    for name, lines in found.sections:
-        click.echo(f"## {name}\n")
-        for line in lines:
-            click.echo(f"* *{line.status}*: `{line.text}`" if "=" in line.text else f"* *{line.status}*: {line.text}")
-        click.echo("")
+    lines = [f"# {markdown(_title(found))}", "", "```"]
+    for variable, polynomial in zip(found.file.variables, found.file.system.rhs, strict=True):
+        lines.append(f"{variable}' = {format_polynomial(polynomial)}")
+    lines += ["```", "", f"**{markdown(found.conclusion.sentence)}**", ""]
+    for name, told in found.sections:
+        lines += [f"## {name}", ""]
+        lines += [f"* *{one.status}*: {(code if '=' in one.text else markdown)(one.text)}" for one in told]
+        lines.append("")
+    echo("\n".join(lines))

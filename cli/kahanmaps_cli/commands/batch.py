@@ -16,6 +16,7 @@ from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import OptionType
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import echo
 
 if TYPE_CHECKING:
     from kahanmaps.experiments.store import Store
@@ -265,7 +266,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
     else:
         for source, found in merged:
             counts = f"new results: {found.results}\tfailures replaced: {found.replaced}\tconflicts: {found.conflicts}"
-            click.echo(f"{source}\t{counts}")
+            echo(f"{source}\t{counts}")
     if conflicts and not quiet:
         keys = [key for _, found in merged for key in found.conflicting]
         say(

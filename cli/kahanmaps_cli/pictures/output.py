@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from kahanmaps.errors import printable
 from kahanmaps_cli.options import stack
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import OptionType
-from kahanmaps_cli.progress import printable, say
+from kahanmaps_cli.progress import say
 from kahanmaps_cli.terminal import is_coloured
 
 if TYPE_CHECKING:

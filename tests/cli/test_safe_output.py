@@ -1,0 +1,118 @@
+"""What others wrote obeys nobody: texts of files on terminals, in pipes, pages and tables, commands printed."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+from cli_helpers import shell, terminal
+
+FREE = "T\\u001b[31m\\u009b2J\\u202e\\n<script>t</script>\\r=cmd() | `x` <img src=x onerror=y>"
+NAME = "=cmd()<script>a</script>,=b|`c`"
+SYSTEM = f"""
+name = {NAME!r}
+variables = ["x1", "x2", "x3", "x4"]
+[family]
+A = [["1","0","0","0"], ["0","-2","0","0"], ["0","0","1","0"], ["0","0","0","-2"]]
+H = "x1^3 + x2^3 + x1^2*x3 + x3^3 + x2*x4^2"
+[integrals]
+"=cmd()<script>i</script>" = "x1"
+'@x,"' = "x2"
+[density]
+phi = "1"
+[catalog]
+title = "{FREE}"
+facts = ["{FREE}"]
+convention = "{FREE}"
+sources = ["petrera-suris-2016"]
+"""
+SPEC = '[experiments.e]\ntask = "check-integrals"\nsystem = "s.toml"\n'
+ORBIT = "s.toml --start 1,2,3,4 --eps 1/10 --steps 2"
+
+COMMANDS = [
+    "systems s.toml",
+    "systems s.toml --toml",
+    "systems s.toml --latex",
+    f"orbit {ORBIT} --integral known",
+    f"orbit {ORBIT} --integral known --format csv",
+    f"orbit {ORBIT} --integral known --format jsonl",
+    f"ensemble {ORBIT.replace('--start 1,2,3,4', '--random 2')}",
+    "check-integrals s.toml",
+    "check-measure s.toml --steps 1",
+    "check-commute s.toml -v",
+    "verify s.toml --section 2",
+    "verify s.toml --section 2 --markdown",
+    "family show s.toml",
+    "family space s.toml",
+    "degrees s.toml --terms 3",
+    "heights s.toml --steps 10",
+    "find-symmetry s.toml --seconds 1",
+    "find-density s.toml --seconds 1 --toml",
+    "batch status --db r.db",
+    "batch summary --db r.db --by name,message,system",
+    "batch summary --db r.db --by name,message,system --markdown",
+    "batch export --db r.db --csv",
+    "batch show KEY --db r.db",
+    f"plot drift {ORBIT} --format text --title \x1b[31m",
+    f"plot drift {ORBIT} --format svg --title <script>\x1b[31m",
+    "analyze s.toml --seconds 1 --markdown",
+    "report s.toml --from checks --no-pictures -o -",
+    *(f"convert s.toml --to {language}" for language in ("sage", "pari", "latex", "julia", "mathematica", "sympy")),
+]
+PAGES = ("report", "svg", "--markdown")
+TAGS = re.compile(r"<script|<img")
+# What a terminal obeys, but for the colours of a terminal.
+OBEYED = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]")
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where a system lies whose texts are hostile, and a database of checks of it."""
+    folder = tmp_path_factory.mktemp("hostile")
+    (folder / "s.toml").write_text(SYSTEM)
+    (folder / "spec.toml").write_text(SPEC)
+    run = "kahanmaps batch run spec.toml --db r.db -q -j 1 && kahanmaps batch export --db r.db --jsonl -o r.jsonl"
+    assert shell(run, folder).status == 0
+    return folder
+
+
+def words_of(line: str, folder: Path) -> list[str]:
+    """The words of a command."""
+    key = json.loads((folder / "r.jsonl").read_text().splitlines()[1])["key"]
+    return [key if word == "KEY" else word for word in line.split()]
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_no_text_of_a_file_moves_a_terminal_or_becomes_a_tag(line, folder, monkeypatch, capsys):
+    from kahanmaps_cli.main import main
+
+    monkeypatch.chdir(folder)
+    assert main(words_of(line, folder)) in (0, 1, 3)
+    out, err = capsys.readouterr()
+    assert len(out) > 20
+    assert OBEYED.findall(out + err) == []
+    if any(word in line for word in PAGES):
+        assert TAGS.findall(re.sub(r"(`+).*?\1", "", out)) == []
+
+
+@pytest.mark.parametrize("line", ["systems s.toml", "check-integrals s.toml -v", "verify s.toml --section 2"])
+def test_a_terminal_gets_colours_of_ours_only(line, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    out = terminal(*line.split(), columns=200).out
+    assert OBEYED.findall(COLOUR.sub("", out)) == []
+    assert "\x1b[31m" not in out or line.startswith("check")  # red: what is refuted
+
+
+@pytest.mark.parametrize("line", [f"orbit {ORBIT} --integral known --format csv", "batch export --db r.db --csv"])
+def test_no_cell_of_a_table_is_a_formula(line, folder, monkeypatch, capsys):
+    from kahanmaps_cli.main import main
+
+    monkeypatch.chdir(folder)
+    assert main(line.split()) in (0, 3)
+    cells = [cell for row in csv.reader(capsys.readouterr().out.splitlines()) for cell in row]
+    assert any("=cmd()" in cell for cell in cells)
+    assert [c for c in cells if re.match(r"[=+\-@\t\r]", c) and not re.fullmatch(r"-?[0-9./]+", c)] == []
