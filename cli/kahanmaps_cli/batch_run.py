@@ -13,7 +13,7 @@ import click
 from kahanmaps.errors import counted, quoted, suggestion
 from kahanmaps_cli.batch_progress import BatchProgress, duration
 from kahanmaps_cli.batch_show import print_status, status_data
-from kahanmaps_cli.progress import say
+from kahanmaps_cli.progress import as_typed, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.terminal import tell
@@ -180,13 +180,18 @@ def _tell_end(
 ) -> None:
     if progress.done:
         say(f"{_tasks(progress.done)} in {duration(progress.seconds)}")
-    again = f"kahanmaps batch run {path + ' ' if path else ''}--db {db}"
-    again += "".join(f" -e {name}" for name in options["only"])
+    words = ["kahanmaps", "batch", "run", "--db", db]
+    if path:
+        words.insert(3, f"./{path}" if path.startswith("-") else path)
+    for name in options["only"]:
+        words += ["-e", name]
     for name in ("scheduler", "worker_python"):
         if options[name] is not None:
-            again += f" --{name.replace('_', '-')} {options[name]}"
+            words += [f"--{name.replace('_', '-')}", options[name]]
     if options["shard"]:
-        again += f" --shard {options['shard'][0]}/{options['shard'][1]}"
+        words += ["--shard", f"{options['shard'][0]}/{options['shard'][1]}"]
+    again = as_typed(words)
+    why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
     if progress.lost:
         from kahanmaps.experiments.endings import TRIES
 
@@ -197,10 +202,7 @@ def _tell_end(
     if missing:
         say(f"{'interrupted: ' if interrupted else ''}{_tasks(missing)} without a result yet; to continue: {again}")
     if failed:
-        say(
-            f"{_tasks(failed)} failed, why: kahanmaps batch summary --db {db} --by outcome,message; "
-            f"to try again: {again} --retry-failed"
-        )
+        say(f"{_tasks(failed)} failed, why: {why}; to try again: {again} --retry-failed")
 
 
 def _require_names(only: tuple[str, ...], spec: Spec) -> None:

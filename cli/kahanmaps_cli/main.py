@@ -19,7 +19,7 @@ from kahanmaps.errors import InputError, KahanmapsError, bounded, is_out_of_memo
 from kahanmaps_cli.colour_option import colour_option, with_colour_option
 from kahanmaps_cli.groups import SuggestingGroup, in_our_words
 from kahanmaps_cli.params import with_short_integers
-from kahanmaps_cli.progress import say
+from kahanmaps_cli.progress import as_typed, say
 from kahanmaps_cli.streams import have_standard_streams, leave_nothing_to_flush
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ class LazyGroup(SuggestingGroup):
         from kahanmaps.systems.catalog import names
 
         if written in names() or written.endswith(".toml"):
-            return f" To see what the map of {written} preserves: kahanmaps analyze {written}"
+            return f" To see what the map of {written} preserves: {as_typed(['kahanmaps', 'analyze', written])}"
         if written == "help":
             return " For help: kahanmaps --help, or kahanmaps COMMAND --help."
         return super().hint(written, known)

@@ -7,8 +7,10 @@ has to listen: a standard error that cannot be written to changes neither the wo
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 import time
+from collections.abc import Iterable
 from contextlib import suppress
 from types import TracebackType
 
@@ -22,6 +24,19 @@ def say(message: str) -> None:
     text = printable(message)
     with suppress(OSError):
         click.echo(_fitted(text) if sys.stderr.isatty() else text, err=True)
+
+
+def as_typed(words: Iterable[str]) -> str:
+    """The words of a command as one would type them, on one line of UTF-8."""
+    return " ".join(map(_typed, words))
+
+
+def _typed(word: str) -> str:
+    """A word as a shell reads it; what cannot be printed is spelt out, such as bytes that are not UTF-8."""
+    if word.isprintable():
+        return shlex.quote(word)
+    spelt = "".join(chr(b) if 32 <= b < 127 and chr(b) not in "'\\" else f"\\x{b:02x}" for b in os.fsencode(word))
+    return f"$'{spelt}'"
 
 
 class Progress:
@@ -65,13 +80,15 @@ def _width() -> int:
 
 
 def _fitted(text: str) -> str:
-    """The text in lines that fit the terminal; but a caret and the line above it stay, or it would point elsewhere."""
+    """The text in lines that fit the terminal; but a caret and the line above it stay, or it would point elsewhere, and
+    so do commands that are to be copied.
+    """
     from kahanmaps_cli.terminal import wrapped
 
     lines = text.split("\n")
     found = []
     for line, below in zip(lines, [*lines[1:], ""], strict=True):
-        if len(line) <= _width() or "^" in (line.strip(), below.strip()):
+        if len(line) <= _width() or "^" in (line.strip(), below.strip()) or ": kahanmaps " in line:
             found.append(line)
         else:
             words = line.lstrip()

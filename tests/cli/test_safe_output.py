@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from cli_helpers import shell, terminal
 
+from kahanmaps_cli.progress import as_typed, say
+
 FREE = "T\\u001b[31m\\u009b2J\\u202e\\n<script>t</script>\\r=cmd() | `x` <img src=x onerror=y>"
 NAME = "=cmd()<script>a</script>,=b|`c`"
 SYSTEM = f"""
@@ -116,3 +118,27 @@ def test_no_cell_of_a_table_is_a_formula(line, folder, monkeypatch, capsys):
     cells = [cell for row in csv.reader(capsys.readouterr().out.splitlines()) for cell in row]
     assert any("=cmd()" in cell for cell in cells)
     assert [c for c in cells if re.match(r"[=+\-@\t\r]", c) and not re.fullmatch(r"-?[0-9./]+", c)] == []
+
+
+def test_the_commands_that_a_batch_prints_can_be_pasted_whatever_its_files_are_called(tmp_path):
+    spec, db = "a b;touch PWNED;#.toml", "$(touch PWNED) '.db"
+    (tmp_path / spec).write_text('[experiments.e]\ntask = "check-integrals"\nsystem = "lorenz"\n')
+    first = shell('kahanmaps batch run "$SPEC" --db "$DB" -j 1 -e e', tmp_path, SPEC=spec, DB=db)
+    why, again = re.search("1 task failed, why: (.*); to try again: (.*)", first.err).groups()
+    reasons = shell(why, tmp_path)
+    assert (reasons.status, "failed" in reasons.out) == (0, True)
+    repeated = shell(again, tmp_path)
+    assert repeated.err.splitlines()[0].startswith("1 task to do, results go to $(touch")
+    assert repeated.err.splitlines()[-1] == first.err.splitlines()[-1]
+    assert not (tmp_path / "PWNED").exists()
+
+
+def test_the_command_in_a_hint_can_be_pasted(kahanmaps):
+    assert kahanmaps("'a b;x.toml'").err.rstrip().endswith("kahanmaps analyze 'a b;x.toml'")
+
+
+def test_a_terminal_gets_a_command_on_one_line(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    command = f"to continue: {as_typed(['kahanmaps', 'a  b', 'word ' * 40])}"
+    say(command)
+    assert capsys.readouterr().err == command + "\n"

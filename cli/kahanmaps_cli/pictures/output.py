@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
 import shutil
 import sys
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -17,7 +16,7 @@ from kahanmaps.errors import printable
 from kahanmaps_cli.options import stack
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import OptionType
-from kahanmaps_cli.progress import say
+from kahanmaps_cli.progress import as_typed, say
 from kahanmaps_cli.terminal import is_coloured
 
 if TYPE_CHECKING:
@@ -138,19 +137,6 @@ def command_line() -> str:
     context = click.get_current_context()
     words = context.command_path.split()[1:]  # the first one is the program, whatever it was called
     return as_typed(["kahanmaps", *words, *context.meta[_ARGUMENTS]])
-
-
-def as_typed(words: Iterable[str]) -> str:
-    """The words of a command as one would type them, on one line of UTF-8."""
-    return " ".join(map(_typed, words))
-
-
-def _typed(word: str) -> str:
-    """A word as a shell reads it; what cannot be printed is spelt out, such as bytes that are not UTF-8."""
-    if word.isprintable():
-        return shlex.quote(word)
-    spelt = "".join(chr(b) if 32 <= b < 127 and chr(b) not in "'\\" else f"\\x{b:02x}" for b in os.fsencode(word))
-    return f"$'{spelt}'"
 
 
 def _draw_in_terminal(figure: Figure, style: Style, path: str) -> None:
