@@ -154,15 +154,8 @@ def costs_of_a_group(folder: Path, number: int) -> dict[str, float]:
     running: list[subprocess.Popen[bytes]] = []
     try:
         for module, *options in commands:
-            command = [
-                sys.executable,
-                "-m",
-                f"distributed.cli.{module}",
-                "--no-dashboard",
-                "--host",
-                "127.0.0.1",
-                *options,
-            ]
+            here = ["--host", "127.0.0.1", "--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
+            command = [sys.executable, "-m", f"distributed.cli.{module}", *here, *options]
             running.append(subprocess.Popen(command, stderr=subprocess.DEVNULL))
             while not file.exists():
                 time.sleep(0.05)

@@ -28,7 +28,9 @@ options = { max_degree = 300 }
 
 
 def start(module, *options):
-    command = [sys.executable, "-m", f"distributed.cli.{module}", *options]
+    # Whoever reaches a port of dask can run code there: these are reached from this machine only.
+    here = ["--host", "127.0.0.1", "--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
+    command = [sys.executable, "-m", f"distributed.cli.{module}", *here, *options]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     stack.callback(process.wait)
     stack.callback(process.terminate)
@@ -42,9 +44,9 @@ def results(records):
 with ExitStack() as stack:
     folder = Path(stack.enter_context(TemporaryDirectory()))
     scheduler = folder / "scheduler.json"
-    start("dask_scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", str(scheduler))
+    start("dask_scheduler", "--port", "0", "--scheduler-file", str(scheduler))
     for _ in range(2):
-        start("dask_worker", "--scheduler-file", str(scheduler), "--nthreads", "1", "--no-dashboard")
+        start("dask_worker", "--scheduler-file", str(scheduler), "--nthreads", "1")
     there = results(km.run(SPEC, folder / "cluster.db", scheduler=str(scheduler)))
 
 here = results(km.run(SPEC))

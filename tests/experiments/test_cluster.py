@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
+import shutil
 import signal
 import socket
 import subprocess
@@ -70,8 +71,9 @@ ROOT = Path(__file__).resolve().parents[2]
 class Machines:
     """A scheduler and workers, each in a process group of its own, that end with the test."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *more: str) -> None:
         self.folder = folder
+        self.more = more  # options of the scheduler and the workers
         self.file = folder / "scheduler.json"
         self.running: list[subprocess.Popen[bytes]] = []
         self.scheduler = self.start("distributed.cli.dask_scheduler", "--port", "0", "--scheduler-file", str(self.file))
@@ -88,7 +90,9 @@ class Machines:
             return False
 
     def start(self, module: str, *options: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", module, "--no-dashboard", "--host", "127.0.0.1", *options]
+        # --no-dashboard alone leaves a server of HTTP on all interfaces.
+        here = ["--host", "127.0.0.1", "--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
+        command = [sys.executable, "-m", module, *here, *self.more, *options]
         with (self.folder / "log").open("ab") as log:
             process = subprocess.Popen(
                 command,
@@ -131,10 +135,10 @@ def until(holds, seconds=20.0):
 
 
 @contextmanager
-def machines_in(folder):
+def machines_in(folder, *more):
     """A scheduler without workers."""
     with ExitStack() as stack:
-        machines = Machines(folder)
+        machines = Machines(folder, *more)
         stack.callback(machines.end)
         yield machines
 
@@ -681,3 +685,56 @@ def test_json_that_is_no_record_is_no_record():
     assert [record_on(line) for line in (b"", b"{", b"{}", b"[1]", b'{"key": 1, "outcome": "fine"}')] == [None] * 5
     line = json.dumps({"key": "k", "outcome": "ok"}).encode()
     assert record_on(line).is_ok
+
+
+# Who may come: whoever reaches a port of dask runs code there
+
+
+def listening(machines):
+    """The addresses at which the machines of a test, and what they have started, can be reached."""
+    import psutil
+
+    processes = [psutil.Process(one.pid) for one in machines.running]
+    processes += [child for process in processes for child in process.children(recursive=True)]
+    found = [
+        socket.laddr.ip for one in processes for socket in one.net_connections("inet") if socket.status == "LISTEN"
+    ]
+    assert found
+    return set(found)
+
+
+def test_what_these_tests_start_is_reached_from_this_machine_only(shared, workers):
+    done(workers, jobs_of(1))
+    assert listening(shared) == {"127.0.0.1"}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, which makes the certificates")
+def test_tls_is_set_up_as_dask_has_it_and_nobody_comes_in_without_a_certificate(tmp_path, monkeypatch):
+    for name in ("ca", "stranger"):
+        words = "openssl req -x509 -newkey rsa:2048 -nodes -days 1 -subj /CN=kahanmaps -keyout KEY -out CERT"
+        words = words.replace("KEY", f"{name}.key").replace("CERT", f"{name}.pem")
+        subprocess.run(words.split(), cwd=tmp_path, check=True, capture_output=True)
+    files = {"ca-file": "ca.pem", "cert": "ca.pem", "key": "ca.key"}
+    options = [word for name, file in files.items() for word in (f"--tls-{name}", str(tmp_path / file))]
+    (tmp_path / "study.toml").write_text(
+        '[experiments.e]\ntask = "family-space"\nsystem = "family"\naxes = { m = "2", seed = "0..3" }\n'
+    )
+    with machines_in(tmp_path, "--protocol", "tls", *options) as machines:
+        machines.worker()
+        address = json.loads(machines.file.read_text())["address"]
+        assert address.startswith("tls://127.0.0.1:")
+
+        def run(**chosen):
+            """The batch, by a client that dask's own variables give these files."""
+            found = {f"DASK_DISTRIBUTED__COMM__TLS__{name}": str(tmp_path / file) for name, file in chosen.items()}
+            command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "study.toml", "--json"]
+            command += ["--scheduler", address]
+            return subprocess.run(command, cwd=tmp_path, env={**os.environ, **found}, capture_output=True)
+
+        for wrong in ({}, {"CA_FILE": "ca.pem", "CLIENT__CERT": "stranger.pem", "CLIENT__KEY": "stranger.key"}):
+            refused = run(**wrong)
+            assert refused.returncode == 2
+            assert b"Error: no dask scheduler answers at tls://" in refused.stderr, refused.stderr
+        ended = run(CA_FILE="ca.pem", CLIENT__CERT="ca.pem", CLIENT__KEY="ca.key")
+        assert json.loads(ended.stdout)["done"] == {"ok": 4}, ended.stderr

@@ -88,7 +88,9 @@ def command() -> None:
     "--max-tasks", type=click.IntRange(1), metavar="N", help="Refuse specs with more tasks (default 1000000)."
 )
 @click.option(
-    "--scheduler", metavar="ADDRESS", help="Use the workers of a dask scheduler: tcp://host:port or its file."
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Use the workers of a dask scheduler that you trust: tls://host:port, tcp://host:port or its file.",
 )
 @click.option("--worker-python", metavar="PATH", help="The Python of those workers (default: the path of this one).")
 @click.option(
