@@ -49,9 +49,10 @@ class ClusterWorkers(Executor):
 
     `address` is that of the scheduler, "tcp://host:port", or the path of its scheduler file; for "tls://host:port" the
     certificates are those of dask's own configuration. dask's parties unpickle what they are sent, so each of them can
-    run code on all others: scheduler and workers have to be trusted, and closed to everybody else. `command` is what a worker
-    runs for a group, by default `python -m kahanmaps.experiments.group` with this interpreter, which the workers have
-    to find at the same path. A group takes about `group_seconds` and has at most `largest_group` jobs. `talk` is told,
+    run code on all others: scheduler and workers have to be trusted, and closed to everybody else.
+
+    `command` is what a worker runs for a group, by default `python -m kahanmaps.experiments.group` with this
+    interpreter, which the workers have to find at the same path. A group takes about `group_seconds` and has at most `largest_group` jobs. `talk` is told,
     now and then, what is being waited for.
 
     At most two groups for each thread of the workers are under way, so that memory here does not depend on the number

@@ -17,6 +17,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from kahanmaps.maps import float_steps
 from kahanmaps.maps.float_blocks import CUBES, GENERAL, LINES, PlanarBlocks
 from kahanmaps.maps.float_numbers import FloatArray
 from kahanmaps.maps.float_steps import GenericEquation, Lanes
+from kahanmaps.maps.kept_code import compiled
 
 _WIDTH = 256
 _PIECE = 256
@@ -52,14 +54,6 @@ complex_lines = _inner(float_steps.complex_lines)
 complex_general = _inner(float_steps.complex_general)
 real_integral = _inner(float_steps.real_integral)
 complex_integral = _inner(float_steps.complex_integral)
-
-
-def _kernel(function: Callable[..., Any]) -> Any:
-    """The function compiled, and the machine code kept on disk if there is a folder that can be written to."""
-    try:
-        return numba.njit(error_model="numpy", nogil=True, cache=True)(function)
-    except RuntimeError:  # "no locator available": neither the installation nor the user's cache can be written to
-        return _inner(function)
 
 
 @_inner
@@ -757,6 +751,7 @@ def _points_kernel(stamp: int) -> Any:
 
 
 _STAMP = _stamp()
+_kernel = partial(compiled, error_model="numpy", nogil=True)
 planar_advance = _kernel(_planar_kernel(_STAMP))
 generic_advance = _kernel(_generic_kernel(_STAMP))
 points = _kernel(_points_kernel(_STAMP))

@@ -35,18 +35,15 @@ def kernels() -> tuple[Any, Any, Any]:
 def _compiled() -> tuple[Any, Any, Any]:
     import numba
 
+    from kahanmaps.maps.kept_code import compiled
+
     module = globals()
     for name, factors in (("_mul", 2), ("_dot2", 4), ("_dot4", 8)):
         module[name] = _operation(factors)
     inner = numba.njit(nogil=True)
     for name in ("_walk_plane", "_inner_product", "_eliminate"):
         module[name] = inner(module[name])
-    try:
-        outer = numba.njit(nogil=True, cache=True)
-        walkers = outer(walk_planes), outer(walk_general)
-    except RuntimeError:  # "no locator available": no folder that can be written to
-        walkers = inner(walk_planes), inner(walk_general)
-    return *walkers, module["_inner_product"]
+    return compiled(walk_planes, nogil=True), compiled(walk_general, nogil=True), module["_inner_product"]
 
 
 def _operation(factors: int) -> Any:
