@@ -11,10 +11,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from errno import ENOMEM
+from errno import EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC
 from typing import Any
 
 _MISTAKES_SHOWN = 50
+# The disk is full or broken, or the machine has no more of something.
+_OF_THE_MACHINE = frozenset({EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC})
 # What the dynamic linker and the libraries say that are loaded where memory is short.
 _NO_ROOM = re.compile(r"failed to map segment|[Cc]annot allocate memory|[Nn]ot enough memory|Unable to allocate")
 _LONGEST_WORD, _LONGEST_LINE, _MOST_LINES = 300, 1000, 200  # of a message
@@ -179,6 +181,11 @@ def is_out_of_memory(error: BaseException) -> bool:
     if isinstance(error, OSError) and error.errno == ENOMEM:
         return True
     return isinstance(error, (ImportError, OSError)) and _NO_ROOM.search(str(error)) is not None
+
+
+def is_of_the_machine(error: OSError) -> bool:
+    """Whether nobody made a mistake: the same may well be possible later, or elsewhere."""
+    return error.errno in _OF_THE_MACHINE
 
 
 def counted(number: int, word: str) -> str:

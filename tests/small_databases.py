@@ -69,7 +69,7 @@ PRELUDE = """
 import json, os, resource, sys, time, urllib.parse  # the last one for scripts that give up the right to load it later
 from kahanmaps.experiments import database
 from kahanmaps.experiments.records import Limits, Outcome, Record, Task
-from kahanmaps.experiments.store import Store, StoreError
+from kahanmaps.experiments.store import Store, StoreError, Unavailable
 
 def task(number):
     return Task("orbit", {"family": {"m": 2, "seed": number}}, {"eps": "1/10"})
@@ -83,7 +83,7 @@ path, arguments = sys.argv[1], sys.argv[2:]
 
 def start(script: str, path: Path, *arguments: object) -> subprocess.Popen[str]:
     command = [sys.executable, "-c", PRELUDE + script, str(path), *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
 def output(script: str, path: Path, *arguments: object) -> str:

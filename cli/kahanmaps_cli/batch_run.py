@@ -79,7 +79,7 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     """Do what is missing; the exit status."""
     from kahanmaps.experiments.run import plan
     from kahanmaps.experiments.spec import MAX_TASKS, read_spec
-    from kahanmaps.experiments.store import Damaged, Store, StoreError
+    from kahanmaps.experiments.store import Store
 
     spec = None if path is None else read_spec(path, max_tasks=options["max_tasks"] or MAX_TASKS)
     if spec is not None:
@@ -95,13 +95,7 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
         with BatchProgress(todo, options["quiet"]) as progress:
             if todo:
                 jobs = store.pending(**which, retry_failed=options["retry_failed"])
-                try:
-                    was_interrupted = _do(jobs, store, progress, options)
-                except Damaged:
-                    raise
-                except StoreError as error:  # the disk is full or the database gone: no wrong use, but the end
-                    say(f"Error: {error}")
-                    return 3
+                was_interrupted = _do(jobs, store, progress, options)
         missing = store.count_pending(**which)
         data = status_data(store, names or ())
     interrupted = was_interrupted and missing > 0

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kahanmaps.errors import InputError, KahanmapsError, bounded, is_out_of_memory
+from kahanmaps.errors import InputError, KahanmapsError, bounded, is_of_the_machine, is_out_of_memory
 from kahanmaps_cli.colour_option import colour_option, with_colour_option
 from kahanmaps_cli.groups import SuggestingGroup, in_our_words
 from kahanmaps_cli.params import with_short_integers
@@ -215,7 +215,7 @@ def _report(error: Exception) -> int:
     if isinstance(error, OSError):
         where = f": {error.filename or repr('')}" if error.filename is not None else ""
         say(bounded(f"Error: {error.strerror or error}{where}{_missing_folder(error)}"))
-        return WRONG_USE
+        return UNDECIDED if is_of_the_machine(error) else WRONG_USE
     if isinstance(error, ImportError) and not (error.name or "").startswith("kahanmaps"):
         say(bounded(f"Error: {error.name or 'a library'} cannot be loaded: {error}; install it again"))
         return UNDECIDED

@@ -15,9 +15,9 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, Self
 
-from kahanmaps.errors import InputError, quoted
-from kahanmaps.experiments.journals import journal_for
-from kahanmaps.experiments.locks import Lock, LockedByAnother
+from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, quoted
+from kahanmaps.experiments.journals import is_mounted, journal_for
+from kahanmaps.experiments.locks import Lock, LockedByAnother, NotOurs, require_plain
 from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT, SCHEMA
 from kahanmaps.whole_files import resolved
 
@@ -34,6 +34,10 @@ _DEEPEST = 100  # brackets within brackets of a text that is read: what walks th
 
 class StoreError(InputError):
     """A database that cannot be used, or not in this way: the message says what to do."""
+
+
+class Unavailable(KahanmapsError, OSError):
+    """A database that cannot be used just now, by nobody's mistake: the disk is full or broken, the file is gone."""
 
 
 class Damaged(StoreError):
@@ -78,8 +82,10 @@ class Database:
             self._lock.take()
         except LockedByAnother as holder:
             raise StoreError(f"another batch is writing to {self.name} ({holder}): wait for it, or end it") from None
+        except NotOurs as found:
+            raise self._in_the_way(found) from None
         except OSError as error:
-            raise StoreError(
+            raise (Unavailable if is_of_the_machine(error) else StoreError)(
                 f"{self.name} cannot be locked for writing ({self._lock.path}: {error.strerror}): change the "
                 "permissions of its folder, or work on a copy elsewhere"
             ) from error
@@ -89,7 +95,9 @@ class Database:
         if os.getpid() != self._process:
             return  # a forked child has left a `with` of its parent
         try:
-            if self._connection is not None and not self._is_readonly and self._lock.is_held:
+            # Under a new name the file may belong to somebody else by now; SQLite itself then leaves it alone.
+            is_mine = not self._is_readonly and self._lock.is_held and self._identity == self._named()
+            if self._connection is not None and is_mine:
                 # Out of WAL, so that the file opens where nothing can be written. A reader may hold on to it, or the
                 # disk may be full: then it stays as it is, complete together with its journal.
                 with suppress(sqlite3.Error):
@@ -113,6 +121,7 @@ class Database:
         """What is executed in it is done completely or not at all."""
         with self._errors():
             connection = self._opened
+            self._require_name()
             connection.execute("BEGIN IMMEDIATE")
             try:
                 yield
@@ -147,7 +156,7 @@ class Database:
     def _require_name(self) -> None:
         """Refuse to go on with a file that nobody will find. SQLite itself does not mind."""
         if self._identity is not None and self._identity != self._named():
-            raise StoreError(
+            raise Unavailable(
                 f"{self.name} has been removed or replaced while it was being written to: what was written last is "
                 "not in the file of this name; leave it there, and run the batch again"
             )
@@ -214,6 +223,17 @@ class Database:
                 raise StoreError(f"{self.name} cannot be made: there is no folder {self.path.parent}; make it first")
         elif not self.path.is_file():
             raise StoreError(f"{self.name} is a pipe or a device, expected a file: check the name")
+        elif (names := self.path.stat().st_nlink) > 1:
+            # Lock and journal lie beside a name: whoever comes by another one sees neither.
+            raise StoreError(
+                f"{self.name} has {names} names (hard links), and its journal lies beside only one of them: remove the "
+                f"other names, or make a copy of its own (cp {self.name} copy.db) and use that"
+            )
+        elif is_mounted(self.path):
+            raise StoreError(
+                f"{self.name} is mounted by itself, and its journal would not lie beside it where it comes from: "
+                "mount its folder instead"
+            )
         elif not os.access(self.path, os.R_OK):
             raise StoreError(f"{self.name} may not be read: change the permissions of the file")
         elif 0 < self.path.stat().st_size < _SMALLEST:
@@ -223,6 +243,11 @@ class Database:
             raise StoreError(
                 f"{self.name} may not be written to: change the permissions of the file, or work on a copy"
             )
+        for end in ("-wal", "-shm", "-journal"):
+            try:
+                require_plain(Path(f"{self.path}{end}"))
+            except NotOurs as found:
+                raise self._in_the_way(found) from None
         if not self._is_readonly and not os.access(self.path.parent, os.W_OK | os.X_OK):
             # SQLite needs more than the file: its journal lies beside it.
             raise StoreError(
@@ -324,14 +349,23 @@ class Database:
             # Python, where a text or a name is not UTF-8.
             if _primary_code(error) in (sqlite3.SQLITE_ERROR, None):
                 raise self.damaged(quoted(str(error), 100)) from error
-            raise StoreError(self._sentence(error)) from error
+            raise self._failure(error) from error
         except sqlite3.Error as error:
             if _primary_code(error) in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_CONSTRAINT, sqlite3.SQLITE_MISMATCH):
                 raise self.damaged(quoted(str(error), 100)) from error
-            raise StoreError(self._sentence(error)) from error
+            raise self._failure(error) from error
 
-    def _unopened(self, error: OSError) -> StoreError:
+    def _unopened(self, error: OSError) -> KahanmapsError:
+        if is_of_the_machine(error):
+            return Unavailable(f"{self.name} cannot be opened ({error.strerror})")
         return StoreError(f"{self.name} cannot be opened ({error.strerror or error}): check the name")
+
+    def _in_the_way(self, found: NotOurs) -> StoreError:
+        return StoreError(f"{self.name} cannot be used: {found}; look at it, and remove it or move it away")
+
+    def _failure(self, error: Exception) -> KahanmapsError:
+        kind = Unavailable if _primary_code(error) in _OF_THE_MACHINE else StoreError
+        return kind(self._sentence(error))
 
     def _sentence(self, error: Exception) -> str:
         match _primary_code(error):
@@ -365,6 +399,9 @@ class Database:
 
     def _foreign(self) -> str:
         return f"{self.name} is not an SQLite database: check the name"
+
+
+_OF_THE_MACHINE = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
 
 
 def _refuse(constant: str) -> Any:

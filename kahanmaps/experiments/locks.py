@@ -5,8 +5,11 @@ The operating system frees it when the process ends, however it ends.
 
 from __future__ import annotations
 
+import errno
 import os
 import platform
+import re
+import stat
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -20,6 +23,10 @@ except ImportError:  # pragma: no cover - there is none on Windows, where SQLite
 
 class LockedByAnother(Exception):
     """Somebody else has the lock: the message says who."""
+
+
+class NotOurs(Exception):
+    """What has the name of a file of ours is something else, and left alone: the message says what."""
 
 
 @dataclass(eq=False)
@@ -38,7 +45,7 @@ class Lock:
         return self._descriptor is not None
 
     def take(self) -> None:
-        """Take it; LockedByAnother says who has it, OSError why there can be no such file."""
+        """Take it; LockedByAnother says who has it, NotOurs and OSError why there can be no such file."""
         if self.is_held or fcntl is None:
             return
         try:
@@ -49,7 +56,9 @@ class Lock:
         now = datetime.now(UTC).isoformat(timespec="seconds")
         try:
             os.ftruncate(descriptor, 0)
-            os.write(descriptor, f"process {os.getpid()} on {platform.node()} since {now}\n".encode())
+            line = f"process {os.getpid()} on {platform.node()} since {now}\n".encode()
+            if os.write(descriptor, line) < len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError:
             self.free()
             raise
@@ -75,12 +84,16 @@ class Lock:
     def _locked(self) -> int:
         """A descriptor of the file, with the lock on it."""
         while True:
-            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+            require_plain(self.path)
+            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 # The one before may have removed the file after it was opened here. Whoever locks a file that has no
                 # name any longer locks nobody out; whoever holds the one with the name keeps it there.
                 if self._is_named(descriptor):
+                    require_plain(self.path)
+                    if not _LINE.fullmatch(os.pread(descriptor, _LONGEST_LINE, 0)):
+                        raise NotOurs(f"{self.path} is not a lock file")
                     return descriptor
             except BaseException:
                 os.close(descriptor)
@@ -89,7 +102,7 @@ class Lock:
 
     def _is_named(self, descriptor: int) -> bool:
         try:
-            return os.path.samestat(os.fstat(descriptor), os.stat(self.path))
+            return os.path.samestat(os.fstat(descriptor), os.lstat(self.path))
         except FileNotFoundError:
             return False
 
@@ -100,6 +113,19 @@ class Lock:
             line = ""
         return "".join(c for c in line if c.isprintable()) or "which has only begun"
 
+
+def require_plain(path: Path) -> None:
+    """Raise NotOurs if there is something of this name other than a file with this one name."""
+    try:
+        found = os.lstat(path)
+    except FileNotFoundError:
+        return
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+        raise NotOurs(f"{path} is not a file of its own, but a link, a folder or a device")
+
+
+_LONGEST_LINE = 1000
+_LINE = re.compile(rb"(?:process [^\n]*\n)?")  # nothing: its writer was killed before it had written it
 
 _held: set[Lock] = set()
 

@@ -26,7 +26,7 @@ from types import TracebackType
 from typing import NamedTuple, NoReturn, Self
 
 from kahanmaps.errors import note_source, quoted
-from kahanmaps.experiments.database import Damaged, Database, StoreError
+from kahanmaps.experiments.database import Damaged, Database, StoreError, Unavailable
 from kahanmaps.experiments.merging import Merged, merge
 from kahanmaps.experiments.plans import (
     PLAN_CHUNK,
@@ -65,6 +65,7 @@ __all__ = [
     "Planned",
     "Store",
     "StoreError",
+    "Unavailable",
 ]
 
 COUNT_CHUNK = 50_000  # rows that are only counted: some 50 ms

@@ -265,11 +265,12 @@ def test_export_to_parquet(batch):
 def test_an_export_does_not_go_where_the_database_is(batch, name: str):
     batch("run", SPACE, "-q")
     os.symlink("study.db", "link")
-    os.link("study.db", "hard")
+    if name == "hard":
+        os.link("study.db", "hard")
     before = Path("study.db").read_bytes()
     done = batch(f"export --db study.db --csv -o {name}")
     assert done.status == 2
-    assert "is the database itself" in done.err
+    assert ("has 2 names" if name == "hard" else "is the database itself") in done.err
     assert Path("study.db").read_bytes() == before
 
 
@@ -466,6 +467,25 @@ def test_a_database_that_is_taken_away_ends_the_batch_with_status_3_and_a_senten
     assert "Traceback" not in err
     Path("elsewhere.db").rename("study.db")
     assert batch("run", PAUSE, "-q").status == 0  # what had been done is still there
+
+
+@pytest.mark.parametrize("blocks", [0, 1, 2, 40])
+def test_a_full_disk_ends_a_batch_with_status_3_and_what_was_stored_before(batch, tmp_path: Path, blocks: int):
+    """What is planned does not fit, or the file itself, or its lock; ulimit counts in units of 1024 bytes."""
+    Path("study.toml").write_text(SPACE.replace('"0..2"', '"0..999"'))
+    done = shell(f"ulimit -f {blocks}; kahanmaps batch run study.toml -j 1 -q", tmp_path)
+    assert done.status == 3, done
+    assert re.match("Error: study.db .*(disk|space|too large)", done.err), done.err
+    if blocks:
+        assert batch("run", SPACE, "-q", "-j", "1").status == 0
+
+
+def test_an_export_to_a_full_disk_ends_with_status_3_and_leaves_the_old_file(batch, tmp_path: Path):
+    batch("run", SPACE, "-q")
+    Path("old.csv").write_text("old")
+    done = shell("ulimit -f 0; kahanmaps batch export --db study.db -o old.csv", tmp_path)
+    assert (done.status, Path("old.csv").read_text()) == (3, "old")
+    assert done.err.startswith("Error: File too large")
 
 
 def test_two_batches_do_not_write_to_one_database(batch, start):

@@ -19,16 +19,21 @@ from tempfile import TemporaryDirectory
 import pytest
 from small_databases import LIMITS, killed, ok, output, planned, seed, seeds, small_chunks, start, tasks
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.experiments import database
 from kahanmaps.experiments.database import Database
-from kahanmaps.experiments.store import APPLICATION_ID, FORMAT, Store, StoreError
+from kahanmaps.experiments.store import APPLICATION_ID, FORMAT, Store, StoreError, Unavailable
 
 # Files that cannot be used
 
 
 def test_errors_of_the_store_are_errors_of_input():
     assert issubclass(StoreError, InputError)
+
+
+def test_what_the_machine_does_not_allow_is_no_error_of_input():
+    assert not issubclass(Unavailable, InputError)
+    assert issubclass(Unavailable, (KahanmapsError, OSError))
 
 
 @pytest.mark.parametrize("readonly", [True, False])
@@ -172,11 +177,11 @@ def test_a_full_disk_is_told_in_a_sentence_and_loses_nothing(store):
             store.add([ok(number, "1/3" * 1000)])
             stored.append(number)
 
-    with pytest.raises(StoreError, match="disk is full; what was stored before is safe"):
+    with pytest.raises(Unavailable, match="disk is full; what was stored before is safe"):
         add_all()
     assert stored
     assert [seed(row.task) for row in store.rows()] == stored
-    with pytest.raises(StoreError, match="disk is full"):
+    with pytest.raises(Unavailable, match="disk is full"):
         store.plan("a", "2", LIMITS, tasks(*range(500, 9000)), {})
     store._database.execute("PRAGMA max_page_count = 1000000")
     store.add([ok(number) for number in range(500)])
@@ -196,7 +201,7 @@ with Store.open(path) as store:
         for number in range(400):
             store.add([ok(number, "1/3" * 1000)])
             stored.append(number)
-    except StoreError as error:
+    except Unavailable as error:
         message = str(error)
     resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
     store.add([ok(499)])
