@@ -1,0 +1,191 @@
+"""What the library says, frozen: answers to many commands, as they were, and as they have to be after any rebuilding.
+
+A file of this folder is one system: `system` is what @ stands for in the command lines below it, `files` are files that
+the commands read, `fast` and `slow` map command lines to what they answered. An answer has the exit status, what was
+printed without times, versions, primes drawn and the echo of the input, and `bounds` apart from it: sizes, how many
+random points, and what follows of the probability of an error. These are compared by tests of their own, which
+`-k "not bounds"` leaves out. Numbers of such kinds within sentences are N, long texts their SHA-256.
+
+Searches get a time that they never use up, so that no answer depends on the machine; `left_out` says what is missing
+and why. The answers are right as far as the other tests know: here they need not be right, but the same.
+
+    python tests/frozen/test_frozen.py [NAME...]        # writes anew what has changed; git diff shows it
+    {"fast": {"degrees @ --terms 5 --json": null}}      # a new answer: null, and then the same
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import re
+import shlex
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from kahanmaps_cli.main import main
+
+FOLDER = Path(__file__).parent
+# Of longer texts, and of numbers with more digits, the length and the SHA-256 are kept.
+LONGEST, MOST_DIGITS = 400, 90
+NUMBER = re.compile(r"-?\d+(/\d+)?")
+
+# Of the input, of the machine, or told elsewhere: `text` says what S and r are, B what g is, and parts of an analysis
+# have commands of their own. What is not there and what is null, false or empty is the same here.
+DROPPED = {"version", "seconds", "convention", "time_step", "command", "check", "seed", "error_bits", "latex"}
+DROPPED |= {"system", "document", "other_document", "primes", "lines"}
+TOLD_BY = {"text": {"S", "r"}, "B": {"rhs"}, "key": {"section", "section_title", "place", "label", "source"}}
+TOLD_BY["statements"] = {"integrals", "densities", "degrees", "heights", "symmetries", "commuting", "singularities"}
+
+# How sure, and how much work. `points` counts random points where a method is named, and is an answer elsewhere.
+BOUNDS = {"error_bound", "degree_bound", "coefficient_bits_bound", "pole_degree_bound", "splitting_field_degree_bound"}
+BOUNDS |= {"products_of_terms", "indeterminates", "blocks", "poles_met", "undefined_at"}
+COUNTED = re.compile(r"(?<=2\^-)\d+|\b\d+(?= bits\b)|\b\d+ (random points?|blocks?)\b|GF\(\d{12,}\)")
+
+
+def digest(text: str) -> str:
+    """What is kept of a long text."""
+    return f"{len(text)} characters, {hashlib.sha256(text.encode()).hexdigest()[:16]}"
+
+
+def split(value: Any, path: str, bounds: dict[str, Any], in_full: bool) -> Any:
+    """What is kept of a value; what belongs to the bounds is put there, under the path of what it belongs to."""
+    if isinstance(value, dict):
+        if "key" in value and not in_full:
+            return claim_in_a_line(split(value, path, {}, True))
+        if value.keys() == {"section", "status", "text"}:
+            return split("{section}, {status}: {text}".format(**value), path, bounds, in_full)
+        told = set().union(*(TOLD_BY[key] for key in TOLD_BY if value.get(key)))
+        apart = BOUNDS | ({"points"} if "method" in value else set())
+        if found := {key: value[key] for key in value if key in apart}:
+            bounds[path] = found
+        rest = {key: entry for key, entry in value.items() if key not in DROPPED | told | apart}
+        kept = {key: split(entry, f"{path}/{key}".lstrip("/"), bounds, in_full) for key, entry in rest.items()}
+        return {key: entry for key, entry in kept.items() if entry not in (None, "", [], {}) and entry is not False}
+    if isinstance(value, list):
+        return [split(entry, f"{path}/{k}".lstrip("/"), bounds, in_full) for k, entry in enumerate(value)]
+    if isinstance(value, float):
+        return float(f"{value:.6g}")
+    if isinstance(value, str):
+        text = COUNTED.sub("N", value)
+        return digest(text) if len(text) > (MOST_DIGITS if NUMBER.fullmatch(text) else LONGEST) else text
+    return value
+
+
+def claim_in_a_line(claim: dict[str, Any]) -> str:
+    """A claim of the paper: its verdict, and a digest of all that is said of it, which paper_m2 has in full."""
+    everything = hashlib.sha256(json.dumps(claim, sort_keys=True).encode()).hexdigest()[:8]
+    return (
+        f"{claim['key']}{' without ' + claim['breaks'] if 'breaks' in claim else ''}: {claim['verdict']} {everything}"
+    )
+
+
+def run(given: dict[str, Any], line: str) -> tuple[int, str, str]:
+    """The exit status of a command line, what it prints, and what it says on standard error."""
+    words = [given["system"] if word == "@" else [word] for word in shlex.split(line)]
+    out, err = io.StringIO(), io.StringIO()
+    with tempfile.TemporaryDirectory() as folder, chdir(folder), redirect_stdout(out), redirect_stderr(err):
+        for file, lines in given.get("files", {}).items():
+            Path(file).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        status = main([piece for word in words for piece in word])
+    return status, out.getvalue(), err.getvalue()
+
+
+def answer_of(given: dict[str, Any], line: str, status: int, out: str, err: str) -> dict[str, Any]:
+    """What is kept of that: the status, the answer or the error, the bounds."""
+    if status == 2:
+        return {"status": status, "error": err.rstrip()}
+    printed = out.splitlines()
+    answer = [json.loads(each) for each in printed] if "json" in line else printed
+    bounds: dict[str, Any] = {}
+    kept = split(answer[0] if len(answer) == 1 else answer, "", bounds, line in given.get("in_full", ()))
+    return {"status": status, "answer": kept, **({"bounds": bounds} if bounds else {})}
+
+
+@lru_cache(maxsize=8)  # the answer and its bounds are compared by two tests, one after the other
+def said(name: str, line: str) -> dict[str, Any]:
+    """What the library says now."""
+    return answer_of(read(name), line, *run(read(name), line))
+
+
+def differences(was: Any, now: Any, path: str = "") -> Iterator[str]:
+    """Where two answers differ, a line each."""
+    if isinstance(was, dict) and isinstance(now, dict):
+        for key in dict.fromkeys((*was, *now)):
+            yield from differences(was.get(key, "(nothing)"), now.get(key, "(nothing)"), f"{path}/{key}")
+    elif isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
+        for k, (old, new) in enumerate(zip(was, now, strict=True)):
+            yield from differences(old, new, f"{path}/{k}")
+    elif was != now:
+        yield f"{path}\n    was {json.dumps(was)}\n    is  {json.dumps(now)}"
+
+
+@lru_cache(maxsize=2)
+def read(name: str) -> dict[str, Any]:
+    """The file of a system."""
+    found: dict[str, Any] = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
+    return found
+
+
+def pretty(value: Any, indent: str = "") -> str:
+    """JSON with everything in one line that fits into it, so that a difference shows as one."""
+    flat = json.dumps(value, ensure_ascii=False)
+    if not isinstance(value, dict | list) or len(indent) + len(flat) <= 120:
+        return flat
+    inner = indent + " "
+    if isinstance(value, dict):
+        lines = [f"{inner}{json.dumps(key)}: {pretty(entry, inner)}" for key, entry in value.items()]
+        return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
+    return "[\n" + ",\n".join(inner + pretty(entry, inner) for entry in value) + f"\n{indent}]"
+
+
+def write(name: str) -> None:
+    """Put what the library says now into the file of a system."""
+    given = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
+    for speed in ("fast", "slow"):
+        given[speed] = {line: said(name, line) for line in given.get(speed, {})}
+    (FOLDER / f"{name}.json").write_text(pretty(given) + "\n", encoding="utf-8")
+
+
+NAMES = sorted(path.stem for path in FOLDER.glob("*.json"))
+
+
+def frozen() -> Iterator[Any]:
+    """All that is frozen, as parameters of a test."""
+    for name in NAMES:
+        given = read(name)
+        for speed in ("fast", "slow"):
+            marks = [pytest.mark.slow] if speed == "slow" else []
+            for line, was in given.get(speed, {}).items():
+                yield pytest.param(name, line, ("status", "answer", "error"), marks=marks, id=f"{name}: {line}")
+                if was and "bounds" in was:
+                    yield pytest.param(name, line, ("bounds",), marks=marks, id=f"{name}: {line} (bounds)")
+
+
+@pytest.mark.parametrize(("name", "line", "parts"), list(frozen()))
+def test_what_the_library_says_is_what_it_said(name: str, line: str, parts: tuple[str, ...]):
+    given = read(name)
+    was, now = (given.get("fast", {}) | given.get("slow", {}))[line], said(name, line)
+    found = list(differences(*({part: each.get(part) for part in parts} for each in (was, now))))
+    assert not found, f"kahanmaps {line}, @ = {shlex.join(given['system'])}\n" + "\n".join(found)
+
+
+def test_a_difference_is_told_with_its_place():
+    was = {"degrees": [1, 2, 4], "verdict": "proved", "witness": None}
+    now = {"degrees": [1, 2, 3], "verdict": "proved", "note": "new"}
+    assert [line.splitlines()[0] for line in differences(was, now)] == ["/degrees/2", "/witness", "/note"]
+    assert list(differences(was, dict(was))) == []
+
+
+if __name__ == "__main__":
+    os.environ.pop("KAHANMAPS_DEBUG", None)
+    for each in sys.argv[1:] or NAMES:
+        write(each)
