@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -18,7 +19,7 @@ from typing import Any, Self
 from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, quoted
 from kahanmaps.experiments.journals import is_mounted, journal_for
 from kahanmaps.experiments.locks import Lock, LockedByAnother, NotOurs, require_plain
-from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT, SCHEMA
+from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT, SCHEMA, UPGRADE
 from kahanmaps.whole_files import resolved
 
 _BUSY_SECONDS = 30.0
@@ -57,6 +58,7 @@ class Database:
             self.path = resolved(self.name)
         except OSError as error:
             raise self._unopened(error) from error
+        self.format = 0  # unknown before it is open
         self._is_readonly = readonly
         self._lock = Lock(Path(f"{self.path}.lock"))
         self._connection: sqlite3.Connection | None = None
@@ -64,13 +66,20 @@ class Database:
         self._identity: tuple[int, int] | None = None
 
     @classmethod
-    def open(cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False) -> Self:
-        """The database in this file; `create` makes it if it is not there. Open for writing, it has the lock."""
+    def open(
+        cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False, is_checked: bool = True
+    ) -> Self:
+        """The database in this file; `create` makes it if it is not there. Open for writing, it has the lock.
+
+        `is_checked`: damaged pages, and indexes that do not say what is in the tables, are `Damaged` at once.
+        """
         if create and readonly:
             raise ValueError("a database opened for reading only cannot be created")
         database = cls(path, readonly)
         try:
             database._open(create)
+            if is_checked and (problems := database.problems(1)):
+                raise database.damaged(problems[0])
         except BaseException:
             database.close()
             raise
@@ -111,9 +120,14 @@ class Database:
 
     # Reading and writing
 
-    def fetch(self, sql: str, values: Sequence[Any] = ()) -> list[Any]:
-        """All rows at once: a statement half read would keep its snapshot, and the writer from tidying its journal."""
+    def fetch(self, sql: str, values: Sequence[Any] = (), is_lenient: bool = False) -> list[Any]:
+        """All rows at once: a statement half read would keep its snapshot, and the writer from tidying its journal.
+
+        `is_lenient`: text that is not UTF-8 comes with its bytes replaced, for who finds out by other means that it is
+        not what was written.
+        """
         with self._errors():
+            self._opened.text_factory = (lambda data: data.decode(errors="replace")) if is_lenient else str
             return self.execute(sql, values).fetchall()
 
     @contextmanager
@@ -190,8 +204,8 @@ class Database:
         """The error that says what in the file cannot be what was written, and what to do."""
         what = " ".join(what.split())
         return Damaged(
-            f"{self.name} is damaged ({what}): take a copy from before, or save what can be read with "
-            f"`sqlite3 {self.name} .recover`"
+            f"{self.name} is damaged ({what}): take a copy from before; `kahanmaps batch check --db "
+            f"{shlex.quote(self.name)}` says what is whole, and `batch run` does damaged results again"
         )
 
     def require(self, is_sound: bool, what: str, found: Any, expected: str) -> None:
@@ -286,8 +300,6 @@ class Database:
         is_empty = is_empty and self._check_format(may_be_empty=True)
         self.execute(f"PRAGMA cache_size = -{_CACHE}")
         self.execute(f"PRAGMA journal_size_limit = {_LARGEST_JOURNAL}")
-        if not is_empty:
-            self._check_pages()
         wanted = journal_for(self.path)
         got = self.execute(f"PRAGMA journal_mode = {wanted}").fetchone()[0]
         # WAL is whole after a loss of power as it is, only the last commits may be lost; a rollback journal is not.
@@ -296,6 +308,7 @@ class Database:
             with self.transaction():
                 for statement in SCHEMA.split(";"):  # executescript would commit
                     self.execute(statement)
+            self._check_format()
 
     def _connect(self, how: str) -> None:
         self._connection = sqlite3.connect(
@@ -325,17 +338,27 @@ class Database:
             raise StoreError(f"{self.name} is empty and not a database of results: check the name")
         if application != APPLICATION_ID:
             raise StoreError(f"{self.name} is an SQLite database of another program, not one of results: left alone")
-        if version != FORMAT:
+        if not 1 <= version <= FORMAT:
             raise StoreError(
-                f"{self.name} was written by format {version} of kahanmaps databases, this version reads format "
+                f"{self.name} was written by format {version} of kahanmaps databases, this version reads formats 1 to "
                 f"{FORMAT}: use the kahanmaps that wrote it, or begin another database"
             )
+        self.format = version
         return False
 
-    def _check_pages(self) -> None:
-        found = self.execute("PRAGMA quick_check(1)").fetchone()[0]
-        if found != "ok":
-            raise self.damaged(found)
+    def problems(self, most: int) -> list[str]:
+        """What is wrong with the pages of the file, and where an index does not say what is in its table."""
+        found = [row[0] for row in self.fetch(f"PRAGMA integrity_check({most})")]
+        return [] if found == ["ok"] else found
+
+    @contextmanager
+    def upgrade(self) -> Iterator[None]:
+        """A transaction in which the tables get the form of the latest format, and whoever asks for it fills them."""
+        with self.large_cache(), self.transaction():
+            for statement in UPGRADE.split(";"):
+                self.execute(statement)
+            yield
+        self.format = FORMAT
 
     # Errors
 

@@ -22,7 +22,7 @@ from kahanmaps.experiments.plans import (
     whole_stretches,
 )
 from kahanmaps.experiments.records import Outcome, digest
-from kahanmaps.experiments.results import RECORD, RESULT_CHUNK, find_result, put_result, record_of
+from kahanmaps.experiments.results import ATTEMPTS, RESULT_CHUNK, find_result, put_result, record_columns, record_of
 
 CONFLICTS_SHOWN = 5
 
@@ -94,29 +94,29 @@ def _merge_results(database: Database, source: Database, new: int) -> Merged:
     conflicting: list[str] = []
     last = 0
     sql = f"""
-        SELECT t.id, t.key, t.text, r.attempts, {RECORD} FROM result AS r JOIN task AS t ON t.id = r.task
+        SELECT t.id, t.key, t.text, {record_columns(source)} FROM result AS r JOIN task AS t ON t.id = r.task
         WHERE r.task > ? ORDER BY r.task LIMIT ?"""
     while rows := source.fetch(sql, (last, RESULT_CHUNK)):
-        for id, key, text, attempts, *row in rows:
+        for id, key, text, *row in rows:
             # Not so where pages are damaged, and then it would go round for ever.
             source.require(id > last, "the table of results, task", id, f"more than {last}")
             last = id
             _checked(source, key, text)
-            source.require(isinstance(attempts, int), f"the record of task {key}, attempts", attempts, "a number")
             source.require(record_of(source, key, row) is not None, f"the record of task {key}", None, "an outcome")
             found = find_result(database, key)
             if found is None:
                 new += add_tasks(database, [(key, text)])
                 found = find_result(database, key)
                 assert found is not None
-            task, outcome, result, verdict = found
-            if outcome is None:
+            task, mine = found
+            attempts = row[ATTEMPTS] + (mine[ATTEMPTS] or 0)
+            if mine[0] is None:
                 results += 1
-                put_result(database, task, attempts, tuple(row))
-            elif row[0] == Outcome.OK != outcome:
+                put_result(database, task, key, attempts, row)
+            elif row[0] == Outcome.OK != mine[0]:
                 replaced += 1
-                put_result(database, task, attempts, tuple(row))
-            elif row[0] == Outcome.OK and row[1:3] != [result, verdict]:
+                put_result(database, task, key, attempts, row)
+            elif row[0] == Outcome.OK and row[1:3] != mine[1:3]:
                 conflicts += 1
                 if conflicts <= CONFLICTS_SHOWN:
                     conflicting.append(key)

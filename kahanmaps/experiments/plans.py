@@ -11,10 +11,11 @@ from itertools import islice
 from typing import Any
 
 from kahanmaps.errors import quoted
-from kahanmaps.experiments.database import Database, StoreError, shown
-from kahanmaps.experiments.records import Limits, Task, canonical, digest
+from kahanmaps.experiments.database import Damaged, Database, StoreError, shown
+from kahanmaps.experiments.records import Limits, Task, canonical, checksum, digest, has_checksum
 
 _LONGEST_NAME = 1000
+_SEALED = "id, name, digest, limits, total, tasks"  # what the checksum of an experiment is of
 PLAN_CHUNK = 1000  # rows of the plan that one read takes: they are short
 
 
@@ -50,23 +51,9 @@ class Chosen:
 
 def choose(database: Database, experiments: Sequence[str] | None) -> list[Chosen]:
     """These experiments, or all, in their order in the database."""
-    # One statement, so that nobody plans in between.
-    rows = database.fetch(
-        "SELECT id, name, limits, total, tasks, (SELECT count(task) FROM plan WHERE experiment = e.id), "
-        "(SELECT min(number) FROM plan WHERE experiment = e.id), "
-        "(SELECT max(number) FROM plan WHERE experiment = e.id), "
-        "(SELECT min(task) FROM plan), (SELECT max(task) FROM plan), (SELECT max(id) FROM task) "
-        "FROM experiment AS e ORDER BY id"
-    )
-    for _, name, _, total, tasks, count, first, last, *ids in rows:
-        database.require(is_a_name(name), "the table of experiments, name", name, "a name")
-        what = f"the experiment {quoted(name)}"
-        database.require(isinstance(total, int) and total == count, f"{what}, total", total, str(count))
-        database.require(isinstance(tasks, int) and 0 <= tasks <= total, f"{what}, tasks", tasks, f"0 to {total}")
-        span = (0, total - 1) if total else (None, None)
-        database.require((first, last) == span, f"the plan of {quoted(name)}, number", [first, last], str(span))
-        is_known = ids[0] is None or (all(isinstance(id, int) for id in ids) and 0 < ids[0] <= ids[1] <= ids[2])
-        database.require(is_known, "the table of plans, task", ids[:2], f"1 to {ids[2]}")
+    rows = _experiments(database)
+    for row in rows:
+        _require_sound(database, row)
     if experiments is not None:
         known = [row[1] for row in rows]
         for name in experiments:
@@ -81,6 +68,48 @@ def choose(database: Database, experiments: Sequence[str] | None) -> list[Chosen
             chosen.append(Chosen(id, name, limits_of(database, limits), total, tasks, offset))
             offset += total
     return chosen
+
+
+def sound_experiments(database: Database) -> Iterator[tuple[Any, bool]]:
+    """The names of the experiments, and whether all of each is as it was planned."""
+    for row in _experiments(database, is_lenient=True):
+        id, name, limits, total, tasks, *_ = row
+        try:
+            _require_sound(database, row)
+            definition_of(database, Chosen(id, name, limits_of(database, limits), total, tasks, 0))
+        except Damaged:
+            yield name, False
+        else:
+            sql = "SELECT count(*) FROM plan WHERE experiment = ? AND task NOT IN (SELECT id FROM task)"
+            yield name, database.fetch(sql, (id,)) == [(0,)]
+
+
+def _experiments(database: Database, is_lenient: bool = False) -> list[Any]:
+    """Their rows, and what is known of their plans: in one statement, so that nobody plans in between."""
+    return database.fetch(
+        "SELECT id, name, limits, total, tasks, (SELECT count(task) FROM plan WHERE experiment = e.id), "
+        "(SELECT min(number) FROM plan WHERE experiment = e.id), "
+        "(SELECT max(number) FROM plan WHERE experiment = e.id), "
+        f"(SELECT min(task) FROM plan), (SELECT max(task) FROM plan), (SELECT max(id) FROM task), "
+        f"digest, {'checksum' if database.format > 1 else 'NULL'} "
+        "FROM experiment AS e ORDER BY id",
+        is_lenient=is_lenient,
+    )
+
+
+def _require_sound(database: Database, row: Sequence[Any]) -> None:
+    """Raise `Damaged` unless the row of an experiment agrees with itself and with its plan."""
+    id, name, limits, total, tasks, count, first, last, *ids, name_of_definition, found = row
+    database.require(is_a_name(name), "the table of experiments, name", name, "a name")
+    what = f"the experiment {quoted(name)}"
+    database.require(isinstance(total, int) and total == count, f"{what}, total", total, str(count))
+    database.require(isinstance(tasks, int) and 0 <= tasks <= total, f"{what}, tasks", tasks, f"0 to {total}")
+    span = (0, total - 1) if total else (None, None)
+    database.require((first, last) == span, f"the plan of {quoted(name)}, number", [first, last], str(span))
+    is_known = ids[0] is None or (all(isinstance(id, int) for id in ids) and 0 < ids[0] <= ids[1] <= ids[2])
+    database.require(is_known, "the table of plans, task", ids[:2], f"1 to {ids[2]}")
+    if database.format > 1 and not has_checksum([id, name, name_of_definition, limits, total, tasks], found):
+        raise database.damaged(f"{what}: it has not its checksum")
 
 
 def is_a_name(value: Any) -> bool:
@@ -169,12 +198,12 @@ def replace_plan(
 ) -> Planned:
     """Plan an experiment, new or with another definition than before; see `Store.plan`."""
     limits_text = text_of_limits(limits)
-    before = database.execute(
-        "SELECT id, digest, total, tasks FROM experiment WHERE name = ?", (experiment,)
-    ).fetchone()
-    if before is not None and before[1] == digest(definition):
+    before = database.execute(f"SELECT {_SEALED}, checksum FROM experiment WHERE name = ?", (experiment,)).fetchone()
+    # One that is damaged is planned anew.
+    if before is not None and before[2] == digest(definition) and has_checksum(before[:-1], before[-1]):
         database.execute("UPDATE experiment SET limits = ? WHERE id = ?", (limits_text, before[0]))
-        return Planned(before[2], before[3], 0, 0, is_resumed=True)
+        seal(database, before[0])
+        return Planned(before[4], before[5], 0, 0, is_resumed=True)
     id = add_experiment(database, experiment) if before is None else before[0]
     database.execute("CREATE TEMP TABLE earlier (task INTEGER PRIMARY KEY)")
     database.execute("INSERT INTO earlier SELECT DISTINCT task FROM plan WHERE experiment = ?", (id,))
@@ -230,7 +259,14 @@ def fill_plan(
         "UPDATE experiment SET definition = ?, digest = ?, limits = ?, total = ?, tasks = ? WHERE id = ?",
         (definition, digest(definition), limits, total, different, experiment),
     )
+    seal(database, experiment)
     return total, different, new
+
+
+def seal(database: Database, experiment: int) -> None:
+    """Write the checksum of an experiment as it is now."""
+    row = database.execute(f"SELECT {_SEALED} FROM experiment WHERE id = ?", (experiment,)).fetchone()
+    database.execute("UPDATE experiment SET checksum = ? WHERE id = ?", (checksum(row), experiment))
 
 
 def add_tasks(database: Database, tasks: Sequence[tuple[str, str]]) -> int:

@@ -8,12 +8,13 @@ batch, on every machine.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from hashlib import sha256
 from typing import Any
+from zlib import crc32
 
 KEY_LENGTH = 32  # hexadecimal digits: 128 bits, no two tasks will ever share them
 
@@ -30,6 +31,23 @@ def canonical(data: Any) -> str:
 def digest(text: str) -> str:
     """The hash by which tasks and documents are known."""
     return sha256(text.encode()).hexdigest()[:KEY_LENGTH]
+
+
+def checksum(cells: Sequence[Any]) -> int:
+    """By what it is seen that the cells of a row are still those that were written.
+
+    >>> checksum(["ok", None, 0.25]) == checksum(["ok", None, 0.5])
+    False
+    """
+    return crc32(canonical(list(cells)).encode())
+
+
+def has_checksum(cells: Sequence[Any], found: Any) -> bool:
+    """Whether this is their checksum; whatever the cells hold."""
+    try:
+        return bool(found == checksum(cells))
+    except (TypeError, ValueError):  # bytes, or a number that is not finite
+        return False
 
 
 @dataclass(frozen=True)

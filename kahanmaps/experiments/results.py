@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from kahanmaps.experiments.database import Database, shown
-from kahanmaps.experiments.records import Outcome, Record, canonical
+from kahanmaps.experiments.records import Outcome, Record, canonical, checksum, has_checksum
 
 _LONGEST_VERDICT = 200
 RESULT_CHUNK = 50  # rows with their results, which may be megabytes
@@ -24,11 +24,16 @@ _COLUMNS = (
     "versions",
     "finished",
 )
-RECORD = ", ".join(f"r.{column}" for column in _COLUMNS)  # what is selected from `result AS r` for `record_of`
+ATTEMPTS = len(_COLUMNS)  # where the number of attempts stands in a row
 _PUT = f"""
-    INSERT INTO result (task, attempts, {", ".join(_COLUMNS)}) VALUES (?, ?, {", ".join("?" * len(_COLUMNS))})
-    ON CONFLICT (task) DO UPDATE SET attempts = attempts + excluded.attempts,
-    {", ".join(f"{column} = excluded.{column}" for column in _COLUMNS)}"""
+    INSERT OR REPLACE INTO result (task, {", ".join(_COLUMNS)}, attempts, checksum)
+    VALUES (?, {", ".join("?" * len(_COLUMNS))}, ?, ?)"""
+
+
+def record_columns(database: Database) -> str:
+    """What is selected from `result AS r` for `record_of`: the record, the attempts at it, and a checksum."""
+    last = "r.checksum" if database.format > 1 else "NULL"
+    return ", ".join([*(f"r.{column}" for column in _COLUMNS), "r.attempts", last])
 
 
 def _is_text(value: Any) -> bool:
@@ -57,23 +62,33 @@ _SOUND: dict[str, tuple[Callable[[Any], bool], str]] = {
 }
 
 
-def find_result(database: Database, key: str) -> tuple[Any, ...] | None:
-    """Task, outcome, result and verdict; None if there is no such task."""
-    found: tuple[Any, ...] | None = database.execute(
-        "SELECT t.id, r.outcome, r.result, r.verdict FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
+def find_result(database: Database, key: str) -> tuple[int, list[Any]] | None:
+    """The task and the row of its result, all None if it has none; None if there is no such task."""
+    found = database.execute(
+        f"SELECT t.id, {record_columns(database)} FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
         "WHERE t.key = ?",
         (key,),
     ).fetchone()
-    return found
+    if found is None:
+        return None
+    task, *row = found
+    record_of(database, key, row)  # nothing is said about a damaged one, and nothing written over it
+    return task, row
 
 
-def put_result(database: Database, task: int, attempts: int, row: tuple[Any, ...]) -> None:
-    """Write a result over the one there may be; its attempts come on top."""
-    database.execute(_PUT, (task, attempts, *row))
+def put_result(database: Database, task: int, key: str, attempts: int, row: Sequence[Any]) -> None:
+    """Write a row, whose attempts and checksum do not count, over the result there may be."""
+    cells = (*row[:ATTEMPTS], attempts)
+    database.execute(_PUT, (task, *cells, checksum([key, *cells])))
+
+
+def is_as_written(key: Any, row: Sequence[Any]) -> bool:
+    """Whether the row has its checksum."""
+    return has_checksum([key, *row[:-1]], row[-1])
 
 
 def row_of(record: Record) -> tuple[Any, ...]:
-    """The record as it lies in a row; what JSON cannot hold is a ValueError."""
+    """The record as it lies in a row, without attempts; what JSON cannot hold is a ValueError."""
     if not math.isfinite(record.seconds):
         raise ValueError(f"a record cannot have taken {record.seconds} seconds")
     return (
@@ -82,7 +97,7 @@ def row_of(record: Record) -> tuple[Any, ...]:
         None if record.verdict is None else _encodable(record.verdict),
         _encodable(record.message),
         _encodable(record.stderr),
-        record.seconds,
+        float(record.seconds),
         record.peak_memory,
         record.host,
         canonical(dict(record.versions)),
@@ -94,11 +109,14 @@ def record_of(database: Database, key: str, row: Sequence[Any]) -> Record | None
     """The record that lies in a row like this; None if the task has no result."""
     if all(value is None for value in row):
         return None
-    known = dict(zip(_COLUMNS, row, strict=True))
+    known = dict(zip(_COLUMNS, row[:ATTEMPTS], strict=True))
     what = f"the record of task {key}"
     for column, (is_sound, expected) in _SOUND.items():
         if not is_sound(known[column]):
             raise database.damaged(f"{what}, {column}: found {shown(known[column])}, expected {expected}")
+    database.require(isinstance(row[ATTEMPTS], int), f"{what}, attempts", row[ATTEMPTS], "a number")
+    if database.format > 1 and not is_as_written(key, row):
+        raise database.damaged(f"{what}: it has not its checksum")
     outcome = Outcome(known["outcome"])
     is_ok, has_result = outcome is Outcome.OK, known["result"] is not None
     if is_ok is not has_result:

@@ -116,7 +116,8 @@ def run(
     a record there are not done again, and every record is in the database before it is yielded; without, nothing is
     kept. `jobs` children work at a time, or those of a dask `scheduler`. `only` names experiments, `shard` = (i, n) is
     the i-th of n parts, `retry_failed` does failed tasks again. A task that is killed from outside at every try is
-    yielded as lost, and stays without a record in `db`. Closing the generator kills what is in flight.
+    yielded as lost, and stays without a record in `db`. A record there that is damaged is removed, and its task done
+    again. Closing the generator kills what is in flight.
 
     Raises SpecError, StoreError.
 
@@ -133,6 +134,7 @@ def run(
                 yield from records
         return
     with Store.open(db, create=True) as store, closing(executor_for(store.document, jobs, scheduler)) as executor:
+        store.forget_damaged()
         plan(spec, store)
         for records in Batch(store.pending(names, retry_failed=retry_failed, shard=shard), executor):
             if records:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-FORMAT = 1  # of the tables below; a change that older versions cannot read counts it up
+FORMAT = 2  # of the tables below; a change that older versions cannot read counts it up. Format 1 is read, too.
 APPLICATION_ID = 0x4B61684D  # "KahM": by this a file is known to be ours
 
 SCHEMA = f"""
@@ -26,5 +26,14 @@ CREATE TABLE result (
 -- Whatever is only counted is read from here: the pages of the table itself are full of results.
 CREATE INDEX result_summary ON result (task, outcome, verdict, seconds);
 PRAGMA application_id = {APPLICATION_ID};
-PRAGMA user_version = {FORMAT};
+PRAGMA user_version = 1;
+"""
+
+# Format 2. A new file is made in format 1 and upgraded, so that there is one way to it, and one text of the tables.
+UPGRADE = """
+-- Of the other columns of the row, and of the key of the task: what is read is what was written. The texts of tasks,
+-- documents and definitions have digests already, and plans and indexes say the same twice, which SQLite compares.
+ALTER TABLE experiment ADD COLUMN checksum INTEGER;
+ALTER TABLE result ADD COLUMN checksum INTEGER;
+PRAGMA user_version = 2;
 """

@@ -12,7 +12,7 @@ Three rules keep it whole:
 * no reader holds the writer up: long reads go in chunks, each fetched completely before the first row is handed out.
 
 The file itself is the matter of database.py, its tables are in schema.py. What plans and results are in them is in
-plans.py and results.py, and merging.py makes one database of two.
+plans.py and results.py, checking.py sees whether they are what was written, and merging.py makes one database of two.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from types import TracebackType
 from typing import NamedTuple, NoReturn, Self
 
 from kahanmaps.errors import note_source, quoted
+from kahanmaps.experiments.checking import Checked, add_checksums, check, forget_damaged
 from kahanmaps.experiments.database import Damaged, Database, StoreError, Unavailable
 from kahanmaps.experiments.merging import Merged, merge
 from kahanmaps.experiments.plans import (
@@ -42,12 +43,13 @@ from kahanmaps.experiments.plans import (
 )
 from kahanmaps.experiments.records import KEY_LENGTH, Job, Limits, Outcome, Record, Row, Task
 from kahanmaps.experiments.results import (
-    RECORD,
+    ATTEMPTS,
     RESULT_CHUNK,
     find_result,
     is_a_time,
     is_a_verdict,
     put_result,
+    record_columns,
     record_of,
     row_of,
 )
@@ -56,6 +58,7 @@ from kahanmaps.experiments.shown import store_html
 
 __all__ = [
     "APPLICATION_ID",
+    "Checked",
     "Damaged",
     "Experiment",
     "ExperimentStatus",
@@ -125,9 +128,31 @@ class Store:
     # Opening and closing
 
     @classmethod
-    def open(cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False) -> Self:
-        """The store in this file; `create` makes it if it is not there. Open for writing, it has the lock."""
-        return cls(Database.open(path, create, readonly))
+    def open(
+        cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False, is_checked: bool = True
+    ) -> Self:
+        """The store in this file; `create` makes it if it is not there. Open for writing, it has the lock.
+
+        What SQLite finds damaged is `Damaged` at once, unless it is not `is_checked`, which is for `check`. A file of
+        an older format gets the latest one when it is opened for writing.
+        """
+        database = Database.open(path, create, readonly, is_checked)
+        try:
+            if not readonly and database.format < FORMAT:
+                add_checksums(database)
+        except BaseException:
+            database.close()
+            raise
+        return cls(database)
+
+    def check(self) -> Checked:
+        """All of it, read and compared with its checksums; nothing that is damaged is an error here."""
+        return check(self._database)
+
+    def forget_damaged(self) -> list[str]:
+        """Remove the records that are not what was written, so that their tasks are done again; the tasks' keys."""
+        self._database.must_write()
+        return forget_damaged(self._database)
 
     def lock(self) -> None:
         """Become the one that writes, until `close`; opening for writing does it. Another writer: StoreError."""
@@ -257,11 +282,10 @@ class Store:
                     raise StoreError(
                         f"{self._database.name} has no task {record.key}: plan it before its result is added"
                     )
-                task, outcome = found[:2]
-                if outcome == Outcome.OK and not record.is_ok:
-                    self._database.execute("UPDATE result SET attempts = attempts + 1 WHERE task = ?", (task,))
-                else:
-                    put_result(self._database, task, 1, row)
+                task, before = found
+                is_kept = before[0] == Outcome.OK and not record.is_ok
+                attempts = (before[ATTEMPTS] or 0) + 1
+                put_result(self._database, task, record.key, attempts, before if is_kept else row)
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
         """The tasks with their records in plan order; with `missing` also those that have none."""
@@ -270,8 +294,8 @@ class Store:
     def _rows(self, chosen: list[Chosen], missing: bool) -> Iterator[Row]:
         # All rows of the plan, so that what is missing is seen.
         sql = f"""
-            SELECT p.number, t.key, t.text, {RECORD} FROM plan AS p JOIN task AS t ON t.id = p.task
-            LEFT JOIN result AS r ON r.task = p.task
+            SELECT p.number, t.key, t.text, {record_columns(self._database)}
+            FROM plan AS p JOIN task AS t ON t.id = p.task LEFT JOIN result AS r ON r.task = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
         for experiment in chosen:
             for rows in whole_stretches(self._database, sql, experiment, RESULT_CHUNK):
@@ -342,12 +366,11 @@ class Store:
                 "digits"
             )
         rows = self._database.fetch(
-            f"SELECT t.id, t.key, t.text, r.attempts, {RECORD} FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
+            f"SELECT t.id, t.key, t.text, {record_columns(self._database)} "
+            "FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
             "WHERE t.key >= ? AND t.key < ? ORDER BY t.key LIMIT ?",
             (prefix, f"{prefix}g", FOUND_AT_MOST),  # g comes after every hexadecimal digit
         )
-        for _, key, _, attempts, *_ in rows:
-            self._database.require(isinstance(attempts, int | None), f"task {key}, attempts", attempts, "a number")
         choose(self._database, None)  # what is damaged in the plans is told
         return [
             Found(
@@ -358,9 +381,9 @@ class Store:
                     "WHERE p.task = ? ORDER BY p.experiment, p.number",
                     (id,),
                 ),
-                attempts or 0,
+                record[ATTEMPTS] or 0,
             )
-            for id, key, text, attempts, *record in rows
+            for id, key, text, *record in rows
         ]
 
     def task(self, key: str) -> Task:

@@ -20,7 +20,7 @@ from small_databases import LIMITS, MEMORY, failed, ok, seed, seeds, small_chunk
 from kahanmaps.experiments import plans as plans_module
 from kahanmaps.experiments.plans import PLAN_CHUNK
 from kahanmaps.experiments.records import Limits, Outcome, Record, Row, Task, digest
-from kahanmaps.experiments.store import ExperimentStatus, Planned, Store, StoreError
+from kahanmaps.experiments.store import ExperimentStatus, Planned, Store, StoreError, Unavailable
 
 # Records
 
@@ -381,7 +381,7 @@ def test_a_database_that_is_taken_away_while_it_is_written_to_is_told(store, pat
     path.rename(path.with_name("elsewhere.db"))
     if is_replaced:
         path.write_bytes(b"")
-    with pytest.raises(StoreError, match="has been removed or replaced while it was being written to"):
+    with pytest.raises(Unavailable, match="has been removed or replaced while it was being written to"):
         store.add([ok(2)])
 
 
@@ -389,8 +389,8 @@ def test_an_experiment_that_is_planned_while_somebody_asks_for_the_status_does_n
     with Store.open(path, readonly=True) as reader:
         fetch = reader._database.fetch
 
-        def fetch_and_be_late(*question):
-            answer = fetch(*question)
+        def fetch_and_be_late(*question, **how):
+            answer = fetch(*question, **how)
             if not store.experiments():
                 store.plan("new", "1", LIMITS, tasks(1, 2), {})
             return answer

@@ -1,0 +1,121 @@
+"""Whether a database holds what was written: pages are seen to by SQLite, texts by digests, rows by checksums.
+
+Everything that reads does the same with what it reads. Here all is read, and what is damaged is named and not an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from kahanmaps.experiments.database import Damaged, Database
+from kahanmaps.experiments.plans import seal, sound_experiments
+from kahanmaps.experiments.records import digest
+from kahanmaps.experiments.results import RESULT_CHUNK, is_as_written, put_result, record_columns, record_of
+
+_PROBLEMS = 20  # of the pages of a file, told at most
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What is whole in a database: `whole` counts it, and `damaged` names what is not, both by kind.
+
+    `pages` is what is wrong with the file itself: what is counted is then what could still be read. Without
+    `has_checksums` (format 1) only the forms of results were looked at.
+    """
+
+    pages: tuple[str, ...]
+    whole: dict[str, int]
+    damaged: dict[str, tuple[str, ...]]
+    has_checksums: bool
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is damaged."""
+        return not self.pages and not any(self.damaged.values())
+
+
+def check(database: Database) -> Checked:
+    """Read all of it; see `Store.check`."""
+    pages = _problems(database)
+    whole: dict[str, int] = {}
+    damaged: dict[str, tuple[str, ...]] = {}
+    for kind, rows in {
+        "experiments": sound_experiments(database),
+        "tasks": _texts(database, "task", "key"),
+        "documents": _texts(database, "document", "digest"),
+        "results": ((key, is_sound) for _, key, is_sound in _results(database)),
+    }.items():
+        names = []
+        whole[kind] = 0
+        try:
+            for name, is_sound in rows:
+                whole[kind] += is_sound
+                if not is_sound:
+                    names.append(str(name))
+        except Damaged:  # a page: the rest of this table cannot be reached
+            names.append("the rest")
+        damaged[kind] = tuple(names)
+    return Checked(tuple(pages), whole, damaged, database.format > 1)
+
+
+def forget_damaged(database: Database) -> list[str]:
+    """Remove damaged results; see `Store.forget_damaged`."""
+    found = [(task, str(key)) for task, key, is_sound in _results(database) if not is_sound]
+    with database.transaction():
+        database.execute_many("DELETE FROM result WHERE task = ?", [(task,) for task, _ in found])
+    return [key for _, key in found]
+
+
+def add_checksums(database: Database) -> None:
+    """Bring a file to the latest format. What cannot be what was written stays without a checksum, and is damaged."""
+    with database.upgrade():
+        for (experiment,) in database.fetch("SELECT id FROM experiment"):
+            seal(database, experiment)
+        for rows in _chunks(database, "result", "task", f"t.key, {record_columns(database)}", _RESULTS):
+            for task, key, *row in rows:
+                if _can_be(database, key, row):
+                    put_result(database, task, key, row[-2], row)
+
+
+def _problems(database: Database) -> list[str]:
+    try:
+        return database.problems(_PROBLEMS)
+    except Damaged as error:
+        return [str(error)]
+
+
+_RESULTS = "LEFT JOIN task AS t ON t.id = r.task"
+
+
+def _results(database: Database) -> Iterator[tuple[int, Any, bool]]:
+    """The task of each result, its key, and whether the result is sound."""
+    for rows in _chunks(database, "result", "task", f"t.key, {record_columns(database)}", _RESULTS):
+        for task, key, *row in rows:
+            yield task, key, is_as_written(key, row) if database.format > 1 else _can_be(database, key, row)
+
+
+def _can_be(database: Database, key: Any, row: list[Any]) -> bool:
+    try:
+        return isinstance(key, str) and record_of(database, key, row) is not None
+    except Damaged:
+        return False
+
+
+def _texts(database: Database, table: str, name: str) -> Iterator[tuple[Any, bool]]:
+    """The name of each text, and whether it is the digest of the text."""
+    for rows in _chunks(database, table, "rowid", f"r.{name}, r.text"):
+        for _, found, text in rows:
+            yield found, isinstance(text, str) and found == digest(text)
+
+
+def _chunks(database: Database, table: str, id: str, columns: str, join: str = "") -> Iterator[list[Any]]:
+    """Rows of a table with their numbers, some at a time, in their order."""
+    last = 0
+    sql = f"SELECT r.{id}, {columns} FROM {table} AS r {join} WHERE r.{id} > ? ORDER BY r.{id} LIMIT ?"
+    while rows := database.fetch(sql, (last, RESULT_CHUNK), is_lenient=True):
+        yield rows
+        # Not so where pages are damaged, and then it would go round for ever.
+        database.require(rows[-1][0] > last, f"the table {table}, number", rows[-1][0], f"more than {last}")
+        last = rows[-1][0]
