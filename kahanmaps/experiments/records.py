@@ -16,6 +16,7 @@ from hashlib import sha256
 from typing import Any
 from zlib import crc32
 
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
 KEY_LENGTH = 32  # hexadecimal digits: 128 bits, no two tasks will ever share them
 
 
@@ -25,7 +26,7 @@ def canonical(data: Any) -> str:
     >>> canonical({"m": 2, "eps": "1/10"})
     '{"eps":"1/10","m":2}'
     """
-    return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return _ENCODER.encode(data)
 
 
 def digest(text: str) -> str:
