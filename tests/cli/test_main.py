@@ -7,8 +7,10 @@ a sentence and an exit status, never a traceback.
 from __future__ import annotations
 
 import re
+import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -208,6 +210,55 @@ sys.exit(__main__.main())
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
+def test_nothing_is_loaded_before_ctrl_c_is_looked_after():
+    script = """
+import _signal, os, sys
+before = set(sys.modules)
+def signal(*_):
+    os.write(1, " ".join(sorted(set(sys.modules) - before)).encode())
+    os._exit(0)
+from kahanmaps_cli.__main__ import main
+_signal.signal = signal
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "kahanmaps_cli kahanmaps_cli.__main__"
+
+
+@pytest.mark.parametrize(
+    ("end", "status", "told"),
+    [
+        ("os.kill(os.getpid(), 2)", 130, "interrupted\n"),  # between the end of the command and that of Python
+        ("atexit._run_exitfuncs(); os.kill(os.getpid(), 2)", 0, ""),  # while Python ends
+    ],
+)
+def test_ctrl_c_after_the_end_of_a_command_is_told_without_a_traceback(end, status, told):
+    script = f"""
+import atexit, os, sys
+from kahanmaps_cli import __main__
+sys.argv = ["kahanmaps", "--version"]
+status = __main__.main()
+{end}
+sys.exit(status)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (status, f"kahanmaps {__version__}\n", told)
+
+
+@pytest.mark.slow
+def test_ctrl_c_at_any_moment_shows_no_traceback_of_ours():
+    # What Python prints before it comes to our first line is its own, and nobody can help it.
+    for k in range(100):
+        command = [sys.executable, "-m", "kahanmaps_cli", "systems"]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(0.004 * k)
+        process.send_signal(signal.SIGINT)
+        err = process.communicate(timeout=30)[1]
+        assert not re.search(r"__main__.py\", line \d+, in main", err), err
+        assert process.returncode in (0, 130) or "Traceback" in err or not err
 
 
 def test_the_program_gives_the_status_of_the_command():
