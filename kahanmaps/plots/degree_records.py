@@ -47,7 +47,7 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
             patterns=_patterns(record.get("singularities")),
         )
         return str(record["system"]), growth
-    except (KeyError, TypeError, ValueError, AttributeError, InputError) as error:
+    except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise InputError(f"{where}: found degrees that cannot be read ({error}), expected those of degrees") from error
 
 

@@ -74,7 +74,7 @@ def curves_of_record(record: Any, where: str = "record") -> tuple[HeightCurve, .
         raise InputError(f"{where}: found something else, expected an object written by 'kahanmaps heights --json'")
     try:
         return tuple(_curve_of(orbit) for orbit in orbits)
-    except (KeyError, TypeError, ValueError, AttributeError, InputError) as error:
+    except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise InputError(f"{where}: found an orbit that cannot be read ({error}), expected one of heights") from error
 
 

@@ -234,8 +234,8 @@ def test_exact_numbers_of_any_length_are_read(tmp_path):
     ("name", "content", "message"),
     [
         ("a.txt", "1,2", "found .txt, expected a file of kahanmaps orbit or ensemble"),
-        ("a.npy", "nothing", "found no .npy file that can be read"),
-        ("a.npz", "nothing", "found no .npz file that can be read"),
+        ("a.npy", "nothing", "found no orbit that kahanmaps wrote"),
+        ("a.npz", "nothing", "found no orbit that kahanmaps wrote"),
         ("a.csv", "x,y\n1,2\n", "found no orbit that kahanmaps wrote"),
         ("a.csv", '# {"variables": ["x"]}\nstep,x\n', "found no point in it"),
         ("a.csv", '# {"variables": ["x"]}\nstep,x\n0,1e999\n', "expected one in the range of machine floats"),

@@ -14,6 +14,8 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from kahanmaps.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,16 +60,20 @@ def read_orbits(path: str, variables: Sequence[str] | None) -> Stored:
             f"{path}: found {ending or 'no ending'}, expected a file of kahanmaps orbit or ensemble: "
             f"{', '.join(_ENDINGS)}"
         )
-    if ending == ".npy":
-        found = _from_npy(path, variables)
-    else:
-        read = {".npz": _from_npz, ".jsonl": _from_jsonl, ".csv": _from_csv}[ending]
-        try:
-            found = read(path)
-        except InputError:
+    try:
+        if ending == ".npy":
+            found = _from_npy(path, variables)
+        else:
+            found = {".npz": _from_npz, ".jsonl": _from_jsonl, ".csv": _from_csv}[ending](path)
+    except click.ClickException:
+        raise
+    except Exception as error:  # zip archives, headers of arrays and numbers that are damaged may go wrong in any way
+        is_told = isinstance(error, InputError) and path in str(error)
+        if is_told or (isinstance(error, OSError) and error.filename is not None):  # the other cannot even be opened
             raise
-        except (ValueError, TypeError, LookupError, ZeroDivisionError) as error:
-            raise InputError(f"{path}: found no orbit that kahanmaps wrote ({_first(error)})") from None
+        raise InputError(
+            f"{path}: found no orbit that kahanmaps wrote ({_first(error)}): it is another file, or damaged"
+        ) from None
     if variables is not None and tuple(variables) != found.variables:
         raise InputError(
             f"{path}: found the variables {', '.join(found.variables)}, expected those of the system: "
@@ -81,10 +87,7 @@ def read_orbits(path: str, variables: Sequence[str] | None) -> Stored:
 def _from_npy(path: str, variables: Sequence[str] | None) -> Stored:
     import numpy as np
 
-    try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, EOFError) as error:
-        raise InputError(f"{path}: found no .npy file that can be read ({_first(error)})") from None
+    array = np.lib.format.open_memmap(path, mode="r")
     if array.dtype.kind not in "fiu" or array.ndim not in (2, 3):
         raise InputError(
             f"{path}: found an array of type {array.dtype} and shape {array.shape}, expected numbers (points, dim) of "
@@ -99,18 +102,11 @@ def _from_npy(path: str, variables: Sequence[str] | None) -> Stored:
 
 
 def _from_npz(path: str) -> Stored:
-    import zipfile
-
     import numpy as np
 
-    try:
-        with np.load(path, allow_pickle=False) as held:
-            meta = json.loads(str(held["meta"]))
-            steps, x = held["step"], held["x"]
-    except (zipfile.BadZipFile, OSError, EOFError, ValueError) as error:
-        if isinstance(error, OSError) and error.errno is not None:
-            raise
-        raise InputError(f"{path}: found no .npz file that can be read ({_first(error)})") from None
+    with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as held:
+        meta = json.loads(str(held["meta"]))
+        steps, x = held["step"], held["x"]
     if x.ndim != 2:
         raise InputError(f"{path}: found an array of shape {x.shape}, expected (points, dim)")
     if x.dtype.kind == "S":

@@ -1,4 +1,5 @@
-"""Files that commands write: never what they read, whole or not at all, and told where they cannot be written.
+"""Files that commands write and read: none is written over that is read, none is half written, none that is damaged is
+an internal error.
 
 The commands and their options are found from the tree of commands, so that a new one has to be entered in `READS`.
 """
@@ -8,14 +9,16 @@ from __future__ import annotations
 import io
 import json
 import os
+import random
 import shlex
 import signal
 import subprocess
 import time
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -24,9 +27,16 @@ from cli_helpers import COMMAND, shell
 from command_tree import LEAST, all_commands
 from small_databases import ok, planned
 
+from kahanmaps.errors import InputError
+from kahanmaps.plots.degree_records import degrees_of_record
+from kahanmaps.plots.height_curves import curves_of_record
+from kahanmaps.plots.recipe import read_recipe
 from kahanmaps_cli import orbit_formats
+from kahanmaps_cli.ensemble_starts import read_starts
 from kahanmaps_cli.main import main
 from kahanmaps_cli.outputs import OutputFile, OutputFolder
+from kahanmaps_cli.pictures.records import read_record
+from kahanmaps_cli.pictures.stored import read_orbits
 
 ORBIT = "--start 1,2 --eps 1/10 --steps 1"
 
@@ -90,7 +100,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made")
     planned(folder / "study.db", 1, records=[ok(1)])
     np.save(folder / "starts.npy", np.ones((1, 2)))
-    assert main([*shlex.split(f"orbit harmonic {ORBIT} -q -o"), str(folder / "orbit.npz")]) == 0
+    for name, more in {"orbit.npz": "", "float.npz": "--arithmetic float", "orbit.csv": "", "orbit.jsonl": ""}.items():
+        assert main([*shlex.split(f"orbit harmonic {ORBIT} {more} -q -o"), str(folder / name)]) == 0
+    assert main(["plot", "degrees", "harmonic", "-q", "-o", str(folder / "picture.png")]) == 0
     for name, line in {
         "system.toml": "systems harmonic --toml",
         "heights.json": "heights harmonic --steps 3 --json -q",
@@ -238,6 +250,84 @@ def test_links_in_a_circle_are_no_place(kahanmaps, tmp_path, ending):
     outcome = kahanmaps(f"orbit harmonic {ORBIT} --arithmetic float -o", loop)
     assert (outcome.status, outcome.out) == (2, "")
     assert outcome.err == f"Error: Too many levels of symbolic links: {loop}\n"
+
+
+# Damaged files
+
+READERS = {
+    "orbit.npz": lambda path: read_orbits(path, None),
+    "float.npz": lambda path: read_orbits(path, None),
+    "orbit.csv": lambda path: read_orbits(path, None),
+    "orbit.jsonl": lambda path: read_orbits(path, None),
+    "orbits.npy": lambda path: read_orbits(path, None),
+    "starts.npy": lambda path: read_starts(path, ["x", "y"], None),
+    "heights.json": lambda path: curves_of_record(read_record(path), path),
+    "degrees.json": lambda path: degrees_of_record(read_record(path), path),
+    "picture.png": read_recipe,
+}
+NASTY = (None, True, -1.5, float("inf"), 10**400, "", "1/0", [], {})
+
+
+def damages(content: bytes, count: int) -> Iterator[bytes]:
+    """The content cut off, with bits turned, bytes left out and others put in."""
+    drawn = random.Random(1)
+    for _ in range(count):
+        at = drawn.randrange(len(content))
+        yield content[:at]
+        yield content[:at] + bytes([content[at] ^ 1 << drawn.randrange(8)]) + content[at + 1 :]
+        yield content[:at] + content[at + drawn.randrange(1, 40) :]
+        yield content[:at] + drawn.choice([b"{", b'"', b"(", b"9" * 400, b"NaN", b"\0" * 9, b"\xff"]) + content[at:]
+
+
+def is_read_or_refused(read: Callable[[str], Any], path: Path) -> bool:
+    """Whether a file is read, or refused in a sentence with its name: anything else is raised."""
+    try:
+        read(str(path))
+    except InputError as error:
+        return str(path) in str(error)
+    return True
+
+
+@pytest.mark.parametrize("count", [25, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", READERS)
+def test_a_damaged_file_is_read_or_refused_with_its_name(made, tmp_path, name, count):
+    content = (made / name.replace("orbits.npy", "starts.npy")).read_bytes()
+    path = tmp_path / name
+    for damaged in damages(content, count):
+        path.write_bytes(damaged)
+        assert is_read_or_refused(READERS[name], path)
+
+
+@pytest.mark.parametrize("name", ["heights.json", "degrees.json", "orbit.jsonl"])
+def test_a_record_with_any_other_value_is_read_or_refused_with_its_name(made, tmp_path, name):
+    path = tmp_path / name
+    records = [json.loads(line) for line in (made / name).read_text().splitlines()]
+    for table, key in list(places(records)):
+        for nasty in NASTY:
+            before, table[key] = table[key], nasty
+            path.write_text("\n".join(map(json.dumps, records)))
+            assert is_read_or_refused(READERS[name], path)
+            table[key] = before
+
+
+def places(value: Any) -> Iterator[tuple[Any, Any]]:
+    """Every place of a value in JSON: what it is in, and its key there; of long lists the first two."""
+    if isinstance(value, dict | list):
+        for key in list(value) if isinstance(value, dict) else range(min(2, len(value))):
+            yield value, key
+            yield from places(value[key])
+
+
+@pytest.mark.parametrize("damage", [b"", b"PK", b"\x93NUMPY\x01\x00"])
+@pytest.mark.parametrize(
+    "line", ["plot portrait --from x.npz", "plot portrait --from x.npy", "plot degrees --from x.npy"]
+)
+def test_a_damaged_file_gives_2(kahanmaps, tmp_path, monkeypatch, line, damage):
+    monkeypatch.chdir(tmp_path)
+    Path(line.split()[-1]).write_bytes(damage)
+    outcome = kahanmaps(line)
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err.startswith(f"Error: {line.split()[-1]}: found no ")
 
 
 # Readers that leave
