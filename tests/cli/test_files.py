@@ -10,9 +10,11 @@ import io
 import json
 import os
 import random
+import resource
 import shlex
 import signal
 import subprocess
+import sys
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator
@@ -37,6 +39,8 @@ from kahanmaps_cli.main import main
 from kahanmaps_cli.outputs import OutputFile, OutputFolder
 from kahanmaps_cli.pictures.records import read_record
 from kahanmaps_cli.pictures.stored import read_orbits
+
+needs_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 
 ORBIT = "--start 1,2 --eps 1/10 --steps 1"
 
@@ -70,7 +74,7 @@ READS = {
         ".svg",
         {"system": "plot heights IN --start 1,2 --eps 1/10 --steps 3", "record": "plot heights --from IN"},
     ),
-    "plot invariant-curves": (".svg", {"system": "plot invariant-curves IN --start 1,2 --eps 1/100 --steps 2"}),
+    "plot invariant-curves": (".svg", {"system": "plot invariant-curves IN --start 1,2,3,4 --eps 1/100 --steps 2"}),
     "plot portrait": (
         ".npz",
         {
@@ -105,6 +109,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert main(["plot", "degrees", "harmonic", "-q", "-o", str(folder / "picture.png")]) == 0
     for name, line in {
         "system.toml": "systems harmonic --toml",
+        "member.toml": "systems paper_m2 --toml",
         "heights.json": "heights harmonic --steps 3 --json -q",
         "degrees.json": "degrees harmonic --terms 3 --json -q",
     }.items():
@@ -141,7 +146,7 @@ def test_every_output_goes_through_the_one_door_and_every_input_is_tried():
 def test_no_file_is_written_over_that_is_read(kahanmaps, given, words, name, way):
     ending, lines = READS[words]
     source = Path("in" + ending)
-    source.write_bytes(Path(CONTENT.get(name, "system.toml")).read_bytes())
+    source.write_bytes(Path(source_of(words, name)).read_bytes())
     before = source.read_bytes()
     target = Path("./in" + ending) if way == "the same" else Path("out" + ending)
     if way == "hard link":
@@ -158,7 +163,7 @@ def test_any_other_file_is_written_over(kahanmaps, given, words):
     ending, lines = READS[words]
     source, target = Path("in" + ending), Path("out" + ending)
     name = next(reversed(lines))
-    source.write_bytes(Path(CONTENT.get(name, "system.toml")).read_bytes())
+    source.write_bytes(Path(source_of(words, name)).read_bytes())
     target.write_bytes(before := source.read_bytes())
     assert kahanmaps(lines[name].replace("IN", str(source)), "-o", target).status == 0
     assert (source.read_bytes(), target.read_bytes() == before) == (before, False)
@@ -388,3 +393,76 @@ def test_a_command_ends_early_when_the_reader_of_its_pipe_leaves(tmp_path):
     words = "orbit harmonic --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007 -q -o p"
     outcome = shell(f"mkfifo p; head -n 1 p > /dev/null & kahanmaps {words}", tmp_path)
     assert (outcome.status, outcome.err) == (3, "")
+
+
+# Disks and limits
+
+LIMITS = [
+    *((resource.RLIMIT_FSIZE, size) for size in (0, 4000)),
+    *((resource.RLIMIT_NOFILE, count) for count in (5, 7)),  # with fewer Python itself does not come to us
+]
+
+
+def source_of(words: str, name: str) -> str:
+    """The file that an option or argument of a command can take."""
+    return CONTENT.get(name, "member.toml" if words == "plot invariant-curves" else "system.toml")
+
+
+def line_to(words: str, target: str) -> str:
+    """A line that writes to a file, from the first of the inputs that the command takes."""
+    lines = READS[words][1]
+    name = next(iter(lines), "")
+    line = lines[name].replace("IN", source_of(words, name)) if lines else "family new --m 1"
+    return f"{line} -o {target}"
+
+
+def limited(line: str, limit: tuple[int, int] | None) -> tuple[int, str]:
+    """Run a line in a process of its own with a limit: exit status and standard error."""
+    done = subprocess.run(
+        [sys.executable, "-m", "kahanmaps_cli", *shlex.split(line)],
+        preexec_fn=None if limit is None else lambda: resource.setrlimit(limit[0], (limit[1], limit[1])),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    return done.returncode, done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [*READS, "orbit npz"])
+def test_a_limit_leaves_the_old_file_or_the_whole_new_one(given, words):
+    line, ending = ("orbit", ".npz") if words == "orbit npz" else (words, READS[words][0])
+    target = Path("out" + ending)
+    line = line_to(line, str(target))
+    usual, _ = limited(line, None)
+    whole = target.read_bytes()
+    beside = set(given.iterdir())
+    for limit in LIMITS:
+        target.write_bytes(b"before")
+        status, told = limited(line, limit)
+        assert "Traceback" not in told
+        if status == usual:
+            assert target.read_bytes() == whole
+        else:
+            assert status in (2, 3), (limit, told)
+            is_stream = words in ("orbit", "ensemble")  # valid as far as it goes
+            assert is_stream or target.read_bytes() == b"before"
+        assert set(given.iterdir()) == beside
+
+
+@needs_full_device
+@pytest.mark.slow
+@pytest.mark.parametrize("words", READS)
+def test_a_full_device_gives_2_and_is_named(kahanmaps, given, words):
+    full = Path("full" + READS[words][0])
+    full.symlink_to("/dev/full")
+    outcome = kahanmaps(line_to(words, str(full)))
+    assert (outcome.status, outcome.err.splitlines()[-1]) == (2, f"Error: No space left on device: {full}")
+
+
+@pytest.mark.parametrize("words", READS)
+def test_a_folder_that_may_not_be_written_to_is_told_before_anything_is_read(kahanmaps, given, monkeypatch, words):
+    monkeypatch.setattr("os.access", lambda _, mode: mode != os.W_OK)  # who runs the tests may be root
+    target = "new" + READS[words][0]
+    outcome = kahanmaps(line_to(words, target).replace("system.toml", "missing.toml"))
+    assert (outcome.status, outcome.err) == (2, f"Error: Permission denied: {target}\n")
