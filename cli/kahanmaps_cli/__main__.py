@@ -27,6 +27,7 @@ def main() -> int:
 
     from kahanmaps_cli.limited_memory import look_for_room
     from kahanmaps_cli.main import main as run
+    from kahanmaps_cli.signals import handle
 
     look_for_room()
     if not is_ours:
@@ -34,7 +35,7 @@ def main() -> int:
     # Python takes handlers away at its end, and the status is known by then.
     atexit.register(_signal.signal, _signal.SIGINT, _signal.SIG_IGN)
     try:
-        _signal.signal(_signal.SIGINT, _signal.default_int_handler)
+        handle(_signal.SIGINT, _signal.default_int_handler)
         return run()
     except KeyboardInterrupt:  # just before `run` looks for it, or just after
         _end(_signal.SIGINT, None)

@@ -20,6 +20,7 @@ from kahanmaps_cli.terminal import tell
 # An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
 MAX_PADDED_BYTES = 512_000_000
 _ROWS = 10_000  # of an npz file that are held in memory
+_LONG_LINE = 10_000  # characters, after which the next step may take minutes
 _NARROWEST = 9  # a column of numbers with the middle left out
 
 
@@ -54,9 +55,9 @@ class Writer(ABC):
 
     def _line(self, text: str) -> None:
         self.stream.write(text + "\n")
-        # Now and then, so that a reader of the file sees it grow and a kill loses little.
+        # Now and then, so that a reader of the file sees it grow and a kill loses little; always before long steps.
         now = time.monotonic()
-        if now - self._flushed > 0.5:
+        if now - self._flushed > 0.5 or len(text) > _LONG_LINE:
             self.stream.flush()
             self._flushed = now
 

@@ -33,6 +33,7 @@ class OrbitRun:
     def __init__(self, file: SystemFile, eps: Any, options: dict[str, Any]) -> None:
         from kahanmaps.family.structure import NoStructure
         from kahanmaps.maps.methods import choose_method
+        from kahanmaps.maps.orbits import require_short
 
         self.file = file
         self.eps = eps
@@ -44,6 +45,8 @@ class OrbitRun:
         self.kind, self.number = options["arithmetic"]
         self.columns: list[Column] = []
         self._not_accurate = ""
+        if self.kind == "exact":
+            require_short(eps, self.start, options["max_digits"])
         structure = self._structure(options["method"])
         self.method = choose_method(options["method"], self.kind, structure, self.at)
         if self.method.name != "jump" and self.steps > _TOO_FAR:

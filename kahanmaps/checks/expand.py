@@ -28,7 +28,9 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
     if identity.dim > MAX_DIMENSION:
         return None
     if budget is None:
-        budget = int(DEFAULT_BUDGET / max(1.0, identity.equation.bits / 256))
+        # A product takes longer than in proportion to its bits once it has left the innermost caches.
+        bits = identity.equation.bits
+        budget = int(DEFAULT_BUDGET / max(1.0, bits / 256) / max(1.0, bits / 10_000))
     names = [f"x{i + 1}" for i in range(identity.dim)] + ["eps"]
     field = FunctionField(names, budget)
     eps = field.variables[-1] if identity.eps is None else field.convert(identity.eps)

@@ -16,11 +16,12 @@ from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
 from kahanmaps.errors import InputError
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.orbits import Orbit, OrbitEnd
+from kahanmaps.maps.orbits import Orbit, OrbitEnd, require_short
 from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
 
+MAX_STEPS = 10_000  # of the exact orbit, all of whose points are kept
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
 
 
@@ -53,8 +54,9 @@ class Settings:
             object.__setattr__(self, "start", tuple(rational(entry) for entry in self.start))
         if self.eps == 0:
             raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
-        if self.steps < 0:
-            raise InputError(f"found {self.steps} steps, expected 0 or more")
+        if not 0 <= self.steps <= MAX_STEPS:
+            raise InputError(f"found {self.steps} steps, expected 0 to {MAX_STEPS}")
+        require_short(self.eps, self.start or (), self.max_digits)
         if not 1 <= self.error_bits <= 10_000:
             raise InputError(f"found an error bound of {self.error_bits} bits, expected 1 to 10000")
 

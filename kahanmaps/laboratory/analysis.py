@@ -255,11 +255,11 @@ def analyze(
             found.commuting = commuting_systems(system, seed=seed, seconds=share(0.1), progress=told("commuting"))
 
     def confinement() -> None:
-        if can_be_written(system, found.eps):
-            values = default_eps(system, seed) if found.eps is None else (found.eps,)
-            part = share(0.2 if system.dim <= WRITTEN_DIMENSION else 0.1)
+        values = default_eps(system, seed) if found.eps is None else (found.eps,)
+        part = share(0.2 if system.dim <= WRITTEN_DIMENSION else 0.1) / len(values)
+        if all(can_be_written(system, value, part) for value in values):
             found.singularities = [
-                singularities(system, value, seed=seed, seconds=part / len(values), progress=told("singularities"))
+                singularities(system, value, seed=seed, seconds=part, progress=told("singularities"))
                 for value in values
             ]
 

@@ -45,7 +45,9 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 6
 MAX_STEPS = 10_000
-MAX_DIGITS = 10_000  # of eps, in whose numbers hypersurfaces are written: seconds in dimension 3
+MAX_DIGITS = 10_000  # of eps and the system, in whose numbers hypersurfaces are written
+_DIGITS_A_SECOND = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # by dimension: above 4 less is expanded
+_FEW_DIGITS = 50
 _REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the least
 _LEAST_REACH = 100
 _ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
@@ -137,8 +139,8 @@ def singularities(
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
     above, fewer where series are needed all the way. Hypersurfaces are exact, their fate is that of two random points
     modulo two random primes; "not confined" means within so many steps. Stops after about `seconds` seconds. Returns a
-    SingularityRun; raises InputError for dimensions above 6, an eps of more than 10,000 digits and a wrong number of
-    steps. Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
+    SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and an eps or coefficients so long
+    that writing the formulas down would take longer than `seconds`, or of more than 10,000 digits. Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
     >>> run.denominator, run.verdict
@@ -147,9 +149,11 @@ def singularities(
     exact_eps = rational(eps)
     if system.dim > MAX_DIMENSION:
         raise InputError(f"found a system of dimension {system.dim}, expected at most {MAX_DIMENSION}")
-    if not _is_short(exact_eps):
+    most = _most_digits(system.dim, seconds)
+    if _digits(system, exact_eps) > most:
         raise InputError(
-            f"found an eps of more than {MAX_DIGITS} digits, expected one in which formulas can be written"
+            f"found numbers of about {_digits(system, exact_eps)} digits in eps and the system, expected at most {most}: "
+            f"in dimension {system.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
         )
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
@@ -265,7 +269,7 @@ def patterns(
             break
         values = default_eps(system, seed + again) if eps is None else (eps,)
         part = max(0.0, end - time.monotonic()) / len(values)
-        if system.dim <= WRITTEN_DIMENSION and all(map(_is_short, values)):
+        if system.dim <= WRITTEN_DIMENSION and all(can_be_written(system, value, part) for value in values):
             runs = [singularities(system, value, steps=steps, seed=seed, seconds=part) for value in values]
             found = patterns_of(runs)
         else:
@@ -282,13 +286,18 @@ def _at_random(system: QuadraticSystem, eps: fmpq, steps: int | None, seed: int,
     return _refused(eps, True, limits.is_over) or _patterns(found)
 
 
-def _is_short(eps: fmpq) -> bool:
-    return bool(max(abs(eps.p), eps.q) < 10**MAX_DIGITS)
+def _digits(system: QuadraticSystem, eps: fmpq) -> int:
+    return int(max(eps.p.bit_length(), eps.q.bit_length()) * 0.30103) + 1 + system.digits
 
 
-def can_be_written(system: QuadraticSystem, eps: fmpq | None) -> bool:
+def _most_digits(dim: int, seconds: float) -> int:
+    """The digits with which formulas are written within this time; a few always are."""
+    return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_A_SECOND[dim] * min(seconds, MAX_DIGITS))))
+
+
+def can_be_written(system: QuadraticSystem, eps: fmpq, seconds: float) -> bool:
     """Whether `singularities` takes a system and eps."""
-    return system.dim <= MAX_DIMENSION and (eps is None or _is_short(eps))
+    return system.dim <= MAX_DIMENSION and _digits(system, eps) <= _most_digits(system.dim, seconds)
 
 
 def _one_of(several: set[Patterns]) -> Patterns:

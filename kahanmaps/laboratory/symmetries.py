@@ -32,6 +32,7 @@ DEFAULT_SECONDS = 30
 MAX_LINEAR = 16  # dimension up to which infinitesimal symmetries are computed: n^2 + n + 1 unknowns
 MAX_LISTED = 200  # of each kind in the JSON
 MAX_GENERAL = 3  # dimension up to which the polynomial equations for S are solved
+_LONGEST = 2_000  # digits of coefficients, with which they are
 
 
 @dataclass(frozen=True)
@@ -291,6 +292,9 @@ def _add_general(found: Symmetries, deadline: float) -> None:
     n = f.dim
     if any(x.is_linear for x in found.infinitesimal):
         found.searched.append("other matrices: not searched, since there are infinitesimal linear symmetries")
+        return
+    if f.digits > _LONGEST:
+        found.undecided.append(f"other matrices are searched for coefficients of up to {_LONGEST} digits only")
         return
     context = ring([f"s{i + 1}{j + 1}" for i in range(n) for j in range(n)])
     gens = context.gens()

@@ -14,6 +14,8 @@ from itertools import count
 from threading import get_ident
 from typing import Any
 
+from flint import fmpq
+
 from kahanmaps.algebra.fields import QQ, BallField, Field
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.family.structure import Structure
@@ -26,6 +28,7 @@ from kahanmaps.maps.rational_jump import OverBudget
 from kahanmaps.maps.shown import orbit_html
 
 DEFAULT_MAX_DIGITS = 200_000
+LONGEST_INPUT = 10_000  # digits of eps and of the start, unless --max-digits says more
 FIRST_POINTS = 3  # that an orbit remembers
 _DIGITS_PER_BIT = 0.30103
 
@@ -284,6 +287,21 @@ class Iterates:
             self._done = done = step
             yield OrbitPoint(step, self.map.field, value)
         self.end = OrbitEnd("completed", done, f"{counted(len(self.at), 'iterate')} reached directly")
+
+
+def require_short(eps: fmpq | None, start: Sequence[fmpq], max_digits: int | None) -> None:
+    """Raises InputError where eps or the start is longer than anybody means, unless the budget is as long.
+
+    The first step alone would take minutes, in calls that nothing can interrupt.
+    """
+    most = max(LONGEST_INPUT, max_digits or 0)
+    for name, numbers in (("eps", () if eps is None else (eps,)), ("start", start)):
+        digits = max((_digits(max(x.p.bit_length(), x.q.bit_length())) for x in numbers), default=0)
+        if digits > most:
+            raise InputError(
+                f"found numbers of about {digits} digits for {name}, expected at most {most}: "
+                "a larger --max-digits allows as many"
+            )
 
 
 def _bits(max_digits: int | None) -> int | None:

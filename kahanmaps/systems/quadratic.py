@@ -207,6 +207,13 @@ class QuadraticSystem:
             fmpz_mat(n, 1, integers(self.c)),
         )
 
+    @cached_property
+    def digits(self) -> int:
+        """About how many decimal digits the longest of the integers in `integer_form` has."""
+        below, *matrices = self.integer_form
+        entries = (entry for matrix in matrices for entry in matrix.entries())
+        return int(max(below.bit_length(), *(entry.bit_length() for entry in entries)) * 0.30103) + 1
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, QuadraticSystem):
             return NotImplemented

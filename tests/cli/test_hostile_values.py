@@ -6,6 +6,7 @@ for each kind of them. No outcome is an internal error, none is a traceback, and
 
 from __future__ import annotations
 
+import re
 import shlex
 import sqlite3
 from collections.abc import Iterator
@@ -160,3 +161,41 @@ def test_a_damaged_record_is_told_in_one_line_with_its_file_and_key(kahanmaps, l
 @pytest.mark.parametrize(("words", "name"), cases(VALUES))
 def test_no_value_of_any_option_ends_in_an_internal_error_or_is_repeated_at_length(words, name, capsys):
     assert mistakes_of(words, name, VALUES, capsys) == []
+
+
+LONG_EPS = "9" * 10_100
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "orbit paper_m3 --start 1,2,3,4,5,6 --steps 1 --eps EPS",
+        "orbit harmonic --start 1,EPS --steps 1 --eps 1/10",
+        "check-integrals paper_m2 --eps 1/EPS",
+        "check-measure lotka_volterra --start EPS,1",
+        "check-commute paper_m2 --eps EPS",
+    ],
+)
+def test_numbers_longer_than_anybody_means_are_refused_before_the_first_step(kahanmaps, line):
+    outcome = kahanmaps(line.replace("EPS", LONG_EPS))
+    assert outcome.status == 2
+    assert re.search("found numbers of about 101.. digits for (eps|start), expected at most 10000", outcome.err)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "orbit harmonic --start 1,2 --steps 1 --eps EPS --max-digits 40000",
+        "orbit harmonic --start 1,2 --steps 1 --eps EPS --arithmetic mod:10007",
+        "check-measure harmonic --eps EPS --max-digits 10200",
+    ],
+)
+def test_long_numbers_are_taken_where_the_budget_allows_them_or_they_cost_nothing(kahanmaps, line):
+    assert kahanmaps(line.replace("EPS", LONG_EPS)).status == 0
+
+
+@pytest.mark.parametrize("steps", ["10001", "9" * 100])
+def test_the_orbit_of_a_check_has_a_bounded_number_of_steps(kahanmaps, steps):
+    outcome = kahanmaps(f"check-integrals harmonic --steps {steps}")
+    assert outcome.status == 2
+    assert "expected 0 to 10000" in outcome.err

@@ -381,3 +381,33 @@ def test_a_character_that_the_output_cannot_encode_is_spelt_out(tmp_path):
 def test_the_plain_locale_is_good_enough(tmp_path):
     plain = environment(LC_ALL="C", PYTHONCOERCECLOCALE="0", PYTHONUTF8="0")
     assert shell("kahanmaps systems --json", tmp_path, **plain) == shell("kahanmaps systems --json", tmp_path)
+
+
+IN_FLINT = """
+from flint import fmpz
+from kahanmaps_cli.signals import interruptible
+with interruptible(lambda: print("asked to end", flush=True)):
+    print("ready", flush=True)
+    fmpz.fac_ui(10_000_000)  # ten seconds and more in one call
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+def test_signals_in_a_row_end_a_call_of_flint_that_holds_them_back(number):
+    with subprocess.Popen([sys.executable, "-c", IN_FLINT], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        for _ in range(10):  # the first one may have come before the call
+            process.send_signal(number)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(0.2)
+                break
+        else:
+            process.kill()
+        assert process.returncode == -number  # which shells call 130, or 143
+        assert process.stdout.read() in ("", "asked to end\n")
+
+
+def test_the_first_signal_is_taken_by_the_work():
+    script = IN_FLINT.replace("fmpz.fac_ui(10_000_000)", "import os, signal; os.kill(os.getpid(), signal.SIGINT)")
+    done = subprocess.run([sys.executable, "-c", script + "print('ended well')"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "ready\nasked to end\nended well\n")

@@ -39,7 +39,14 @@ from kahanmaps.laboratory.fates import (
 )
 from kahanmaps.laboratory.modular_points import rank
 from kahanmaps.laboratory.recurrences import GrowthClass
-from kahanmaps.laboratory.singularities import MAX_DIGITS, Patterns, patterns, patterns_of, singularities
+from kahanmaps.laboratory.singularities import (
+    MAX_DIGITS,
+    Patterns,
+    can_be_written,
+    patterns,
+    patterns_of,
+    singularities,
+)
 from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -388,7 +395,9 @@ def test_patterns_that_are_open_end_the_search_without_a_recurrence():
 def test_an_eps_too_long_for_formulas_is_refused_or_followed_at_random_points():
     eps = fmpq(1, 7 * 10**MAX_DIGITS + 1)
     top = load("euler_top").system
-    with pytest.raises(InputError, match="found an eps of more than 10000 digits"):
+    with pytest.raises(
+        InputError, match="found numbers of about 1000. digits in eps and the system, expected at most 10000"
+    ):
         singularities(top, eps)
     found = degree_growth(top, eps, seconds=20)
     assert (found.patterns.lengths, found.patterns.running) == ((3,), "")
@@ -415,3 +424,15 @@ def test_of_two_points_on_one_hypersurface_the_one_that_was_followed_less_counts
     for one, other in ((near, far), (far, near)):
         joined = _joined(one, other)
         assert (joined.followed, set(joined.primes)) == (40, {5, 7})
+
+
+def test_formulas_are_written_only_where_the_time_is_long_enough_for_their_numbers():
+    system = load("nahm_tetrahedral").system
+    eps = fmpq(10**3000 + 1, 7**3500)
+    assert [can_be_written(system, eps, seconds) for seconds in (0.1, 1)] == [False, True]
+    four = load("paper_m2").system
+    assert [can_be_written(four, fmpq(1, 3**k), 1) for k in (100, 400)] == [True, False]
+    assert can_be_written(four, fmpq(2, 11), 0.001)  # a few digits always
+    with pytest.raises(InputError, match=r"in dimension 4 formulas with longer ones are not written within 1 s"):
+        singularities(four, fmpq(1, 3**400), seconds=1)
+    assert patterns(four, fmpq(1, 3**400), seconds=4).running == ""

@@ -287,3 +287,10 @@ def test_a_family_of_three_by_three_matrices_is_singular_where_its_determinant_i
 
 def family(entries):
     return Component(tuple(parse_polynomial(entry, ["a", "b", "c"]) for entry in entries))
+
+
+def test_matrices_without_form_are_not_searched_where_coefficients_are_long():
+    long = f"{10**2100 + 1}/{7**2600}"
+    found = linear_symmetries(QuadraticSystem.from_text(["x", "y"], [f"{long}*x^2 + y^2", "x*y + x^2"]))
+    assert found.undecided == ["other matrices are searched for coefficients of up to 2000 digits only"]
+    assert not found.complete
