@@ -52,8 +52,8 @@ class ClusterWorkers(Executor):
     run code on all others: scheduler and workers have to be trusted, and closed to everybody else.
 
     `command` is what a worker runs for a group, by default `python -m kahanmaps.experiments.group` with this
-    interpreter, which the workers have to find at the same path. A group takes about `group_seconds` and has at most `largest_group` jobs. `talk` is told,
-    now and then, what is being waited for.
+    interpreter, which the workers have to find at the same path. A group takes about `group_seconds` and has at most
+    `largest_group` jobs. `talk` is told, now and then, what is being waited for.
 
     At most two groups for each thread of the workers are under way, so that memory here does not depend on the number
     of tasks. A group that ends early is taken apart: each job without a record is tried a few times more, alone, before

@@ -27,7 +27,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
 from kahanmaps.algebra.polynomials import degree, primitive_part
 from kahanmaps.systems.hamiltonian import linear_combinations
-from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver
 
 # The determinant has degree m (m + 3)/2 along a line for m variables: 90 for this bound, a few seconds.
 MAX_EXTACTIC_DIMENSION = 12
@@ -145,6 +145,9 @@ def affine_darboux(system: QuadraticSystem, *, seed: int = 0) -> AffineDarbouxLi
     if m > MAX_EXTACTIC_DIMENSION:
         found = _factors_that_are(system, coordinates)
         return AffineDarbouxList(found, False, f"more than {MAX_EXTACTIC_DIMENSION} variables: {only}")
+    if system.digits > LONG_COEFFICIENTS:
+        found = _factors_that_are(system, coordinates)
+        return AffineDarbouxList(found, False, f"coefficients of more than {LONG_COEFFICIENTS} digits: {only}")
     local = system.over(QQ)
     # A hyperplane parallel to the line is not met by it, so the line must not be known to who writes the system.
     rng = random.Random(f"affine {seed_for(seed, system.rhs)}")

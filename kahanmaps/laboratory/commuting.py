@@ -36,7 +36,7 @@ from kahanmaps.laboratory.commuting_space import (
     unknowns,
 )
 from kahanmaps.laboratory.shown import commuting_html
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 DEFAULT_SECONDS = 60
 ORDERS = (4, 6, 8)  # powers of eps in the commutator; odd ones follow from those before
@@ -195,8 +195,13 @@ class _Search:
         if all(p.is_zero() for p in f.rhs):
             self._add_zero(count)
             return
-        if count > MAX_UNKNOWNS:
-            found.undecided.append(f"g has {count} unknown coefficients, and at most {MAX_UNKNOWNS} are tried")
+        if count > MAX_UNKNOWNS or f.digits > LONG_COEFFICIENTS:
+            if count > MAX_UNKNOWNS:
+                found.undecided.append(f"g has {count} unknown coefficients, and at most {MAX_UNKNOWNS} are tried")
+            else:
+                found.undecided.append(
+                    f"other g are searched for coefficients of up to {LONG_COEFFICIENTS} digits only"
+                )
             self.space = CommutingSpace((f,), (QQ.identity(f.dim),) * (found.shape == "linear"), 1)
         else:
             self.settings.progress("the fields g with [f, g] = 0")

@@ -20,12 +20,13 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.fields import GF, QQ, rational
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_number, format_polynomial
-from kahanmaps.errors import InputError, SingularStep, counted
+from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.laboratory.fates import (
     CONFINED,
     FIRST_STEPS,
@@ -139,8 +140,9 @@ def singularities(
     They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
     above, fewer where series are needed all the way. Hypersurfaces are exact, their fate is that of two random points
     modulo two random primes; "not confined" means within so many steps. Stops after about `seconds` seconds. Returns a
-    SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and an eps or coefficients so long
-    that writing the formulas down would take longer than `seconds`, or of more than 10,000 digits. Source: grammaticos-ramani-papageorgiou-1991, zander-2021.
+    SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and an eps or coefficients of
+    more than 10,000 digits, or so long that writing formulas would take more than `seconds`. Source:
+    grammaticos-ramani-papageorgiou-1991, zander-2021.
 
     >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
     >>> run.denominator, run.verdict
@@ -150,9 +152,9 @@ def singularities(
     if system.dim > MAX_DIMENSION:
         raise InputError(f"found a system of dimension {system.dim}, expected at most {MAX_DIMENSION}")
     most = _most_digits(system.dim, seconds)
-    if _digits(system, exact_eps) > most:
+    if (digits := _digits(system, exact_eps)) > most:
         raise InputError(
-            f"found numbers of about {_digits(system, exact_eps)} digits in eps and the system, expected at most {most}: "
+            f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
             f"in dimension {system.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
         )
     if steps is not None and not 1 <= steps <= MAX_STEPS:
@@ -373,12 +375,13 @@ def default_eps(system: QuadraticSystem, seed: int) -> tuple[fmpq, fmpq]:
 
 def _is_dominant(system: QuadraticSystem, eps: fmpq) -> bool:
     """Whether det dPhi is not 0 at one of a few points: proved where it is, and false otherwise as good as never."""
-    kahan_map, rng = KahanMap(system, eps), random.Random(f"dominant {seed_for(0, system.rhs, eps)}")
+    rng = random.Random(f"dominant {seed_for(0, system.rhs, eps)}")
     for _ in range(_POINTS):
+        field = GF(random_prime(rng))  # what is not 0 there is not 0 over Q
         try:
-            if det(kahan_map.jacobian([rng.randint(-(10**9), 10**9) for _ in range(system.dim)])) != 0:
+            if det(KahanMap(system, eps, field).jacobian([rng.randrange(field.prime) for _ in range(system.dim)])) != 0:
                 return True
-        except SingularStep:
+        except (SingularStep, BadPrime):
             continue
     return False
 

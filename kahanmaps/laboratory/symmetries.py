@@ -26,13 +26,12 @@ from kahanmaps.laboratory.shown import symmetries_html
 from kahanmaps.laboratory.signed_permutations import MAX_DIMENSION as MAX_SIGNED
 from kahanmaps.laboratory.signed_permutations import signed_permutations
 from kahanmaps.laboratory.symmetry_equations import is_singular, matrix_equations, translation
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 DEFAULT_SECONDS = 30
 MAX_LINEAR = 16  # dimension up to which infinitesimal symmetries are computed: n^2 + n + 1 unknowns
 MAX_LISTED = 200  # of each kind in the JSON
 MAX_GENERAL = 3  # dimension up to which the polynomial equations for S are solved
-_LONGEST = 2_000  # digits of coefficients, with which they are
 
 
 @dataclass(frozen=True)
@@ -293,8 +292,8 @@ def _add_general(found: Symmetries, deadline: float) -> None:
     if any(x.is_linear for x in found.infinitesimal):
         found.searched.append("other matrices: not searched, since there are infinitesimal linear symmetries")
         return
-    if f.digits > _LONGEST:
-        found.undecided.append(f"other matrices are searched for coefficients of up to {_LONGEST} digits only")
+    if f.digits > LONG_COEFFICIENTS:
+        found.undecided.append(f"other matrices are searched for coefficients of up to {LONG_COEFFICIENTS} digits only")
         return
     context = ring([f"s{i + 1}{j + 1}" for i in range(n) for j in range(n)])
     gens = context.gens()

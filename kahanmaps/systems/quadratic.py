@@ -22,6 +22,7 @@ from kahanmaps.systems.shown import system_latex
 
 # f'' has dim^3 entries: 10^6 of them at the largest dimension.
 MAX_DIMENSION = 100
+LONG_COEFFICIENTS = 2_000  # digits, with which equations in them are no longer set up and solved
 
 
 @dataclass(frozen=True, eq=False)

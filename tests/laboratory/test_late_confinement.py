@@ -396,7 +396,7 @@ def test_an_eps_too_long_for_formulas_is_refused_or_followed_at_random_points():
     eps = fmpq(1, 7 * 10**MAX_DIGITS + 1)
     top = load("euler_top").system
     with pytest.raises(
-        InputError, match="found numbers of about 1000. digits in eps and the system, expected at most 10000"
+        InputError, match=r"found numbers of about 1000. digits in eps and the system, .* at most 10000"
     ):
         singularities(top, eps)
     found = degree_growth(top, eps, seconds=20)

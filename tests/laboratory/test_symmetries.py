@@ -15,6 +15,8 @@ from kahanmaps import KahanMap
 from kahanmaps.algebra.small_systems import Component
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import InputError, SingularStep
+from kahanmaps.laboratory.affine_functions import affine_darboux
+from kahanmaps.laboratory.commuting import commuting_systems
 from kahanmaps.laboratory.signed_permutations import signed_permutations
 from kahanmaps.laboratory.symmetries import linear_symmetries
 from kahanmaps.laboratory.symmetry_equations import is_singular, is_symmetry
@@ -289,8 +291,11 @@ def family(entries):
     return Component(tuple(parse_polynomial(entry, ["a", "b", "c"]) for entry in entries))
 
 
-def test_matrices_without_form_are_not_searched_where_coefficients_are_long():
+def test_equations_with_long_coefficients_are_not_set_up_and_nothing_is_called_complete():
     long = f"{10**2100 + 1}/{7**2600}"
-    found = linear_symmetries(QuadraticSystem.from_text(["x", "y"], [f"{long}*x^2 + y^2", "x*y + x^2"]))
-    assert found.undecided == ["other matrices are searched for coefficients of up to 2000 digits only"]
-    assert not found.complete
+    system = QuadraticSystem.from_text(["x", "y"], [f"{long}*x^2 + y^2", "x*y + x^2"])
+    symmetries, commuting, darboux = linear_symmetries(system), commuting_systems(system), affine_darboux(system)
+    assert symmetries.undecided == ["other matrices are searched for coefficients of up to 2000 digits only"]
+    assert commuting.undecided == ["other g are searched for coefficients of up to 2000 digits only"]
+    assert (symmetries.complete, commuting.complete, darboux.complete) == (False, False, False)
+    assert [one.trivial for one in commuting.solutions] == ["0", "f", "-f"]
