@@ -30,6 +30,7 @@ from kahanmaps.laboratory.modular_points import (
     null_space,
 )
 from kahanmaps.systems.parametric import ParametricSystem
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
 
 _SPARE = 8
 _DETERMINANT_BUDGET = 20_000_000
@@ -64,7 +65,10 @@ DETERMINANT = Cofactor("det dPhi", 1, None)
 
 def determinant_polynomial(system: ParametricSystem) -> fmpq_mpoly | None:
     """det(I - eps f'(x)) in (variables, symbols, eps); None where it is too large to be expanded."""
-    if system.dim > _MAX_DIMENSION:
+    # Over one denominator a right-hand side has coefficients of about so many bits.
+    bits = max(sum(int(c.q.bit_length()) for c in p.coeffs()) for p in system.rhs)
+    bits += max((int(c.p.bit_length()) for p in system.rhs for c in p.coeffs()), default=0)
+    if system.dim > _MAX_DIMENSION or bits > LONG_COEFFICIENTS / 0.30103:
         return None
     names = (*system.variables, *system.symbols, "eps")
     field = FunctionField(names, _DETERMINANT_BUDGET)

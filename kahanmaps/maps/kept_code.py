@@ -11,12 +11,13 @@ import hashlib
 import io
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+_caching: Any = import_module("numba.core.caching")  # which has few types
 _DIGEST = hashlib.sha256().digest_size
 
 
@@ -28,7 +29,7 @@ def compiled(function: Callable[..., Any], **options: Any) -> Any:
     return found
 
 
-class _Cache(FunctionCache):  # type: ignore[misc]
+class _Cache(_caching.FunctionCache):  # type: ignore[misc]
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         stamp = self._impl.locator.get_source_stamp()
@@ -39,7 +40,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             super().save_overload(sig, data)
 
 
-class _Files(IndexDataCacheFile):  # type: ignore[misc]
+class _Files(_caching.IndexDataCacheFile):  # type: ignore[misc]
     """The index and the files of code, each with a digest behind what numba reads, which ends where its pickle does."""
 
     def _digest(self, content: bytes) -> bytes:

@@ -23,6 +23,7 @@ from kahanmaps.laboratory.cofactors import (
 )
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.systems.catalog import load, names
+from kahanmaps.systems.files import parse_system
 from kahanmaps.systems.parametric import ParametricSystem
 
 SMALL_ONES = [name for name in names() if load(name).system.dim <= 4]
@@ -113,3 +114,10 @@ def test_a_cofactor_that_none_has_finds_nothing():
     laboratory = Laboratory(load("lotka_volterra"))
     wrong = Cofactor("x + 1", 1, parse_polynomial("x + 1", ["x", "y", "eps"]))
     assert list(search_cofactors(laboratory.maps[0], [wrong], [], 1, 3, 10.0)) == []
+
+
+@pytest.mark.parametrize(("digits", "is_written"), [(800, True), (1200, False)])
+def test_a_determinant_is_not_expanded_where_coefficients_are_long(digits, is_written):
+    text = f'variables = ["x"]\n[system]\nrhs = ["x^2*{10**digits + 1}/{7**digits}"]'
+    system_ = ParametricSystem.of(parse_system(text))
+    assert (determinant_polynomial(system_) is not None) == is_written

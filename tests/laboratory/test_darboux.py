@@ -99,17 +99,20 @@ def test_a_degree_with_too_many_terms_is_lowered_and_said() -> None:
     assert found.degree == 12
 
 
-def test_a_polynomial_that_is_one_only_where_eps_equals_a_coordinate_is_not_proved(monkeypatch) -> None:
+@pytest.mark.parametrize("moves", [0, 1])
+def test_a_polynomial_that_is_one_only_where_eps_equals_a_coordinate_is_not_proved(monkeypatch, moves) -> None:
     """x' = x, y' = 0 keeps y. P = x + eps - y is x where eps = y, but no Darboux polynomial; P = x is one."""
-    file = SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], ["x", "0"]))
+    rhs = ["x", "0"] if moves == 0 else ["0", "y"]
+    file = SystemFile.from_system(QuadraticSystem.from_text(["x", "y"], rhs))
     (right,) = [space for space in darboux_polynomials(file, 1).spaces if space.cofactor != "1"]
-    assert ([str(P) for P in right.polynomials], right.verdict) == (["x"], Verdict.PROVED)
+    assert ([str(P) for P in right.polynomials], right.verdict) == (["xy"[moves]], Verdict.PROVED)
     found = Laboratory.formulas
 
     def wrong(*arguments: Any) -> Any:
         forms = found(*arguments)
-        x, y, eps = forms.bases[0][0].context().gens()
-        return replace(forms, bases=[[x + eps - y if P == x else P for P in basis] for basis in forms.bases])
+        *point, eps = forms.bases[0][0].context().gens()
+        moved, kept = point[moves], point[1 - moves]
+        return replace(forms, bases=[[moved + eps - kept if P == moved else P for P in b] for b in forms.bases])
 
     monkeypatch.setattr(Laboratory, "formulas", wrong)
     spaces = [space for space in darboux_polynomials(file, 1).spaces if space.cofactor == right.cofactor]
