@@ -142,3 +142,15 @@ def test_a_terminal_gets_a_command_on_one_line(monkeypatch, capsys):
     command = f"to continue: {as_typed(['kahanmaps', 'a  b', 'word ' * 40])}"
     say(command)
     assert capsys.readouterr().err == command + "\n"
+
+
+@pytest.mark.parametrize("option", ["", "--system"])
+def test_the_recipe_of_a_picture_of_somebody_else_moves_no_terminal(option, folder, kahanmaps, monkeypatch):
+    monkeypatch.chdir(folder)
+    assert kahanmaps("plot drift", ORBIT, "-o theirs.svg -q").status == 3  # an integral drifts
+    picture = Path("theirs.svg")
+    picture.write_text(picture.read_text().replace("kahanmaps plot", "kahanmaps \u202e plot").replace("x1^3", "\u202e"))
+    outcome = kahanmaps("plot recipe theirs.svg", option)
+    assert outcome.status == 0
+    assert r"\u202e" in outcome.out
+    assert OBEYED.findall(outcome.out) == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import echo
 
 
 @click.command("recipe")
@@ -28,6 +29,6 @@ def command(picture: str, show_system: bool, as_json: bool) -> None:
     elif show_system:
         if not recipe.system:
             raise click.UsageError(f"{picture}: found a picture without one system, expected one of a system")
-        click.echo(recipe.system, nl=False)
+        echo(recipe.system, end="")
     else:
-        click.echo(recipe.command)
+        echo(recipe.command)
