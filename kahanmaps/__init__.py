@@ -23,13 +23,13 @@ from kahanmaps.version import __version__
 if TYPE_CHECKING:
     from kahanmaps.algebra.fields import CC, GF, QQ, RR
     from kahanmaps.algebra.interpolation import reconstruct
-    from kahanmaps.algebra.latex import latex_polynomial, latex_rational_function
     from kahanmaps.algebra.text import parse_point, parse_polynomial, parse_rational_function
     from kahanmaps.checks.claims import Finding, Report, Verdict
     from kahanmaps.checks.commute import check_commute
     from kahanmaps.checks.conserve import check_integrals
     from kahanmaps.checks.preserve import check_measure, check_poisson
     from kahanmaps.checks.settings import Settings
+    from kahanmaps.display.latex import latex_polynomial, latex_rational_function
     from kahanmaps.errors import InputError, KahanmapsError, SingularStep, SystemFileError
     from kahanmaps.experiments.records import Record, Task
     from kahanmaps.experiments.run import run
@@ -79,7 +79,7 @@ _HOME = {
     "algebra.fields": ("CC", "GF", "QQ", "RR"),
     "algebra.text": ("parse_point", "parse_polynomial", "parse_rational_function"),
     "algebra.interpolation": ("reconstruct",),
-    "algebra.latex": ("latex_polynomial", "latex_rational_function"),
+    "display.latex": ("latex_polynomial", "latex_rational_function"),
     "systems.quadratic": ("QuadraticSystem",),
     "systems.hamiltonian": ("CubicHamiltonian", "standard_structure"),
     "systems.files": ("SystemFile", "parse_system", "read_system"),

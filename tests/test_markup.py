@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps import markup
+from kahanmaps.display import markup
 
 EVIL = '<script>alert("x")</script>&amp;\x00\x1b[31m\ud800\'"'
 

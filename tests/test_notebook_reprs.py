@@ -10,10 +10,10 @@ from flint import fmpq_mat
 from small_databases import ok, planned
 
 import kahanmaps as km
-from kahanmaps.algebra.latex import latex_cut
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.display.latex import latex_cut
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.maps.orbits import FIRST_POINTS
 

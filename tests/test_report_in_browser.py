@@ -13,8 +13,8 @@ import subprocess
 import pytest
 
 import kahanmaps as km
-from kahanmaps.algebra.mathml import formula
 from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.display.mathml import formula
 from kahanmaps.reports.report import report_html
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

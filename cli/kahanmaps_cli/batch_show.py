@@ -140,7 +140,9 @@ def print_summary(
     if as_json:
         print_json({"command": "batch summary", "version": __version__, "convention": CONVENTION, **found.to_json()})
     elif as_markdown:
-        echo(found.markdown(), end="")
+        from kahanmaps.display.experiments import summary_markdown
+
+        echo(summary_markdown(found), end="")
     elif on_terminal():
         for table in found.tables(digits=4):
             print_table([table.columns, *table.rows], words=table.words)

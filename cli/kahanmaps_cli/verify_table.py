@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING, Any
 
-from kahanmaps import markup
+from kahanmaps.display import markup
 from kahanmaps_cli.render import exit_status, headline, print_report, verdict_style, witness_lines
 from kahanmaps_cli.terminal import NARROW, NUMBER_WIDTH, columns, console, echo, on_terminal, shorten, styled, tell
 

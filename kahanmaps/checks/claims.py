@@ -13,10 +13,10 @@ from dataclasses import field as field_of
 from enum import StrEnum
 from typing import Any
 
-from kahanmaps.checks.shown import ShownAsWord, finding_html, report_html
+from kahanmaps.displayed import Displayed
 
 
-class Verdict(ShownAsWord, StrEnum):
+class Verdict(Displayed, StrEnum):
     """How much is known of a claim."""
 
     PROVED = "proved"
@@ -67,7 +67,7 @@ class Witness:
 
 
 @dataclass(frozen=True)
-class Finding:
+class Finding(Displayed):
     """One claim with its verdict. A `control` is a claim that is expected to be refuted and proves the check alive."""
 
     claim: str
@@ -89,9 +89,6 @@ class Finding:
     def is_as_expected(self) -> bool:
         """Whether a control was refuted; true for everything that is not a control."""
         return not self.control or self.verdict is Verdict.REFUTED
-
-    def _repr_html_(self) -> str:
-        return finding_html(self)
 
     def to_json(self) -> dict[str, Any]:
         plain: dict[str, Any] = {
@@ -116,7 +113,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Report:
+class Report(Displayed):
     """The findings of one check, and what is needed to do it again (`context`)."""
 
     check: str
@@ -134,9 +131,6 @@ class Report:
     def holds(self) -> bool | None:
         """Whether everything claimed holds; None where that is undecided."""
         return self.verdict.holds
-
-    def _repr_html_(self) -> str:
-        return report_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """The report as plain data, the shape that scripts rely on."""

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import NamedTuple, NoReturn, Self
 
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import note_source, quoted
 from kahanmaps.experiments.checking import Checked, add_checksums, check, forget_damaged
 from kahanmaps.experiments.database import Damaged, Database, StoreError, Unavailable
@@ -54,7 +55,6 @@ from kahanmaps.experiments.results import (
     row_of,
 )
 from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT
-from kahanmaps.experiments.shown import store_html
 
 __all__ = [
     "APPLICATION_ID",
@@ -111,7 +111,7 @@ class Found(NamedTuple):
     attempts: int
 
 
-class Store:
+class Store(Displayed):
     """A database of results. Make one with `Store.open`, and close it, best by `with`.
 
     >>> from tempfile import TemporaryDirectory
@@ -169,9 +169,6 @@ class Store:
         if error is not None:
             note_source(error, self._database.name)
         self.close()
-
-    def _repr_html_(self) -> str:
-        return store_html(self)
 
     # Experiments and their plans
 

@@ -17,11 +17,10 @@ from heapq import merge
 from math import inf, isfinite
 from typing import Any
 
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.export import NUMBER, Entry, entries, plain
 from kahanmaps.experiments.records import KEPT, Row, canonical
-from kahanmaps.experiments.shown import summary_html
-from kahanmaps.markup import markdown
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
 VERDICTS = ("proved", "supported", "refuted", "undecided")
@@ -82,22 +81,13 @@ class Table:
         for row in (self.columns, *self.rows):
             yield "\t".join(" ".join(cell.split()) for cell in row)
 
-    def markdown(self) -> str:
-        """The table for a Markdown file."""
-        rule = ["---"] * self.words + ["---:"] * (len(self.columns) - self.words)
-        rows = (self.columns, rule, *self.rows)
-        return "".join("| " + " | ".join(map(markdown, row)) + " |\n" for row in rows)
-
 
 @dataclass(frozen=True)
-class Summary:
+class Summary(Displayed):
     """Groups in the order of their values, numbers as numbers before texts, and None (not known) at the end."""
 
     by: tuple[str, ...]
     groups: tuple[Group, ...]
-
-    def _repr_html_(self) -> str:
-        return summary_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """The summary as plain data: numbers as they were, all quantiles, all outcomes and verdicts."""
@@ -166,10 +156,6 @@ class Summary:
             if place:
                 yield ""
             yield from table.lines()
-
-    def markdown(self, digits: int | None = 6) -> str:
-        """The tables for a Markdown file."""
-        return "\n".join(table.markdown() for table in self.tables(digits))
 
 
 def summarise(

@@ -15,9 +15,9 @@ from functools import cached_property
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 
 from kahanmaps.algebra.polynomials import names_of
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.cubics import chain
-from kahanmaps.family.shown import associated_html, member_html
 from kahanmaps.family.skew_hamiltonian import (
     Factor,
     evaluate_at_matrix,
@@ -29,7 +29,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 @dataclass(frozen=True, eq=False)
-class AssociatedSystem:
+class AssociatedSystem(Displayed):
     """f_s = B^T f_0: the signs, the matrix B with its coefficients as a polynomial in A, and the cubic K."""
 
     signs: tuple[int, ...]
@@ -52,12 +52,9 @@ class AssociatedSystem:
         """The signs as text, `++-`."""
         return "".join("+" if sign > 0 else "-" for sign in self.signs)
 
-    def _repr_html_(self) -> str:
-        return associated_html(self)
-
 
 @dataclass(frozen=True, eq=False)
-class FamilyMember:
+class FamilyMember(Displayed):
     """A skew-Hamiltonian A, a cubic H of its space, and signs that pick one associated system (all + : f_0 itself).
 
     Raises HypothesisError where A is not skew-Hamiltonian or H not in its space.
@@ -143,9 +140,6 @@ class FamilyMember:
     def chosen(self) -> AssociatedSystem:
         """The associated system that `signs` picks."""
         return self.associate(self.signs)
-
-    def _repr_html_(self) -> str:
-        return member_html(self)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FamilyMember):

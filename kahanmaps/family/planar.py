@@ -27,10 +27,10 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.matrices import primitive_integers
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import HypothesisError, InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import third_derivatives
-from kahanmaps.family.shown import normal_form_html
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.family.skew_hamiltonian import format_univariate
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -76,7 +76,7 @@ class PlanarPart:
 
 
 @dataclass(frozen=True, eq=False)
-class NormalForm:
+class NormalForm(Displayed):
     """x' = J grad H(x) as one planar system over K = Q[t]/chi: x = S z, and H(x) = l(h(X, Y)); see the module.
 
     Made by `normal_form`. That it is the system, exactly, is verified at construction.
@@ -99,9 +99,6 @@ class NormalForm:
 
     def __post_init__(self) -> None:
         self.verify()
-
-    def _repr_html_(self) -> str:
-        return normal_form_html(self)
 
     @property
     def dim(self) -> int:

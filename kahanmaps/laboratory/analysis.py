@@ -16,6 +16,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.text import format_number
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.laboratory.commuting import CommutingSystems, commuting_systems
@@ -27,7 +28,6 @@ from kahanmaps.laboratory.height_survey import HeightSurvey, height_survey
 from kahanmaps.laboratory.integrals import IntegralSearch, find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.report import Conclusion, Statement, conclude, sections
-from kahanmaps.laboratory.shown import analysis_html
 from kahanmaps.laboratory.singularities import (
     WRITTEN_DIMENSION,
     SingularityRun,
@@ -47,7 +47,7 @@ _MAX_DEGREE = 200_000
 
 
 @dataclass
-class Analysis:
+class Analysis(Displayed):
     """What `analyze` found: the results of the parts, None for those not reached, and statements about them."""
 
     file: SystemFile
@@ -100,9 +100,6 @@ class Analysis:
     def sections(self) -> list[tuple[str, list[Statement]]]:
         """The report: titles and their statements."""
         return [(title, lines) for title, lines in sections(self) if lines]
-
-    def _repr_html_(self) -> str:
-        return analysis_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: the verdict, the statements, and all results."""

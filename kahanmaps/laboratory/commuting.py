@@ -24,6 +24,7 @@ from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.checks.claims import Finding, Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.commuting_equations import commutator_equations
 from kahanmaps.laboratory.commuting_proofs import affine, is_affine, judge_family, judge_field
@@ -35,7 +36,6 @@ from kahanmaps.laboratory.commuting_space import (
     field_at,
     unknowns,
 )
-from kahanmaps.laboratory.shown import commuting_html
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 DEFAULT_SECONDS = 60
@@ -92,7 +92,7 @@ class CommutingFamily:
 
 
 @dataclass
-class CommutingSystems:
+class CommutingSystems(Displayed):
     """What was found. `complete` says that there are no other rational g of that shape.
 
     `dimension` is that of the space of g with [f, g] = 0; `irrational` tells of solutions outside Q; `discarded` counts
@@ -127,9 +127,6 @@ class CommutingSystems:
         """The weakest verdict on what was found; undecided where the list may not be complete."""
         found = [g.finding.verdict for g in self.solutions] + [family.finding.verdict for family in self.families]
         return combined([*found, *([] if self.complete else [Verdict.UNDECIDED])])
-
-    def _repr_html_(self) -> str:
-        return commuting_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, the shape that scripts rely on."""

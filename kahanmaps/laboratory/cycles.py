@@ -16,9 +16,9 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.reversors import require_reversor
-from kahanmaps.laboratory.shown import census_html
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_POINTS = 2_000_000  # up to which the whole graph is made, up to dimension 6
@@ -28,7 +28,7 @@ DEFAULT_EPS = ("1/10", "1/7", "2/11", "3/13", "3/17", "5/19", "2/3", "5/2", "3",
 
 
 @dataclass(frozen=True)
-class Census:
+class Census(Displayed):
     """What becomes of the points of P^n over GF(p) under the Kahan map at one eps (half the time step); exact counts.
 
     `lengths` is the number of cycles by length if the graph is `complete`, else the number of sampled points whose
@@ -58,9 +58,6 @@ class Census:
     factor: str | None
     degree: int
     is_undefined: bool
-
-    def _repr_html_(self) -> str:
-        return census_html(self)
 
     @property
     def periodic(self) -> int:

@@ -15,10 +15,10 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
-from kahanmaps.algebra.latex import latex_polynomial
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
+from kahanmaps.displayed import Displayed, latex
 from kahanmaps.errors import SingularMatrix, SingularStep
 from kahanmaps.laboratory.cofactors import (
     Cofactor,
@@ -31,7 +31,6 @@ from kahanmaps.laboratory.cofactors import (
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, exponents_up_to
-from kahanmaps.laboratory.shown import darboux_html
 from kahanmaps.maps.kahan import KahanMapOver
 from kahanmaps.systems.files import SystemFile
 
@@ -56,13 +55,13 @@ class DarbouxPolynomials:
         return {
             "cofactor": self.cofactor,
             "polynomials": [format_polynomial(P) for P in self.polynomials],
-            "latex": [latex_polynomial(P) for P in self.polynomials],
+            "latex": [latex(P) for P in self.polynomials],
             "verdict": str(self.verdict),
         }
 
 
 @dataclass
-class DarbouxSearch:
+class DarbouxSearch(Displayed):
     """What `darboux_polynomials` found: spaces by the weight of their cofactor; `reason` if the search ended early."""
 
     file: SystemFile
@@ -74,9 +73,6 @@ class DarbouxSearch:
     cofactors: tuple[str, ...] = ()
     spaces: list[DarbouxPolynomials] = field(default_factory=list)
     reason: str = ""
-
-    def _repr_html_(self) -> str:
-        return darboux_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -28,10 +28,10 @@ from flint import fmpq
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.laboratory.curves import Line, Stopped
 from kahanmaps.laboratory.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence, rate_json
-from kahanmaps.laboratory.shown import degrees_html
 from kahanmaps.laboratory.singularities import MAX_STEPS, Patterns
 from kahanmaps.laboratory.singularities import patterns as patterns_of_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -46,7 +46,7 @@ _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to n
 
 
 @dataclass(frozen=True)
-class DegreeGrowth:
+class DegreeGrowth(Displayed):
     """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a Kahan map, and what they say of its complexity.
 
     `eps` is None for generic eps (a random residue for each line). `ended` is "recurrence" (one was found, with
@@ -172,9 +172,6 @@ class DegreeGrowth:
             lines.append(("singularities", self.patterns.text))
         lines += [("ended", self.message), *(("note", note) for note in self.notes)]
         return "\n".join(f"{word}\t{rest}" for word, rest in lines)
-
-    def _repr_html_(self) -> str:
-        return degrees_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; primes are text, for they exceed what readers of JSON hold exactly."""

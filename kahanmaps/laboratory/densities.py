@@ -15,10 +15,10 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
 
-from kahanmaps.algebra.latex import latex_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, primitive_part
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.displayed import Displayed, latex
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.cofactors import (
     DETERMINANT,
@@ -34,7 +34,6 @@ from kahanmaps.laboratory.identities import density_verdict
 from kahanmaps.laboratory.integrals import closing_note, toml_comment
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.laboratory.shown import densities_html
 from kahanmaps.systems.files import SystemFile
 
 _MAX_UNKNOWNS = 1000
@@ -60,14 +59,14 @@ class FoundDensity:
         """Plain data."""
         return {
             "phi": self.text,
-            "latex": latex_rational_function(self.function),
+            "latex": latex(self.function),
             "verdict": str(self.verdict),
             "evidence": self.evidence.to_json(),
         }
 
 
 @dataclass(frozen=True)
-class DensitySearch:
+class DensitySearch(Displayed):
     """What `find_densities` found.
 
     `densities` span all phi of the least degree that has some, or are det(I - eps f') of a Hamiltonian system, which
@@ -89,9 +88,6 @@ class DensitySearch:
     def note(self) -> str:
         """That orbits close, and for which eps; empty where they do not."""
         return closing_note(self.period, self.eps)
-
-    def _repr_html_(self) -> str:
-        return densities_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

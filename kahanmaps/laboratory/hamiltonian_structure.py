@@ -22,11 +22,11 @@ from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals import ModifiedHamiltonian
 from kahanmaps.invariants.measures import DeterminantDensity
 from kahanmaps.laboratory.affine_functions import QuotientForms, affine_integrals, quotient_by
-from kahanmaps.laboratory.shown import structures_html
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -35,7 +35,7 @@ _GRID = 2000  # points at which a Pfaffian is shown to vanish identically
 
 
 @dataclass(frozen=True, eq=False)
-class ConstantStructures:
+class ConstantStructures(Displayed):
     """What `constant_structures` found; every form, function and matrix is exact.
 
     forms: a basis of the skew K for which K f is a gradient (invertible or not), of coprime integers.
@@ -51,9 +51,6 @@ class ConstantStructures:
     casimirs: tuple[fmpq_mpoly, ...]
     reason: str
     proved: bool
-
-    def _repr_html_(self) -> str:
-        return structures_html(self)
 
     @property
     def integral(self) -> ModifiedHamiltonian | None:

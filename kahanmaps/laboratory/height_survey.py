@@ -18,10 +18,10 @@ from flint import fmpq
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.heights import Growth, HeightGrowth, height_growth
-from kahanmaps.laboratory.shown import heights_html
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -51,7 +51,7 @@ class SurveyedOrbit:
 
 
 @dataclass(frozen=True)
-class HeightSurvey:
+class HeightSurvey(Displayed):
     """The orbits of the survey, in the order of eps and then of starts; `is_whole` is False where time ended it."""
 
     orbits: tuple[SurveyedOrbit, ...]
@@ -92,9 +92,6 @@ class HeightSurvey:
             if orbit.growth.kind is not Growth.UNDECIDED:
                 kinds.setdefault(orbit.eps, set()).add(orbit.growth.kind)
         return all(len(found) == 1 for found in kinds.values())
-
-    def _repr_html_(self) -> str:
-        return heights_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -18,10 +18,10 @@ from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
-from kahanmaps.algebra.latex import latex_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate, ring
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.displayed import Displayed, latex
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.branches import Branches, Pattern, tell_apart
 from kahanmaps.laboratory.cofactors import Cofactor
@@ -32,7 +32,6 @@ from kahanmaps.laboratory.inherited import InheritedIntegrals, inherited_integra
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
 from kahanmaps.laboratory.search import AFFINE, Found, classes, may_be_conjugate, repeat, search
-from kahanmaps.laboratory.shown import integrals_html
 from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.parametric import ParametricSystem
 
@@ -69,7 +68,7 @@ class FoundIntegral:
         return {
             "name": self.name,
             "integral": self.text,
-            "latex": latex_rational_function(self.function),
+            "latex": latex(self.function),
             "degrees": [degree(self.function.numerator), degree(self.function.denominator)],
             "origin": self.origin,
             "verdict": str(self.verdict),
@@ -78,7 +77,7 @@ class FoundIntegral:
 
 
 @dataclass(frozen=True)
-class IntegralSearch:
+class IntegralSearch(Displayed):
     """What `find_integrals` found.
 
     `integrals` are functionally independent; `profile` is what relations along orbits show (measured); `by_theorems` is
@@ -137,9 +136,6 @@ class IntegralSearch:
     def is_complete(self) -> bool:
         """Whether there is a closed form for every integral that is known."""
         return len(self.integrals) >= self.codimension
-
-    def _repr_html_(self) -> str:
-        return integrals_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -26,6 +26,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.laboratory.fates import (
     CONFINED,
@@ -39,7 +40,6 @@ from kahanmaps.laboratory.fates import (
     fates_at_random,
     unwritten,
 )
-from kahanmaps.laboratory.shown import singularities_html
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -61,7 +61,7 @@ _MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expande
 
 
 @dataclass(frozen=True)
-class SingularityRun:
+class SingularityRun(Displayed):
     """The singularities of a Kahan map at one exact eps, half the time step.
 
     `denominator` is det(I - eps f'(x)) as text; `critical_degree` the degree of the Jacobian determinant of the
@@ -78,9 +78,6 @@ class SingularityRun:
     stopped: bool
     is_undefined: bool
     is_dominant: bool
-
-    def _repr_html_(self) -> str:
-        return singularities_html(self)
 
     @property
     def verdict(self) -> str:

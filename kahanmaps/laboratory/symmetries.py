@@ -21,8 +21,8 @@ from kahanmaps.algebra.matrices import nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import solve_system
 from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.shown import symmetries_html
 from kahanmaps.laboratory.signed_permutations import MAX_DIMENSION as MAX_SIGNED
 from kahanmaps.laboratory.signed_permutations import signed_permutations
 from kahanmaps.laboratory.symmetry_equations import is_singular, matrix_equations, translation
@@ -99,7 +99,7 @@ class Infinitesimal:
 
 
 @dataclass
-class Symmetries:
+class Symmetries(Displayed):
     """What was found. `complete` says that each search in `searched` came to its end.
 
     `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` a field of weight 1 or None;
@@ -131,9 +131,6 @@ class Symmetries:
     def reversing(self) -> list[Symmetry]:
         """All finite ones that take the map to its inverse."""
         return [t for t in (*self.signed, *self.others) if t.reversing]
-
-    def _repr_html_(self) -> str:
-        return symmetries_html(self)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, the shape that scripts rely on."""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from flint import fmpq
 
-from kahanmaps.algebra.latex import latex_name, latex_polynomial, latex_rational_function
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator
+from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.languages.writer import header
 

@@ -20,9 +20,9 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.matrices import det, solve
+from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
-from kahanmaps.maps.shown import map_latex
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 
 
@@ -118,7 +118,7 @@ class KahanMapOver:
         )
 
 
-class KahanMap(KahanMapOver):
+class KahanMap(DisplayedAsFormula, KahanMapOver):
     """The map Phi(., eps) of a rational system over a field (the rationals unless another is given).
 
     `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
@@ -168,9 +168,6 @@ class KahanMap(KahanMapOver):
 
     def _named(self) -> str:
         return f": {', '.join(self.system.variables)}"
-
-    def _repr_latex_(self) -> str:
-        return map_latex(self)
 
     def __repr__(self) -> str:
         return f"KahanMap({', '.join(self.system.variables)}; eps={self.field.format(self.eps)}, over {self.field})"

@@ -17,6 +17,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ, BallField, Field
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.family.structure import Structure
 from kahanmaps.maps.integer_steps import IntegerPoint
@@ -25,7 +26,6 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_steps import NormalSteps
 from kahanmaps.maps.planes_point import PlanesPoint
 from kahanmaps.maps.rational_jump import OverBudget
-from kahanmaps.maps.shown import orbit_html
 
 DEFAULT_MAX_DIGITS = 200_000
 LONGEST_INPUT = 10_000  # digits of eps and of the start, unless --max-digits says more
@@ -83,7 +83,7 @@ class OrbitPoint:
         return f"OrbitPoint({self.step}: {','.join(self.text)})"
 
 
-class Orbit:
+class Orbit(Displayed):
     """The orbit of `start` under a Kahan map: iterate over it once, then look at `end`.
 
     `start` is a sequence of exact numbers, `steps` how many steps to take (None: no limit, even after the start came
@@ -135,9 +135,6 @@ class Orbit:
                 self.first.append(point)
             self.last = point
             yield point
-
-    def _repr_html_(self) -> str:
-        return orbit_html(self)
 
     def _points(self) -> Iterator[OrbitPoint]:
         field = self.map.field

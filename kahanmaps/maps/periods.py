@@ -31,11 +31,11 @@ from flint import (
 )
 
 from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.displayed import Displayed
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.family.structure import Structure
 from kahanmaps.maps.level_curves import Jacobian, LevelCubic, translation_order
 from kahanmaps.maps.planar_block import PlanarBlock, Triple, same_point
-from kahanmaps.maps.shown import period_html
 from kahanmaps.maps.splitting import Plane, Splitting
 
 LARGEST_FIELD = 1 << 192  # of so many elements: it takes a minute or two
@@ -80,7 +80,7 @@ class PlanePeriod:
 
 
 @dataclass(frozen=True)
-class OrbitPeriod:
+class OrbitPeriod(Displayed):
     """The period of an orbit, continued through poles: the least common multiple over the planes.
 
     `status` is "periodic", "aperiodic" (proved), "undefined" (a plane starts where the map has no value and cannot be
@@ -98,9 +98,6 @@ class OrbitPeriod:
         """A sentence, and a line for each plane."""
         lines = [self._sentence(), *(plane.text for plane in self.planes)]
         return "\n".join(lines)
-
-    def _repr_html_(self) -> str:
-        return period_html(self)
 
     def _sentence(self) -> str:
         if self.period is None:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
-from kahanmaps.algebra.latex import latex_name
+from kahanmaps.display.latex import latex_name
 from kahanmaps.errors import InputError
 from kahanmaps.plots.recipe import Recipe
 from kahanmaps.plots.style import Style

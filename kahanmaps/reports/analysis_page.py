@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kahanmaps import markup
-from kahanmaps.algebra.mathml import formula
 from kahanmaps.algebra.text import format_number
+from kahanmaps.display import markup
+from kahanmaps.display.laboratory import eps_sentence, heights_html, singularities_html
+from kahanmaps.display.mathml import formula
+from kahanmaps.display.systems import equations_html
 from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
-from kahanmaps.laboratory.shown import eps_sentence, heights_html, singularities_html
 from kahanmaps.reports.page import CHARACTERS, Origin, Section, page, statements, text, wide
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.reports.portraits import invariant_curves_figure, portrait_figure
 from kahanmaps.reports.statement_formulas import formulas_of
 from kahanmaps.sources import source
-from kahanmaps.systems.shown import equations_html
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

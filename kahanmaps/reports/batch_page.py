@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from kahanmaps import markup
+from kahanmaps.display import markup
+from kahanmaps.display.experiments import status_table, table_html
 from kahanmaps.errors import counted
-from kahanmaps.experiments.shown import status_table, table_html
 from kahanmaps.experiments.summary import summarise
 from kahanmaps.reports.page import Origin, Section, page, text, wide
 from kahanmaps.reports.pictures import Pictures

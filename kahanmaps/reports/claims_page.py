@@ -7,9 +7,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from kahanmaps import markup
 from kahanmaps.checks.claims import combined
-from kahanmaps.checks.shown import (
+from kahanmaps.display import markup
+from kahanmaps.display.checks import (
     counts,
     ending_sentence,
     eps_sentence,

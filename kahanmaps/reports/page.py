@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kahanmaps import markup
-from kahanmaps.checks.shown import Room
+from kahanmaps.display import markup
+from kahanmaps.display.checks import Room
 from kahanmaps.plots.recipe import Recipe
 from kahanmaps.reports.stylesheet import STYLESHEET
 

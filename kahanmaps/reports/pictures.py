@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from kahanmaps import markup
+from kahanmaps.display import markup
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.plots.figures import require_matplotlib, svg_text
 from kahanmaps.plots.style import Style

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from kahanmaps.algebra.mathml import formula
 from kahanmaps.algebra.text import format_polynomial, parse_polynomial, parse_rational_function
-from kahanmaps.checks.shown import because
+from kahanmaps.display.checks import because
+from kahanmaps.display.mathml import formula
 from kahanmaps.errors import KahanmapsError
 from kahanmaps.reports.page import CHARACTERS, ROOM, text
 

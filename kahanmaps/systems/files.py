@@ -17,13 +17,13 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, SystemFileError, reading
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.systems.document import KINDS, DocumentReader
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.systems.shown import file_html
 from kahanmaps.systems.toml_text import to_toml
 
 MAX_FILE_BYTES = 16_000_000
@@ -31,7 +31,7 @@ _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 
 
 @dataclass(frozen=True, eq=False)
-class SystemFile:
+class SystemFile(Displayed):
     """A system with everything that its file says of it.
 
     `system` is the quadratic system whose Kahan map is meant; `hamiltonian` and `member` are there when the file
@@ -99,9 +99,6 @@ class SystemFile:
     def to_toml(self) -> str:
         """The file as text; `parse_system` reads it back equal."""
         return to_toml(self.document, ("name", "variables"), _SECTIONS)
-
-    def _repr_html_(self) -> str:
-        return file_html(self)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, SystemFile):

@@ -13,9 +13,9 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import degree, gradient, is_homogeneous, names_of
+from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.systems.shown import hamiltonian_latex
 
 
 def standard_structure(dim: int) -> fmpq_mat:
@@ -32,7 +32,7 @@ def standard_structure(dim: int) -> fmpq_mat:
 
 
 @dataclass(frozen=True, eq=False)
-class CubicHamiltonian:
+class CubicHamiltonian(DisplayedAsFormula):
     """A polynomial H of degree at most 3 and a constant skew matrix J; the system is f = J grad H.
 
     >>> from kahanmaps.algebra.text import parse_polynomial
@@ -86,9 +86,6 @@ class CubicHamiltonian:
     def system(self) -> QuadraticSystem:
         """The quadratic system x' = J grad H(x)."""
         return QuadraticSystem.from_polynomials(linear_combinations(self.J, self.gradient))
-
-    def _repr_latex_(self) -> str:
-        return hamiltonian_latex(self)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, CubicHamiltonian):

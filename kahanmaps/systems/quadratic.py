@@ -17,8 +17,8 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz, fmpz_mat
 from kahanmaps.algebra.fields import Field, rational
 from kahanmaps.algebra.polynomials import degree, evaluate, names_of, ring
 from kahanmaps.algebra.text import check_names, format_polynomial, parse_polynomial
+from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
-from kahanmaps.systems.shown import system_latex
 
 # f'' has dim^3 entries: 10^6 of them at the largest dimension.
 MAX_DIMENSION = 100
@@ -26,7 +26,7 @@ LONG_COEFFICIENTS = 2_000  # digits, with which equations in them are no longer 
 
 
 @dataclass(frozen=True, eq=False)
-class QuadraticSystem:
+class QuadraticSystem(DisplayedAsFormula):
     """x' = Q(x, x) + B x + c: one symmetric matrix `Q[i]` a component, the matrix `B`, the vector `c`, all over Q.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y - x", "1/2*x^2"])
@@ -224,9 +224,6 @@ class QuadraticSystem:
     def __hash__(self) -> int:
         # B and Q would make it slow; equal systems have equal hashes all the same.
         return hash((self.variables, self.c))
-
-    def _repr_latex_(self) -> str:
-        return system_latex(self)
 
     def __str__(self) -> str:
         pairs = zip(self.variables, self.rhs, strict=True)

@@ -10,7 +10,9 @@ from helpers import rationals
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.latex import (
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.display.latex import (
     latex_aligned,
     latex_cut,
     latex_name,
@@ -18,8 +20,6 @@ from kahanmaps.algebra.latex import (
     latex_polynomial,
     latex_rational_function,
 )
-from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
 from kahanmaps.errors import InputError
 
 NAMES = ["x1", "x12", "al", "eps", "beta", "my_H"]

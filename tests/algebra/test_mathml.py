@@ -11,7 +11,9 @@ from helpers import rationals, some
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.mathml import (
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.text import LIMITS, parse_polynomial, parse_rational_function
+from kahanmaps.display.mathml import (
     equations,
     formula,
     mathml_name,
@@ -20,8 +22,6 @@ from kahanmaps.algebra.mathml import (
     mathml_rational_function,
     matrix,
 )
-from kahanmaps.algebra.polynomials import RationalFunction, ring
-from kahanmaps.algebra.text import LIMITS, parse_polynomial, parse_rational_function
 from kahanmaps.errors import InputError
 
 NAMES = ["x1", "x12", "al", "eps", "beta", "my_H"]

@@ -92,7 +92,7 @@ def _print(found: Analysis) -> None:
 
 def _print_markdown(found: Analysis) -> None:
     from kahanmaps.algebra.text import format_polynomial
-    from kahanmaps.markup import code, markdown
+    from kahanmaps.display.markup import code, markdown
 
     lines = [f"# {markdown(_title(found))}", "", "```"]
     for variable, polynomial in zip(found.file.variables, found.file.system.rhs, strict=True):

@@ -124,7 +124,7 @@ def _known_lines(file: Any) -> list[str]:
 
 def _latex(file: Any) -> str:
     """The system as displayed formulas."""
-    from kahanmaps.algebra.latex import latex_name, latex_polynomial, latex_rational_function
+    from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
 
     names = [latex_name(name) for name in file.variables]
     rows = [rf"\dot{{{x}}} &= {latex_polynomial(f)}" for x, f in zip(names, file.system.rhs, strict=True)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kahanmaps.algebra.latex import latex_name, latex_number, latex_polynomial, latex_rational_function
+from kahanmaps.display.latex import latex_name, latex_number, latex_polynomial, latex_rational_function
 from kahanmaps.systems.catalog import load, names
 from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.structured_facts import relations

@@ -71,6 +71,17 @@ def shortened(text: object, width: int = _SHORTENED) -> str:
     return f"{whole[:keep]}…{whole[-keep:]} ({len(whole)} characters)"
 
 
+def eps_words(eps: object = None, step: object = None) -> str:
+    """For which eps something is said, with the time step, as text; None is every eps.
+
+    >>> eps_words(), eps_words("1/10", "1/5")
+    ('every eps (the time step is 2 eps)', 'eps = 1/10 (time step 2 eps = 1/5)')
+    """
+    if eps is None:
+        return "every eps (the time step is 2 eps)"
+    return f"eps = {shortened(eps)} (time step 2 eps = {shortened(step)})"
+
+
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> str:
     """A table. `head` and `caption` are text, the cells of `rows` are HTML already.
 

@@ -15,6 +15,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
 from kahanmaps.algebra.reading import factors_of, first_terms, reading_order
+from kahanmaps.displayed import latex_form
 from kahanmaps.errors import InputError, counted
 
 # TeX has no commands for the letters that look Latin, such as omicron and capital Alpha.
@@ -64,6 +65,7 @@ def latex_number(value: fmpq) -> str:
     return f"-{size}" if value < 0 else size
 
 
+@latex_form.register
 def latex_polynomial(polynomial: fmpq_mpoly) -> str:
     r"""A polynomial over Q as LaTeX, exact: its terms by increasing powers of eps, else in the order of its ring.
 
@@ -84,6 +86,7 @@ def latex_polynomial(polynomial: fmpq_mpoly) -> str:
     return text or "0"
 
 
+@latex_form.register
 def latex_rational_function(function: RationalFunction) -> str:
     r"""A quotient of polynomials over Q as LaTeX, exact, without fractions inside the fraction.
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from kahanmaps import markup
+from kahanmaps.display import markup
+from kahanmaps.displayed import html_form
 from kahanmaps.experiments.database import StoreError
-
-if TYPE_CHECKING:
-    from kahanmaps.experiments.store import ExperimentStatus, Store
-    from kahanmaps.experiments.summary import Summary, Table
+from kahanmaps.experiments.store import ExperimentStatus, Store
+from kahanmaps.experiments.summary import Summary, Table
 
 _ROWS = 40
 
 
+@html_form.register
 def store_html(store: Store) -> str:
     """How far each experiment has come."""
     try:
@@ -42,6 +41,7 @@ def status_table(status: Sequence[ExperimentStatus]) -> str:
     return markup.table(["experiment", "tasks", "missing", "outcomes", "verdicts"], rows)
 
 
+@html_form.register
 def summary_html(summary: Summary) -> str:
     """The tables of a summary."""
     return markup.titled("summary", "\n".join(table_html(table, _ROWS) for table in summary.tables(6)))
@@ -52,3 +52,15 @@ def table_html(table: Table, most: int | None = None) -> str:
     rows = [[markup.escape(cell) for cell in row] for row in table.rows[:most]]
     more = len(table.rows) - len(rows)
     return markup.table(table.columns, rows, table.title) + (f"\n<p>… and {more} more rows</p>" if more else "")
+
+
+def summary_markdown(summary: Summary) -> str:
+    """A summary as tables for a Markdown file."""
+    return "\n".join(table_markdown(table) for table in summary.tables(6))
+
+
+def table_markdown(table: Table) -> str:
+    """One table for a Markdown file."""
+    rule = ["---"] * table.words + ["---:"] * (len(table.columns) - table.words)
+    rows = (table.columns, rule, *table.rows)
+    return "".join("| " + " | ".join(map(markup.markdown, row)) + " |\n" for row in rows)

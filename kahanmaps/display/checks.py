@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from kahanmaps import markup
+from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.display import markup
+from kahanmaps.displayed import html_form
 from kahanmaps.errors import counted
-from kahanmaps.maps.shown import eps_words
-
-if TYPE_CHECKING:
-    from kahanmaps.checks.claims import Evidence, Finding, Report, Witness
 
 _CLAIMS = 30  # in a notebook
 _TEXT = 400
@@ -31,11 +28,10 @@ class Room:
 NOTEBOOK = Room(_TEXT, 1_200, 60, 8)
 
 
-class ShownAsWord:
-    """For an Enum, whose body may not have a method with such a name."""
-
-    def _repr_html_(self) -> str:
-        return markup.verdict(self)
+@html_form.register
+def word_html(verdict: Verdict) -> str:
+    """The word with its mark."""
+    return markup.verdict(verdict)
 
 
 def verdict_html(finding: Finding) -> str:
@@ -48,6 +44,7 @@ def verdict_html(finding: Finding) -> str:
     return word if finding.applies else f"{word} (does not count here)"
 
 
+@html_form.register
 def finding_html(finding: Finding) -> str:
     """A claim with its verdict, the evidence and the witness."""
     rows = [("verdict", verdict_html(finding)), *evidence_rows(finding)]
@@ -102,9 +99,9 @@ def eps_sentence(report: Report) -> str:
     if "eps" not in context:
         return ""
     if context["eps"] == "every":
-        return eps_words()
+        return markup.eps_words()
     second = f", second map at eps2 = {markup.shortened(context['eps2'])}" if "eps2" in context else ""
-    return eps_words(context["eps"], context["time_step"]) + second
+    return markup.eps_words(context["eps"], context["time_step"]) + second
 
 
 def ending_sentence(report: Report) -> str:
@@ -121,6 +118,7 @@ def systems_sentence(report: Report) -> str:
     return ", ".join(str(report.context[key]) for key in ("system", "other") if key in report.context)
 
 
+@html_form.register
 def report_html(report: Report) -> str:
     """The findings of a check as a table; of many claims the number in each section, and those that are not proved."""
     title = f"{report.check}: {systems_sentence(report)}"

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from flint import fmpq
 
-from kahanmaps import markup
-from kahanmaps.algebra.latex import latex_aligned, latex_name, latex_number
-
-if TYPE_CHECKING:
-    from kahanmaps.maps.kahan import KahanMap
-    from kahanmaps.maps.orbits import Orbit, OrbitPoint
-    from kahanmaps.maps.periods import OrbitPeriod
-    from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.display import markup
+from kahanmaps.display.latex import latex_aligned, latex_name, latex_number
+from kahanmaps.displayed import html_form, latex_form
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.orbits import Orbit, OrbitPoint
+from kahanmaps.maps.periods import OrbitPeriod
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 _EQUATIONS = 8
 _TERMS = 12
@@ -21,17 +18,7 @@ _COORDINATES = 8
 _LARGEST_SHOWN = 2_000  # digits: the text of a longer number is not even made
 
 
-def eps_words(eps: object = None, step: object = None) -> str:
-    """For which eps something is said, with the time step, as text; None is every eps.
-
-    >>> eps_words(), eps_words("1/10", "1/5")
-    ('every eps (the time step is 2 eps)', 'eps = 1/10 (time step 2 eps = 1/5)')
-    """
-    if eps is None:
-        return "every eps (the time step is 2 eps)"
-    return f"eps = {markup.shortened(eps)} (time step 2 eps = {markup.shortened(step)})"
-
-
+@latex_form.register
 def map_latex(kahan: KahanMap) -> str:
     """The equation that defines the map, for its system and its eps."""
     system, field = kahan.system, kahan.field
@@ -89,6 +76,7 @@ def _plain(text: object) -> str:
     return str(text).replace("_", r"\_")
 
 
+@html_form.register
 def orbit_html(orbit: Orbit) -> str:
     """The first points and the last one that were computed, and how the orbit ended."""
     variables = orbit.map.system.variables
@@ -125,6 +113,7 @@ def _beginning_and_end(number: str) -> str:
     return number if len(number) <= 24 else f"{number[:10]}…{number[-10:]}"
 
 
+@html_form.register
 def period_html(found: OrbitPeriod) -> str:
     """The period, and that of every plane."""
     sentence, *planes = found.text.split("\n")

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 from flint import fmpq
 
-from kahanmaps import markup
-from kahanmaps.algebra.mathml import formula
 from kahanmaps.algebra.text import format_number
-from kahanmaps.maps.shown import eps_words
-from kahanmaps.systems.shown import CHARACTERS, equations_html
-
-if TYPE_CHECKING:
-    from kahanmaps.laboratory.analysis import Analysis
-    from kahanmaps.laboratory.commuting import CommutingSystems
-    from kahanmaps.laboratory.cycles import Census
-    from kahanmaps.laboratory.darboux import DarbouxSearch
-    from kahanmaps.laboratory.degrees import DegreeGrowth
-    from kahanmaps.laboratory.densities import DensitySearch
-    from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures
-    from kahanmaps.laboratory.height_survey import HeightSurvey
-    from kahanmaps.laboratory.integrals import IntegralSearch
-    from kahanmaps.laboratory.singularities import SingularityRun
-    from kahanmaps.laboratory.symmetries import Symmetries
-    from kahanmaps.systems.files import SystemFile
+from kahanmaps.display import markup
+from kahanmaps.display.mathml import formula
+from kahanmaps.display.systems import CHARACTERS, equations_html
+from kahanmaps.displayed import html_form
+from kahanmaps.laboratory.analysis import Analysis
+from kahanmaps.laboratory.commuting import CommutingSystems
+from kahanmaps.laboratory.cycles import Census
+from kahanmaps.laboratory.darboux import DarbouxSearch
+from kahanmaps.laboratory.degrees import DegreeGrowth
+from kahanmaps.laboratory.densities import DensitySearch
+from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures
+from kahanmaps.laboratory.height_survey import HeightSurvey
+from kahanmaps.laboratory.integrals import IntegralSearch
+from kahanmaps.laboratory.singularities import SingularityRun
+from kahanmaps.laboratory.symmetries import Symmetries
+from kahanmaps.systems.files import SystemFile
 
 _ROWS = 20
 _FORMULAS = 5  # rows of which each has several formulas
@@ -36,9 +33,10 @@ Row = tuple[str, str]
 
 def eps_sentence(eps: fmpq | None) -> str:
     """For which eps a result is, with the time step: a phrase."""
-    return eps_words() if eps is None else eps_words(format_number(eps), format_number(2 * eps))
+    return markup.eps_words() if eps is None else markup.eps_words(format_number(eps), format_number(2 * eps))
 
 
+@html_form.register
 def analysis_html(found: Analysis) -> str:
     """The verdict first, then the statements."""
     final = found.conclusion
@@ -53,6 +51,7 @@ def analysis_html(found: Analysis) -> str:
     return markup.titled(_name(found.file), "\n".join(inside), f"dimension {found.dim}, {eps_sentence(found.eps)}")
 
 
+@html_form.register
 def integrals_html(search: IntegralSearch) -> str:
     """The integrals with their verdicts, and how many there should be."""
     rows = [
@@ -67,6 +66,7 @@ def integrals_html(search: IntegralSearch) -> str:
     )
 
 
+@html_form.register
 def densities_html(search: DensitySearch) -> str:
     """The densities phi with dx/phi invariant."""
     rows = [
@@ -78,6 +78,7 @@ def densities_html(search: DensitySearch) -> str:
     return markup.titled(f"densities of {_name(search.file)}", inside + notes, more)
 
 
+@html_form.register
 def darboux_html(search: DarbouxSearch) -> str:
     """The spaces of Darboux polynomials by cofactor."""
     rows = [
@@ -94,6 +95,7 @@ def darboux_html(search: DarbouxSearch) -> str:
     return markup.titled(f"Darboux polynomials of {_name(search.file)}", inside + notes, more)
 
 
+@html_form.register
 def degrees_html(found: DegreeGrowth) -> str:
     """The degrees of the iterates, and what they say."""
     lines = [line.split("\t", 1) for line in found.text.split("\n")]
@@ -101,6 +103,7 @@ def degrees_html(found: DegreeGrowth) -> str:
     return markup.titled("degrees of the iterates", markup.definitions(rows), "measured, " + eps_sentence(found.eps))
 
 
+@html_form.register
 def heights_html(survey: HeightSurvey) -> str:
     """The kind of growth of each orbit."""
     rows = [
@@ -117,6 +120,7 @@ def heights_html(survey: HeightSurvey) -> str:
     return markup.titled("heights of exact orbits", f"<p>{_text(survey.text)}</p>\n{inside}", "the time step is 2 eps")
 
 
+@html_form.register
 def singularities_html(run: SingularityRun) -> str:
     """Each contracted hypersurface and its fate."""
     rows = [
@@ -133,6 +137,7 @@ def singularities_html(run: SingularityRun) -> str:
     return markup.titled(f"singularities: {run.text}", inside, eps_sentence(run.eps))
 
 
+@html_form.register
 def symmetries_html(found: Symmetries) -> str:
     """Symmetries and reversing symmetries."""
     rows: list[Row] = [("infinitesimal", _text(f"({', '.join(one.rhs)})")) for one in found.infinitesimal[:_ROWS]]
@@ -150,6 +155,7 @@ def _symmetry_row(reversing: bool, text: str) -> Row:
     return ("reversing" if reversing else "symmetry", _text(text))
 
 
+@html_form.register
 def commuting_html(found: CommutingSystems) -> str:
     """The systems whose Kahan maps commute."""
     rows = [
@@ -174,6 +180,7 @@ def commuting_html(found: CommutingSystems) -> str:
     return markup.titled("systems x' = g(x) whose Kahan maps commute", inside + notes, f"{found.shape} g, every eps")
 
 
+@html_form.register
 def census_html(census: Census) -> str:
     """The counts of points and cycles."""
     kind = "all points" if census.complete else "random points"
@@ -188,6 +195,7 @@ def census_html(census: Census) -> str:
     return markup.titled(title, markup.definitions(rows), eps_sentence(census.eps))
 
 
+@html_form.register
 def structures_html(found: ConstantStructures) -> str:
     """The Hamiltonian form, or why there is none."""
     if found.hamiltonian is None:

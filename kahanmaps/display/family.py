@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from kahanmaps import markup
-from kahanmaps.algebra.mathml import formula, matrix
 from kahanmaps.algebra.text import format_number
-from kahanmaps.systems.shown import CHARACTERS, equations_html
-
-if TYPE_CHECKING:
-    from kahanmaps.family.associated import AssociatedSystem, FamilyMember
-    from kahanmaps.family.planar import NormalForm
+from kahanmaps.display import markup
+from kahanmaps.display.mathml import formula, matrix
+from kahanmaps.display.systems import CHARACTERS, equations_html
+from kahanmaps.displayed import html_form
+from kahanmaps.family.associated import AssociatedSystem, FamilyMember
+from kahanmaps.family.planar import NormalForm
 
 _TEXT = 200
 
 
+@html_form.register
 def member_html(member: FamilyMember) -> str:
     """A member: A, H, chi, the associated system that its signs pick."""
     factors = " ".join(
@@ -31,6 +29,7 @@ def member_html(member: FamilyMember) -> str:
     return markup.titled(f"member of the commuting family, m = {member.m}", markup.definitions(rows))
 
 
+@html_form.register
 def associated_html(found: AssociatedSystem) -> str:
     """An associated system: its signs, K, B and the equations."""
     powers = [
@@ -46,6 +45,7 @@ def associated_html(found: AssociatedSystem) -> str:
     return markup.titled(f"associated system {found.label}", markup.definitions(rows))
 
 
+@html_form.register
 def normal_form_html(form: NormalForm) -> str:
     """A normal form: chi, h, D and the planes over Q."""
     rows = [

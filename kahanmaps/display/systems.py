@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from kahanmaps import markup
-from kahanmaps.algebra.latex import latex_aligned, latex_cut, latex_name, latex_number
-from kahanmaps.algebra.mathml import equations, formula, matrix
 from kahanmaps.algebra.text import format_number
-
-if TYPE_CHECKING:
-    from kahanmaps.systems.files import SystemFile
-    from kahanmaps.systems.hamiltonian import CubicHamiltonian
-    from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.display import markup
+from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_number
+from kahanmaps.display.mathml import equations, formula, matrix
+from kahanmaps.displayed import html_form, latex_form
+from kahanmaps.systems.files import SystemFile
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 CHARACTERS = 300  # of one formula, about
 _EQUATIONS = 12
 _LARGEST_J = 8
 
 
+@latex_form.register
 def system_latex(system: QuadraticSystem) -> str:
     """The equations x' = f(x), for a notebook."""
     names = [rf"\dot{{{latex_name(name)}}}" for name in system.variables]
@@ -27,6 +25,7 @@ def system_latex(system: QuadraticSystem) -> str:
     return latex_aligned(rows, _EQUATIONS)
 
 
+@latex_form.register
 def hamiltonian_latex(hamiltonian: CubicHamiltonian) -> str:
     """H, and the equations x' = J grad H, for a notebook."""
     return latex_aligned(
@@ -50,6 +49,7 @@ def equations_html(system: QuadraticSystem, characters: int | None = CHARACTERS,
     return shown if system.dim <= most else f"{shown}<br/>\n… ({system.dim} equations)"
 
 
+@html_form.register
 def file_html(file: SystemFile) -> str:
     """A system file: its equations, parameters and claims."""
     rows = [("equations", equations_html(file.system))]

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
-from kahanmaps.algebra.latex import GREEK_NAMES
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
 from kahanmaps.algebra.reading import factors_of, first_terms, reading_order
 from kahanmaps.algebra.text import format_number
+from kahanmaps.display.latex import GREEK_NAMES
+from kahanmaps.display.markup import escape
 from kahanmaps.errors import InputError, counted
-from kahanmaps.markup import escape
 
 _GREEK = dict(zip(GREEK_NAMES.split("|"), "αβγδϵζηθικλμνξπρστυϕχψωΓΔΘΛΞΠΣΥΦΨΩ", strict=True), eps="ε")
 _WITH_INDEX = re.compile(r"([A-Za-z]+)([0-9]*)")
