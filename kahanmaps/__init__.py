@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from kahanmaps.checks.preserve import check_measure, check_poisson
     from kahanmaps.checks.settings import Settings
     from kahanmaps.display.latex import latex_polynomial, latex_rational_function
+    from kahanmaps.documents.catalog import load, names
+    from kahanmaps.documents.files import SystemFile, parse_system, read_system
     from kahanmaps.errors import InputError, KahanmapsError, SingularStep, SystemFileError
     from kahanmaps.experiments.records import Record, Task
     from kahanmaps.experiments.run import run
@@ -70,8 +72,6 @@ if TYPE_CHECKING:
     from kahanmaps.paper.examiner import VerifyOptions
     from kahanmaps.paper.verify import verify, verify_universal
     from kahanmaps.reports.report import report_html, write_report
-    from kahanmaps.systems.catalog import load, names
-    from kahanmaps.systems.files import SystemFile, parse_system, read_system
     from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
     from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -82,8 +82,8 @@ _HOME = {
     "display.latex": ("latex_polynomial", "latex_rational_function"),
     "systems.quadratic": ("QuadraticSystem",),
     "systems.hamiltonian": ("CubicHamiltonian", "standard_structure"),
-    "systems.files": ("SystemFile", "parse_system", "read_system"),
-    "systems.catalog": ("load", "names"),
+    "documents.files": ("SystemFile", "parse_system", "read_system"),
+    "documents.catalog": ("load", "names"),
     "family.associated": ("AssociatedSystem", "FamilyMember"),
     "family.cubics": ("cubic_space",),
     "family.draw": ("draw_generic", "draw_with_chi", "draw_with_eigenvalues"),

@@ -21,9 +21,9 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
 from kahanmaps.checks.claims import Finding, Report, Verdict, Witness
 from kahanmaps.checks.settings import Settings
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import cubic_space
-from kahanmaps.systems.files import SystemFile, parse_system
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

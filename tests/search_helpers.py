@@ -16,10 +16,10 @@ from typing import Any
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks.settings import random_starts
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import SingularStep
 from kahanmaps.laboratory.modular_points import ModularMap, rank
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import SystemFile, parse_system
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PRIME = 2**61 - 1

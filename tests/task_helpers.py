@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.experiments.recipes import recipe_of, system_from
 from kahanmaps.experiments.records import canonical
 from kahanmaps.experiments.registry import task_kind
-from kahanmaps.systems.files import SystemFile
 
 
 def made(file: SystemFile) -> SystemFile:

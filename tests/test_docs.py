@@ -22,8 +22,8 @@ from kahanmaps_docs import docstrings, expanded, part, reference  # noqa: E402
 from kahanmaps_docs.links import outside_code  # noqa: E402
 
 import kahanmaps  # noqa: E402
+from kahanmaps.documents.catalog import names  # noqa: E402
 from kahanmaps.sources import SOURCES  # noqa: E402
-from kahanmaps.systems.catalog import names  # noqa: E402
 from kahanmaps_cli.main import COMMANDS  # noqa: E402
 from kahanmaps_cli.schema_files import schema_titles  # noqa: E402
 

@@ -1,4 +1,4 @@
-"""The floors of the house: imports point down, never up, and loading a file loads nothing heavy.
+"""The floors of the house: imports point down, never up and never in circles, and loading a file loads nothing heavy.
 
 `violations` reads one file without running it, so an import inside a function counts for the floors too. Heavy
 packages may be imported inside functions, where they cost only those who call them.
@@ -8,32 +8,20 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 
-FLOORS = {
-    "errors": 0,
-    "sources": 0,
-    "version": 0,
-    "markup": 0,
-    "whole_files": 0,
-    "algebra": 1,
-    "systems": 2,
-    "family": 2,
-    "maps": 3,
-    "invariants": 4,
-    "languages": 4,
-    "checks": 5,
-    "paper": 5,
-    "laboratory": 5,
-    "experiments": 6,
-    "plots": 7,
-    "reports": 7,
-}
-CLI_FLOOR = 8
+# From the ground up, one folder or file of kahanmaps/ a floor.
+FLOORS = [
+    *("errors", "version", "sources", "displayed", "whole_files"),
+    *("algebra", "systems", "family", "documents", "maps", "invariants"),
+    *("checks", "paper", "laboratory", "experiments"),
+    *("display", "languages", "plots", "reports"),
+]
 
 NEVER_IN_THE_LIBRARY = {"click", "rich", "kahanmaps_cli"}
 NEVER_WHILE_LOADING = {"matplotlib", "numba", "distributed"}
@@ -84,8 +72,8 @@ def _off_floor(importer: list[str], target: list[str]) -> list[str]:
         return []
     if len(target) == 1 or target[1] not in FLOORS:
         return [f"imports {'.'.join(target)}, which stands above all floors: import the module that defines it"]
-    if FLOORS[target[1]] > FLOORS[importer[1]]:
-        return [f"{importer[1]} [{FLOORS[importer[1]]}] imports {target[1]} [{FLOORS[target[1]]}], a floor above"]
+    if FLOORS.index(target[1]) > FLOORS.index(importer[1]):
+        return [f"{importer[1]} imports {target[1]}, a floor above"]
     return []
 
 
@@ -129,17 +117,51 @@ def test_every_file_imports_its_own_floor_and_those_below():
     assert not found, "\n" + "\n".join(found)
 
 
+def circle(files: dict[str, str]) -> list[str]:
+    """Modules of kahanmaps that import each other in a circle, [] where there is none; `files` has path and source.
+
+    Imports inside functions and those for types alone count: who reads the one file has to read the other.
+    """
+    modules = {path.removesuffix(".py").removesuffix("/__init__").replace("/", "."): path for path in files}
+    graph = {}
+    for module, path in modules.items():
+        package = path.split("/")[:-1]
+        named = {target for _, target in _imports(ast.parse(files[path]).body, package)}
+        named |= {target.rpartition(".")[0] for target in named if target not in modules}
+        graph[module] = named & modules.keys() - {"kahanmaps", module}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_no_files_import_each_other_in_a_circle():
+    library = (path for path in python_files() if path.is_relative_to(ROOT / "kahanmaps"))
+    assert circle({path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in library}) == []
+
+
+@pytest.mark.parametrize(
+    "back",
+    ["from kahanmaps.a.two import f", "from .two import f", "def g():\n    from kahanmaps.a import two"],
+)
+def test_a_circle_is_found_whatever_hides_it(back):
+    files = {"kahanmaps/a/one.py": back, "kahanmaps/a/two.py": "if TYPE_CHECKING:\n    from kahanmaps.a.one import g"}
+    assert set(circle(files)) == {"kahanmaps.a.one", "kahanmaps.a.two"}
+    assert circle(files | {"kahanmaps/a/two.py": "from kahanmaps import three"}) == []
+
+
 MAPS = "kahanmaps/maps/kahan.py"
 
 WRONG = [
-    ("kahanmaps/algebra/fields.py", "from kahanmaps.maps.kahan import step", "maps [3], a floor above"),
-    ("kahanmaps/algebra/fields.py", "from kahanmaps import maps", "maps [3], a floor above"),
-    ("kahanmaps/algebra/fields.py", "import kahanmaps.systems.files as f", "systems [2], a floor above"),
-    ("kahanmaps/errors.py", "from .algebra import fields", "algebra [1], a floor above"),
-    (MAPS, "from ..checks.claims import Claim", "checks [5], a floor above"),
-    ("kahanmaps/maps/__init__.py", "from ..checks import claims", "checks [5], a floor above"),
-    (MAPS, "def f():\n    from kahanmaps.plots import draw", "plots [7], a floor above"),
-    (MAPS, "if TYPE_CHECKING:\n    from kahanmaps.checks import Claim", "checks [5], a floor above"),
+    ("kahanmaps/algebra/fields.py", "from kahanmaps.maps.kahan import step", "imports maps, a floor above"),
+    ("kahanmaps/algebra/fields.py", "from kahanmaps import maps", "imports maps, a floor above"),
+    ("kahanmaps/algebra/fields.py", "import kahanmaps.documents.files as f", "imports documents, a floor above"),
+    ("kahanmaps/errors.py", "from .algebra import fields", "imports algebra, a floor above"),
+    (MAPS, "from ..checks.claims import Claim", "imports checks, a floor above"),
+    ("kahanmaps/maps/__init__.py", "from ..checks import claims", "imports checks, a floor above"),
+    (MAPS, "def f():\n    from kahanmaps.plots import draw", "imports plots, a floor above"),
+    (MAPS, "if TYPE_CHECKING:\n    from kahanmaps.checks import Claim", "imports checks, a floor above"),
     (MAPS, "from kahanmaps import QuadraticSystem", "above all floors"),
     (MAPS, "import kahanmaps", "above all floors"),
     ("kahanmaps/helpers.py", "from kahanmaps import errors", "has no floor"),
@@ -173,7 +195,8 @@ RIGHT = [
     (MAPS, "from kahanmaps import errors, sources"),
     (MAPS, "def f():\n    import numpy"),
     (MAPS, "if TYPE_CHECKING:\n    import numpy"),
-    ("kahanmaps/systems/catalog/__init__.py", "from ...family import cubics"),
+    ("kahanmaps/documents/catalog/__init__.py", "from ...family import cubics"),
+    ("kahanmaps/maps/orbits.py", "from kahanmaps.displayed import Displayed"),
     ("kahanmaps/family/planar.py", "from kahanmaps.systems.quadratic import QuadraticSystem"),
     ("kahanmaps/experiments/store.py", "from kahanmaps import __version__"),
     ("kahanmaps/maps/fast.py", "import numpy as np"),

@@ -90,7 +90,7 @@ def toml_files(incomplete: str) -> list[str]:
 
 
 def _catalogue_names(incomplete: str) -> list[str]:
-    from kahanmaps.systems.catalog import names
+    from kahanmaps.documents.catalog import names
 
     return [name for name in names() if name.startswith(incomplete)]
 
@@ -102,7 +102,7 @@ def _parameters(context: click.Context) -> list[str]:
     reference = str(named)
     path = Path(reference).expanduser()
     if reference in _catalogue_names(""):
-        from kahanmaps.systems import catalog
+        from kahanmaps.documents import catalog
 
         path = Path(catalog.__file__).with_name(f"{reference}.toml")
     if not path.is_file() or path.stat().st_size > _MAX_BYTES:

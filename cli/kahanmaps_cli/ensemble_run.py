@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kahanmaps.algebra.polynomials import RationalFunction
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.family.planar import NormalForm
     from kahanmaps.family.structure import NoStructure, Structure
-    from kahanmaps.systems.files import SystemFile
 
 FAILURES_SHOWN = 20
 _WORTH_COMPILING = 5_000_000  # orbits times steps, below which numpy is done before compiled code is loaded

@@ -113,7 +113,7 @@ class LazyGroup(SuggestingGroup):
         return with_colour_option(with_short_integers(command))
 
     def hint(self, written: str, known: list[str]) -> str:
-        from kahanmaps.systems.catalog import names
+        from kahanmaps.documents.catalog import names
 
         if written in names() or written.endswith(".toml"):
             return f" To see what the map of {written} preserves: {as_typed(['kahanmaps', 'analyze', written])}"

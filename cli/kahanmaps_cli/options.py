@@ -16,7 +16,7 @@ from kahanmaps_cli.params import ExactNumber, NameValue, PointText, Seconds, Who
 
 if TYPE_CHECKING:
     from kahanmaps.checks.settings import Settings
-    from kahanmaps.systems.files import SystemFile
+    from kahanmaps.documents.files import SystemFile
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -196,8 +196,8 @@ def load_system(
     reference: str | None, variables: str | None, rhs: Sequence[str], parameters: Sequence[tuple[str, str]]
 ) -> SystemFile:
     """The system that a command line names: a path, a catalogue name, `-` for standard input, or an inline system."""
+    from kahanmaps.documents.files import MAX_FILE_BYTES, parse_system
     from kahanmaps.errors import InputError, reading
-    from kahanmaps.systems.files import MAX_FILE_BYTES, parse_system
 
     given = dict(parameters)
     if len(given) < len(parameters):
@@ -225,8 +225,8 @@ def load_system(
 
 def load_reference(reference: str, parameters: Mapping[str, str]) -> SystemFile:
     """The system of that name or in that file; where there is no such file, those that are named like it are told."""
+    from kahanmaps.documents.catalog import load
     from kahanmaps.errors import InputError
-    from kahanmaps.systems.catalog import load
 
     try:
         return load(reference, parameters)

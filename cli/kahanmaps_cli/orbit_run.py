@@ -10,9 +10,9 @@ import click
 
 if TYPE_CHECKING:
     from kahanmaps.algebra.polynomials import RationalFunction
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.family.structure import NoStructure, Structure
     from kahanmaps.maps.orbits import OrbitEnd
-    from kahanmaps.systems.files import SystemFile
 
 Column = tuple[str, Callable[[Sequence[Any]], str | None]]
 Point = tuple[int, "list[str] | None", "list[str | None]"]

@@ -21,8 +21,8 @@ from flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
 from lark import Lark, Token, Transformer
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
+from kahanmaps.algebra.numerals import BLANKS, Limits, is_name, number_in
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import BLANKS, Limits, is_name, number_in
 from kahanmaps.errors import ExpressionError, quoted
 
 # Signs below powers, so that -x^2 is -(x^2); powers from the right, so that 2^3^2 is 2^9.

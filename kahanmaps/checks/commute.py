@@ -15,11 +15,11 @@ from kahanmaps.checks.claims import Evidence, Finding, Report
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import OrbitRun, Settings, run_orbit
+from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.invariants.sizes import VARIABLE, eps_size, step_size
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import SystemFile, matched
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

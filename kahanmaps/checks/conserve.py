@@ -18,6 +18,7 @@ from kahanmaps.checks.decide import Identity, Sides, random_prime_field
 from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings, run_orbit
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.invariants.integrals import (
@@ -31,7 +32,6 @@ from kahanmaps.invariants.integrals import (
 from kahanmaps.invariants.phase_functions import PhaseFunction
 from kahanmaps.invariants.sizes import VARIABLE, eps_size, step_size
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 # With more rational factors than this only the K~ with a single minus sign are listed; the others are their

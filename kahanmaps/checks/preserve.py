@@ -13,6 +13,7 @@ from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import Contradiction, judge
 from kahanmaps.checks.settings import Settings, run_orbit
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.measures import (
     ClaimedDensity,
@@ -23,7 +24,6 @@ from kahanmaps.invariants.phase_functions import PhaseFunction
 from kahanmaps.invariants.poisson import jacobi_defects, jacobi_size, transformation_sides, transformation_size
 from kahanmaps.invariants.sizes import VARIABLE, Fraction, determinant_size, eps_size, step_size
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -14,10 +14,10 @@ from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit, OrbitEnd, require_short
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
 

@@ -11,6 +11,7 @@ from kahanmaps.display import markup
 from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import CHARACTERS, equations_html
 from kahanmaps.displayed import html_form
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.commuting import CommutingSystems
 from kahanmaps.laboratory.cycles import Census
@@ -22,7 +23,6 @@ from kahanmaps.laboratory.height_survey import HeightSurvey
 from kahanmaps.laboratory.integrals import IntegralSearch
 from kahanmaps.laboratory.singularities import SingularityRun
 from kahanmaps.laboratory.symmetries import Symmetries
-from kahanmaps.systems.files import SystemFile
 
 _ROWS = 20
 _FORMULAS = 5  # rows of which each has several formulas

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from kahanmaps.algebra.text import format_number
-from kahanmaps.display import markup
 from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_number
-from kahanmaps.display.mathml import equations, formula, matrix
-from kahanmaps.displayed import html_form, latex_form
-from kahanmaps.systems.files import SystemFile
+from kahanmaps.display.mathml import equations
+from kahanmaps.displayed import latex_form
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -47,24 +45,3 @@ def equations_html(system: QuadraticSystem, characters: int | None = CHARACTERS,
     """The equations as HTML, at most `most` of them, each cut after about so many characters."""
     shown = equations(system.variables[:most], system.rhs[:most], characters)
     return shown if system.dim <= most else f"{shown}<br/>\n… ({system.dim} equations)"
-
-
-@html_form.register
-def file_html(file: SystemFile) -> str:
-    """A system file: its equations, parameters and claims."""
-    rows = [("equations", equations_html(file.system))]
-    if file.parameters:
-        values = (f"{name} = {markup.shortened(format_number(v))}" for name, v in list(file.parameters.items())[:20])
-        rows.append(("parameters", markup.escape(", ".join(values))))
-    if file.member is not None:
-        rows.append(("member of the commuting family", matrix(file.member.A, "A")))
-    if file.hamiltonian is not None:
-        rows.append(("Hamiltonian", formula(file.hamiltonian.H, "H", CHARACTERS)))
-    rows += [
-        (f"integral {markup.shortened(name)}".strip(), formula(function, characters=CHARACTERS))
-        for name, function in list(file.integrals.items())[:10]
-    ]
-    if file.density is not None:
-        rows.append(("density (claimed)", formula(file.density, "phi", CHARACTERS)))
-    title = file.catalog.get("title", "")
-    return markup.titled(markup.shortened(file.name), markup.definitions(rows), markup.shortened(str(title), 200))

@@ -10,9 +10,9 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from kahanmaps.algebra.text import format_number
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.registry import Result, task
-from kahanmaps.systems.files import SystemFile
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.cycle_laws import Comparison

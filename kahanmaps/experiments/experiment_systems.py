@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, suggestion
 from kahanmaps.experiments.grid import Values
 from kahanmaps.experiments.options import OTHER, show
@@ -13,7 +14,6 @@ from kahanmaps.experiments.recipes import find_file, recipe_of
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind
 from kahanmaps.experiments.spec_document import ExperimentTable
 from kahanmaps.family.draw import parse_chi
-from kahanmaps.systems.files import SystemFile
 
 FAMILY_WORD = "family"
 _FILES_AT_MOST = 10_000

@@ -16,8 +16,8 @@ from flint import fmpq_poly
 from kahanmaps.algebra.text import format_univariate
 from kahanmaps.checks.claims import Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.experiments.registry import Result, task
-from kahanmaps.systems.files import SystemFile
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis

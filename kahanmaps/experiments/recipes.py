@@ -18,6 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from kahanmaps.algebra.text import format_number
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.document import DocumentReader
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.options import FAMILY, show
 from kahanmaps.experiments.records import canonical, digest
@@ -29,9 +32,6 @@ from kahanmaps.family.draw import (
     parse_chi,
     random_eigenvalues,
 )
-from kahanmaps.systems.catalog import load, names
-from kahanmaps.systems.document import DocumentReader
-from kahanmaps.systems.files import SystemFile
 
 _KEPT = 16  # systems that a child keeps: tasks that differ in eps only come one after the other
 

@@ -22,6 +22,7 @@ from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings, random_starts
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, task
 from kahanmaps.family.cubics import cubic_space
@@ -32,7 +33,6 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.methods import choose_method
 from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitPoint
 from kahanmaps.maps.periods import period_of
-from kahanmaps.systems.files import SystemFile
 
 _WORTH_COMPILING = 5_000_000  # orbits times steps
 _LONGEST_POINT = 400  # characters of a last point that are kept; longer ones are known by their hash

@@ -213,7 +213,7 @@ def height_growth(
     large numbers, which for long orbits is most of the work: three planes take about 0.2 s for 100 steps, 2 s for 200
     and 8 s for 300, but 0.8 s with `every` = 15, which tells nearly as much.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> found = height_growth(KahanMap(load("weierstrass").system, "1/10"), [1, "1/2"], 40)
     >>> found.heights[:6], found.kind, decimal_text(found.constant)
     ((2, 7, 17, 32, 52, 82), <Growth.QUADRATIC: 'quadratic'>, '3.04132')

@@ -10,35 +10,32 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any
-
-from flint import fmpq
 
 from kahanmaps.algebra.text import format_number
 from kahanmaps.displayed import Displayed
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError
-from kahanmaps.family.structure import NoStructure, Structure, structure_of
-from kahanmaps.laboratory.commuting import CommutingSystems, commuting_systems
-from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
-from kahanmaps.laboratory.densities import DensitySearch, find_densities
+from kahanmaps.family.structure import Structure, structure_of
+from kahanmaps.laboratory.commuting import commuting_systems
+from kahanmaps.laboratory.degrees import degree_growth
+from kahanmaps.laboratory.densities import find_densities
+from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
-from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, constant_structures
-from kahanmaps.laboratory.height_survey import HeightSurvey, height_survey
-from kahanmaps.laboratory.integrals import IntegralSearch, find_integrals
+from kahanmaps.laboratory.hamiltonian_structure import constant_structures
+from kahanmaps.laboratory.height_survey import height_survey
+from kahanmaps.laboratory.integrals import find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.report import Conclusion, Statement, conclude, sections
 from kahanmaps.laboratory.singularities import (
     WRITTEN_DIMENSION,
-    SingularityRun,
     can_be_written,
     default_eps,
     patterns_of,
     singularities,
 )
-from kahanmaps.laboratory.sparse_relations import SparseRelation, sparse_relations
-from kahanmaps.laboratory.symmetries import Symmetries, linear_symmetries
-from kahanmaps.systems.files import SystemFile
+from kahanmaps.laboratory.sparse_relations import sparse_relations
+from kahanmaps.laboratory.symmetries import linear_symmetries
 
 # Seconds for everything, by dimension; about half of it is used where nothing is hard.
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
@@ -46,50 +43,8 @@ _MOST_SECONDS = 150.0
 _MAX_DEGREE = 200_000
 
 
-@dataclass
-class Analysis(Displayed):
-    """What `analyze` found: the results of the parts, None for those not reached, and statements about them."""
-
-    file: SystemFile
-    eps: fmpq | None
-    seconds: float
-    seed: int
-    symbols: tuple[str, ...] = ()
-    integrals: IntegralSearch | None = None
-    relations: tuple[SparseRelation, ...] = ()
-    densities: DensitySearch | None = None
-    degrees: DegreeGrowth | None = None
-    heights: HeightSurvey | None = None
-    singularities: list[SingularityRun] = field(default_factory=list)
-    symmetries: Symmetries | None = None
-    commuting: CommutingSystems | None = None
-    structure: Structure | NoStructure | None = None
-    hamiltonian: ConstantStructures | None = None
-    skipped: list[str] = field(default_factory=list)
-    elapsed: float = 0.0
-
-    @property
-    def dim(self) -> int:
-        """The dimension of the system."""
-        return self.file.system.dim
-
-    @property
-    def integral_count(self) -> int:
-        """The number of independent integrals: found, shown by orbits, or given by theorems; see `count_is_exact`."""
-        known = self.integrals.codimension if self.integrals is not None else 0
-        family = self.structure.form.m if isinstance(self.structure, Structure) else 0
-        return max(known, family)
-
-    @property
-    def count_is_exact(self) -> bool:
-        """Whether there are no more than `integral_count` integrals: else it is a lower bound."""
-        return self.integrals is not None and self.integrals.is_exact
-
-    @property
-    def integrals_were_counted(self) -> bool:
-        """Whether `integral_count` says anything: it is 0 as well where the orbits were not reached or not defined."""
-        measured = self.integrals is not None and bool(self.integrals.profile.nullities)
-        return measured or self.integral_count > 0
+class Analysis(Findings, Displayed):
+    """What `analyze` found, and statements about it."""
 
     @property
     def conclusion(self) -> Conclusion:
@@ -177,7 +132,7 @@ def analyze(
     Raises:
         InputError: for eps = 0, unknown symbols, and a time that is not positive.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> found = analyze(load("nahm_tetrahedral"))
     >>> found.conclusion.kind, found.conclusion.integrals, found.conclusion.growth
     ('integrable', 1, 'quadratic')

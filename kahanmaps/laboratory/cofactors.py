@@ -21,6 +21,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
@@ -29,7 +30,6 @@ from kahanmaps.laboratory.modular_points import (
     monomial_values,
     null_space,
 )
-from kahanmaps.systems.parametric import ParametricSystem
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
 
 _SPARE = 8

@@ -6,19 +6,15 @@ What is proved stands. Where two measurements exclude each other, neither is a f
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from kahanmaps.errors import counted
 from kahanmaps.invariants.heights import Growth
+from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.recurrences import GrowthClass
-
-if TYPE_CHECKING:
-    from kahanmaps.laboratory.analysis import Analysis
 
 _POLYNOMIAL = (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
 
 
-def orbits_lie_on_curves(found: Analysis) -> bool:
+def orbits_lie_on_curves(found: Findings) -> bool:
     """Whether dim - 1 independent integrals are proved or supported: then degrees grow quadratically at most.
 
     For the map acts on each of the curves, which have genus 0 or 1 where it has infinite order.
@@ -26,7 +22,7 @@ def orbits_lie_on_curves(found: Analysis) -> bool:
     return found.integrals is not None and len(found.integrals.integrals) >= found.dim - 1 >= 1
 
 
-def contradictions(found: Analysis) -> list[str]:
+def contradictions(found: Findings) -> list[str]:
     """What excludes each other among integrals, closed orbits and degrees: sentences, none where all agree."""
     growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
     period = found.integrals.profile.period if found.integrals is not None else None
@@ -38,7 +34,7 @@ def contradictions(found: Analysis) -> list[str]:
     return said
 
 
-def doubt_of_heights(found: Analysis) -> str:
+def doubt_of_heights(found: Findings) -> str:
     """Why the growth of heights is no finding beside that of the degrees; empty where the two go together."""
     if found.heights is None or found.degrees is None:
         return ""

@@ -19,6 +19,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.displayed import Displayed, latex
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import SingularMatrix, SingularStep
 from kahanmaps.laboratory.cofactors import (
     Cofactor,
@@ -32,7 +33,6 @@ from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, exponents_up_to
 from kahanmaps.maps.kahan import KahanMapOver
-from kahanmaps.systems.files import SystemFile
 
 _BUDGET = 20_000_000
 _MOST_TERMS = 2000  # of a polynomial: as many unknowns
@@ -115,7 +115,7 @@ def darboux_polynomials(
 
     Source: celledoni-2019.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> for space in darboux_polynomials(load("lotka_volterra"), 2).spaces:
     ...     print(space.cofactor, *space.polynomials, space.verdict)
     C[x] x proved

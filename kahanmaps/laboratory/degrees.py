@@ -220,7 +220,7 @@ def degree_growth(
 
     Source: bellon-viallet-1999.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> found = degree_growth(load("euler_top").system)
     >>> found.degrees[:6], str(found.growth), found.recurrence.closed_form
     ((1, 3, 9, 19, 33, 51), 'quadratic', '2*n^2 + 1')

@@ -19,6 +19,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, pri
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import Displayed, latex
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.cofactors import (
     DETERMINANT,
@@ -34,7 +35,6 @@ from kahanmaps.laboratory.identities import density_verdict
 from kahanmaps.laboratory.integrals import closing_note, toml_comment
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.systems.files import SystemFile
 
 _MAX_UNKNOWNS = 1000
 _MAX_DEGREE = 12
@@ -139,7 +139,7 @@ def find_densities(
 
     Source: celledoni-2019.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> found = find_densities(load("lotka_volterra"))
     >>> [(one.text, str(one.verdict)) for one in found.densities]
     [('x*y', 'proved')]

@@ -123,7 +123,7 @@ def height_survey(
     replaced by another.
     Raises InputError for wrong values.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> found = height_survey(load("weierstrass").system, starts=2, steps=40)
     >>> found.kind, found.text
     (<Growth.QUADRATIC: 'quadratic'>, 'quadratic: 4 orbits, 2 values of eps')

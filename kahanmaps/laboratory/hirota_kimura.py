@@ -161,7 +161,7 @@ def orbit_profile(
     Source: petrera-pfadler-suris-2009.
 
     >>> from kahanmaps.laboratory.laboratory import Laboratory
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> profile = orbit_profile(Laboratory(load("euler_top")).maps)
     >>> profile.nullities, profile.codimension
     ((0, 2), 2)
@@ -248,8 +248,8 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
     Source: petrera-pfadler-suris-2009.
 
     >>> from kahanmaps.laboratory.laboratory import Laboratory
-    >>> from kahanmaps.systems.catalog import load
-    >>> from kahanmaps.systems.structured_facts import relation_functions
+    >>> from kahanmaps.documents.catalog import load
+    >>> from kahanmaps.documents.structured_facts import relation_functions
     >>> top, squares = load("euler_top"), ["x1^2", "x2^2", "x3^2", "1"]
     >>> hirota_kimura_basis(Laboratory(top).maps, relation_functions(squares, top.variables), squares).dimension
     2

@@ -22,11 +22,11 @@ from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.decide import decide
 from kahanmaps.checks.preserve import density_identity
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep
 from kahanmaps.invariants.integrals import ClaimedIntegral, integral_condition
 from kahanmaps.invariants.measures import ClaimedDensity, density_condition
 from kahanmaps.maps.kahan import KahanMapOver
-from kahanmaps.systems.parametric import ParametricSystem
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _BUDGET = 60_000_000

@@ -103,7 +103,7 @@ def inherited_integrals(system: QuadraticSystem, *, seed: int = 0) -> InheritedI
     Returns:
         The `InheritedIntegrals`: all affine ones and, up to dimension 30, a basis of the K. Source: cmoq-2013.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> found = inherited_integrals(load("volterra_periodic_3").system)
     >>> found.text, found.hamiltonian(0)
     ('1 affine integral and 1 modified Hamiltonian', x1*x2*x3)

@@ -22,6 +22,8 @@ from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate, ri
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import Displayed, latex
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.branches import Branches, Pattern, tell_apart
 from kahanmaps.laboratory.cofactors import Cofactor
@@ -32,8 +34,6 @@ from kahanmaps.laboratory.inherited import InheritedIntegrals, inherited_integra
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
 from kahanmaps.laboratory.search import AFFINE, Found, classes, may_be_conjugate, repeat, search
-from kahanmaps.systems.files import SystemFile
-from kahanmaps.systems.parametric import ParametricSystem
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
@@ -211,7 +211,7 @@ def find_integrals(
 
     Source: petrera-pfadler-suris-2009, celledoni-2019, cmoq-2013.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> found = find_integrals(load("nahm_tetrahedral"))
     >>> [(one.text, str(one.verdict)) for one in found.integrals], found.codimension
     ([('(3*x^2*y - y^3)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)

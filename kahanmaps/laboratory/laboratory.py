@@ -12,13 +12,13 @@ from flint import fmpq_mpoly
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.closed_forms import ClosedForms, Spaces, closed_forms
 from kahanmaps.laboratory.cofactors import Cofactor, cofactor_of_affine, determinant_factors
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.systems.files import SystemFile
-from kahanmaps.systems.parametric import ParametricSystem
 
 
 class Laboratory:
@@ -27,7 +27,7 @@ class Laboratory:
     With `eps` (exact; the time step is 2 eps) all maps are at that eps. Raises InputError for eps = 0, for eps both a
     number and a symbol, and for symbols that `ParametricSystem.of` refuses.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> laboratory = Laboratory(load("euler_top"), ["a1"])
     >>> len(laboratory.maps), laboratory.eps_enters, laboratory.defect
     (2, 'by weight', '')

@@ -10,9 +10,9 @@ from flint import nmod_mat
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import monomials
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import KahanmapsError, SingularStep
 from kahanmaps.maps.kahan import KahanMapOver
-from kahanmaps.systems.parametric import ParametricSystem
 
 Point = tuple[int, ...]
 _TRIES = 60

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.errors import counted
@@ -11,10 +10,8 @@ from kahanmaps.family.structure import Structure
 from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.commuting import CommutingField
 from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
+from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.recurrences import GrowthClass
-
-if TYPE_CHECKING:
-    from kahanmaps.laboratory.analysis import Analysis
 
 PROVED, SUPPORTED, MEASURED, UNDECIDED, NOTE = "proved", "supported", "measured", "undecided", "note"
 _SHOWN_DEGREES = 12
@@ -42,7 +39,7 @@ class Conclusion:
     sentence: str
 
 
-def conclude(found: Analysis) -> Conclusion:
+def conclude(found: Findings) -> Conclusion:
     """The verdict on what was found."""
     count = found.integral_count
     growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
@@ -95,7 +92,7 @@ def conclude(found: Analysis) -> Conclusion:
     return verdict("undecided", f"The growth is undecided: {phrase}; {integrals}.")
 
 
-def _count_text(found: Analysis) -> str:
+def _count_text(found: Findings) -> str:
     """How many integrals there are; where that is a lower bound, the sentence says so."""
     count, search = found.integral_count, found.integrals
     where = f" in dimension {found.dim}"
@@ -105,14 +102,14 @@ def _count_text(found: Analysis) -> str:
     return number + where if found.count_is_exact else f"at least {number}{where}"
 
 
-def _is_affine(found: Analysis) -> bool:
+def _is_affine(found: Findings) -> bool:
     return all(int(p.total_degree()) <= 1 for p in found.file.system.rhs)
 
 
 # -- the statements -------------------------------------------------------------------------------------------------
 
 
-def sections(found: Analysis) -> list[tuple[str, list[Statement]]]:
+def sections(found: Findings) -> list[tuple[str, list[Statement]]]:
     """Titles with their statements, which may be none."""
     return [
         ("integrals", _integral_lines(found)),
@@ -126,7 +123,7 @@ def sections(found: Analysis) -> list[tuple[str, list[Statement]]]:
     ]
 
 
-def _integral_lines(found: Analysis) -> list[Statement]:
+def _integral_lines(found: Findings) -> list[Statement]:
     search = found.integrals
     if search is None:
         return []
@@ -167,7 +164,7 @@ def _integral_lines(found: Analysis) -> list[Statement]:
     return lines
 
 
-def _measure_lines(found: Analysis) -> list[Statement]:
+def _measure_lines(found: Findings) -> list[Statement]:
     search = found.densities
     if search is None:
         return []
@@ -177,7 +174,7 @@ def _measure_lines(found: Analysis) -> list[Statement]:
     return lines
 
 
-def _growth_lines(found: Analysis) -> list[Statement]:
+def _growth_lines(found: Findings) -> list[Statement]:
     lines = []
     if found.degrees is not None:
         shown = ", ".join(map(str, found.degrees.degrees[1 : _SHOWN_DEGREES + 1]))
@@ -199,7 +196,7 @@ def _growth_lines(found: Analysis) -> list[Statement]:
     return lines
 
 
-def _singularity_lines(found: Analysis) -> list[Statement]:
+def _singularity_lines(found: Findings) -> list[Statement]:
     if not found.singularities:
         return []
     verdicts = {run.verdict for run in found.singularities}
@@ -214,7 +211,7 @@ def _singularity_lines(found: Analysis) -> list[Statement]:
     return lines
 
 
-def _symmetry_lines(found: Analysis) -> list[Statement]:
+def _symmetry_lines(found: Findings) -> list[Statement]:
     search = found.symmetries
     if search is None:
         return []
@@ -230,7 +227,7 @@ def _symmetry_lines(found: Analysis) -> list[Statement]:
     return lines or [Statement(NOTE, "no affine symmetry of the kinds searched, apart from the identity")]
 
 
-def _structure_lines(found: Analysis) -> list[Statement]:
+def _structure_lines(found: Findings) -> list[Statement]:
     lines = []
     structures = found.hamiltonian
     if structures is not None and structures.hamiltonian is not None:
@@ -256,7 +253,7 @@ def _structure_lines(found: Analysis) -> list[Statement]:
     return lines
 
 
-def _commuting_lines(found: Analysis) -> list[Statement]:
+def _commuting_lines(found: Findings) -> list[Statement]:
     search = found.commuting
     if search is None:
         return []

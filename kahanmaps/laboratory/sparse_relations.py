@@ -66,7 +66,7 @@ def sparse_relations(
     Source: petrera-pfadler-suris-2009.
 
     >>> from kahanmaps.laboratory.laboratory import Laboratory
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> top = load("euler_top")
     >>> [one.text for one in sparse_relations(Laboratory(top).maps, 2, top.variables)]
     ['x1^2 + c1*x3^2 + c2 = 0', 'x2^2 + c3*x3^2 + c4 = 0']

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from kahanmaps.algebra.text import is_name
+from kahanmaps.algebra.numerals import is_name
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.languages.formulas import Formulas, check_parts
 from kahanmaps.languages.julia import JULIA
@@ -16,7 +17,6 @@ from kahanmaps.languages.pari import PARI
 from kahanmaps.languages.sage import SAGE
 from kahanmaps.languages.sympy import SYMPY
 from kahanmaps.languages.writer import PARTS, write
-from kahanmaps.systems.files import SystemFile
 
 _TABLES: dict[str, Language] = {table.key: table for table in (SYMPY, PARI, MAPLE, MATHEMATICA, SAGE, JULIA)}
 LANGUAGES = ("latex", *_TABLES)
@@ -49,7 +49,7 @@ def convert(
         InputError: for an unknown language or part, a name that is none, integrals or a density where none is known,
             and a closed form ("map-formulas") that is too large.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> print(convert(load("harmonic"), "pari", ["system"]).split("\\n\\n")[1].strip())
     \\\\ x' = f(x)
     {vector_field(point) =

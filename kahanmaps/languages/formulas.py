@@ -15,9 +15,9 @@ from flint import fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import InputError
-from kahanmaps.systems.files import SystemFile
-from kahanmaps.systems.parametric import ParametricSystem
 
 # The closed form of the map, all components together, before common factors are removed.
 MAX_TERMS = 4_000
@@ -108,7 +108,7 @@ class Formulas:
         Raises InputError where they are too large, which is found out on the way: in a second, unless numbers are long.
 
         >>> from kahanmaps.algebra.text import format_rational_function
-        >>> from kahanmaps.systems.catalog import load
+        >>> from kahanmaps.documents.catalog import load
         >>> [format_rational_function(component) for component in Formulas.of(load("harmonic")).closed_form()]
         ['(-x*eps^2 + 2*y*eps + x)/(eps^2 + 1)', '(-y*eps^2 - 2*x*eps + y)/(eps^2 + 1)']
         """

@@ -32,6 +32,7 @@ from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.decide import random_prime_field
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import CONVENTION, Settings
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.planar import normal_form
@@ -44,7 +45,6 @@ from kahanmaps.paper.examiner import Examiner, VerifyOptions
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.proofs import PROOF_BUDGET, normal_form_proof
 from kahanmaps.paper.registry import Claim, Kind
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.version import __version__
 
 MAX_M = 8

@@ -87,7 +87,7 @@ def survey_drift(
     function has no value at the start.
 
     >>> from kahanmaps.plots.drift_functions import known_functions
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> top = load("euler_top")
     >>> found = survey_drift(top.system, "1/10", [1, "1/2", "1/3"], 1000, known_functions(top, fmpq(1, 10)))
     >>> [f"{curve.errors.max():.0e}" for curve in found.curves if curve.function == "F1"][1:]

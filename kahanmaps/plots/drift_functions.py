@@ -10,8 +10,10 @@ import numpy as np
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.numerals import is_name
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.algebra.text import format_polynomial, is_name, parse_rational_function
+from kahanmaps.algebra.text import format_polynomial, parse_rational_function
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
 from kahanmaps.invariants.phase_functions import PhaseFunction
@@ -19,7 +21,6 @@ from kahanmaps.maps.float_ensemble import FloatEnsemble
 from kahanmaps.maps.float_numbers import FloatArray, to_float, to_floats
 from kahanmaps.plots.figures import label_of, plain
 from kahanmaps.plots.point_functions import PointFunction
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
 _LONGEST = 30
@@ -120,7 +121,7 @@ def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
     The integrals that the file claims; the modified H of a cubic Hamiltonian; for a member of the family the integrals
     of the commutant; and last the plain H, which the Kahan map does not conserve. `eps` is exact, half the time step.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> list(functions_of(load("paper_m2"), fmpq(1, 9)))
     ['I1', 'I2', 'modified H', 'H~_1', 'H']
     """

@@ -40,7 +40,7 @@ def draw_degrees(
     Raises InputError for no system or more than 7, and for a scale of another name.
 
     >>> from kahanmaps.laboratory.degrees import degree_growth
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> figure = draw_degrees({"Euler top": degree_growth(load("euler_top").system)})
     >>> figure.legends[0].get_texts()[0].get_text()
     'Euler top: $d_n = 2n^{2} + 1$, $\\\\lambda = 1$'

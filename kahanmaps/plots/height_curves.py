@@ -41,7 +41,7 @@ def height_curves(survey: HeightSurvey) -> tuple[HeightCurve, ...]:
     """The orbits of a survey as curves, every height of them.
 
     >>> from kahanmaps.laboratory.height_survey import height_survey
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> [curve] = height_curves(height_survey(load("weierstrass").system, "1/10", starts=[[1, "1/2"]], steps=40))
     >>> curve.bits[:6].tolist(), str(curve.kind), round(curve.constant, 4)
     ([2.0, 7.0, 17.0, 32.0, 52.0, 82.0], 'quadratic', 3.0413)

@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import RR, rational
 from kahanmaps.algebra.text import format_number
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.structure import NoStructure, structure_of
 from kahanmaps.maps.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.splitting import Splitting
 from kahanmaps.plots.plane_cubics import PlaneCubic
 from kahanmaps.plots.symmetric_planes import COMPLEX, Matrix, inverse, symmetric_coordinates, transformed
-from kahanmaps.systems.files import SystemFile
 
 MAX_POINTS = 1_000_000
 MAX_STARTS = 7  # as many colours as there are
@@ -104,7 +104,7 @@ def find_invariant_curves(
     member of the family is taken where an A is found for its Hamiltonian. Raises HypothesisError where there is no
     normal form: no member, or chi has a repeated root; InputError for wrong sizes.
 
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> found = find_invariant_curves(load("paper_m2"), [[1, 0, "1/2", 0]], "1/20", 100)
     >>> [plane.root_text for plane in found.planes], found.poles
     (['1', '2'], (None,))

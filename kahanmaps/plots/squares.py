@@ -13,10 +13,10 @@ from typing import Any
 from flint import arb, fmpq
 
 from kahanmaps.algebra.fields import rational
+from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import SystemFile, matched
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

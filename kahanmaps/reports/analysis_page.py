@@ -20,9 +20,9 @@ from kahanmaps.sources import source
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.analysis import Analysis
     from kahanmaps.plots.style import Style
-    from kahanmaps.systems.files import SystemFile
 
 _EQUATIONS = 40
 

@@ -26,7 +26,7 @@ from kahanmaps.sources import source
 
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Finding, Report
-    from kahanmaps.systems.files import SystemFile
+    from kahanmaps.documents.files import SystemFile
 
 _PAPER = "petrera-suris-2016"
 _EXPLAINED = (

@@ -16,8 +16,8 @@ from kahanmaps.reports.pictures import Pictures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.plots.style import Style
-    from kahanmaps.systems.files import SystemFile
 
 _EPS = fmpq(1, 20)  # where a page is for every eps
 _STEPS = 600

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from kahanmaps.checks.claims import Report
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.store import Store
 from kahanmaps.laboratory.analysis import Analysis
@@ -16,7 +17,6 @@ from kahanmaps.reports.batch_page import batch_page
 from kahanmaps.reports.claims_page import claims_page
 from kahanmaps.reports.page import Origin
 from kahanmaps.reports.pictures import Pictures
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.whole_files import write_whole
 
 
@@ -51,7 +51,7 @@ def report_html(
         InputError: for something else, no reports, and names that no result of a Store has.
 
     >>> from kahanmaps.checks.conserve import check_integrals
-    >>> from kahanmaps.systems.catalog import load
+    >>> from kahanmaps.documents.catalog import load
     >>> top = load("euler_top")
     >>> text = report_html(check_integrals(top), file=top, pictures=False)
     >>> text[:15], text.count("</details>")

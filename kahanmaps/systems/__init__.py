@@ -1,1 +1,1 @@
-"""The differential equations: quadratic vector fields, cubic Hamiltonians, system files, the catalogue."""
+"""The differential equations: quadratic vector fields, cubic Hamiltonians."""

@@ -15,8 +15,9 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import Field, rational
+from kahanmaps.algebra.numerals import check_names
 from kahanmaps.algebra.polynomials import degree, evaluate, names_of, ring
-from kahanmaps.algebra.text import check_names, format_polynomial, parse_polynomial
+from kahanmaps.algebra.text import format_polynomial, parse_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
 

@@ -17,15 +17,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra import expressions
+from kahanmaps.algebra.numerals import Limits, check_names, is_name
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import (
-    Limits,
-    check_names,
     format_number,
     format_point,
     format_polynomial,
     format_rational_function,
-    is_name,
     parse_constant,
     parse_number,
     parse_point,

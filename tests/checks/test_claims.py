@@ -21,9 +21,9 @@ from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import CONVENTION, Settings
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InexactNumber, InputError
 from kahanmaps.family.draw import draw_with_eigenvalues
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.version import __version__
 
 P, R, S, U = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED

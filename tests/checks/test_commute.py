@@ -34,12 +34,12 @@ from kahanmaps.checks.claims import Report, Verdict
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -41,12 +41,12 @@ from kahanmaps.checks.claims import Finding, Verdict
 from kahanmaps.checks.conserve import check_integrals, conservation, known_integrals
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import SystemFile, parse_system
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

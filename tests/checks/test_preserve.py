@@ -45,11 +45,11 @@ from kahanmaps.checks.claims import Finding, Verdict
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.invariants import poisson
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import SystemFile, parse_system
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from cli_helpers import COMMAND, Outcome, environment, shell
 
+from kahanmaps.documents.catalog import names
 from kahanmaps.experiments.registry import task_kinds
-from kahanmaps.systems.catalog import names
 from kahanmaps_cli.main import COMMANDS
 
 HEAVY = ("numpy", "flint", "lark", "rich", "matplotlib")

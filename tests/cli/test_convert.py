@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.languages.convert import LANGUAGES, PARTS, convert
-from kahanmaps.systems.catalog import load
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

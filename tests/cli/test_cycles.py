@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from cli_helpers import shell
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.cycles import cycle_census
-from kahanmaps.systems.catalog import load
 from kahanmaps.version import __version__
 
 

@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 from cli_helpers import COMMAND, shell, terminal
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.maps.fast import FloatEnsemble
 from kahanmaps.maps.float_stream import NpyFile
-from kahanmaps.systems.catalog import load
 from kahanmaps.version import __version__
 from kahanmaps_cli import ensemble_starts
 

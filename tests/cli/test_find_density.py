@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from kahanmaps.systems.catalog import load
+from kahanmaps.documents.catalog import load
 from kahanmaps.version import __version__
 
 RAMP = "--vars x,y --rhs x --rhs 3*y"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from cli_helpers import shell
 
-from kahanmaps.systems.catalog import load
+from kahanmaps.documents.catalog import load
 from kahanmaps.version import __version__
 
 OSCILLATOR = "--vars x,y --rhs y --rhs=-x+x^2"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.height_survey import height_survey
-from kahanmaps.systems.catalog import load
 from kahanmaps.version import __version__
 
 OSCILLATOR = "--vars q,p --rhs p --rhs '2*q^2-q'"  # q'' = -q + 2 q^2; the fourth iterate at eps = 1 is the identity

@@ -189,7 +189,7 @@ def test_an_internal_error_says_that_it_is_a_bug_and_how_to_see_more(kahanmaps, 
 def test_an_internal_error_names_the_file_that_was_being_read(kahanmaps, monkeypatch, tmp_path):
     path = tmp_path / "a.toml"
     path.write_text('variables = ["x"]\n[system]\nrhs = ["x"]')
-    monkeypatch.setattr("kahanmaps.systems.files.DocumentReader", lambda *_: None)  # has no method `read`
+    monkeypatch.setattr("kahanmaps.documents.files.DocumentReader", lambda *_: None)  # has no method `read`
     outcome = kahanmaps("systems", path)
     assert outcome.status == 70
     assert f"Either {path}, which was being read, is damaged, or this is a bug in kahanmaps" in outcome.err

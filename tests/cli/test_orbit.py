@@ -21,9 +21,9 @@ import numpy as np
 import pytest
 from cli_helpers import COMMAND, Outcome, shell, terminal
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit
-from kahanmaps.systems.catalog import load
 from kahanmaps.version import __version__
 from kahanmaps_cli.progress import Progress
 

@@ -7,10 +7,10 @@ import signal
 import numpy as np
 import pytest
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.maps.fast import FloatOrbit
 from kahanmaps.plots import draw_portrait as drawing
 from kahanmaps.plots.recipe import read_recipe
-from kahanmaps.systems.catalog import load
 from kahanmaps_cli.pictures.stored import read_orbits
 from kahanmaps_cli.progress import Progress
 

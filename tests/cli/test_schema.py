@@ -11,12 +11,12 @@ from cli_helpers import Outcome
 from jsonschema import Draft202012Validator
 
 from kahanmaps.checks.claims import Verdict
+from kahanmaps.documents.structured_facts import GROWTHS, VERDICTS
 from kahanmaps.experiments.records import KEPT
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.cycle_laws import LAWS
 from kahanmaps.laboratory.recurrences import GrowthClass
 from kahanmaps.maps.periods import Kind
-from kahanmaps.systems.structured_facts import GROWTHS, VERDICTS
 from kahanmaps_cli.main import cli
 from kahanmaps_cli.schema_files import ALIASES, schema, schema_titles
 

@@ -10,11 +10,11 @@ import pytest
 from cli_helpers import Outcome
 from schema_helpers import mistakes
 
+from kahanmaps.documents import document
+from kahanmaps.documents.files import SystemFileError, parse_system
 from kahanmaps.experiments.options import FAMILY, VOCABULARY
 from kahanmaps.experiments.registry import task_kinds
 from kahanmaps.experiments.spec import SpecError, parse_spec
-from kahanmaps.systems import document
-from kahanmaps.systems.files import SystemFileError, parse_system
 from kahanmaps_cli.schema_files import schema
 
 Run = Callable[..., Outcome]

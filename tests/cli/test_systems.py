@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from kahanmaps.systems import catalog
-from kahanmaps.systems.files import parse_system
+from kahanmaps.documents import catalog
+from kahanmaps.documents.files import parse_system
 
 over_names = pytest.mark.parametrize("name", catalog.names())
 

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.experiments.children import ChildrenError, LocalChildren
 from kahanmaps.experiments.records import Job, Limits, Outcome, Record, Task
 from kahanmaps.experiments.run import Batch
-from kahanmaps.systems.catalog import load
 
 HERE = Path(__file__).parent
 KILL, ABORT, SEGFAULT, HANG, PYTHON_BOMB, FLINT_BOMB, GMP_BOMB = range(1, 8)

@@ -17,6 +17,8 @@ import pytest
 from task_helpers import made, member, perform
 
 import kahanmaps as km
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.export import write_csv, write_jsonl
 from kahanmaps.experiments.registry import task_kind
@@ -33,8 +35,6 @@ from kahanmaps.laboratory.singularities import singularities
 from kahanmaps.laboratory.symmetries import linear_symmetries
 from kahanmaps.maps.float_ensemble import starts_in_box
 from kahanmaps.maps.float_lyapunov import lyapunov_exponents
-from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import SystemFile, parse_system
 
 TASKS = (
     "degrees", "find-integrals", "find-density", "find-symmetry", "find-commuting", "analyze", "singularities",

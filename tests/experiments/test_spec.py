@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from specs import COMMUTE, FAMILY, LORENZ, ROTOR, SPACE, UNIVERSAL, keys, mistakes, only, option, task_of, tasks
 
+from kahanmaps.documents.catalog import names
 from kahanmaps.experiments.records import Limits, Task
 from kahanmaps.experiments.spec import DEFAULT_LIMITS, parse_spec, read_spec
-from kahanmaps.systems.catalog import names
 
 # What a spec says
 

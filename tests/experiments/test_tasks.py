@@ -20,6 +20,8 @@ from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings, random_starts
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.records import canonical
 from kahanmaps.family.cubics import cubic_space
@@ -31,8 +33,6 @@ from kahanmaps.maps.orbits import Orbit
 from kahanmaps.maps.periods import period_of
 from kahanmaps.paper.examiner import VerifyOptions
 from kahanmaps.paper.verify import verify, verify_universal
-from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import SystemFile, parse_system
 
 FALSE = """
 name = "false claims"

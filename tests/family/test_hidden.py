@@ -21,6 +21,7 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import det, rank
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import belongs, default_variables, third_derivatives
@@ -37,7 +38,6 @@ from kahanmaps.family.hidden import (
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi, defects, evaluate_at_matrix, random_symplectic
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -17,6 +17,7 @@ from helpers import random_point
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import HypothesisError, InexactNumber, InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import cubic_space, default_variables
@@ -24,7 +25,6 @@ from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenva
 from kahanmaps.family.planar import NormalForm, normal_form
 from kahanmaps.family.skew_hamiltonian import random_symplectic, symplectic_inverse
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.hamiltonian import standard_structure
 
 t = fmpq_poly([0, 1])

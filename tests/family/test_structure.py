@@ -13,13 +13,13 @@ from planar_helpers import diagonal, invertible, moved, over_members, structure_
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.documents.catalog import load
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.splitting import Splitting
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

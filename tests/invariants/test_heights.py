@@ -22,6 +22,7 @@ from planar_helpers import SPLIT, over_members, side_by_side, structure_and_syst
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.checks.settings import random_starts
+from kahanmaps.documents.catalog import load, names
 from kahanmaps.errors import InexactNumber, InputError
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.structure import structure_of
@@ -38,7 +39,6 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_steps import NormalSteps
 from kahanmaps.maps.orbits import Orbit, OrbitEnd
 from kahanmaps.maps.planar_integers import IntegerBlock
-from kahanmaps.systems.catalog import load, names
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 START = ["1/2", "1/3", "-1/5", "2/7", "3/4", "-2/3"]

@@ -14,6 +14,7 @@ import kahanmaps
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.documents.files import read_system
 from kahanmaps.laboratory.affine_functions import (
     affine_cofactor,
     affine_darboux,
@@ -21,7 +22,6 @@ from kahanmaps.laboratory.affine_functions import (
     quotient_by,
 )
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import read_system
 from kahanmaps.systems.hamiltonian import linear_combinations
 from kahanmaps.systems.quadratic import QuadraticSystem
 

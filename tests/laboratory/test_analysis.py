@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from search_helpers import random_system, system
 
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile, parse_system, read_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import analysis as module
 from kahanmaps.laboratory.analysis import Analysis, analyze
-from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import SystemFile, parse_system, read_system
 
 FURTHER = Path(__file__).parent / "further_systems"
 PARTS = (

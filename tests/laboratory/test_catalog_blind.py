@@ -13,12 +13,12 @@ import pytest
 from analysis_helpers import Answer, differences, residues_of
 from search_helpers import ranks
 
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.structured_facts import relations
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.hirota_kimura import hirota_kimura_basis, relations_on_orbit
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.systems.catalog import load, names
-from kahanmaps.systems.files import SystemFile
-from kahanmaps.systems.structured_facts import relations
 
 FACTS = [name for name in names() if set(load(name).catalog) & {"degrees", "growth", "verdict", "codimension"}]
 # Seconds that are enough, where the default would be long. All below takes less than a second.

@@ -6,6 +6,9 @@ import pytest
 from search_helpers import random_system, system
 
 from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.files import parse_system
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.laboratory import cofactors as module
 from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.cofactors import (
@@ -22,9 +25,6 @@ from kahanmaps.laboratory.cofactors import (
     search_cofactors,
 )
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.systems.catalog import load, names
-from kahanmaps.systems.files import parse_system
-from kahanmaps.systems.parametric import ParametricSystem
 
 SMALL_ONES = [name for name in names() if load(name).system.dim <= 4]
 ONE = CofactorProduct((), 0)

@@ -16,12 +16,12 @@ from kahanmaps import KahanMap, draw_with_eigenvalues
 from kahanmaps.algebra.polynomials import degree, ring
 from kahanmaps.algebra.small_systems import Component, independent
 from kahanmaps.checks.settings import Settings
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.laboratory.commuting import _Search, commuting_systems
 from kahanmaps.laboratory.commuting_equations import coefficients_of, combination, commutator_equations, system_of
 from kahanmaps.laboratory.commuting_proofs import _family_identity, affine, judge_family, judge_field, splitting
 from kahanmaps.laboratory.commuting_space import bracket_vanishes, commuting_space, field_at
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 TRIVIAL = ["0", "f", "-f"]

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.laboratory.cycle_laws import LAWS, _critical, _distance, _reversible, compare
 from kahanmaps.laboratory.cycles import cycle_census, default_eps
@@ -19,7 +20,6 @@ from kahanmaps.laboratory.reversors import find_reversor, is_reversor
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.modular_projective import ProjectiveMap, graph_of, hasse_weil
 from kahanmaps.maps.projective import homogeneous_map
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

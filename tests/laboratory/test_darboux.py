@@ -13,12 +13,12 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.darboux import darboux_polynomials
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import SystemFile, parse_system
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

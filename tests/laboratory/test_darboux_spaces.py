@@ -9,6 +9,7 @@ import pytest
 from flint import nmod_mat
 from search_helpers import random_system, system
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.darboux_spaces import (
     DarbouxSpace,
     _is_darboux,
@@ -18,7 +19,6 @@ from kahanmaps.laboratory.darboux_spaces import (
 )
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import combine, echelon, exponents_up_to, monomial_values
-from kahanmaps.systems.catalog import load
 
 SMALL = 101
 

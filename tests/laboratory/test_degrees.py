@@ -13,11 +13,11 @@ from degree_helpers import polynomial_degrees
 from flint import fmpz_poly
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.documents.catalog import load, names
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import curves
 from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.recurrences import GrowthClass
-from kahanmaps.systems.catalog import load, names
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 CATALOG = {

@@ -15,6 +15,8 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import random_starts
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.laboratory import densities as module
 from kahanmaps.laboratory.densities import _space, find_densities
@@ -22,8 +24,6 @@ from kahanmaps.laboratory.identities import density_verdict
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import rank
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.catalog import load, names
-from kahanmaps.systems.parametric import ParametricSystem
 
 # lorenz and kirchhoff_generic: searched as far as dimension and time allow, nothing found
 WITHOUT = ("lorenz", "kirchhoff_generic")

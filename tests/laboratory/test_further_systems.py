@@ -34,12 +34,12 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure
 from kahanmaps.checks.settings import random_starts
+from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.densities import find_densities
 from kahanmaps.laboratory.integrals import find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap
-from kahanmaps.systems.files import parse_system, read_system
 
 FOLDER = Path(__file__).parent / "further_systems"
 FURTHER = json.loads((FOLDER / "answers.json").read_text(encoding="utf-8"))

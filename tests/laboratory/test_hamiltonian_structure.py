@@ -16,10 +16,10 @@ import kahanmaps
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import gradient, monomials, ring
+from kahanmaps.documents.files import read_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, _invertible, _small, constant_structures
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.files import read_system
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -6,6 +6,9 @@ from __future__ import annotations
 import pytest
 from search_helpers import random_system, system
 
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.parametric import ParametricSystem
+from kahanmaps.documents.structured_facts import relation_functions, relations
 from kahanmaps.laboratory import hirota_kimura as module
 from kahanmaps.laboratory.hirota_kimura import (
     hirota_kimura_basis,
@@ -15,9 +18,6 @@ from kahanmaps.laboratory.hirota_kimura import (
 )
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, monomial_values
-from kahanmaps.systems.catalog import load, names
-from kahanmaps.systems.parametric import ParametricSystem
-from kahanmaps.systems.structured_facts import relation_functions, relations
 
 # Sets of more than 300 functions are measured by the tests of the catalogue.
 RELATIONS = [

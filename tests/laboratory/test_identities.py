@@ -7,15 +7,15 @@ from flint import fmpq
 
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
 from kahanmaps.checks.claims import Verdict
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import identities
 from kahanmaps.laboratory.darboux import darboux_polynomials
 from kahanmaps.laboratory.densities import find_densities
 from kahanmaps.laboratory.identities import density_verdict, integral_verdict
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import SystemFile, parse_system
-from kahanmaps.systems.parametric import ParametricSystem
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 ROTATION = ParametricSystem.of_system(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]))

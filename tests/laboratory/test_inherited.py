@@ -11,14 +11,14 @@ from search_helpers import random_system, ranks, system
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.inherited import inherited_integrals
 from kahanmaps.laboratory.integrals import _gradient, find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import rank
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

@@ -14,12 +14,12 @@ from search_helpers import PRIME, random_system, ranks, specialised, system, val
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.identities import integral_verdict
 from kahanmaps.laboratory.integrals import _is_affine_integral, closing_note, find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.systems.catalog import load, names
-from kahanmaps.systems.parametric import ParametricSystem
 
 PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
 LONG = ("henon_heiles", "paper_m2")

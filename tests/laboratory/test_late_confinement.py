@@ -19,6 +19,7 @@ from search_helpers import system as file_from
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.analysis import Analysis, analyze
@@ -47,7 +48,6 @@ from kahanmaps.laboratory.singularities import (
     patterns_of,
     singularities,
 )
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

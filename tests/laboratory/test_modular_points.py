@@ -12,6 +12,8 @@ from search_helpers import PRIME, system
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import evaluate, ring
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
     NoPoint,
@@ -24,8 +26,6 @@ from kahanmaps.laboratory.modular_points import (
     rank,
 )
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.catalog import load
-from kahanmaps.systems.parametric import ParametricSystem
 
 SMALL = 101
 residues = st.integers(0, SMALL - 1)

@@ -9,6 +9,7 @@ from flint import nmod
 from search_helpers import random_system, system
 
 from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory import search as module
 from kahanmaps.laboratory.closed_forms import closed_forms
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
@@ -16,7 +17,6 @@ from kahanmaps.laboratory.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
 from kahanmaps.laboratory.search import affine_space, repeat, search
-from kahanmaps.systems.catalog import load
 
 
 def searched(file, eps=None, seconds=30.0):

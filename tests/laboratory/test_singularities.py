@@ -10,6 +10,7 @@ from flint import fmpq, nmod_poly
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.fates import CONFINED, NOT_CONFINED
 from kahanmaps.laboratory.jets import (
@@ -24,7 +25,6 @@ from kahanmaps.laboratory.jets import (
 from kahanmaps.laboratory.singularities import default_eps, singularities, symbolic_denominator
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map, linear_forms
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PRIME = 2_305_843_009_213_693_951

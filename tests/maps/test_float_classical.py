@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from flint import fmpq_mat
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.maps.float_classical import METHODS, ClassicalOrbit, _solve
 from kahanmaps.maps.float_numbers import exact, to_float
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 GROWTH = QuadraticSystem.from_text(["x"], ["x"])

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.maps.float_ensemble import starts_in_box
 from kahanmaps.maps.float_lyapunov import lyapunov_exponents
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from flint import fmpq_poly
 
 from kahanmaps.checks.decide import random_prime_field
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import BadPrime
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
@@ -16,7 +17,6 @@ from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.paper import realise
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Claim, claims
-from kahanmaps.systems.files import SystemFile
 
 t = fmpq_poly([0, 1])
 

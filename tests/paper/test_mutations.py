@@ -13,6 +13,7 @@ from paper.members import fresh
 from kahanmaps.algebra.duals import Dual
 from kahanmaps.algebra.matrices import solve
 from kahanmaps.checks.claims import Verdict
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.family import associated, cubics
 from kahanmaps.invariants.integrals import ModifiedHamiltonian, PaperIntegral
 from kahanmaps.maps.kahan import KahanMapOver
@@ -22,7 +23,6 @@ from kahanmaps.paper.proofs import normal_form_proof
 from kahanmaps.paper.registry import claims
 from kahanmaps.paper.verify import verify, verify_universal
 from kahanmaps.systems import hamiltonian, quadratic
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.quadratic import SystemOver
 
 MISPRINTS = {claim.key for claim in claims() if claim.misprint}

@@ -21,6 +21,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import Settings
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
@@ -30,7 +31,6 @@ from kahanmaps.paper.controls import CONTROLS
 from kahanmaps.paper.examiner import VerifyOptions
 from kahanmaps.paper.registry import Kind, claims
 from kahanmaps.paper.verify import verify, verify_universal
-from kahanmaps.systems.files import SystemFile
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
 SLOW = {*LARGE_SPECTRA, *(name for name in SPECTRA if name.startswith("m=4")), "m=3, partly split"}

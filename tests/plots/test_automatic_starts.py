@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.plots.automatic_starts import COUNT, automatic_starts
 from kahanmaps.plots.trajectories import ensemble_for, walked
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.degrees import degree_growth
 from kahanmaps.plots.degree_records import degrees_of_record
-from kahanmaps.systems.catalog import load
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,8 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.family.structure import structure_of
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
@@ -19,8 +21,6 @@ from kahanmaps.plots.drift import BINS, _Bins, _edges, small_start, survey_drift
 from kahanmaps.plots.drift_functions import OfTheImage, asked_functions, functions_of, known_functions
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.style import Style
-from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

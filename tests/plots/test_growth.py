@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from flint import fmpq
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.degrees import DegreeGrowth
@@ -17,7 +18,6 @@ from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.growth import draw_degrees, draw_heights
 from kahanmaps.plots.height_curves import HeightCurve, curves_of_record, fit_of, height_curves
 from kahanmaps.plots.style import Style
-from kahanmaps.systems.catalog import load
 
 SQUARES = tuple(2 * n * n + 1 for n in range(12))  # of the Kahan map of the Euler top
 POWERS = tuple(2**n for n in range(10))

@@ -9,6 +9,8 @@ import pytest
 from flint import fmpq_poly
 
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
@@ -18,8 +20,6 @@ from kahanmaps.plots.invariant_curves import MAX_POINTS, find_invariant_curves
 from kahanmaps.plots.plane_views import Disc, Rectangle, view_of
 from kahanmaps.plots.style import Style
 from kahanmaps.plots.symmetric_planes import ONE_LINE, THREE_LINES, ZERO
-from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from flint import fmpq
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.plots.level_sets import level_curves, levels_through
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.trajectories import ensemble_for, walked
-from kahanmaps.systems.catalog import load
 
 SQUARE = ((-2.0, 2.0), (-2.0, 2.0))
 STARTS = np.array([[-0.5, 0.0], [-0.3, 0.4]])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PathCollection
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.plots.density import density_of
 from kahanmaps.plots.draw_portrait import cells_for, draw_density, draw_portrait
@@ -17,7 +18,6 @@ from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portrait import portrait_of
 from kahanmaps.plots.style import COLOURS, Style
 from kahanmaps.plots.trajectories import MAX_POINTS, Trajectories, ensemble_for, euler_orbits, require_points, walked
-from kahanmaps.systems.catalog import load
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 STYLE = Style(width=8.6, font_size=8)

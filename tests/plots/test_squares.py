@@ -10,6 +10,8 @@ from flint import fmpq
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_chi
 from kahanmaps.maps.kahan import KahanMap
@@ -18,8 +20,6 @@ from kahanmaps.plots.draw_squares import _in_two_digits, draw_squares, widest_ax
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.squares import Pair, pair_of_systems, pairs_of_member, squares
 from kahanmaps.plots.style import Style
-from kahanmaps.systems.catalog import load
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 STYLE = Style(width=12)

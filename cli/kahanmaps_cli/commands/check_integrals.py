@@ -13,7 +13,7 @@ from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
 
 if TYPE_CHECKING:
-    from kahanmaps.systems.files import SystemFile
+    from kahanmaps.documents.files import SystemFile
 
 
 @click.command("check-integrals")

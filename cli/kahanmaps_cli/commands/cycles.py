@@ -21,9 +21,9 @@ from kahanmaps_cli.terminal import tell
 if TYPE_CHECKING:
     from flint import fmpq_mat
 
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.cycle_laws import Comparison
     from kahanmaps.laboratory.cycles import Census
-    from kahanmaps.systems.files import SystemFile
 
 _LENGTHS_SHOWN = 12
 

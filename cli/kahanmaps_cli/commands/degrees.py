@@ -20,8 +20,8 @@ from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.degrees import DegreeGrowth
-    from kahanmaps.systems.files import SystemFile
 
 
 @click.command("degrees")

@@ -29,7 +29,7 @@ from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.algebra.polynomials import RationalFunction
-    from kahanmaps.systems.files import SystemFile
+    from kahanmaps.documents.files import SystemFile
 
 _MAX_STEPS = 10**13  # years
 _MAX_BITS = 61

@@ -29,10 +29,10 @@ from kahanmaps_cli.terminal import on_terminal, shorten, tell
 if TYPE_CHECKING:
     from flint import fmpq_mat
 
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.family.associated import FamilyMember
     from kahanmaps.family.hidden import HiddenMember
     from kahanmaps.family.planar import NormalForm
-    from kahanmaps.systems.files import SystemFile
 
 
 @click.group("family", cls=SuggestingGroup)
@@ -65,8 +65,8 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
 
     Without --eigenvalues, --generic or --chi the eigenvalues are distinct small integers drawn from the seed.
     """
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.family.skew_hamiltonian import diagnosis
-    from kahanmaps.systems.files import SystemFile
 
     output = None if output == "-" else output
     if name is not None and not name.isprintable():
@@ -204,8 +204,8 @@ def associated(
       kahanmaps family associated pair.toml --write-to associated/
     """
     from kahanmaps.algebra.text import format_number, format_polynomial
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.family.associated import FamilyMember
-    from kahanmaps.systems.files import SystemFile
 
     file, member = _member(system, parameters)
     rows = []
@@ -352,7 +352,7 @@ def _parse_matrix(text: str) -> fmpq_mat:
 
 
 def _write(file: SystemFile, output: str | None) -> None:
-    from kahanmaps.systems.files import parse_system
+    from kahanmaps.documents.files import parse_system
     from kahanmaps.whole_files import write_whole
 
     text = file.to_toml()

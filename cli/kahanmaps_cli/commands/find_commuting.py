@@ -19,8 +19,8 @@ from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.commuting import CommutingField, CommutingSystems
-    from kahanmaps.systems.files import SystemFile
 
 _SHAPES = {"linear": "g = B f with a constant matrix B", "quadratic": "any quadratic g"}
 

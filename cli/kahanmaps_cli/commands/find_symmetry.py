@@ -12,8 +12,8 @@ from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.symmetries import Symmetries
-    from kahanmaps.systems.files import SystemFile
 
 _SHOWN = 40
 

@@ -22,8 +22,8 @@ from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.height_survey import HeightSurvey
-    from kahanmaps.systems.files import SystemFile
 
 
 @click.command("heights")

@@ -22,8 +22,8 @@ from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import on_terminal, print_table, tell
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.maps.float_lyapunov import Lyapunov
-    from kahanmaps.systems.files import SystemFile
 
 _MAX_STEPS = 10**9
 _DEFAULT_STARTS = 16

@@ -13,9 +13,9 @@ from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.family.structure import Structure
     from kahanmaps.maps.periods import OrbitPeriod
-    from kahanmaps.systems.files import SystemFile
 
 _STATUS = {"periodic": 0, "aperiodic": 0}
 _LONG_PRIME, _LONGEST_PRIME = 90, 192  # bits, between which it takes from seconds to minutes

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from kahanmaps.checks.claims import Report
     from kahanmaps.checks.settings import Settings
-    from kahanmaps.systems.files import SystemFile
+    from kahanmaps.documents.files import SystemFile
 
 _DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
 _ONLY_FOR = {
@@ -195,7 +195,7 @@ def _settings(options: dict[str, Any], progress: Progress) -> Settings:
 
 def _system_or_member(system: str | None, options: dict[str, Any]) -> SystemFile:
     """The system that is named; for verify, and where one is to be drawn, a member of the family."""
-    from kahanmaps.systems.files import SystemFile
+    from kahanmaps.documents.files import SystemFile
 
     drawn = {name: options[name] for name in _DRAWN}
     is_drawn = any(value is not None and value is not False for value in drawn.values())

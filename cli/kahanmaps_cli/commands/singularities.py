@@ -20,9 +20,9 @@ from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import on_terminal, shorten, tell
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.fates import Hypersurface
     from kahanmaps.laboratory.singularities import SingularityRun
-    from kahanmaps.systems.files import SystemFile
 
 
 @click.command("singularities")

@@ -30,7 +30,7 @@ def command(
       kahanmaps systems euler_top -p a1=2 --toml > my-top.toml
       kahanmaps systems lagrange_top --latex
     """
-    from kahanmaps.systems.catalog import load, names
+    from kahanmaps.documents.catalog import load, names
 
     if as_toml + as_latex + as_json > 1:
         raise click.UsageError("give --toml, --latex or --json, one of the three")
@@ -92,14 +92,14 @@ def _equations(file: Any) -> dict[str, Any]:
 
 def _known(file: Any) -> dict[str, Any]:
     """The structured facts, null where the file has none."""
-    from kahanmaps.systems.structured_facts import KEYS
+    from kahanmaps.documents.structured_facts import KEYS
 
     return {key: file.document.get("catalog", {}).get(key) for key in KEYS}
 
 
 def _known_lines(file: Any) -> list[str]:
     """The structured facts as lines for people."""
-    from kahanmaps.systems.structured_facts import relations
+    from kahanmaps.documents.structured_facts import relations
 
     known = _known(file)
     lines = []

@@ -70,9 +70,9 @@ def command(system: str | None, **options: Any) -> int:
     Misprints are expected to be refuted and do not count.
     """
     from kahanmaps.checks.settings import Settings
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.paper.examiner import VerifyOptions
     from kahanmaps.paper.verify import verify, verify_universal
-    from kahanmaps.systems.files import SystemFile
 
     if options["as_json"] and options["as_markdown"]:
         raise click.UsageError("give --json or --markdown, not both")

@@ -19,8 +19,8 @@ from kahanmaps_cli.pictures.records import read_record
 from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.degrees import DegreeGrowth
-    from kahanmaps.systems.files import SystemFile
 
 
 @click.command("degrees", cls=PictureCommand)

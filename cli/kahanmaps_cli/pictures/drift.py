@@ -13,9 +13,9 @@ from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_optio
 from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.plots.drift import DriftSurvey
     from kahanmaps.plots.drift_functions import WatchedFunction
-    from kahanmaps.systems.files import SystemFile
 
 _WIDE = 24.0  # centimetres: in a terminal panels stand side by side, for its lines are few
 _LONGEST = 160  # characters of a start that is told

@@ -13,8 +13,8 @@ from kahanmaps_cli.pictures.records import read_record
 from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.height_survey import HeightSurvey
-    from kahanmaps.systems.files import SystemFile
 
 # Of OrbitEnd: a number limit or a return are ends that the picture is made for, a hole in the map is not.
 _EARLY = ("singular",)

@@ -22,9 +22,9 @@ from kahanmaps_cli.terminal import is_coloured
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.plots.style import Style
     from kahanmaps.plots.terminal import Cell
-    from kahanmaps.systems.files import SystemFile
 
 F = TypeVar("F", bound=Callable[..., Any])
 _ARGUMENTS = "kahanmaps_cli.arguments"

@@ -11,6 +11,7 @@ from kahanmaps.errors import InputError
 from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.maps.float_numbers import FloatArray
     from kahanmaps.plots.density import Density
     from kahanmaps.plots.drift_functions import WatchedFunction
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from kahanmaps.plots.portrait import Colouring
     from kahanmaps.plots.trajectories import Trajectories
     from kahanmaps.plots.windows import Window
-    from kahanmaps.systems.files import SystemFile
     from kahanmaps_cli.pictures.stored import Stored
 
 _PILOT = 4_000_000  # coordinates, from which the axes and the window of a density are chosen

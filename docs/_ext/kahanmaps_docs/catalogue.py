@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from kahanmaps.display.latex import latex_name, latex_number, latex_polynomial, latex_rational_function
-from kahanmaps.systems.catalog import load, names
-from kahanmaps.systems.files import SystemFile
-from kahanmaps.systems.structured_facts import relations
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.structured_facts import relations
 from kahanmaps_docs.literature import KEY, link
 from kahanmaps_docs.markdown import code, plain, table
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
+from kahanmaps.documents.catalog import load, names
 from kahanmaps.sources import SOURCES
-from kahanmaps.systems.catalog import load, names
 from kahanmaps_docs.markdown import plain
 
 _KEYS = "|".join(sorted(map(re.escape, SOURCES), key=len, reverse=True))

@@ -28,13 +28,13 @@ from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure
 from kahanmaps.checks.settings import Settings
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.family.draw import draw_generic, draw_with_eigenvalues
 from kahanmaps.invariants.integrals import ModifiedHamiltonian
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.sources import SOURCES
-from kahanmaps.systems.catalog import load, names
-from kahanmaps.systems.files import parse_system
 from kahanmaps.systems.hamiltonian import linear_combinations, standard_structure
 
 PACKAGE = Path(kahanmaps.__file__).parent
@@ -511,8 +511,8 @@ def test_a_path_to_no_file_is_refused_as_a_file(reference, tmp_path, monkeypatch
 
 
 def test_listing_the_names_loads_no_arithmetic():
-    code = "import sys, kahanmaps.systems.catalog as c; c.names(); print(*sys.modules)"
+    code = "import sys, kahanmaps.documents.catalog as c; c.names(); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     loaded = set(done.stdout.split())
-    assert loaded & {"flint", "lark", "numpy", "kahanmaps.systems.files"} == set()
-    assert "kahanmaps.systems.catalog" in loaded
+    assert loaded & {"flint", "lark", "numpy", "kahanmaps.documents.files"} == set()
+    assert "kahanmaps.documents.catalog" in loaded

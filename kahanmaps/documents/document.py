@@ -12,22 +12,17 @@ from typing import Any, NamedTuple
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.numerals import check_names
 from kahanmaps.algebra.polynomials import RationalFunction, degree
-from kahanmaps.algebra.text import (
-    check_names,
-    format_number,
-    parse_constant,
-    parse_polynomial,
-    parse_rational_function,
-)
+from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomial, parse_rational_function
+from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
+from kahanmaps.documents.structured_facts import read_structured_facts
 from kahanmaps.errors import InputError, SystemFileError, counted, quoted, suggestion
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.sources import SOURCES
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
-from kahanmaps.systems.structured_facts import KEYS as STRUCTURED_KEYS
-from kahanmaps.systems.structured_facts import read_structured_facts
 
 KINDS = ("system", "hamiltonian", "family")
 _LONGEST_NAME = 1000

@@ -11,11 +11,11 @@ x3' = -3/2*x1*x2
 'Euler top'
 
 A file is data, in the format of every other system file; its name is that of the system. Each of its facts opens with
-its status: Proved (in the source named; where none is, by the argument given or by tests/systems/test_catalog.py, which
-expands claims with eps and the parameters as indeterminates), Refuted (at a point), Measured (a finite computation
-modulo a prime, which is no proof), Classical, or Origin (how the file was made). Degrees, growth, verdict and relations
-stand there for programs as well, see `kahanmaps.systems.structured_facts`; tests/systems/test_catalog_facts.py measures
-them again.
+its status: Proved (in the source named; where none is, by the argument given or by tests/documents/test_catalog.py,
+which expands claims with eps and the parameters as indeterminates), Refuted (at a point), Measured (a finite
+computation modulo a prime, which is no proof), Classical, or Origin (how the file was made). Degrees, growth, verdict
+and relations stand there for programs as well, see `kahanmaps.documents.structured_facts`;
+tests/documents/test_catalog_facts.py measures them again.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any
 from kahanmaps.errors import InputError, quoted
 
 if TYPE_CHECKING:
-    from kahanmaps.systems.files import SystemFile
+    from kahanmaps.documents.files import SystemFile
 
 _ENDING = ".toml"
 _LIST_THEM = "'kahanmaps systems' lists the catalogue"
@@ -69,7 +69,7 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None) -> 
       parameters: unknown parameter 'd', this system has: c
     """
     # Imported here, so that listing names loads no arithmetic.
-    from kahanmaps.systems.files import parse_system, read_system
+    from kahanmaps.documents.files import parse_system, read_system
 
     if not isinstance(reference, Path):
         if reference in names():

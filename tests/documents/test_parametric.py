@@ -12,10 +12,10 @@ from search_helpers import PRIME, system
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.files import parse_system
+from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.systems.catalog import load, names
-from kahanmaps.systems.files import parse_system
-from kahanmaps.systems.parametric import ParametricSystem
 
 FIELD = GF(PRIME)
 WITH_PARAMETERS = [name for name in names() if load(name).parameters and load(name).kind != "family"]

@@ -11,8 +11,8 @@ from flint import fmpq_mpoly
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.systems.files import SystemFile
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 
 
@@ -43,7 +43,7 @@ class ParametricSystem:
                 above 2 or are no polynomials, and for a member of the family, whose A and H must fit together at
                 every value.
 
-        >>> from kahanmaps.systems.catalog import load
+        >>> from kahanmaps.documents.catalog import load
         >>> ParametricSystem.of(load("euler_top"), ["a1"]).rhs
         (x2*x3*a1, -2*x1*x3, x1*x2)
         """

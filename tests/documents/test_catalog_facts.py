@@ -18,10 +18,10 @@ from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.structured_facts import relation_functions, relations
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.catalog import load, names
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.systems.structured_facts import relation_functions, relations
 
 PRIME = 2**61 - 1
 FIELD = GF(PRIME)

@@ -20,15 +20,15 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.documents import files
+from kahanmaps.documents.files import SystemFile, parse_system, read_system
+from kahanmaps.documents.structured_facts import relations
+from kahanmaps.documents.toml_text import to_toml
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
-from kahanmaps.systems import files
-from kahanmaps.systems.files import SystemFile, parse_system, read_system
 from kahanmaps.systems.hamiltonian import standard_structure
-from kahanmaps.systems.structured_facts import relations
-from kahanmaps.systems.toml_text import to_toml
 
 SYSTEM = """
 name = "rotor"

@@ -18,13 +18,13 @@ from flint import fmpq, fmpq_mat
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
+from kahanmaps.documents.document import KINDS, DocumentReader
+from kahanmaps.documents.toml_text import to_toml
 from kahanmaps.errors import InputError, SystemFileError, reading
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
-from kahanmaps.systems.document import KINDS, DocumentReader
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
-from kahanmaps.systems.toml_text import to_toml
 
 MAX_FILE_BYTES = 16_000_000
 _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")

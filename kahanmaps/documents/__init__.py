@@ -1,0 +1,1 @@
+"""Systems in text: files in TOML, what they claim, the catalogue."""

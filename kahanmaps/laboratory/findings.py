@@ -1,0 +1,65 @@
+"""What is known of one Kahan map: the results of all analyses, as far as there was time for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from flint import fmpq
+
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.laboratory.commuting import CommutingSystems
+from kahanmaps.laboratory.degrees import DegreeGrowth
+from kahanmaps.laboratory.densities import DensitySearch
+from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures
+from kahanmaps.laboratory.height_survey import HeightSurvey
+from kahanmaps.laboratory.integrals import IntegralSearch
+from kahanmaps.laboratory.singularities import SingularityRun
+from kahanmaps.laboratory.sparse_relations import SparseRelation
+from kahanmaps.laboratory.symmetries import Symmetries
+
+
+@dataclass
+class Findings:
+    """The results of the parts, None for those not reached."""
+
+    file: SystemFile
+    eps: fmpq | None
+    seconds: float
+    seed: int
+    symbols: tuple[str, ...] = ()
+    integrals: IntegralSearch | None = None
+    relations: tuple[SparseRelation, ...] = ()
+    densities: DensitySearch | None = None
+    degrees: DegreeGrowth | None = None
+    heights: HeightSurvey | None = None
+    singularities: list[SingularityRun] = field(default_factory=list)
+    symmetries: Symmetries | None = None
+    commuting: CommutingSystems | None = None
+    structure: Structure | NoStructure | None = None
+    hamiltonian: ConstantStructures | None = None
+    skipped: list[str] = field(default_factory=list)
+    elapsed: float = 0.0
+
+    @property
+    def dim(self) -> int:
+        """The dimension of the system."""
+        return self.file.system.dim
+
+    @property
+    def integral_count(self) -> int:
+        """The number of independent integrals: found, shown by orbits, or given by theorems; see `count_is_exact`."""
+        known = self.integrals.codimension if self.integrals is not None else 0
+        family = self.structure.form.m if isinstance(self.structure, Structure) else 0
+        return max(known, family)
+
+    @property
+    def count_is_exact(self) -> bool:
+        """Whether there are no more than `integral_count` integrals: else it is a lower bound."""
+        return self.integrals is not None and self.integrals.is_exact
+
+    @property
+    def integrals_were_counted(self) -> bool:
+        """Whether `integral_count` says anything: it is 0 as well where the orbits were not reached or not defined."""
+        measured = self.integrals is not None and bool(self.integrals.profile.nullities)
+        return measured or self.integral_count > 0
