@@ -19,15 +19,16 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
+from functools import cached_property
 from typing import Any
 
 from flint import fmpq, fmpz
 
+from kahanmaps.algebra.bounds import ONE, BoundField, Size, bound_of
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, Field, PrimeField
 from kahanmaps.checks.claims import Evidence, Verdict, Witness
 from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep
-from kahanmaps.invariants.sizes import Size
 
 DEFAULT_ERROR_BITS = 100
 _PRIME_BITS = 62
@@ -46,15 +47,12 @@ class Identity:
     """Two sides to be equal at every point of a space of dimension `dim`.
 
     `sides(field, x, eps)` gives both as lists of field elements; it returns None, or raises SingularStep, where
-    they are not defined. `equation` bounds the polynomials that vanish when they are equal, `poles` the degree of
-    the product of all denominators. `eps` is the step the identity is stated for, None for every eps. `subject` is
-    all that determines the two sides, as `seed_for` takes it: points are drawn by its hash.
+    they are not defined. `eps` is the step the identity is stated for, None for every eps. `subject` is all that
+    determines the two sides, as `seed_for` takes it: points are drawn by its hash.
     """
 
     dim: int
     sides: Callable[[Field, tuple[Any, ...], Any], Sides | None]
-    equation: Size
-    poles: int
     eps: fmpq | None
     left_label: str = "left side"
     right_label: str = "right side"
@@ -64,6 +62,17 @@ class Identity:
     def seed(self, seed: int) -> int:
         """What everything drawn for this identity is drawn from."""
         return seed_for(seed, self.dim, self.eps, self.left_label, self.right_label, self.subject)
+
+    @cached_property
+    def bound(self) -> tuple[Size, int]:
+        """Bounds for the polynomials that vanish where the sides are equal, and the degree of what must not be zero.
+
+        They come from the two sides themselves, computed with bounds in the place of numbers.
+        """
+        field = BoundField()
+        eps = field.variable() if self.eps is None else field.convert(self.eps)
+        sides = self.at(field, tuple(field.variable() for _ in range(self.dim)), eps)
+        return (ONE, 0) if sides is None else bound_of(field, zip(*sides, strict=True))
 
     def at(self, field: Field, point: tuple[Any, ...], eps: Any) -> Sides | None:
         """Both sides, None where they are not defined."""
@@ -85,14 +94,15 @@ class Decision:
 def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
     """Decide an identity at random points over GF(p): supported with error below 2^-error_bits, or refuted."""
     rng = random.Random(f"identity {identity.seed(seed)}")
-    per_trial = trial_bound(identity)
+    equation, pole_degree = identity.bound
+    per_trial = log2_error(equation, pole_degree)
     if per_trial >= -1:
         return Decision(
             Verdict.UNDECIDED,
             Evidence(
                 "random points over GF(p)",
-                f"the degree bound {identity.equation.degree} is too large for primes of 63 bits to decide anything",
-                {"degree_bound": identity.equation.degree},
+                f"the degree bound {equation.degree} is too large for primes of 63 bits to decide anything",
+                {"degree_bound": equation.degree},
             ),
         )
     trials = max(1, math.ceil(error_bits / -per_trial))
@@ -135,20 +145,15 @@ def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) 
             {
                 "points": trials,
                 "error_bound": f"2^{-math.floor(-bound)}",
-                "degree_bound": identity.equation.degree,
-                "coefficient_bits_bound": math.ceil(identity.equation.bits),
-                "pole_degree_bound": identity.poles,
+                "degree_bound": equation.degree,
+                "coefficient_bits_bound": math.ceil(equation.bits),
+                "pole_degree_bound": pole_degree,
                 "poles_met": poles,
                 "primes": [str(prime) for prime in primes],
                 "eps": "every" if identity.eps is None else str(identity.eps),
             },
         ),
     )
-
-
-def trial_bound(identity: Identity) -> float:
-    """log2 of the probability that one trial passes although the identity is false."""
-    return log2_error(identity.equation, identity.poles)
 
 
 def log2_error(equation: Size, poles: int, conjugates: int = 1) -> float:

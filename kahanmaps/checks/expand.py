@@ -29,7 +29,7 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
         return None
     if budget is None:
         # A product takes longer than in proportion to its bits once it has left the innermost caches.
-        bits = identity.equation.bits
+        bits = identity.bound[0].bits
         budget = int(DEFAULT_BUDGET / max(1.0, bits / 256) / max(1.0, bits / 10_000))
     names = [f"x{i + 1}" for i in range(identity.dim)] + ["eps"]
     field = FunctionField(names, budget)

@@ -21,8 +21,7 @@ from kahanmaps.invariants.measures import (
     jacobian_determinant_sides,
 )
 from kahanmaps.invariants.phase_functions import PhaseFunction
-from kahanmaps.invariants.poisson import jacobi_defects, jacobi_size, transformation_sides, transformation_size
-from kahanmaps.invariants.sizes import VARIABLE, Fraction, determinant_size, eps_size, step_size
+from kahanmaps.invariants.poisson import jacobi_defects, transformation_sides
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -42,16 +41,9 @@ def density_identity(system: QuadraticSystem, density: PhaseFunction, eps: fmpq 
             return None  # where the map has no inverse both sides may vanish, and say nothing of a measure
         return [after * below], [before * above]
 
-    size = eps_size(eps)
-    image = step_size(system, size, VARIABLE)
-    after, before = density.size(size, image), density.size(size, VARIABLE)
-    here, there = determinant_size(system, size, VARIABLE), determinant_size(system, size, image)
-    left = Fraction(after.above * here.above, after.below * here.below)
-    right = Fraction(before.above * there.above, before.below * there.below)
-    poles = image.degree + left.below.degree + right.below.degree
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
     subject = (system.rhs, density.subject)
-    return Identity(system.dim, sides, left.equation(right), poles, eps, *labels, subject=subject)
+    return Identity(system.dim, sides, eps, *labels, subject=subject)
 
 
 def _image(kahan: KahanMap, point: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -119,13 +111,10 @@ def transformation_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> 
         left, right = transformation_sides(kahan, hamiltonian, point, _image(kahan, point))
         return left.entries(), right.entries()
 
-    size = eps_size(eps)
-    image = step_size(hamiltonian.system, size, VARIABLE)
     entries = tuple(f"entry ({i + 1},{j + 1})" for i in range(n) for j in range(n))
     labels = ("(I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T", "(I - eps f'(x)) Pi(x~) (I - eps f'(x))^T")
-    equation = transformation_size(hamiltonian, size, VARIABLE)
     subject = (hamiltonian.H, hamiltonian.J)
-    return Identity(n, sides, equation, 4 * image.degree + 4, eps, *labels, entries, subject=subject)
+    return Identity(n, sides, eps, *labels, entries, subject=subject)
 
 
 def jacobi_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> Identity:
@@ -139,10 +128,8 @@ def jacobi_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> Identity
     entries = tuple(
         f"triple ({i + 1},{j + 1},{k + 1})" for i in range(n) for j in range(i + 1, n) for k in range(j + 1, n)
     )
-    size = eps_size(eps)
-    equation = jacobi_size(hamiltonian, size, VARIABLE)
     subject = (hamiltonian.H, hamiltonian.J)
-    return Identity(n, sides, equation, 8, eps, "the cyclic sum", "what it should be", entries, subject=subject)
+    return Identity(n, sides, eps, "the cyclic sum", "what it should be", entries, subject=subject)
 
 
 def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:

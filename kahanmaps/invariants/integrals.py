@@ -19,7 +19,6 @@ from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
-from kahanmaps.invariants.sizes import Fraction, Size, polynomial_size, step_size
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
@@ -43,14 +42,6 @@ class ModifiedHamiltonian(PhaseFunction):
             for x, after, slope in zip(point, image, self.hamiltonian.gradient, strict=True):
                 total = total + evaluate(slope, field, point) * (after - x)
             return evaluate(self.hamiltonian.H, field, point) + total * field.convert(fmpq(1, 3))
-
-    def size(self, eps: Size, point: Size) -> Fraction:
-        # Over the common denominator 3 d W^3 W~: all terms have at most three factors from X / W and one from X~ / W~.
-        H, below = polynomial_size(self.hamiltonian.H)
-        image = step_size(self.hamiltonian.system, eps, point)
-        # |3 H| + |grad H . x~| + |grad H . x| has at most 3 + 3 + 3 times the coefficients of H.
-        factor = Size(0, H.bits + 3.17)
-        return Fraction(factor * point**3 * image, Size(0, below.bit_length() + 1.59) * point**3 * image)
 
 
 class PaperIntegral(PhaseFunction):
@@ -80,11 +71,6 @@ class PaperIntegral(PhaseFunction):
                 total = total + point[i] * image[m + i] - point[m + i] * image[i]
             return total / field.convert(eps)
 
-    def size(self, eps: Size, point: Size) -> Fraction:
-        image = step_size(self.hamiltonian.system, eps, point)
-        dim = Size(0, float(self.hamiltonian.dim.bit_length()))
-        return Fraction(dim * eps * point * image, eps * point * image)
-
 
 class CommutantIntegral(PhaseFunction):
     """eps^{-1} x^T J C x~ with C = (A^T)^k, which commutes with f'(x): rational whatever the roots of chi are.
@@ -108,14 +94,6 @@ class CommutantIntegral(PhaseFunction):
         with field.working():
             column = field.convert_matrix(self.hamiltonian.J * self.matrix) * field.column(image)
             return (field.column(point).transpose() * column)[0, 0] / field.convert(eps)
-
-    def size(self, eps: Size, point: Size) -> Fraction:
-        entries = (self.hamiltonian.J * self.matrix).entries()
-        image = step_size(self.hamiltonian.system, eps, point)
-        # The sum of |numerators| over a common denominator, which is at most the product of all denominators.
-        below = sum(float(entry.q.bit_length()) for entry in entries if entry.q != 1)
-        above = max(float(entry.p.bit_length()) for entry in entries) + below + 2.0 * self.matrix.nrows().bit_length()
-        return Fraction(Size(0, above) * eps * point * image, Size(0, below) * eps * point * image)
 
 
 class ClaimedIntegral(ClaimedFunction):

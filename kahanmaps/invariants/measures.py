@@ -16,7 +16,6 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
-from kahanmaps.invariants.sizes import Fraction, Size, determinant_size
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -37,9 +36,6 @@ class DeterminantDensity(PhaseFunction):
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         return KahanMap(self.system, eps, field).determinant(point)
-
-    def size(self, eps: Size, point: Size) -> Fraction:
-        return determinant_size(self.system, eps, point)
 
 
 class ClaimedDensity(ClaimedFunction):

@@ -18,7 +18,6 @@ from kahanmaps.algebra.polynomials import (
     substitute,
 )
 from kahanmaps.algebra.text import format_polynomial, format_rational_function
-from kahanmaps.invariants.sizes import Fraction, Size, function_size
 
 _LONGEST_CONDITION = 200  # characters
 
@@ -39,10 +38,6 @@ class PhaseFunction(ABC):
     def subject(self) -> tuple[Any, ...]:
         """All that determines the function, as `seed_for` takes it."""
 
-    @abstractmethod
-    def size(self, eps: Size, point: Size) -> Fraction:
-        """Bounds for numerator and denominator of the value at a point of this size."""
-
 
 class ClaimedFunction(PhaseFunction):
     """A rational function of the variables and eps (its last variable) that somebody makes a claim about."""
@@ -59,9 +54,6 @@ class ClaimedFunction(PhaseFunction):
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         with field.working():
             return self.function.value(field, (*point, field.convert(eps)))
-
-    def size(self, eps: Size, point: Size) -> Fraction:
-        return function_size(self.function, len(self.function.names) - 1, eps, point)
 
 
 def at_eps(function: RationalFunction, eps: fmpq | None) -> tuple[fmpq_mpoly, fmpq_mpoly]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.matrices import rank
@@ -28,8 +28,7 @@ from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings
-from kahanmaps.invariants.sizes import VARIABLE, Size, step_size
-from kahanmaps.laboratory.commuting_equations import coefficients_of, combination, system_of
+from kahanmaps.laboratory.commuting_equations import coefficients_of, combination
 from kahanmaps.laboratory.commuting_space import CommutingSpace, field_at
 from kahanmaps.maps.kahan import KahanMap, KahanMapOver
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
@@ -185,18 +184,9 @@ def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: Componen
         x = point[:n]
         return phi_g.step(phi_f.step(x)), phi_f.step(phi_g.step(x))
 
-    bound, common = _dominating(f, table)
-
-    def step_g(point: Size) -> Size:
-        # D (I - eps g') has entries with the parameters to the first power, and coefficients below those of the bound.
-        return step_size(bound, VARIABLE, point) * Size(n, n * common)
-
-    after_f, after_g = step_size(f, VARIABLE, VARIABLE), step_g(VARIABLE)
-    left, right = step_g(after_f), step_size(f, VARIABLE, after_g)
-    poles = after_f.degree + after_g.degree + left.degree + right.degree
     labels = ("Phi_g(Phi_f(x))", "Phi_f(Phi_g(x))")
     subject = (f.rhs, table, free)
-    return Identity(n + len(free), sides, left * right + right * left, poles, None, *labels, subject=subject)
+    return Identity(n + len(free), sides, None, *labels, subject=subject)
 
 
 def _over(field: Field, table: Sequence[Sequence[fmpq_mpoly]], parameters: Sequence[Any], n: int) -> SystemOver:
@@ -213,14 +203,3 @@ def _over(field: Field, table: Sequence[Sequence[fmpq_mpoly]], parameters: Seque
         constants.append(values[-1])
     matrices = field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants)
     return SystemOver.from_tensor(field, *matrices)
-
-
-def _dominating(f: QuadraticSystem, table: Sequence[Sequence[fmpq_mpoly]]) -> tuple[QuadraticSystem, float]:
-    """A system with integer coefficients above those of D g in size, D the common denominator of g; and log2 D."""
-    common = fmpz(1)
-    for row in table:
-        for p in row:
-            for coefficient in p.coeffs():
-                common = common.lcm(coefficient.q)
-    rows = [[sum((abs(c) * common for c in p.coeffs()), fmpq(0)) for p in row] for row in table]
-    return system_of(f.variables, [[2 * c for c in row] for row in rows]), float(common.bit_length())

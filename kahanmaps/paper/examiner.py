@@ -9,14 +9,15 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
+from kahanmaps.algebra.bounds import BoundField, Size, bound_of
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.checks.claims import Evidence, Finding, Verdict, Witness
 from kahanmaps.checks.decide import log2_error
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.sizes import Size
 from kahanmaps.paper.controls import CONTROLS, broken
 from kahanmaps.paper.evaluate import UNDEFINED, Outcome, evaluate, witness_of
 from kahanmaps.paper.objects import PaperObjects
@@ -245,12 +246,7 @@ class Examiner(ABC):
     def _size(self, claim: Claim) -> tuple[set[str], Size, int]:
         """What a claim uses, a bound for the equation it amounts to, and the degree of all its denominators."""
         bounds = self.bounds()
-        equation, poles = Size(0, 0.0), 0
-        for left, right in claim.function(bounds):
-            sides = [value.entry if hasattr(value, "entry") else bounds.K.convert(value) for value in (left, right)]
-            difference = sides[0] - sides[1]
-            equation = equation | difference.above
-            poles += difference.pole_degree
+        equation, poles = bound_of(cast(BoundField, bounds.K), claim.function(bounds))
         return bounds.used, equation, poles
 
     def _refuted(self, claim: Claim, roots: bool, outcome: Outcome) -> Finding:

@@ -18,6 +18,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_poly, fmpz, nmod_poly
 
+from kahanmaps.algebra.bounds import BoundField
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import CC, QQ, Field, PrimeField
 from kahanmaps.algebra.functions import FunctionField
@@ -29,7 +30,6 @@ from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.invariants.integrals import ModifiedHamiltonian, PaperIntegral
 from kahanmaps.invariants.poisson import poisson_tensor
-from kahanmaps.paper.bounds import BoundField
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.systems.hamiltonian import standard_structure
 from kahanmaps.systems.quadratic import SystemOver

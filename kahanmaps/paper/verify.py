@@ -24,6 +24,7 @@ from typing import Any
 
 from flint import fmpq_poly
 
+from kahanmaps.algebra.bounds import Size
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded
@@ -38,7 +39,6 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.family.skew_hamiltonian import diagnosis, format_univariate
-from kahanmaps.invariants.sizes import Size
 from kahanmaps.paper import realise
 from kahanmaps.paper.evaluate import UNDEFINED, entries, evaluate, same, witness_of
 from kahanmaps.paper.examiner import Examiner, VerifyOptions

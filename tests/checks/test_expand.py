@@ -17,7 +17,6 @@ from kahanmaps.checks.decide import Decision, Identity
 from kahanmaps.checks.expand import NotEqual, expansion
 from kahanmaps.checks.settings import Settings
 from kahanmaps.invariants.integrals import ClaimedIntegral
-from kahanmaps.invariants.sizes import Size
 
 TOP = QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "-2*z*x", "x*y"])
 CONSERVED = "(1 - eps^2*y^2)/(1 + 2*eps^2*z^2)"
@@ -54,7 +53,7 @@ def test_a_quantity_that_is_not_conserved_is_never_proved(claim):
 
 @pytest.mark.parametrize("wrong", [(0,), (1,), (2,), (0, 1), (1, 2)])
 def test_all_components_have_to_agree(wrong):
-    right = Identity(3, lambda field, x, eps: (list(x), list(x)), Size(1, 0.0), 0, None, subject=())
+    right = Identity(3, lambda field, x, eps: (list(x), list(x)), None, subject=())
 
     def sides(field, x, eps):
         return list(x), [x[k] + field.one if k in wrong else x[k] for k in range(3)]
@@ -69,7 +68,7 @@ def test_a_small_budget_ends_without_an_answer():
 
 
 def test_sides_that_are_not_defined_prove_nothing():
-    assert expansion(Identity(1, lambda field, x, eps: None, Size(1, 0.0), 0, None, subject=())) is None
+    assert expansion(Identity(1, lambda field, x, eps: None, None, subject=())) is None
 
 
 def test_expansion_agrees_with_the_value_at_a_point():
@@ -80,12 +79,11 @@ def test_expansion_agrees_with_the_value_at_a_point():
 @pytest.mark.parametrize("k", [0, 1, 2])
 def test_every_eps_is_not_an_eps_that_equals_a_coordinate(k):
     """eps = x_k holds where eps is that coordinate, and eps x_k = x_k eps everywhere."""
-    size = Size(2, 0.0)
     with pytest.raises(NotEqual):
-        expansion(Identity(3, lambda field, x, eps: ([eps], [x[k]]), size, 0, None, subject=()))
+        expansion(Identity(3, lambda field, x, eps: ([eps], [x[k]]), None, subject=()))
     with pytest.raises(NotEqual):
-        expansion(Identity(3, lambda field, x, eps: ([eps * eps], [x[k] * eps]), size, 0, None, subject=()))
-    evidence = expansion(Identity(3, lambda field, x, eps: ([eps * x[k]], [x[k] * eps]), size, 0, None, subject=()))
+        expansion(Identity(3, lambda field, x, eps: ([eps * eps], [x[k] * eps]), None, subject=()))
+    evidence = expansion(Identity(3, lambda field, x, eps: ([eps * x[k]], [x[k] * eps]), None, subject=()))
     assert evidence is not None
     assert evidence.data["eps"] == "every"
 

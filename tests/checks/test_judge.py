@@ -16,7 +16,6 @@ from kahanmaps.checks.decide import Decision, Identity
 from kahanmaps.checks.judge import Contradiction, judge
 from kahanmaps.checks.settings import OrbitRun, Settings
 from kahanmaps.errors import SingularStep
-from kahanmaps.invariants.sizes import Size
 from kahanmaps.maps.orbits import OrbitEnd
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
@@ -25,9 +24,7 @@ PROOF = theorems.evidence("Theorem 1", [("a hypothesis", True)])
 
 def identity_of(right) -> Identity:
     """x = right(x, field)."""
-    return Identity(
-        1, lambda field, point, eps: ([point[0]], [right(point[0], field)]), Size(40, 200.0), 0, None, subject=()
-    )
+    return Identity(1, lambda field, point, eps: ([point[0]], [right(point[0], field)]), None, subject=())
 
 
 TRUE = identity_of(lambda x, field: x)
@@ -37,8 +34,6 @@ FALSE_BUT_ON_AN_ORBIT = identity_of(lambda x, field: x + (x - field.one) * (x - 
 POLE_FIRST = Identity(
     1,
     lambda field, point, eps: None if point[0] == field.one else ([point[0]], [field.convert(2)]),
-    Size(1, 10.0),
-    1,
     None,
     subject=(),
 )
@@ -53,7 +48,7 @@ def undefined(field, point, eps):
     raise SingularStep("no value")
 
 
-NOWHERE = Identity(1, undefined, Size(1, 1.0), 1, None, subject=())
+NOWHERE = Identity(1, undefined, None, subject=())
 
 
 @pytest.fixture

@@ -1,0 +1,280 @@
+"""Bounds for degrees and coefficients, as a field: whatever is computed with field operations bounds itself.
+
+An element stands for a rational function N / (s D_1^k_1 D_2^k_2 ...): N a polynomial with integer coefficients of which
+the `Size` is kept, s a positive integer, D_1, D_2, ... what was divided by on the way, with their sizes. Sums are taken
+over a common denominator. A matrix has one bound for all its entries, and a linear system is solved by Cramer's rule.
+Run over this field, a claim tells the degree and the coefficients of the polynomial equation that it amounts to
+(`bound_of`).
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import fmpq_mat, fmpz
+
+from kahanmaps.algebra.fields import Element, Field, rational
+from kahanmaps.errors import InputError
+
+
+@dataclass(frozen=True)
+class Size:
+    """A bound on an integer polynomial: total degree, and log2 of the sum of the absolute coefficients.
+
+    That sum is submultiplicative and subadditive, so that bounds follow a computation step by step.
+
+    >>> Size(2, 1.0) * Size(3, 0.5)
+    Size(degree=5, bits=1.5)
+    >>> Size(2, 1.0) + Size(3, 1.0)
+    Size(degree=3, bits=2.0)
+    """
+
+    degree: int
+    bits: float
+
+    def __mul__(self, other: Size) -> Size:
+        return Size(self.degree + other.degree, self.bits + other.bits)
+
+    def __add__(self, other: Size) -> Size:
+        return Size(max(self.degree, other.degree), _log_sum(self.bits, other.bits))
+
+    def __pow__(self, exponent: int) -> Size:
+        return Size(self.degree * exponent, self.bits * exponent)
+
+    def __or__(self, other: Size) -> Size:
+        """A bound for either polynomial."""
+        return Size(max(self.degree, other.degree), max(self.bits, other.bits))
+
+
+ONE = Size(0, 0.0)
+
+
+def bound_of(field: BoundField, pairs: Iterable[tuple[Any, Any]]) -> tuple[Size, int]:
+    """What pairs of elements, or of matrices, amount to that are to be equal, all computed over `field`.
+
+    Returns:
+        A bound for each of the polynomials that vanish where the pairs are equal, and the degree of the product of all
+        that must not be zero for them to have values: of what was divided by, and of what was compared with zero.
+    """
+    equation = ONE
+    for pair in pairs:
+        left, right = (side.entry if isinstance(side, BoundMatrix) else field.convert(side) for side in pair)
+        equation = equation | (left - right).above
+    return equation, field.pole_degree
+
+
+class BoundField(Field):
+    """The field of bounds: `variable()` is a variable, `polynomial(...)` any polynomial of at most that size."""
+
+    name = "bounds"
+    characteristic = 0
+
+    def __init__(self) -> None:
+        self._denominators: list[Size] = []
+        self._number_of: dict[int, tuple[Any, int]] = {}
+
+    @property
+    def zero(self) -> Bound:
+        return Bound(self, ONE, 1, {})
+
+    @property
+    def one(self) -> Bound:
+        return Bound(self, ONE, 1, {})
+
+    def variable(self) -> Bound:
+        """A variable."""
+        return Bound(self, Size(1, 0.0), 1, {})
+
+    def polynomial(self, degree: int, bits: float) -> Bound:
+        """A polynomial with integer coefficients of this degree, the sum of their absolute values below 2^bits."""
+        return Bound(self, Size(degree, bits), 1, {})
+
+    @property
+    def pole_degree(self) -> int:
+        """The degree of the product of everything that must not be zero."""
+        return sum(size.degree for size in self._denominators)
+
+    def denominator(self, of: Any, size: Size) -> int:
+        """The number of the denominator that belongs to the object `of`; one object has one denominator."""
+        known = self._number_of.get(id(of))
+        if known is None:
+            known = self._number_of[id(of)] = (of, len(self._denominators))  # `of` is kept, so its id stays its own
+            self._denominators.append(size)
+        return known[1]
+
+    def product(self, powers: Mapping[int, int]) -> Size:
+        """The size of a product of denominators."""
+        total = ONE
+        for number, power in powers.items():
+            total = total * self._denominators[number] ** power
+        return total
+
+    def convert(self, value: Any) -> Bound:
+        if isinstance(value, Bound):
+            return value
+        number = rational(value)
+        return Bound(self, Size(0, log2(number.p)), int(number.q), {})
+
+    def convert_matrix(self, matrix: fmpq_mat) -> BoundMatrix:
+        above, below = matrix.numer_denom()
+        largest = max((abs(entry) for entry in above.entries()), default=fmpz(0))
+        return BoundMatrix(self, matrix.nrows(), matrix.ncols(), Bound(self, Size(0, log2(largest)), int(below), {}))
+
+    def random(self, rng: random.Random, height: int = 10) -> Bound:
+        return self.variable()
+
+    def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> BoundMatrix:
+        """The matrix with the common bound of these entries."""
+        # Entries are mostly one object many times over.
+        elements = [self.convert(entry) for entry in {id(entry): entry for entry in entries}.values()]
+        scale, below = 1, dict[int, int]()
+        for element in elements:
+            scale, below = math.lcm(scale, element.scale), _larger(below, element.below)
+        above = ONE
+        for element in elements:
+            above = above | element.over(scale, below)
+        return BoundMatrix(self, rows, columns, Bound(self, above, scale, below))
+
+    def is_zero(self, element: Any) -> bool:
+        """False: what is compared with zero is taken to be something else, and counts among the denominators."""
+        self.denominator(element, element.above)
+        return False
+
+    def equal(self, left: Any, right: Any) -> bool:
+        return True
+
+
+class Bound(Element):
+    """The bound of one rational function."""
+
+    __slots__ = ("above", "below", "scale")
+
+    field: BoundField
+
+    def __init__(self, field: BoundField, above: Size, scale: int, below: Mapping[int, int]) -> None:
+        self.field = field
+        self.above = above
+        self.scale = scale
+        self.below = dict(below)
+
+    def over(self, scale: int, below: Mapping[int, int]) -> Size:
+        """The numerator over a larger denominator."""
+        missing = {number: power - self.below.get(number, 0) for number, power in below.items()}
+        return self.above * self.field.product(missing) * Size(0, log2(scale // self.scale))
+
+    @property
+    def pole_degree(self) -> int:
+        """The degree of the denominator."""
+        return int(self.field.product(self.below).degree)
+
+    def _plus(self, other: Bound) -> Bound:
+        scale, below = math.lcm(self.scale, other.scale), _larger(self.below, other.below)
+        return Bound(self.field, self.over(scale, below) + other.over(scale, below), scale, below)
+
+    def __neg__(self) -> Bound:
+        return self
+
+    def _times(self, other: Bound) -> Bound:
+        below = _together(self.below, other.below)
+        return Bound(self.field, self.above * other.above, self.scale * other.scale, below)
+
+    def _over(self, other: Bound) -> Bound:
+        number = self.field.denominator(other, other.above)
+        above = self.above * self.field.product(other.below) * Size(0, log2(other.scale))
+        return Bound(self.field, above, self.scale, _together(self.below, {number: 1}))
+
+    def _same(self, other: Bound) -> bool:
+        return self is other
+
+
+class BoundMatrix:
+    """A matrix of which a common bound for all entries is known."""
+
+    def __init__(self, field: BoundField, rows: int, columns: int, entry: Bound) -> None:
+        self.field = field
+        self._rows, self._columns = rows, columns
+        self.entry = entry
+
+    def nrows(self) -> int:
+        return self._rows
+
+    def ncols(self) -> int:
+        return self._columns
+
+    def entries(self) -> list[Bound]:
+        return [self.entry] * (self._rows * self._columns)
+
+    def __getitem__(self, place: tuple[int, int]) -> Bound:
+        return self.entry
+
+    def transpose(self) -> BoundMatrix:
+        return BoundMatrix(self.field, self._columns, self._rows, self.entry)
+
+    def __add__(self, other: BoundMatrix) -> BoundMatrix:
+        if (self._rows, self._columns) != (other._rows, other._columns):
+            raise InputError("matrices of different sizes are added")
+        return BoundMatrix(self.field, self._rows, self._columns, self.entry + other.entry)
+
+    def __sub__(self, other: BoundMatrix) -> BoundMatrix:
+        return self + other
+
+    def __neg__(self) -> BoundMatrix:
+        return self
+
+    def __mul__(self, other: Any) -> BoundMatrix:
+        if not isinstance(other, BoundMatrix):
+            return BoundMatrix(self.field, self._rows, self._columns, self.entry * self.field.convert(other))
+        if self._columns != other._rows:
+            raise InputError("matrices whose sizes do not fit are multiplied")
+        product = self.entry * other.entry
+        product.above *= Size(0, log2(self._columns))
+        return BoundMatrix(self.field, self._rows, other._columns, product)
+
+    def det(self) -> Bound:
+        """The determinant: n! products of n entries."""
+        n, entry = self._rows, self.entry
+        below = {number: n * power for number, power in entry.below.items()}
+        return Bound(self.field, self._minor(n), entry.scale**n, below)
+
+    def solve(self, right: BoundMatrix) -> BoundMatrix:
+        """Cramer's rule: with entries N/d the solution is d adj(N) right / det N."""
+        n, entry = self._rows, self.entry
+        number = self.field.denominator(self, self._minor(n))
+        d = self.field.product(entry.below) * Size(0, log2(entry.scale))
+        inverse = Bound(self.field, self._minor(n - 1) * Size(0, log2(n)) * d, 1, {number: 1})
+        return BoundMatrix(self.field, n, right._columns, inverse * right.entry)
+
+    def _minor(self, size: int) -> Size:
+        return self.entry.above**size * Size(0, math.lgamma(size + 1) / math.log(2) + 1e-9)
+
+
+def log2(value: fmpz | int) -> float:
+    """log2 of the absolute value of an integer, rounded up a little; 0 for 0.
+
+    >>> log2(-8) < 3.001, log2(0)
+    (True, 0.0)
+    """
+    number = abs(int(value))
+    if number <= 1:
+        return 0.0
+    shift = max(0, number.bit_length() - 60)
+    return math.log2((number >> shift) + (1 if shift else 0)) + shift + 1e-9
+
+
+def _larger(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
+    """The least common multiple of two products of denominators."""
+    return {number: max(left.get(number, 0), right.get(number, 0)) for number in {*left, *right}}
+
+
+def _together(left: Mapping[int, int], right: Mapping[int, int]) -> dict[int, int]:
+    """The product of two products of denominators."""
+    return {number: left.get(number, 0) + right.get(number, 0) for number in {*left, *right}}
+
+
+def _log_sum(left: float, right: float) -> float:
+    high, low = max(left, right), min(left, right)
+    return high + math.log2(1 + 2 ** (low - high)) if high - low < 200 else high + 1e-9

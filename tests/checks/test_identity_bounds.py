@@ -1,0 +1,184 @@
+"""The bound of an identity, against its two sides written out as rational functions of x and eps."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from bound_helpers import check, covers_polynomial, differences, true_size
+from check_helpers import claim, hamiltonian_of, hamiltonians, system_of
+from flint import fmpq
+from helpers import HENON_HEILES, LOTKA_VOLTERRA, matrices, rationals, systems
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from kahanmaps.algebra.bounds import Size
+from kahanmaps.algebra.polynomials import monomials, ring
+from kahanmaps.checks.commute import commutativity
+from kahanmaps.checks.conserve import conservation
+from kahanmaps.checks.preserve import density_identity, jacobi_identity, transformation_identity
+from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
+from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+few = settings(max_examples=15)
+some_eps = st.one_of(st.none(), rationals(6).filter(lambda eps: eps != 0))
+
+
+# Commutativity
+
+
+@few
+@given(systems(dims=(1,)), systems(dims=(1,)), some_eps)
+def test_commutativity_is_bounded_in_dimension_one(f, g, eps):
+    check(commutativity(f, g, eps, ("f", "g")))
+
+
+@few
+@given(systems(dims=(2,)), systems(dims=(2,)), some_eps)
+def test_commutativity_is_bounded_in_dimension_two(f, g, eps):
+    check(commutativity(f, g, eps, ("f", "g")))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_commutativity_is_bounded_for_dense_systems_and_not_far_from_the_truth(seed):
+    rng = random.Random(seed)
+
+    def dense():
+        rhs = ring(["x", "y"])
+        exponents = [e for d in range(3) for e in monomials(2, d)]
+        rows = [{e: fmpq(rng.randint(-99, 99), rng.randint(1, 9)) for e in exponents} for _ in range(2)]
+        return QuadraticSystem.from_polynomials([rhs.from_dict(row) for row in rows])
+
+    identity = commutativity(dense(), dense(), None if seed % 2 else fmpq(rng.randint(1, 9), 7), ("f", "g"))
+    equation, poles = check(identity, differs=True)
+    largest = max(true_size(above)[0] for above, _ in differences(identity))
+    assert largest <= equation.degree <= 4 * largest
+    assert poles <= 2 * equation.degree
+
+
+# One large row, one large part of a row, large denominators: nothing makes up for a row that is left out.
+LOPSIDED = [
+    system_of("x", "10^30*x^2"),
+    system_of("x", "10^30"),
+    system_of("x y", "10^30*x^2", "x + y"),
+    system_of("x y", "x + y", "10^30*x*y"),
+    system_of("x y", "10^30*(x - y)", "y^2"),
+    system_of("x y", "1", "10^30"),
+    system_of("x y", "x^2/(10^30 + 57)", "y^2/(10^30 + 57)"),
+    system_of("x y", "x/(10^30 + 57)", "y/(10^15 + 37)"),
+]
+
+
+@pytest.mark.parametrize("eps", [None, fmpq(10**20, 3), fmpq(3, 10**20)])
+@pytest.mark.parametrize("system", LOPSIDED)
+def test_a_system_with_one_large_part_is_bounded(system, eps):
+    other = system_of("x", "x^2 + 1") if system.dim == 1 else LOTKA_VOLTERRA
+    check(commutativity(system, other, eps, ("f", "g")))
+    names = " ".join(system.variables)
+    function = ClaimedIntegral("I", claim("(x^2 + 1)/(x + eps)", names))
+    check(conservation(system, function, eps), differs=True)
+
+
+def test_a_smaller_size_would_not_bound_the_difference():
+    identity = conservation(HENON_HEILES, ClaimedIntegral("I", claim("q1", "q1 q2 p1 p2")), None)
+    ((above, _),) = differences(identity)
+    degree, bits = true_size(above)
+    assert covers_polynomial(identity.bound[0], above)
+    assert not covers_polynomial(Size(degree - 1, identity.bound[0].bits), above)
+    assert not covers_polynomial(Size(identity.bound[0].degree, bits - 0.01), above)
+
+
+# Integrals and densities: of another system, so that the two sides differ
+
+
+@few
+@given(hamiltonians(dims=(2,)), hamiltonians(dims=(2,)))
+def test_conservation_of_another_modified_h_is_bounded(hamiltonian, other):
+    check(conservation(hamiltonian.system, ModifiedHamiltonian(other), fmpq(2, 3)))
+
+
+@few
+@given(hamiltonians(dims=(2,), homogeneous=True, standard=True), systems(dims=(2,)), some_eps)
+def test_conservation_of_the_papers_integral_is_bounded(hamiltonian, system, eps):
+    check(conservation(system, PaperIntegral(hamiltonian), eps))
+
+
+@few
+@given(hamiltonians(dims=(2,), homogeneous=True, standard=True), matrices(2, 2), systems(dims=(2,)), some_eps)
+def test_conservation_of_an_integral_of_the_commutant_is_bounded(hamiltonian, A, system, eps):
+    check(conservation(system, CommutantIntegral(hamiltonian, A, 2), eps))
+
+
+CLAIMS = [
+    "x",
+    "x^2/3 + eps*y",
+    "(x^2 + y^2)/(1 - eps^2*y^2)",
+    "x*y/(2*x - 3/5*y) + eps/7",
+    "1/(x^3 + eps^4*y)",
+]
+
+
+@pytest.mark.parametrize("eps", [None, fmpq(-3, 7), fmpq(10**9 + 7, 998244353)])
+@pytest.mark.parametrize("text", CLAIMS)
+def test_conservation_of_a_claimed_function_is_bounded(text, eps):
+    check(conservation(LOTKA_VOLTERRA, ClaimedIntegral("I", claim(text, "x y")), eps), differs=True)
+
+
+@pytest.mark.parametrize("eps", [None, fmpq(-3, 7)])
+@pytest.mark.parametrize("text", [None, *CLAIMS])
+def test_invariance_of_a_density_is_bounded(text, eps):
+    density = DeterminantDensity(LOTKA_VOLTERRA) if text is None else ClaimedDensity(claim(text, "x y"))
+    check(density_identity(LOTKA_VOLTERRA, density, eps), differs=True)
+
+
+def test_determinants_that_must_not_be_zero_count_among_the_poles():
+    # In one dimension: x~ has the denominator 1 - 2 eps x; the other determinant is 1 + 2 eps x~, of degree 3.
+    density = ClaimedDensity(claim("x", "x"))
+    assert density_identity(system_of("x", "x^2"), density, None).bound[1] >= 2 + 3
+
+
+# Poisson tensors
+
+
+@few
+@given(hamiltonians(dims=(1, 2)), some_eps)
+def test_the_transformation_law_is_bounded(hamiltonian, eps):
+    check(transformation_identity(hamiltonian, eps))
+
+
+@few
+@given(hamiltonians(dims=(3,)), some_eps)
+def test_the_jacobi_identity_is_bounded(hamiltonian, eps):
+    check(jacobi_identity(hamiltonian, eps))
+
+
+LOPSIDED_HAMILTONIANS = [
+    hamiltonian_of("q p", "10^30*q^3 + p"),
+    hamiltonian_of("q p", "q^2*p/(10^30 + 57) + p^2"),
+    hamiltonian_of("q p", "q^3 + p^3", [[0, fmpq(1, 10**30)], [fmpq(-1, 10**30), 0]]),
+    hamiltonian_of("x y z", "x^2*z", [[0, 10**30, 0], [-(10**30), 0, 1], [0, -1, 0]]),
+    hamiltonian_of("x y z", "10^30*z^3 + x*y*z", [[0, 1, fmpq(1, 10**9)], [-1, 0, 1], [fmpq(-1, 10**9), -1, 0]]),
+]
+
+
+@pytest.mark.parametrize("eps", [fmpq(2, 3), fmpq(10**20, 3), fmpq(3, 10**20)])
+@pytest.mark.parametrize("hamiltonian", LOPSIDED_HAMILTONIANS)
+def test_the_poisson_identities_of_a_system_with_one_large_part_are_bounded(hamiltonian, eps):
+    check(transformation_identity(hamiltonian, eps))
+    check(jacobi_identity(hamiltonian, eps))
+
+
+# Primes of 21 bits: together they make a common denominator that no single entry has.
+_PRIMES = (2097143, 2097133, 2097131, 2097097, 2097091, 2097083)
+_ODD_DENOMINATORS = [
+    [0, f"1/{_PRIMES[0]}", f"1/{_PRIMES[1]}", f"1/{_PRIMES[2]}"],
+    [f"-1/{_PRIMES[0]}", 0, f"1/{_PRIMES[3]}", f"1/{_PRIMES[4]}"],
+    [f"-1/{_PRIMES[1]}", f"-1/{_PRIMES[3]}", 0, f"1/{_PRIMES[5]}"],
+    [f"-1/{_PRIMES[2]}", f"-1/{_PRIMES[4]}", f"-1/{_PRIMES[5]}", 0],
+]
+
+
+@pytest.mark.parametrize("H", ["x^3", "x^3 + y^2*z - w", "w^3 + z*y*x"])
+def test_denominators_of_j_without_common_factors_are_bounded(H):
+    check(jacobi_identity(hamiltonian_of("x y z w", H, _ODD_DENOMINATORS), None))
