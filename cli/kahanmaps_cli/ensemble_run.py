@@ -132,8 +132,6 @@ class FloatRun(Run):
         return self.ensemble.n, self.ensemble.system.dim
 
     def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
-        from kahanmaps.maps.fast import stream_ensemble
-
         def progress(step: int) -> None:
             told(step)
             if self.interrupted:
@@ -142,7 +140,7 @@ class FloatRun(Run):
         looks = max(1, min(_LOOKS, _VALUES // self.ensemble.n))
         look = every or max(1, -(-steps // looks))
         if output is not None and (every or not self.asked):
-            self.records = stream_ensemble(self.ensemble, output, steps, every or max(1, steps), progress=progress)
+            self.records = self.ensemble.stream(output, steps, every or max(1, steps), progress=progress)
         elif output is not None:
             self._first_and_last(steps, look, output, progress)
         elif self.asked:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from kahanmaps.maps.float_ensemble import (
 )
 from kahanmaps.maps.float_numbers import FloatArray, exact, to_float, to_floats
 from kahanmaps.maps.float_steps import RUNNING
-from kahanmaps.maps.float_stream import stream_ensemble, stream_orbit
+from kahanmaps.maps.float_stream import NpyFile
 from kahanmaps.maps.orbits import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -43,7 +44,6 @@ __all__ = [
     "FloatKahanMap",
     "FloatOrbit",
     "float_function",
-    "stream_ensemble",
     "stream_orbit",
     "to_float",
     "to_floats",
@@ -246,3 +246,19 @@ def float_function(function: RationalFunction) -> Callable[[Sequence[float]], fl
         return found if found is not None and isfinite(found) else None
 
     return value
+
+
+def stream_orbit(orbit: FloatOrbit, path: str | Path, *, progress: Callable[[int], None] | None = None) -> OrbitEnd:
+    """Walk an orbit into a .npy file of shape (points, dim): the start and every `orbit.every`-th iterate.
+
+    `progress` is called with the index of the step reached, about ten times a second; `orbit.interrupt()` ends the walk
+    after the portion in hand.
+    """
+    with NpyFile(path, (orbit.dim,)) as file:
+        for step, x in orbit.portions():
+            file.append(x)
+            if progress is not None:
+                progress(step)
+    if orbit.end is None:
+        raise AssertionError("an orbit has run out of portions without an end")
+    return orbit.end

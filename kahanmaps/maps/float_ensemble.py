@@ -33,6 +33,7 @@ from kahanmaps.maps.float_steps import (
     distances,
     generic_equation,
 )
+from kahanmaps.maps.float_stream import NpyFile
 from kahanmaps.maps.orbits import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -280,16 +281,21 @@ class FloatEnsemble:
     ) -> FloatArray | None:
         """Take `steps` steps and record the points at multiples of `every`, the start among them: (count, n, dim).
 
-        With `out` they go to this .npy file as they come (see float_stream.py) and nothing is returned.
+        Orbits that have ended are NaN. With `out` they go to this .npy file as they come, and nothing is returned.
         """
         require_steps(steps)
         require_every(every)
         if out is not None:
-            from kahanmaps.maps.float_stream import stream_ensemble
-
-            stream_ensemble(self, out, steps, every, progress=progress)
+            self.stream(out, steps, every, progress=progress)
             return None
         return np.concatenate(list(self.records(steps, every, progress=progress)))
+
+    def stream(self, out: str | Path, steps: int, every: int, *, progress: Callable[[int], None] | None = None) -> int:
+        """The same into a .npy file of shape (records, n, dim); returns how many records were written."""
+        with NpyFile(out, (self.n, self.system.dim)) as file:
+            for x in self.records(steps, every, progress=progress):
+                file.append(x)
+            return file.rows
 
     def records(self, steps: int, every: int, *, progress: Callable[[int], None] | None = None) -> Iterator[FloatArray]:
         """The same in portions (count, n, dim), computed as they are asked for."""

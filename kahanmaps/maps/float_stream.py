@@ -12,21 +12,15 @@ the machine itself crashes before, the last portions may be missing, or be zeros
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import IO, TYPE_CHECKING, Any, Literal
+from typing import IO, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
 from kahanmaps.whole_files import sync
-
-if TYPE_CHECKING:
-    from kahanmaps.maps.fast import FloatOrbit
-    from kahanmaps.maps.float_ensemble import FloatEnsemble
-    from kahanmaps.maps.orbits import OrbitEnd
 
 
 class NpyFile:
@@ -90,37 +84,3 @@ class NpyFile:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def stream_orbit(orbit: FloatOrbit, path: str | Path, *, progress: Callable[[int], None] | None = None) -> OrbitEnd:
-    """Walk an orbit into a .npy file of shape (points, dim): the start and every `orbit.every`-th iterate.
-
-    `progress` is called with the index of the step reached, about ten times a second; `orbit.interrupt()` ends the walk
-    after the portion in hand.
-    """
-    with NpyFile(path, (orbit.dim,)) as file:
-        for step, x in orbit.portions():
-            file.append(x)
-            if progress is not None:
-                progress(step)
-    if orbit.end is None:
-        raise AssertionError("an orbit has run out of portions without an end")
-    return orbit.end
-
-
-def stream_ensemble(
-    ensemble: FloatEnsemble,
-    path: str | Path,
-    steps: int,
-    every: int,
-    *,
-    progress: Callable[[int], None] | None = None,
-) -> int:
-    """Advance an ensemble into a .npy file of shape (records, n, dim), and return how many records were written.
-
-    Recorded are the points at multiples of `every`, the start among them; orbits that have ended are NaN.
-    """
-    with NpyFile(path, (ensemble.n, ensemble.system.dim)) as file:
-        for x in ensemble.records(steps, every, progress=progress):
-            file.append(x)
-        return file.rows

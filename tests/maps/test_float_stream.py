@@ -17,7 +17,7 @@ import pytest
 from helpers import EULER_TOP
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit, stream_ensemble, stream_orbit
+from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit, stream_orbit
 from kahanmaps.maps.float_stream import NpyFile
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -33,7 +33,7 @@ def test_the_file_holds_the_points_of_the_orbit(tmp_path):
 
 def test_the_file_of_an_ensemble_holds_its_records(tmp_path):
     starts = np.random.default_rng(0).uniform(-1, 1, (5, 3))
-    rows = stream_ensemble(FloatEnsemble(EULER_TOP, "1/10", starts, kernel="numpy"), tmp_path / "x.npy", 50, 5)
+    rows = FloatEnsemble(EULER_TOP, "1/10", starts, kernel="numpy").stream(tmp_path / "x.npy", 50, 5)
     assert rows == 11
     assert np.array_equal(
         np.load(tmp_path / "x.npy"), FloatEnsemble(EULER_TOP, "1/10", starts, kernel="numpy").run(50, 5)
