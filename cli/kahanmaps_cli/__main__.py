@@ -4,7 +4,7 @@ Python itself prints a traceback where it is interrupted before it comes here. W
 then, or costs nothing: the handler is in place before anything is loaded.
 """
 
-import _signal  # the module `signal` loads enumerations first
+import _signal  # type: ignore[import-not-found]  # the module `signal` loads enumerations first
 import os
 import sys
 
