@@ -57,6 +57,7 @@ class Identity:
     left_label: str = "left side"
     right_label: str = "right side"
     entries: tuple[str, ...] = ()  # names of the entries, where a witness should show only one that differs
+    scope: str = ""  # for what it is stated, in words, where there is more to say than eps
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
     def seed(self, seed: int) -> int:
@@ -135,12 +136,12 @@ def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) 
             return _refuted(identity, seed, field, point, eps, sides)
         primes.append(field.prime)
     bound = per_trial * trials
-    scope = "every eps" if identity.eps is None else f"eps = {identity.eps}"
+    scope = identity.scope or ("for every eps" if identity.eps is None else f"for eps = {identity.eps}")
     return Decision(
         Verdict.SUPPORTED,
         Evidence(
             "random points over GF(p)",
-            f"held at {trials} random point{'s' * (trials > 1)} over GF(p), p random of 63 bits, for {scope}; "
+            f"held at {trials} random point{'s' * (trials > 1)} over GF(p), p random of 63 bits, {scope}; "
             f"false with probability below 2^{math.floor(-bound) * -1}",
             {
                 "points": trials,

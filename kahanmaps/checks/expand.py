@@ -25,9 +25,9 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
     `budget` bounds the products of terms; the default is smaller where coefficients are long.
     Raises NotEqual where both sides were expanded and differ.
     """
-    if identity.dim > MAX_DIMENSION:
-        return None
     if budget is None:
+        if identity.dim > MAX_DIMENSION:
+            return None
         # A product takes longer than in proportion to its bits once it has left the innermost caches.
         bits = identity.bound[0].bits
         budget = int(DEFAULT_BUDGET / max(1.0, bits / 256) / max(1.0, bits / 10_000))

@@ -14,13 +14,13 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly
 
-from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import SingularMatrix, SingularStep
 from kahanmaps.laboratory.cofactors import (
     Cofactor,
     CofactorProduct,
@@ -30,11 +30,11 @@ from kahanmaps.laboratory.cofactors import (
     products,
 )
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.identities import judged
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, exponents_up_to
 from kahanmaps.maps.kahan import KahanMapOver
 
-_BUDGET = 20_000_000
 _MOST_TERMS = 2000  # of a polynomial: as many unknowns
 _MOST_PRODUCTS = 2000
 
@@ -220,33 +220,37 @@ def _list(
         found.reason = f"no closed form for the cofactor {product.text(cofactors)}: {forms.reason}"
         return
     polynomials = tuple(forms.bases[0])
-    outcomes = [_expanded(laboratory, cofactors, product, P) for P in polynomials]
-    if Verdict.REFUTED in outcomes:
+    outcomes = [_judged(laboratory, cofactors, product, P) for P in polynomials]
+    if not all(outcome.holds for outcome in outcomes):
         found.reason = f"a formula for the cofactor {product.text(cofactors)} did not pass as an identity"
         return
     verdict = Verdict.PROVED if all(one is Verdict.PROVED for one in outcomes) else Verdict.SUPPORTED
     found.spaces.append(DarbouxPolynomials(product.text(cofactors), polynomials, verdict))
 
 
-def _expanded(
-    laboratory: Laboratory, cofactors: Sequence[Cofactor], product: CofactorProduct, P: fmpq_mpoly
-) -> Verdict | None:
-    """Whether P(x~) prod g(x, eps)^k = prod g(x~, -eps)^k P(x), expanded: proved, refuted, or None where too large."""
-    system = laboratory.system
-    K = FunctionField((*system.variables, *system.symbols, "eps"), _BUDGET)
-    point, values = K.variables[: system.dim], K.variables[system.dim : -1]
-    eps = K.variables[-1] if laboratory.eps is None else K.convert(laboratory.eps)
-    try:
-        map_ = KahanMapOver(system.over(K, values), eps)
+def _judged(laboratory: Laboratory, cofactors: Sequence[Cofactor], product: CofactorProduct, P: fmpq_mpoly) -> Verdict:
+    """Whether P(x~) prod g(x, eps)^k = prod g(x~, -eps)^k P(x)."""
+    system, n = laboratory.system, laboratory.system.dim
+
+    def sides(field: Field, place: tuple[Any, ...], eps: Any) -> Sides:
+        point, values = place[:n], place[n:]
+        map_ = KahanMapOver(system.over(field, values), eps)
         image = map_.step(point)
-        left, right = evaluate(P, K, (*image, *values, eps)), evaluate(P, K, (*point, *values, eps))
+        left, right = evaluate(P, field, (*image, *values, eps)), evaluate(P, field, (*place, eps))
         for one, power in zip(cofactors, product.powers, strict=True):
             for _ in range(power):
                 if one.polynomial is None:
                     left, right = left * map_.determinant(point), right * map_.inverse.determinant(image)
                 else:
-                    left = left * evaluate(one.polynomial, K, (*point, *values, eps))
-                    right = right * evaluate(one.polynomial, K, (*image, *values, -eps))
-        return Verdict.PROVED if K.equal(left, right) else Verdict.REFUTED
-    except (BudgetExceeded, SingularMatrix, SingularStep, ZeroDivisionError):
-        return None
+                    left = left * evaluate(one.polynomial, field, (*place, eps))
+                    right = right * evaluate(one.polynomial, field, (*image, *values, -eps))
+        return [left], [right]
+
+    subject = (
+        system.symbols,
+        system.rhs,
+        P,
+        [(one.polynomial, k) for one, k in zip(cofactors, product.powers, strict=True)],
+    )
+    identity = Identity(n + len(system.symbols), sides, laboratory.eps, subject=subject)
+    return judged(identity, laboratory.seed)[0]

@@ -6,7 +6,8 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
-from kahanmaps.checks.claims import Verdict
+from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.parametric import ParametricSystem
@@ -30,7 +31,8 @@ def function(text: str):
 @pytest.fixture
 def blind(monkeypatch):
     """Random points that let everything pass."""
-    monkeypatch.setattr(identities, "_holds_at_points", lambda *arguments: True)
+    passed = Decision(Verdict.SUPPORTED, Evidence("random points over GF(p)", "held"))
+    monkeypatch.setattr(identities, "decide", lambda identity, seed: passed)
 
 
 @pytest.mark.parametrize("is_density", [False, True])
@@ -82,6 +84,18 @@ def test_an_integral_with_symbols_is_for_those_at_which_it_has_values():
     verdict, evidence = integral_verdict(system, I, None)
     assert verdict is Verdict.PROVED
     assert evidence.summary.endswith("for every eps and every a where a^2 - 1 is not 0")
+
+
+def test_points_support_what_is_too_large_to_expand_for_every_symbol_with_a_bound(monkeypatch):
+    monkeypatch.setattr(identities, "_BUDGET", 10)
+    system = ParametricSystem.of(file_with('["a*y", "-a*x"]', a="1"), ["a"])
+    I = parse_rational_function("(x^2 + y^2)/(a^2 - 1)", ["x", "y", "a", "eps"])
+    verdict, evidence = integral_verdict(system, I, None)
+    assert verdict is Verdict.SUPPORTED
+    assert "for every eps and every a where a^2 - 1 is not 0; false with probability below 2^-1" in evidence.summary
+    # A symbol is drawn like a coordinate: what holds for a = 1 alone is refuted.
+    wrong = parse_rational_function("x^2 + a*y^2", ["x", "y", "a", "eps"])
+    assert integral_verdict(system, wrong, None)[0] is Verdict.REFUTED
 
 
 def test_a_darboux_polynomial_that_expansion_refutes_is_left_out(monkeypatch):
