@@ -68,10 +68,15 @@ def member_hypotheses(member: FamilyMember) -> list[tuple[str, bool]]:
 
 
 def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
-    """The maps of f and g commute if g = C f with a constant C, C^2 = I, C f'(x) = f'(x) C for every x.
+    """The maps of f and g commute if g = C f with a constant C, C^3 = C, C f'(x) = f'(x) C for every x.
 
-    C then splits the space into two invariant parts, on which g is f and -f, so that Phi_g is Phi_f on the one and
-    its inverse on the other. Holds for inhomogeneous f as well; no Hamiltonian structure is needed.
+    The space is the sum of the eigenspaces of C to 1, -1 and 0, on which f is three separate systems and g is f, -f
+    and 0: so Phi_g is Phi_f, its inverse and the identity there. Holds for inhomogeneous f as well; no Hamiltonian
+    structure is needed.
+
+    >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
+    >>> commuting_by_splitting(f, QuadraticSystem.from_text(["x", "y"], ["0", "-y^2"])).data["hypotheses"][1]
+    'C^3 = C'
     """
     C = linear_relation(f, g)
     if C is None:
@@ -80,7 +85,7 @@ def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence |
         "the splitting lemma (docs/mathematics.md)",
         [
             ("g = C f with a constant matrix C", f.transformed(C) == _renamed(g, f)),
-            ("C^2 = I", bool(C * C == _identity(f.dim))),
+            ("C^3 = C", bool(C * C * C == C)),
             ("C f'(x) = f'(x) C for every x", _commutes(C, f)),
         ],
     )

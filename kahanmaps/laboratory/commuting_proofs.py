@@ -1,9 +1,7 @@
 """Do the Kahan maps of f and of one g, or of a linear family of g, commute: by a lemma, else at random points.
 
-Lemmas, each with hypotheses that are verified exactly (docs/mathematics.md has the first one with C^2 = I):
+Lemmas beside the splitting lemma of checks/theorems.py, each with hypotheses that are verified exactly:
 
-splitting    g = C f, C^3 = C, C f' = f' C. The space is the sum of the eigenspaces of C to 1, -1 and 0, and on them f
-             is three separate systems and g is f, -f and 0; so Phi_g is Phi_f, its inverse and the identity.
 affine       One of the fields is affine. Its Kahan map is affine, x -> P x + q, and commutes with the other map for
              every eps if P g(x) = g(P x + q). That is an identity of polynomials of degree at most 2n in eps once
              det(I - eps B)^2 is multiplied in, so it holds if it does at 2n + 1 values of eps. It is linear in g.
@@ -51,7 +49,7 @@ def judge_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> F
     if trivial is not None:
         return Finding(claim, theorems.PROVED, trivial, formula=_FORMULA)
     identity = commutativity(f, g, None, ("f", "g"))
-    proof = splitting(f, g) or affine(f, [g]) or _in_dimension_one(f, g)
+    proof = theorems.commuting_by_splitting(f, g) or affine(f, [g]) or _in_dimension_one(f, g)
     return judge(claim, identity, settings, proof, formula=_FORMULA)
 
 
@@ -61,29 +59,6 @@ def judge_family(f: QuadraticSystem, space: CommutingSpace, family: Component, s
     proof = affine(f, members) or (_in_dimension_one(f, f) if f.dim == 1 else None)
     claim = "the Kahan maps of f and of every member g of the family commute"
     return judge(claim, _family_identity(f, space, family), settings, proof, formula=_FORMULA)
-
-
-def splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
-    """The evidence that g = C f with C^3 = C, C f' = f' C, and so the maps commute; None where that is not so.
-
-    >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"])
-    >>> splitting(f, QuadraticSystem.from_text(["x", "y"], ["0", "-y^2"])).data["hypotheses"][1]
-    'C^3 = C'
-    """
-    C = theorems.linear_relation(f, g)
-    if C is None:
-        return None
-    # C f'(x) = f'(x) C: for B, and for each of the constant matrices df'/dx_k.
-    n = f.dim
-    slopes = [fmpq_mat(n, n, [f.Q[i][j, k] for i in range(n) for j in range(n)]) for k in range(n)]
-    return theorems.evidence(
-        "the splitting lemma",
-        [
-            ("g = C f with a constant matrix C", coefficients_of(f.transformed(C)) == coefficients_of(g)),
-            ("C^3 = C", bool(C * C * C == C)),
-            ("C f'(x) = f'(x) C for every x", all(C * slope == slope * C for slope in (f.B, *slopes))),
-        ],
-    )
 
 
 def affine(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | None:
