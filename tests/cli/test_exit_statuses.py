@@ -392,6 +392,6 @@ def test_a_file_that_may_not_be_read_gives_2(kahanmaps, tmp_path):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("form", ["text", "jsonl", "csv", "npz"])
-def test_a_full_disk_gives_2_and_names_the_file(kahanmaps, form):
+def test_a_full_disk_is_no_wrong_use_gives_3_and_names_the_file(kahanmaps, form):
     outcome = kahanmaps(f"orbit {TOP} --steps 2 --format {form} -o /dev/full")
-    assert (outcome.status, outcome.err) == (2, "Error: No space left on device: /dev/full\n")
+    assert (outcome.status, outcome.err) == (3, "Error: No space left on device: /dev/full\n")

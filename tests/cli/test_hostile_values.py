@@ -139,7 +139,6 @@ def test_numbers_and_paths_that_nobody_means_are_refused_in_a_sentence(words, ca
         "batch summary --db DB",
         "batch merge new.db DB",
         "batch status --db DB",
-        "batch check --db DB",
         "batch show KEY --db DB",
         "batch run SPEC --dry-run --db DB",
         "report --db DB -o x.html",
