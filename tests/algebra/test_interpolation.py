@@ -278,6 +278,16 @@ def test_few_numbers_over_one_denominator_may_be_higher_than_one_alone(count: in
     assert rational_vector(residues, modulus) == numbers
 
 
+@pytest.mark.parametrize(("bits", "is_one"), [(40, True), (49, False)])
+def test_a_number_above_the_bound_is_not_taken_over_the_denominator_of_the_others(bits: int, is_one: bool) -> None:
+    """Every other of eight numbers says what the denominator is: the bound is m^(4/5)/2^4, about 2^44.8."""
+    modulus, below = 2**61 - 1, 2**34 + 25
+    numbers = [fmpq(2**34 - 3**k, below) for k in range(5, 13)]
+    numbers[3] = fmpq(2**bits + 1, below)
+    residues = [int(x.p) * pow(int(x.q), -1, modulus) % modulus for x in numbers]
+    assert rational_vector(residues, modulus) == (tuple(numbers) if is_one else None)
+
+
 def test_residues_without_simple_numbers() -> None:
     rng = random.Random(1)
     assert rational_vector([rng.randrange(2**61 - 1) for _ in range(9)], 2**61 - 1) is None

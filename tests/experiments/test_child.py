@@ -71,6 +71,23 @@ def test_the_limit_of_memory_ends_with_the_task_so_that_its_result_can_be_told()
     assert after == (before[1], before[1])
 
 
+@pytest.mark.parametrize("verdict", [["proved"], 1, True])
+def test_a_verdict_that_is_no_text_is_a_failure_of_the_task(monkeypatch, verdict):
+    monkeypatch.setattr("kahanmaps.experiments.child._result", lambda task, documents: {"verdict": verdict})
+    done = perform(SPACE, None, {})
+    assert (done["outcome"], done["message"]) == (
+        Outcome.FAILED,
+        f"found the verdict {verdict}, expected a text",
+    )
+
+
+@pytest.mark.parametrize("result", [{}, {"verdict": None}, {"verdict": "proved"}])
+def test_a_verdict_is_kept_beside_the_result(monkeypatch, result):
+    monkeypatch.setattr("kahanmaps.experiments.child._result", lambda task, documents: {**result, "n": 1})
+    done = perform(SPACE, None, {})
+    assert (done["outcome"], done["verdict"], done["result"]) == (Outcome.OK, result.get("verdict"), {"n": 1})
+
+
 def test_what_json_lacks_is_a_failure_of_the_task():
     told = json.loads(_answer({"key": "k", "outcome": Outcome.OK, "result": {"value": float("inf")}}))
     assert (told["key"], told["outcome"]) == ("k", "failed")
