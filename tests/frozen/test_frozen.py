@@ -35,7 +35,7 @@ from kahanmaps_cli.main import main
 
 FOLDER = Path(__file__).parent
 # Of longer texts, and of numbers with more digits, the length and a part of the SHA-256 are kept; lines of WIDTH.
-LONGEST, MOST_DIGITS, WIDTH = 500, 60, 150
+LONGEST, MOST_DIGITS, WIDTH = 400, 50, 150
 NUMBER = re.compile(r"-?\d+(/\d+)?")
 
 # Of the input, of the machine, or told elsewhere: `text` says what S and r are, B what g is, `summary` what theorem it
@@ -43,6 +43,8 @@ NUMBER = re.compile(r"-?\d+(/\d+)?")
 DROPPED = {"version", "seconds", "convention", "time_step", "command", "check", "seed", "error_bits", "latex"}
 DROPPED |= {"system", "document", "other_document", "primes", "lines", "arithmetic"}
 TOLD_BY = {"text": {"S", "r"}, "B": {"rhs"}, "key": {"section", "section_title", "place", "label", "source"}}
+TOLD_BY["error_bound"] = {"summary"}  # which is about nothing else
+TOLD_BY["record"] = {"variables", "rhs"}
 TOLD_BY["summary"] = {"theorem", "hypotheses", "hypotheses_verified", "eps"}
 TOLD_BY["statements"] = {"integrals", "densities", "degrees", "heights", "symmetries", "commuting", "singularities"}
 
@@ -69,7 +71,9 @@ def split(value: Any, path: str, bounds: dict[str, Any], in_full: bool) -> Any:
         kept = {key: entry for key, entry in kept.items() if entry not in (None, "", [], {}) and entry is not False}
         return in_a_line(kept, in_full)
     if isinstance(value, list):
-        return [split(entry, f"{path}/{k}".lstrip("/"), bounds, in_full) for k, entry in enumerate(value)]
+        entries = [split(entry, f"{path}/{k}".lstrip("/"), bounds, in_full) for k, entry in enumerate(value)]
+        numbers = all(isinstance(entry, str) and NUMBER.fullmatch(entry) for entry in entries)
+        return ", ".join(entries) if entries and numbers else entries
     if isinstance(value, float):
         return float(f"{value:.6g}")
     if isinstance(value, str):
@@ -80,13 +84,19 @@ def split(value: Any, path: str, bounds: dict[str, Any], in_full: bool) -> Any:
 
 def in_a_line(kept: dict[str, Any], in_full: bool) -> Any:
     """The same, shorter where there is much of its kind."""
-    if "key" in kept and not in_full:  # a claim of the paper, with a digest of all that is said of it
+    if "key" in kept:  # a claim of the paper, with a digest of all that is said of it
         everything = hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()[:8]
         broken = f" without {kept['breaks']}" if "breaks" in kept else ""
-        return f"{kept['key']}{broken}: {kept['verdict']} {everything}"
-    if kept.keys() in ({"method", "summary"}, {"step", "bits"}, {"section", "status", "text"}):
-        return ": ".join(map(str, kept.values()))
-    return kept
+        texts = [kept["claim"], kept["formula"]] if in_full else []
+        return " | ".join([f"{kept['key']}{broken}: {kept['verdict']} {everything}", *texts])
+    lines = (
+        {"method"},
+        {"method", "summary"},
+        {"step", "bits"},
+        {"section", "status", "text"},
+        {"kind", "text", "verdict"},
+    )
+    return ": ".join(map(str, kept.values())) if kept.keys() in lines else kept
 
 
 def run(given: dict[str, Any], line: str) -> tuple[int, str, str]:
@@ -108,8 +118,8 @@ def answer_of(given: dict[str, Any], line: str, status: int, out: str, err: str)
     answer = [json.loads(each) for each in printed] if "json" in line else printed
     bounds: dict[str, Any] = {}
     kept = split(answer[0] if len(answer) == 1 else answer, "", bounds, line in given.get("in_full", ()))
-    if line.startswith("verify") and line not in given.get("in_full", ()):
-        bounds = {}  # of hundreds of claims, for each of many members
+    if line.startswith("verify"):
+        bounds = {}  # of hundreds of claims
     return {"status": status, "answer": kept, **({"bounds": bounds} if bounds else {})}
 
 
@@ -141,7 +151,7 @@ def read(name: str) -> dict[str, Any]:
 def pretty(value: Any, indent: str = "") -> str:
     """JSON with everything in one line that fits into it, so that a difference shows as one."""
     flat = json.dumps(value, ensure_ascii=False)
-    if not isinstance(value, dict | list) or len(indent) + len(flat) <= WIDTH:
+    if not isinstance(value, dict | list) or len(indent) + len(flat) <= WIDTH or not set(flat) & set('{"'):
         return flat
     inner = indent + " "
     if isinstance(value, dict):
