@@ -4,7 +4,8 @@ A file of this folder is one system: `system` is what @ stands for in the comman
 the commands read, `fast` and `slow` map command lines to what they answered. An answer has the exit status, what was
 printed without times, versions, primes drawn and the echo of the input, and `bounds` apart from it: sizes, how many
 random points, and what follows of the probability of an error. These are compared by tests of their own, which
-`-k "not bounds"` leaves out. Numbers of such kinds within sentences are N, long texts their SHA-256.
+`-k "not bounds"` leaves out. Numbers of such kinds within sentences are N; of long texts, and of the claims of the
+paper but in paper_m2 (`in_full`), there is a digest.
 
 Searches get a time that they never use up, so that no answer depends on the machine; `left_out` says what is missing
 and why. The answers are right as far as the other tests know: here they need not be right, but the same.
@@ -18,7 +19,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import re
 import shlex
 import sys
@@ -48,15 +48,18 @@ TOLD_BY["record"] = {"variables", "rhs"}
 TOLD_BY["summary"] = {"theorem", "hypotheses", "hypotheses_verified", "eps"}
 TOLD_BY["statements"] = {"integrals", "densities", "degrees", "heights", "symmetries", "commuting", "singularities"}
 
+# The keys of what is written as one line, there being much of it.
+LINES = {"method", "method summary", "step bits", "section status text", "kind text verdict"}
+
 # How sure, and how much work. `points` counts random points where a method is named, and is an answer elsewhere.
 BOUNDS = {"error_bound", "degree_bound", "coefficient_bits_bound", "pole_degree_bound", "splitting_field_degree_bound"}
 BOUNDS |= {"products_of_terms", "indeterminates", "blocks", "poles_met", "undefined_at"}
 COUNTED = re.compile(r"(?<=2\^-)\d+|(?<=random of )\d+(?= bits)|\b\d+ (random points?|blocks?)\b|GF\(\d{12,}\)")
 
 
-def digest(text: str) -> str:
-    """What is kept of a long text."""
-    return f"{len(text)} characters, {hashlib.sha256(text.encode()).hexdigest()[:12]}"
+def sha(text: str) -> str:
+    """What tells a text from others."""
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def split(value: Any, path: str, bounds: dict[str, Any], in_full: bool) -> Any:
@@ -78,55 +81,39 @@ def split(value: Any, path: str, bounds: dict[str, Any], in_full: bool) -> Any:
         return float(f"{value:.6g}")
     if isinstance(value, str):
         text = COUNTED.sub("N", value)
-        return digest(text) if len(text) > (MOST_DIGITS if NUMBER.fullmatch(text) else LONGEST) else text
+        most = MOST_DIGITS if NUMBER.fullmatch(text) else LONGEST
+        return text if len(text) <= most else f"{len(text)} characters, {sha(text)}"
     return value
 
 
 def in_a_line(kept: dict[str, Any], in_full: bool) -> Any:
     """The same, shorter where there is much of its kind."""
     if "key" in kept:  # a claim of the paper, with a digest of all that is said of it
-        everything = hashlib.sha256(json.dumps(kept, sort_keys=True).encode()).hexdigest()[:8]
+        everything = sha(json.dumps(kept, sort_keys=True))[:8]
         broken = f" without {kept['breaks']}" if "breaks" in kept else ""
         texts = [kept["claim"], kept["formula"]] if in_full else []
         return " | ".join([f"{kept['key']}{broken}: {kept['verdict']} {everything}", *texts])
-    lines = (
-        {"method"},
-        {"method", "summary"},
-        {"step", "bits"},
-        {"section", "status", "text"},
-        {"kind", "text", "verdict"},
-    )
-    return ": ".join(map(str, kept.values())) if kept.keys() in lines else kept
+    return ": ".join(map(str, kept.values())) if " ".join(kept) in LINES else kept
 
 
-def run(given: dict[str, Any], line: str) -> tuple[int, str, str]:
-    """The exit status of a command line, what it prints, and what it says on standard error."""
+@lru_cache(maxsize=8)  # the answer and its bounds are compared by two tests, one after the other
+def said(name: str, line: str) -> dict[str, Any]:
+    """What the library says now: the exit status, the answer or the error, the bounds."""
+    given = read(name)
     words = [given["system"] if word == "@" else [word] for word in shlex.split(line)]
     out, err = io.StringIO(), io.StringIO()
     with tempfile.TemporaryDirectory() as folder, chdir(folder), redirect_stdout(out), redirect_stderr(err):
         for file, lines in given.get("files", {}).items():
             Path(file).write_text("\n".join(lines) + "\n", encoding="utf-8")
         status = main([piece for word in words for piece in word])
-    return status, out.getvalue(), err.getvalue()
-
-
-def answer_of(given: dict[str, Any], line: str, status: int, out: str, err: str) -> dict[str, Any]:
-    """What is kept of that: the status, the answer or the error, the bounds."""
     if status == 2:
-        return {"status": status, "error": err.rstrip()}
-    printed = out.splitlines()
+        return {"status": status, "error": err.getvalue().rstrip()}
+    printed = out.getvalue().splitlines()
     answer = [json.loads(each) for each in printed] if "json" in line else printed
     bounds: dict[str, Any] = {}
     kept = split(answer[0] if len(answer) == 1 else answer, "", bounds, line in given.get("in_full", ()))
-    if line.startswith("verify"):
-        bounds = {}  # of hundreds of claims
-    return {"status": status, "answer": kept, **({"bounds": bounds} if bounds else {})}
-
-
-@lru_cache(maxsize=8)  # the answer and its bounds are compared by two tests, one after the other
-def said(name: str, line: str) -> dict[str, Any]:
-    """What the library says now."""
-    return answer_of(read(name), line, *run(read(name), line))
+    with_bounds = bounds and not line.startswith("verify")  # of hundreds of claims
+    return {"status": status, "answer": kept} | ({"bounds": bounds} if with_bounds else {})
 
 
 def differences(was: Any, now: Any, path: str = "") -> Iterator[str]:
@@ -144,8 +131,7 @@ def differences(was: Any, now: Any, path: str = "") -> Iterator[str]:
 @lru_cache(maxsize=2)
 def read(name: str) -> dict[str, Any]:
     """The file of a system."""
-    found: dict[str, Any] = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-    return found
+    return dict(json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8")))
 
 
 def pretty(value: Any, indent: str = "") -> str:
@@ -162,9 +148,8 @@ def pretty(value: Any, indent: str = "") -> str:
 
 def write(name: str) -> None:
     """Put what the library says now into the file of a system."""
-    given = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-    for speed in ("fast", "slow"):
-        given[speed] = {line: said(name, line) for line in given.get(speed, {})}
+    given = read(name)
+    given |= {speed: {line: said(name, line) for line in given.get(speed, {})} for speed in ("fast", "slow")}
     (FOLDER / f"{name}.json").write_text(pretty(given) + "\n", encoding="utf-8")
 
 
@@ -199,6 +184,5 @@ def test_a_difference_is_told_with_its_place():
 
 
 if __name__ == "__main__":
-    os.environ.pop("KAHANMAPS_DEBUG", None)
     for each in sys.argv[1:] or NAMES:
         write(each)
