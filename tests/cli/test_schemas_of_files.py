@@ -19,7 +19,7 @@ from kahanmaps_cli.schema_files import schema
 
 Run = Callable[..., Outcome]
 ROOT = Path(__file__).parents[2]
-CATALOG = ROOT / "kahanmaps" / "systems" / "catalog"
+CATALOG = ROOT / "kahanmaps" / "documents" / "catalog"
 
 
 def test_a_system_file_has_the_same_keys_for_the_schema_and_for_the_reader() -> None:

@@ -83,7 +83,7 @@ def test_the_catalogue_has_the_systems_that_the_documentation_speaks_of():
 
 
 def test_the_names_are_those_of_the_files_in_alphabetical_order():
-    assert names() == tuple(sorted(path.stem for path in (PACKAGE / "systems" / "catalog").glob("*.toml")))
+    assert names() == tuple(sorted(path.stem for path in (PACKAGE / "documents" / "catalog").glob("*.toml")))
 
 
 @over_the_catalogue
@@ -111,7 +111,7 @@ def test_every_fact_opens_with_its_status(name):
 
 @over_the_catalogue
 def test_no_file_is_longer_than_a_newcomer_reads(name):
-    lines = (PACKAGE / "systems" / "catalog" / f"{name}.toml").read_text(encoding="utf-8").splitlines()
+    lines = (PACKAGE / "documents" / "catalog" / f"{name}.toml").read_text(encoding="utf-8").splitlines()
     assert len(lines) <= 60
 
 

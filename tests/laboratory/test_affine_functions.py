@@ -25,7 +25,7 @@ from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import linear_combinations
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-CATALOG = Path(kahanmaps.__file__).parent / "systems" / "catalog"
+CATALOG = Path(kahanmaps.__file__).parent / "documents" / "catalog"
 
 
 def catalogue(name: str) -> QuadraticSystem:
