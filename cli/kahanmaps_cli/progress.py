@@ -88,7 +88,8 @@ def _fitted(text: str) -> str:
     lines = text.split("\n")
     found = []
     for line, below in zip(lines, [*lines[1:], ""], strict=True):
-        if len(line) <= _width() or "^" in (line.strip(), below.strip()) or ": kahanmaps " in line:
+        is_command = ": kahanmaps " in line and not line.startswith("Usage: ")
+        if len(line) <= _width() or is_command or "^" in (line.strip(), below.strip()):
             found.append(line)
         else:
             words = line.lstrip()

@@ -354,10 +354,10 @@ def test_a_file_of_residues_is_valid_after_every_row(tmp_path):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("arithmetic", ["float", "mod:10007"])
-def test_a_full_disk_gives_2_and_names_the_file(kahanmaps, tmp_path, arithmetic):
+def test_a_full_disk_gives_3_and_names_the_file(kahanmaps, tmp_path, arithmetic):
     (tmp_path / "full.npy").symlink_to("/dev/full")
     outcome = kahanmaps(f"{TOP} --random 2 --steps 2 --arithmetic {arithmetic} -o", tmp_path / "full.npy")
-    assert (outcome.status, outcome.err) == (2, f"Error: No space left on device: {tmp_path / 'full.npy'}\n")
+    assert (outcome.status, outcome.err) == (3, f"Error: No space left on device: {tmp_path / 'full.npy'}\n")
 
 
 # Interrupts

@@ -157,7 +157,7 @@ def test_a_misspelt_system_is_recognised(kahanmaps, command, written, meant):
     [
         (InputError("found 1, expected 2"), 2, "Error: found 1, expected 2"),
         (click.UsageError("found 1, expected 2"), 2, "Error: found 1, expected 2"),
-        (OSError(28, "No space left on device", "x.csv"), 2, "Error: No space left on device: x.csv"),
+        (OSError(28, "No space left on device", "x.csv"), 3, "Error: No space left on device: x.csv"),
         (OSError(2, "No such file or directory", ""), 2, "Error: No such file or directory: ''"),
         (SingularStep("det(I - eps f'(x)) = 0"), 3, "Error: det(I - eps f'(x)) = 0"),
         (MemoryError(), 3, "out of memory"),
@@ -362,7 +362,7 @@ def test_a_closed_standard_input_holds_no_system(tmp_path):
 )
 def test_a_full_disk_below_standard_output_is_told(tmp_path, command):
     outcome = shell(f"kahanmaps {command} > /dev/full", tmp_path)
-    assert (outcome.status, outcome.err) == (2, "Error: No space left on device\n")
+    assert (outcome.status, outcome.err) == (3, "Error: No space left on device\n")
 
 
 @needs_full_device

@@ -83,7 +83,7 @@ def test_a_picture_carries_its_recipe(kahanmaps, tmp_path):
         ("plot drift harmonic --eps 1/10 --integral 'E=x+'", "expected a number"),
         ("plot drift harmonic --eps 1/10 --integral E=1/x --start 0,1", "take another start"),
         ("plot drift harmonic --eps 1/10 --method normal-form", "there is none"),
-        ("plot drift harmonic --eps 1/10 -o nosuch/x.pdf", "found no folder"),
+        ("plot drift harmonic --eps 1/10 -o nosuch/x.pdf", "there is no folder nosuch"),
     ],
 )
 def test_wrong_use_is_refused(kahanmaps, command, expected):
