@@ -262,19 +262,6 @@ def test_export_to_parquet(batch):
     assert parquet.read_table("study.parquet")["dimension"].to_pylist() == [8] * 3 + [12] * 3
 
 
-@pytest.mark.parametrize("name", ["study.db", "./study.db", "link", "hard"])
-def test_an_export_does_not_go_where_the_database_is(batch, name: str):
-    batch("run", SPACE, "-q")
-    os.symlink("study.db", "link")
-    if name == "hard":
-        os.link("study.db", "hard")
-    before = Path("study.db").read_bytes()
-    done = batch(f"export --db study.db --csv -o {name}")
-    assert done.status == 2
-    assert ("has 2 names" if name == "hard" else "it would be written over") in done.err
-    assert Path("study.db").read_bytes() == before
-
-
 def test_an_export_follows_links_and_goes_through_pipes(batch):
     batch("run", SPACE, "-q")
     expected = batch("export --db study.db --csv --stable").out

@@ -97,11 +97,3 @@ def test_wrong_use_is_told_with_what_was_expected(kahanmaps, options, told, tmp_
 def test_help_names_every_language_and_part(kahanmaps):
     words = kahanmaps("convert --help").out.replace("\n", " ").replace(",", " ").replace(".", " ").split()
     assert {*LANGUAGES, *PARTS} <= set(words)
-
-
-def test_the_file_of_the_system_is_not_overwritten(kahanmaps, pair):
-    before = pair.read_bytes()
-    outcome = kahanmaps("convert", pair, "--to pari -o", pair.parent / "." / pair.name)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert "it would be written over" in outcome.err
-    assert pair.read_bytes() == before

@@ -336,14 +336,6 @@ def test_the_file_may_be_the_starts_of_the_next_run(kahanmaps, tmp_path):
     assert there.tolist() == np.load(path)[-1].tolist()
 
 
-def test_a_file_is_not_written_over_by_the_orbits_of_its_starts(kahanmaps, tmp_path):
-    path = tmp_path / "x.npy"
-    np.save(path, np.ones((2, 3)))
-    outcome = kahanmaps(f"{TOP} --steps 10 --starts", path, "-o", path)
-    assert (outcome.status, np.load(path).tolist()) == (2, np.ones((2, 3)).tolist())
-    assert "it would be written over" in outcome.err
-
-
 def test_a_file_of_residues_is_valid_after_every_row(tmp_path):
     with NpyFile(tmp_path / "r.npy", (2, 1), "<i8") as file:
         assert np.load(tmp_path / "r.npy").shape == (0, 2, 1)
