@@ -306,7 +306,7 @@ def test_main_takes_its_arguments_from_the_command_line_when_given_none(monkeypa
 
 def test_a_reader_that_has_seen_enough_ends_an_orbit_quietly_and_early(tmp_path):
     script = """
-    kahanmaps orbit lotka_volterra --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic float | head -n 2
+    kahanmaps orbit lotka_volterra --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007 | head -n 2
     echo "${PIPESTATUS[0]}"
     """
     outcome = shell(script, tmp_path)

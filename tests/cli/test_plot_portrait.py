@@ -242,6 +242,16 @@ def test_exact_numbers_of_any_length_are_read(tmp_path):
         ("a.csv", '# {"variables": ["x"]}\nstep,x\n0,1/0\n', "found no orbit that kahanmaps wrote"),
         ("a.jsonl", "{}", "found no orbit that kahanmaps wrote (no 'record' in it)"),
         ("a.jsonl", "", "found no orbit that kahanmaps wrote"),
+        (
+            "a.jsonl",
+            '{"record": "header", "variables": ["-1", "y"], "eps": "1"}\n{"record": "point", "step": 0, "x": [1, 2]}',
+            "a.jsonl: found no orbit that kahanmaps wrote (found '-1', expected a name",
+        ),
+        (
+            "a.jsonl",
+            '{"record": "header", "variables": ["x", "y"], "eps": "1/0"}\n{"record": "point", "step": 0, "x": [1, 2]}',
+            "a.jsonl: found the denominator 0",
+        ),
         ("a.jsonl", "[1, 2]", "found no orbit that kahanmaps wrote"),
     ],
 )

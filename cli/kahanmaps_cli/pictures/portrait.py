@@ -137,6 +137,7 @@ def _word(name: str) -> str:
 
 def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
     from kahanmaps.algebra.text import parse_number
+    from kahanmaps.errors import InputError
 
     file = None
     if system is not None or options["variables"] is not None or options["rhs"]:
@@ -146,9 +147,12 @@ def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
     eps = the_eps(options["eps"], options["time_step"], required=False)
     stored = read_orbits(options["stored"], None if file is None else file.variables)
     told = stored.header.get("eps")
-    if eps is None and isinstance(told, str):
-        eps = parse_number(told)
-    return Orbits.of_file(stored, file, eps, stored.header.get("system", options["stored"]))
+    try:
+        if eps is None and isinstance(told, str):
+            eps = parse_number(told)
+        return Orbits.of_file(stored, file, eps, stored.header.get("system", options["stored"]))
+    except InputError as error:
+        raise InputError(f"{options['stored']}: {error}") from error
 
 
 def _walked(system: str | None, options: dict[str, Any]) -> Orbits:

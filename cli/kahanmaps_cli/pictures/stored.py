@@ -107,16 +107,15 @@ def _from_npz(path: str) -> Stored:
     with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as held:
         meta = json.loads(str(held["meta"]))
         steps, x = held["step"], held["x"]
+    header, end = dict(meta["header"]), dict(meta["end"])
     if x.ndim != 2:
         raise InputError(f"{path}: found an array of shape {x.shape}, expected (points, dim)")
     if x.dtype.kind == "S":
         rows = [[cell.decode() for cell in row] for row in x.tolist()]
-        return _stored(path, [int(step) for step in steps], rows, meta["header"], meta["end"])
+        return _stored(path, [int(step) for step in steps], rows, header, end)
     points = np.asarray(x, dtype=np.float64)
     numbers = [int(step) for step in steps]
-    return Stored(
-        _names(meta["header"], points.shape[1]), points[:, None], _steps(numbers), meta["header"], meta["end"]
-    )
+    return Stored(_names(header, points.shape[1]), points[:, None], _steps(numbers), header, end)
 
 
 def _from_jsonl(path: str) -> Stored:
@@ -141,7 +140,7 @@ def _from_csv(path: str) -> Stored:
     table: list[str] = []
     for line in _lines(path):
         if line.startswith("#"):
-            told.append(json.loads(line[1:]))
+            told.append(dict(json.loads(line[1:])))
         else:
             table.append(line)
     header = told[0]
@@ -169,7 +168,10 @@ def _stored(path: str, steps: list[int], rows: list[list[str]], header: dict[str
 
 
 def _names(header: dict[str, Any], width: int) -> tuple[str, ...]:
+    from kahanmaps.algebra.text import check_names
+
     names = tuple(str(name) for name in header["variables"])
+    check_names(names)
     if width and len(names) != width:
         raise ValueError(f"{len(names)} names for {width} columns")
     return names
