@@ -168,7 +168,7 @@ def _stored(path: str, steps: list[int], rows: list[list[str]], header: dict[str
 
 
 def _names(header: dict[str, Any], width: int) -> tuple[str, ...]:
-    from kahanmaps.algebra.text import check_names
+    from kahanmaps.algebra.numerals import check_names
 
     names = tuple(str(name) for name in header["variables"])
     check_names(names)
