@@ -46,7 +46,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / ".mutants"
 FOLDERS = ("algebra", "maps", "invariants", "checks", "laboratory", "paper", "family", "systems", "documents")
-TESTS = [*(f"tests/{folder}" for folder in FOLDERS), "kahanmaps", "tests/cli"]
+TESTS = [*(f"tests/{folder}" for folder in FOLDERS), "kahanmaps", "tests/cli", "tests/frozen"]
 ENOUGH = 0.95
 MEMORY = 8 << 30  # bytes that a mutant may take
 
