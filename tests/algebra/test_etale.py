@@ -7,6 +7,7 @@ FLINT computes there; where they are not, they are enclosed by complex balls. Ze
 from __future__ import annotations
 
 import math
+import operator
 import random
 
 import pytest
@@ -369,3 +370,10 @@ def test_both_ways_to_a_quotient_lead_to_the_same(field, monkeypatch):
 def test_a_long_zero_divisor_is_refused_too():
     with pytest.raises(ZeroDivisionError, match="zero divisor"):
         SPLIT.one / ((SPLIT.generator - 1) * 10**1000)
+
+
+@pytest.mark.parametrize("operation", [operator.add, operator.sub])
+def test_a_number_is_neither_added_to_a_matrix_nor_taken_away(operation):
+    sign = {operator.add: r"\+", operator.sub: "-"}[operation]
+    with pytest.raises(TypeError, match=f"unsupported operand type.* for {sign}: 'EtaleMatrix' and 'int'"):
+        operation(GOLDEN.matrix(1, 1, [1]), 1)

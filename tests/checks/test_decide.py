@@ -435,6 +435,13 @@ def test_an_identity_with_too_many_poles_is_undecided(poles):
     assert decide(identity_of(square_left, square_right, degree=1, poles=poles), 0).verdict is UNDECIDED
 
 
+@pytest.mark.parametrize(("bound", "points"), [(-0.5, 0), (-1.0, 0), (-1.5, 67)])
+def test_where_a_trial_is_wrong_as_often_as_not_nothing_is_decided(bound, points, monkeypatch):
+    monkeypatch.setattr(decide_module, "trial_bound", lambda identity: bound)
+    identity, fields = counted(identity_of(square_left, square_right))
+    assert (decide(identity, 0).verdict, len(fields)) == (SUPPORTED if points else UNDECIDED, points)
+
+
 def test_an_error_of_another_kind_is_not_swallowed():
     with pytest.raises(ZeroDivisionError):
         decide(Stated(1, raises(ZeroDivisionError), None, subject=()), 0)

@@ -7,6 +7,7 @@ structure nothing is found; and an A that leaves repeated roots is said not to b
 
 from __future__ import annotations
 
+import itertools
 import random
 from dataclasses import replace
 
@@ -27,6 +28,8 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import belongs, default_variables, third_derivatives
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.hidden import (
+    _DRAWS,
+    _candidates,
     _variants,
     darboux_coordinates,
     hidden_hamiltonian,
@@ -500,3 +503,12 @@ def test_an_element_is_made_simpler_by_an_integer_shift_and_divisor(before, afte
     assert second[1] == fmpq_poly(after)
     for matrix, polynomial in (first, second):
         assert evaluate_at_matrix(polynomial, matrix) == 0 * E
+
+
+def test_small_combinations_are_tried_before_larger_ones():
+    basis = [fmpq_mat(2, 2, [1, 0, 0, 0]), fmpq_mat(2, 2, [0, 0, 0, 1])]
+    tried = list(itertools.islice(_candidates(basis), 2 + 2 * _DRAWS))
+    assert tried[:2] == basis
+    largest = [max(abs(int(entry.p)) for entry in X.entries()) for X in tried[2:]]
+    assert (max(largest[:_DRAWS]), max(largest[_DRAWS:])) == (1, 2)
+    assert largest[:_DRAWS].count(1) > _DRAWS // 2

@@ -128,6 +128,14 @@ def test_of_many_defects_four_are_shown_and_the_rest_counted():
     assert str(refusal.value).count("expected") == 4
 
 
+def test_four_defects_are_all_that_there_are():
+    A = fmpq_mat(4, 4, [int(k in (2, 7, 8, 13)) for k in range(16)])
+    assert len(defects(A)) == 4
+    with pytest.raises(HypothesisError) as refusal:
+        require_skew_hamiltonian(A)
+    assert str(refusal.value) == "A is not skew-Hamiltonian: " + "; ".join(defects(A))
+
+
 def test_an_entry_of_many_digits_is_shortened_in_the_message():
     (sentence,) = defects(fmpq_mat(2, 2, [fmpq(1), fmpq(10**5000), fmpq(0), fmpq(1)]))
     assert len(sentence) < 200

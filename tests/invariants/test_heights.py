@@ -586,6 +586,6 @@ def test_there_are_no_heights_modulo_a_prime():
 
 def test_an_eps_longer_than_the_budget_ends_an_orbit_before_its_first_step():
     found = height_growth(KahanMap(load("paper_m3").system, fmpq(1, 10**3000)), [1] * 6, 60, max_digits=2000)
-    assert (found.end.status, found.heights) == ("budget", (1,))
+    assert (found.end.status, found.end.steps, found.heights) == ("budget", 0, (1,))
     assert "eps or the start has more digits than the budget of 2000" in found.end.message
     assert height_growth(KahanMap(load("riccati").system, fmpq(1, 10**3000)), [1], 1, max_digits=4000).end.is_whole

@@ -493,3 +493,10 @@ def test_the_clock_is_looked_at_before_every_step():
     system = QuadraticSystem.from_text(names, [f"{name}^2 + x0" for name in names])
     found = cycle_census(system, "1/10", 536_870_909, samples=20, steps=40, seconds=1e-9)
     assert (found.stopped, found.steps, found.open) == (True, 0, 20)
+
+
+def test_the_mean_length_is_that_of_all_cycles():
+    found = cycle_census(load("weierstrass").system, "1/10", 7)
+    lengths = [length for length, n in found.lengths.items() for _ in range(n)]
+    assert len(set(lengths)) > 1
+    assert (found.cycles, found.mean) == (len(lengths), sum(lengths) / len(lengths))

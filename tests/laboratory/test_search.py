@@ -144,6 +144,13 @@ def pencil_at(prime, values):
 MODEL = pencil_at(2**61 - 1, (12345, 67890))
 
 
+def test_the_space_that_shares_numbers_is_taken_of_those_that_look_alike():
+    other, same, wanted = [
+        DarbouxSpace(1, 1, [[1, int(nmod(above, p) / 7)]]) for above, p in ((3, 101), (4, 101), (4, 10**9 + 7))
+    ]
+    assert module._most_alike([other, same], [wanted], 101, 10**9 + 7) == [same]
+
+
 def test_coefficients_are_interpolated():
     found = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol")
     assert [format_polynomial(P) for P in found.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 import pytest
 from flint import fmpq, nmod_poly
@@ -63,6 +64,14 @@ def test_singularities_of_integrable_maps_are_confined(name):
     found = runs(name)
     assert [run.verdict for run in found] == ["confined", "confined"]
     assert found[0].shape == found[1].shape
+
+
+def test_runs_that_differ_in_a_multiplicity_have_different_shapes():
+    run = runs("weierstrass")[0]
+    first, *others = run.hypersurfaces
+    for multiplicity in (None, first.multiplicity + 1):
+        changed = replace(run, hypersurfaces=(replace(first, multiplicity=multiplicity), *others))
+        assert changed.shape != run.shape
 
 
 @pytest.mark.parametrize("name", ["lotka_volterra", "lorenz"])

@@ -221,6 +221,12 @@ def test_the_kernel_is_named():
     assert FloatOrbit(EULER_TOP, "1/10", [1, 1, 1], 10).kernel == "numpy generic"  # too short to be worth compiling
 
 
+@over_kernels
+def test_the_engine_is_that_of_the_kernel(kernel):
+    orbits = FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3)), kernel=kernel)
+    assert type(orbits._stepping._engine).__module__ == f"kahanmaps.maps.float_{kernel}"
+
+
 def test_the_compiled_kernel_is_named_with_its_threads():
     pytest.importorskip("numba")
     assert FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3)), threads=2).kernel == "numba generic, 2 threads"

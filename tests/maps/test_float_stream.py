@@ -95,6 +95,14 @@ def test_rows_of_another_shape_are_refused(tmp_path):
         file.append(np.zeros((1, 3)))
 
 
+def test_more_rows_than_the_header_can_count_are_refused_before_they_are_written(tmp_path):
+    with NpyFile(tmp_path / "x.npy", (2,)) as file:
+        before, file.rows = (tmp_path / "x.npy").read_bytes(), 10**200
+        with pytest.raises(InputError, match=r"more than the header of a \.npy file has room"):
+            file.append(np.zeros((1, 2)))
+    assert (tmp_path / "x.npy").read_bytes() == before
+
+
 ENDLESS = """
 from kahanmaps.maps.fast import FloatOrbit, stream_orbit
 from kahanmaps.systems.quadratic import QuadraticSystem

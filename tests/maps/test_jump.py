@@ -28,7 +28,7 @@ from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi
 from kahanmaps.family.structure import structure_of
-from kahanmaps.maps import jump, tau_table
+from kahanmaps.maps import jump, rational_jump, tau_table
 from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.jump import Jump, special_start
 from kahanmaps.maps.kahan import KahanMap
@@ -424,3 +424,25 @@ def test_around_a_cycle_only_the_rest_of_the_steps_is_walked(block, start, perio
     assert same_point(jump._around_cycle(cubic, point, period - 1), orbit[period - 1])
     with pytest.raises(InputError, match="cannot be reached directly"):
         jump._around_cycle(cubic, point, period)
+
+
+def test_a_pole_modulo_a_prime_alone_is_passed_over(monkeypatch):
+    structure, _ = structure_and_system("m = 2")
+    start = [1, 2, 3, fmpq(1, 4)]
+    wanted = coordinates(Jump(structure, "1/10", QQ).value(start, 30))
+    steps_modulo, random_prime = rational_jump._steps_modulo, rational_jump._random_prime
+    drawn = [1000003, 1000033, 1000037]  # with a pole at step 2, as if these divided W there
+    monkeypatch.setattr(rational_jump, "_random_prime", lambda rng: drawn.pop() if drawn else random_prime(rng))
+    monkeypatch.setattr(
+        rational_jump, "_steps_modulo", lambda *at: (2, (1, 1, 0)) if at[2] < 2**20 else steps_modulo(*at)
+    )
+    assert coordinates(Jump(structure, "1/10", QQ).value(start, 30)) == wanted
+    assert drawn == []
+
+
+@pytest.mark.parametrize(
+    ("ratio", "step"), [(None, None), (fmpq(1), 1), (fmpq(3), 3), (fmpq(0), None), (fmpq(-2), None), (fmpq(5, 2), None)]
+)
+def test_on_a_parabola_the_pole_is_where_the_ratio_is_a_positive_integer(ratio, step, monkeypatch):
+    monkeypatch.setattr(rational_jump.translation, "parabolic_ratio", lambda block, start: ratio)
+    assert rational_jump._parabolic_pole(None, None) == step
