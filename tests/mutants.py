@@ -76,8 +76,17 @@ TURNED: dict[type[ast.AST], list[tuple[str, str]]] = {
     ast.NotIn: [("not in", "in")],
 }
 PRINTS = re.compile(r"__repr__|__str__|_repr_\w+_|to_json|\w*_html")
-NO_MATHEMATICS = {"seed", "seconds", "progress", "maxsize", "strict"}  # arguments by these names
-NO_MATHEMATICS_IN = re.compile(r"\b(seconds|deadline|monotonic|get_close_matches|progress|randint|randrange|Random)\b")
+NO_MATHEMATICS = {"seed", "seconds", "progress", "maxsize", "strict", "repr"}  # arguments by these names
+NO_MATHEMATICS_IN = re.compile(
+    r"\b(seconds|deadline|monotonic|get_close_matches|progress|randint|randrange|Random|spend)\b"
+)
+LIKE = {
+    "context",
+    "dim",
+    "nrows",
+    "ncols",
+}  # the same for all of a list: any X[0] will do
+TYPES = {"tuple", "dict", "list", "Callable", "Mapping"}
 
 
 @dataclass(frozen=True)
@@ -153,11 +162,13 @@ class Changes(ast.NodeVisitor):
                 named = [*zip(reversed([*node.posonlyargs, *node.args]), reversed(node.defaults), strict=False)]
                 named += zip(node.kwonlyargs, node.kw_defaults, strict=True)  # type: ignore[arg-type]
                 self.skipped |= {id(default) for argument, default in named if argument.arg in NO_MATHEMATICS}
+            if isinstance(node, ast.Attribute) and node.attr in LIKE and isinstance(node.value, ast.Subscript):
+                self.skipped |= {id(node.value.slice)} if isinstance(node.value.slice, ast.Constant) else set()
             self.change(node)
             self.inside(node)
 
     def is_no_mathematics(self, node: ast.AST) -> bool:
-        """Clocks, random numbers, words; private numbers of a module, which are limits of effort and tables' sizes."""
+        """Clocks, work, random numbers, words; private numbers of a module, which are limits of effort and sizes."""
         if isinstance(node, ast.Assign) and not self.names and isinstance(node.targets[0], ast.Name):
             private = node.targets[0].id.startswith(("_", "DEFAULT_")) and isinstance(node.value, ast.Constant)
             return private or bool(NO_MATHEMATICS_IN.search(self.code(node)))
@@ -204,7 +215,8 @@ class Changes(ast.NodeVisitor):
                 self.add(node, f"{node.value} -> {new}", str(new) if new >= 0 else f"({new})")
         elif isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Tuple) and len(node.slice.elts) > 1:
             first, second, *rest = [self.code(part) for part in node.slice.elts]
-            if first != second and isinstance(node.value, (ast.Name, ast.Attribute, ast.Subscript, ast.Call)):
+            known = isinstance(node.value, (ast.Name, ast.Attribute, ast.Subscript, ast.Call))
+            if first != second and known and self.code(node.value) not in TYPES:
                 new = ", ".join([second, first, *rest])
                 self.add(node, "indices swapped", f"{self.code(node.value)}[{new}]")
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "transpose":
