@@ -16,9 +16,11 @@ from kahanmaps import KahanMap, draw_with_eigenvalues
 from kahanmaps.algebra.bounds import log2
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import Component, independent
+from kahanmaps.checks.claims import Evidence, Finding, Verdict
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError, SingularStep
+from kahanmaps.laboratory import commuting as module
 from kahanmaps.laboratory.commuting import _Search, commuting_systems
 from kahanmaps.laboratory.commuting_equations import coefficients_of, combination, commutator_equations, system_of
 from kahanmaps.laboratory.commuting_proofs import _family_identity, affine, judge_family, judge_field
@@ -357,3 +359,37 @@ def test_the_identity_of_a_family_is_bounded(f, g, below):
     family = Component((b / below,))
     equation, _ = check(_family_identity(first, SimpleNamespace(fields=[second]), family), differs=True)
     assert equation.bits >= log2(below)
+
+
+def test_what_is_found_without_families_is_told_in_numbers():
+    found = commuting_systems(system("x y", "x^2 + 1", "y^2 - x*y")).to_json()
+    assert [found[name] for name in ("status", "verdict", "order", "discarded", "irrational", "families")] == [
+        "complete",
+        "proved",
+        4,
+        0,
+        [],
+        [],
+    ]
+    assert [(g["B"], g["trivial"]) for g in found["solutions"]] == [
+        ([["0", "0"], ["0", "0"]], "0"),
+        ([["1", "0"], ["0", "1"]], "f"),
+        ([["-1", "0"], ["0", "-1"]], "-f"),
+    ]
+
+
+@pytest.mark.parametrize("shape", ["linear", "quadratic"])
+def test_too_many_unknowns_leave_zero_and_f_and_its_negative(shape, monkeypatch):
+    monkeypatch.setattr(module, "MAX_UNKNOWNS", 3)
+    found = commuting_systems(system("x y", "x^2 + 1", "y^2 - x*y"), shape)
+    assert sorted(g.trivial for g in found.solutions) == sorted(TRIVIAL)
+    assert {g.B is None for g in found.solutions} == {shape == "quadratic"}
+    count = {"linear": 4, "quadratic": 12}[shape]
+    assert (found.order, found.undecided) == (2, [f"g has {count} unknown coefficients, and at most 3 are tried"])
+
+
+def test_a_family_of_which_nothing_is_known_is_not_listed(monkeypatch):
+    doubt = Finding("they commute", Verdict.UNDECIDED, Evidence("none", "nobody knows"))
+    monkeypatch.setattr(module, "judge_family", lambda *_: doubt)
+    found = commuting_systems(system("x y", "y", "-x"))
+    assert (found.families, found.undecided) == ([], ["a family with 2 parameters: nobody knows"])

@@ -105,3 +105,44 @@ def test_the_equation_is_told_with_what_speaks_for_it():
     assert find_recurrence(terms([1, 1], [1, 2], 9)).text == (
         "a(n) = a(n-1)+a(n-2) for n >= 2, from 9 terms of which 5 were not needed to find it"
     )
+
+
+def test_a_third_of_the_order_is_held_out_and_two_terms_at_least():
+    assert [needed_checks(order) for order in range(11)] == [2, 2, 2, 2, 2, 2, 2, 3, 3, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ([n * (n - 1) // 2 for n in range(9)], ("1/2*n^2 - 1/2*n", 2, "1")),
+        ([-n for n in range(7)], ("-n", 1, "1")),
+        ([7, *(3 * n - 1 for n in range(1, 9))], ("3*n - 1 for n >= 1", 1, "1")),
+        ([9, 9, *([1, 2] * 5)], ("1 for n = 0 mod 2; 2 for n = 1 mod 2, all for n >= 2", 0, "1")),
+        (
+            [2 - (n % 12 == 5) for n in range(30)],
+            ("; ".join(f"{2 - (r == 5)} for n = {r} mod 12" for r in range(12)), 0, "1"),
+        ),
+        ([2 - (n % 13 == 5) for n in range(40)], (None, 0, "1")),
+        ([2**520 - 1] * 4, (str(2**520 - 1), 0, "1")),
+        ([(2**520 - 1) ** n for n in range(4)], (None, 0, str(2**520 - 1))),
+        ([(1 - 2**520) ** n for n in range(4)], (None, 0, None)),
+        ([2**n + (-2) ** n for n in range(8)], (None, 0, "2")),
+    ],
+    ids=lambda value: None if isinstance(value, tuple) else str(value)[:12],
+)
+def test_closed_forms_powers_and_rates(values, expected):
+    found = find_recurrence(values)
+    assert (found.closed_form_text, found.power, found.rate and found.rate.text) == expected
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ([5, 0, 0, 0, 0], "a(n) = 0 for n >= 1, from 5 terms of which 3 were"),
+        ([2, 3, 2, 3, 2, 3, 2], "a(n) = a(n-2) for n >= 2, from 7 terms of which 3 were"),
+        (terms([10, -11], [1, 3], 9), "a(n) = 10*a(n-1)-11*a(n-2) for n >= 2, from 9 terms of which 5 were"),
+        ([(-1) ** n for n in range(5)], "a(n) = -a(n-1) for n >= 1, from 5 terms of which 3 were"),
+    ],
+)
+def test_equations_leave_out_what_is_zero_or_one(values, text):
+    assert find_recurrence(values).text == f"{text} not needed to find it"

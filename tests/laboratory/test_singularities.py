@@ -13,6 +13,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.critical import critical_points, pole_points
 from kahanmaps.laboratory.fates import CONFINED, NOT_CONFINED
 from kahanmaps.laboratory.jets import (
     Jet,
@@ -240,6 +241,25 @@ def test_large_dimensions_are_refused():
     names = [f"x{k}" for k in range(7)]
     with pytest.raises(InputError, match="expected at most 6"):
         singularities(QuadraticSystem.from_text(names, [f"{name}^2" for name in names]), "1/7")
+
+
+def test_poles_and_critical_points_on_a_line_are_neither_at_infinity_nor_of_the_other_kind():
+    """x' = y, y' = 6 x^2 - 2 with eps = 1/2: det(I - eps f') = 1 - 3 x at a point and at its image."""
+    field, rng = GF(PRIME), random.Random(3)
+    system = load("weierstrass").system
+    forms, back = (linear_forms(system, eps, field) for eps in ("1/2", "-1/2"))
+    phi = KahanMap(system, "1/2", field)
+    poles, number = pole_points(forms, field, rng)
+    assert number == {1: 1}
+    ((x, _, z),) = [pole.point for pole in poles]
+    assert (z - 3 * x) % PRIME == 0
+    a, b, c = poles[0].gradient
+    assert ((a + 3 * c) % PRIME, b, c != 0) == (0, 0, True)
+    points, number = critical_points(forms, back, field, rng)
+    assert (number, len(points)) == ({1: 1}, 1)
+    for one in points:
+        x, y, z = (field.convert(entry) for entry in one.point)
+        assert phi.step([x / z, y / z])[0] * 3 == 1
 
 
 # --- the series ------------------------------------------------------------------------------------------------------
