@@ -7,6 +7,7 @@ The sequences were computed by others, modulo two primes each, or are in the lit
 from __future__ import annotations
 
 import random
+from types import SimpleNamespace
 
 import pytest
 from degree_helpers import polynomial_degrees
@@ -16,7 +17,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import curves
-from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
+from kahanmaps.laboratory.degrees import DegreeGrowth, _Search, degree_growth
 from kahanmaps.laboratory.recurrences import GrowthClass
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -265,3 +266,34 @@ def test_the_same_seed_gives_the_same_and_progress_is_told():
 def test_wrong_use(options, words):
     with pytest.raises(InputError, match=words):
         degree_growth(load("weierstrass").system, **options)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "n", "steps", "expected"),
+    [
+        ((1, 2, 4), 3, 3, 7),  # three steps, of the degrees 2, 4 and 7
+        ((1, 2, 3), 3, 2, -1),  # not the degree that is known of iterate 2
+        ((1, 2, 4, 7), 4, 4, -1),  # no value at the fourth step
+    ],
+)
+def test_a_line_of_other_degrees_than_are_known_tells_nothing(degrees, n, steps, expected):
+    line = SimpleNamespace(steps=0, degree=1)
+
+    def step(guess):
+        line.steps += 1
+        if line.steps > 3:
+            raise ZeroDivisionError
+        line.degree = (1, 2, 4, 7)[line.steps]
+
+    line.step = step
+    search = SimpleNamespace(_guess=lambda k: 0, degrees=list(degrees))
+    assert (_Search._degree(search, line, n), line.steps) == (expected, steps)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "guesses"),
+    [((1, 2, 4), {0: 1, 2: 4, 3: 8}), ((1, 3, 5), {3: 12}), ((1, 2, 0), {3: 0}), ((1, 0, 0), {3: 0}), ((1,), {1: 5})],
+)
+def test_the_degree_that_is_guessed_is_bounded_by_the_last_ratio(degrees, guesses):
+    search = SimpleNamespace(degrees=list(degrees), _system=SimpleNamespace(dim=5))
+    assert {n: _Search._guess(search, n) for n in guesses} == guesses

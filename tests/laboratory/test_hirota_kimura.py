@@ -11,6 +11,7 @@ from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.documents.structured_facts import relation_functions, relations
 from kahanmaps.laboratory import hirota_kimura as module
 from kahanmaps.laboratory.hirota_kimura import (
+    Profile,
     hirota_kimura_basis,
     orbit_profile,
     relations_on_orbit,
@@ -165,3 +166,19 @@ def test_small_primes_agree_where_orbits_are_long_enough():
     for prime in (10007, 20011, 30011):
         map_ = ModularMap(ParametricSystem.of(file), prime, 5)
         assert len(relations_on_orbit(map_, 2).vectors) == 2
+
+
+@pytest.mark.parametrize(
+    ("nullities", "codimensions", "expected"),
+    [
+        ((), (), (0, 0, None, False)),
+        ((0, 1, 3), (0, 1, 1), (3, 1, 2, False)),
+        ((0, 0, 1, 4), (0, 0, 1, 1), (4, 1, 3, True)),
+        ((0, 0, 1, 4), (0, 0, 1, 2), (4, 2, 3, False)),
+        ((1, 2, 3, 4), (2, 2, 2, 1), (4, 2, 1, False)),
+        ((0, 0, 0, 0, 0), (0, 0, 0, 0, 0), (5, 0, None, True)),
+    ],
+)
+def test_a_profile_is_settled_where_the_last_of_four_degrees_shows_no_more(nullities, codimensions, expected):
+    found = Profile(3, nullities, codimensions, None, True, True)
+    assert (found.degree, found.codimension, found.first_degree, found.is_settled) == expected

@@ -6,6 +6,7 @@ tables are computed here once more, with polynomials and gcds, for as long as th
 
 from __future__ import annotations
 
+import math
 import random
 import time
 from dataclasses import replace
@@ -36,13 +37,16 @@ from kahanmaps.laboratory.fates import (
     _joined,
     _settled,
     _tangents,
+    _walked,
     fate_of,
 )
+from kahanmaps.laboratory.jets import PrecisionTooLow
 from kahanmaps.laboratory.modular_points import rank
 from kahanmaps.laboratory.recurrences import GrowthClass
 from kahanmaps.laboratory.singularities import (
     MAX_DIGITS,
     Patterns,
+    _patterns,
     can_be_written,
     patterns,
     patterns_of,
@@ -436,3 +440,60 @@ def test_formulas_are_written_only_where_the_time_is_long_enough_for_their_numbe
     with pytest.raises(InputError, match=r"in dimension 4 formulas with longer ones are not written within 1 s"):
         singularities(four, fmpq(1, 3**400), seconds=1)
     assert patterns(four, fmpq(1, 3**400), seconds=4).running == ""
+
+
+def hypersurface(status, settled_at, multiplicity=1, followed=100, note=""):
+    return Hypersurface("x - 1", 1, False, multiplicity, status, 1, None, (), (), note, followed, settled_at)
+
+
+@pytest.mark.parametrize(
+    ("hypersurfaces", "expected"),
+    [
+        ([], Patterns((), None, False)),
+        ([("confined", 7), ("confined", 3), ("confined", 7)], Patterns((3, 7), None, True)),
+        ([("confined", 3), ("not confined", 0, 1, 50), ("not confined", 2, 1, 40)], Patterns((2, 3), 40, True)),
+        ([("not confined", 0, 1, 50)], Patterns((), 50, False)),
+        ([("not contracted", None), ("undecided", None, 0)], Patterns((), None, False)),
+        (
+            [("confined", 3), ("undecided", None)],
+            Patterns((), None, False, "what becomes of x - 1 = 0 is undecided: its series ended"),
+        ),
+        (
+            [("undecided", 3, 2, 9, "no luck")],
+            Patterns((), None, False, "what becomes of x - 1 = 0 is undecided: no luck"),
+        ),
+        (
+            [("not confined", None, 1, 90)],
+            Patterns((), None, False, "the pattern of x - 1 = 0 is still running after 90 steps (--steps)"),
+        ),
+    ],
+)
+def test_patterns_are_the_fates_of_what_is_contracted(hypersurfaces, expected):
+    assert _patterns([hypersurface(*one) for one in hypersurfaces]) == expected
+
+
+@pytest.mark.parametrize(
+    ("steps", "options", "found"),
+    [
+        (3, {"most": 63}, (["first"], False, [8, 16, 32])),
+        (3, {"most": 64}, (["first", "t", "last"], True, [8, 16, 32, 64])),
+        (2, {}, (["first", "t"], True, [8, 16, 32, 64])),
+        (3, {"to_event": True}, (["first", "t"], True, [8, 16, 32, 64])),
+        (3, {"end": 0.0}, (["first"], False, [8])),
+        (1, {"end": 0.0}, (["first"], True, [8])),
+    ],
+)
+def test_series_are_taken_again_with_twice_the_terms_up_to_a_limit(steps, options, found, monkeypatch):
+    tried = []
+
+    def walk(forms, point, direction, tangents, prime, precision):
+        tried.append(precision)
+        yield SimpleNamespace(name="first", common=0)
+        if precision < 64:
+            raise PrecisionTooLow
+        yield SimpleNamespace(name="t", common=1)
+        yield SimpleNamespace(name="last", common=0)
+
+    monkeypatch.setattr("kahanmaps.laboratory.fates.walk", walk)
+    run, whole = _walked((), (), (), (), 101, steps, **{"end": math.inf, **options})
+    assert ([step.name for step in run], whole, tried) == found

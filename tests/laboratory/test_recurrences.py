@@ -127,6 +127,8 @@ def test_a_third_of_the_order_is_held_out_and_two_terms_at_least():
         ([(2**520 - 1) ** n for n in range(4)], (None, 0, str(2**520 - 1))),
         ([(1 - 2**520) ** n for n in range(4)], (None, 0, None)),
         ([2**n + (-2) ** n for n in range(8)], (None, 0, "2")),
+        ([n * (-2) ** n for n in range(8)], (None, 1, None)),
+        ([n * (-1) ** n for n in range(8)], ("n for n = 0 mod 2; -n for n = 1 mod 2", 1, "1")),
     ],
     ids=lambda value: None if isinstance(value, tuple) else str(value)[:12],
 )
