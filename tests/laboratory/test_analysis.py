@@ -6,15 +6,20 @@ import json
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from flint import fmpq
 from search_helpers import random_system, system
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system, read_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import analysis as module
+from kahanmaps.laboratory import report
 from kahanmaps.laboratory.analysis import Analysis, analyze
+from kahanmaps.laboratory.hirota_kimura import Profile
+from kahanmaps.laboratory.integrals import IntegralSearch
 
 FURTHER = Path(__file__).parent / "further_systems"
 PARTS = (
@@ -351,3 +356,125 @@ def test_progress_names_the_parts():
 def test_wrong_use(options, words):
     with pytest.raises(InputError, match=words):
         analyze(load("euler_top"), **options)
+
+
+ALONG = "relations along an orbit, of degree at most 1, 2, ...: spaces of dimension 0, 2"
+
+
+@pytest.mark.parametrize(
+    ("profile", "others", "expected"),
+    [
+        ({}, {}, [("measured", f"generic orbits lie on varieties of codimension 2; {ALONG}")]),
+        (
+            {"codimensions": (0, 1)},
+            {"reason": "no closed form"},
+            [
+                ("measured", f"generic orbits lie on varieties of codimension at least 1; {ALONG}"),
+                ("note", "no closed form"),
+            ],
+        ),
+        (
+            {"codimensions": (0, 0), "agree": False},
+            {},
+            [
+                ("measured", f"orbits show no integral up to degree 2; {ALONG}"),
+                ("note", "the orbits that were compared do not agree"),
+            ],
+        ),
+        ({"period": 1}, {}, [("measured", "all orbits tried close after 1 step")]),
+        (
+            {"nullities": (), "codimensions": ()},
+            {"reason": "no time"},
+            [("undecided", "how many integrals there are was not measured: no time")],
+        ),
+        (
+            {"period": 6},
+            {"by_theorems": 1},
+            [
+                ("proved", "1 independent integral by theorems: Prop. 1"),
+                ("measured", "all orbits tried close after 6 steps"),
+            ],
+        ),
+        (
+            {"period": 6},
+            {"by_theorems": 2, "symbols": ("a",)},
+            [
+                ("measured", "2 independent integrals by theorems: Prop. 1"),
+                ("measured", "all orbits tried close after 6 steps"),
+            ],
+        ),
+    ],
+)
+def test_what_is_said_of_integrals(profile, others, expected):
+    measured = {"nullities": (0, 2), "codimensions": (0, 2), "period": None, "agree": True, **profile}
+    search = {"symbols": (), "reason": "", "by_theorems": 0, **others}
+    found = IntegralSearch(
+        file=None,
+        eps=None,
+        integrals=(),
+        profile=Profile(3, complete=True, **measured),
+        primes=(),
+        seed=0,
+        theorems="Prop. 1",
+        **search,
+    )
+    lines = report._integral_lines(SimpleNamespace(integrals=found, relations=(), structure=None))
+    assert [(str(line.status), line.text) for line in lines] == expected
+
+
+@pytest.mark.parametrize(
+    ("integrals", "functions", "notes"),
+    [
+        (((), ()), ((), ()), []),
+        ((("c1",), ("c2",)), ((), ()), ["the c are integrals: numbers that depend on the orbit only"]),
+        (
+            ((), ("k12",)),
+            (("d3",), ()),
+            [
+                "the k are integrals: numbers that depend on the orbit only",
+                "the d are numbers that depend on eps only",
+            ],
+        ),
+    ],
+)
+def test_what_is_said_of_the_numbers_in_relations(integrals, functions, notes):
+    relations = [
+        SimpleNamespace(text=f"R{k}", integrals=ours, functions_of_eps=theirs)
+        for k, (ours, theirs) in enumerate(zip(integrals, functions, strict=True))
+    ]
+    search = SimpleNamespace(
+        integrals=(), by_theorems=0, profile=SimpleNamespace(nullities=(1,), period=2, agree=True), reason=""
+    )
+    _, *lines = report._integral_lines(SimpleNamespace(integrals=search, relations=relations, structure=None))
+    assert [line.text for line in lines] == ["along orbits R0", "along orbits R1", *notes]
+
+
+@pytest.mark.parametrize(
+    ("runs", "expected"),
+    [
+        ([], []),
+        ([("1", "a", 3, []), ("2", "b", 4, [])], [("undecided", "the eps 1, 2 disagree: a, b")]),
+        (
+            [("1", "a", 9, [4, None]), ("2", "a", 3, [6])],
+            [("measured", "a within 3 (eps = 1, 2)"), ("measured", "the last confinement comes after 6 steps")],
+        ),
+        (
+            [("1", "a", 9, [1]), ("2", "a", None, [])],
+            [("measured", "a within None (eps = 1, 2)"), ("measured", "the last confinement comes after 1 step")],
+        ),
+        ([("1/3", "undecided", None, [None])], [("undecided", "undecided within None (eps = 1/3)")]),
+    ],
+)
+def test_what_is_said_of_singularities(runs, expected):
+    found = [
+        SimpleNamespace(
+            eps=fmpq(*map(int, eps.split("/"))),
+            verdict=verdict,
+            followed=followed,
+            text=f"{verdict} within {followed}",
+            hypersurfaces=[SimpleNamespace(confined_at=at) for at in ends],
+        )
+        for eps, verdict, followed, ends in runs
+    ]
+    lines = report._singularity_lines(SimpleNamespace(singularities=found))
+    assert [(str(line.status), line.text) for line in lines] == expected

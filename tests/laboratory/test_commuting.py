@@ -393,3 +393,10 @@ def test_a_family_of_which_nothing_is_known_is_not_listed(monkeypatch):
     monkeypatch.setattr(module, "judge_family", lambda *_: doubt)
     found = commuting_systems(system("x y", "y", "-x"))
     assert (found.families, found.undecided) == ([], ["a family with 2 parameters: nobody knows"])
+
+
+@pytest.mark.parametrize("shape", ["linear", "quadratic"])
+def test_multiples_commute_in_dimension_one_by_a_proof(shape):
+    found = commuting_systems(system("x", "x^2 - 2"), shape)
+    ((family, verdict),) = [(family, family.finding.verdict) for family in found.families]
+    assert (len(family.directions), verdict, found.verdict) == (1, Verdict.PROVED, Verdict.PROVED)

@@ -24,7 +24,7 @@ from kahanmaps.laboratory.jets import (
     sparse_forms,
     valuation,
 )
-from kahanmaps.laboratory.singularities import default_eps, singularities, symbolic_denominator
+from kahanmaps.laboratory.singularities import _range, default_eps, singularities, symbolic_denominator
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map, linear_forms
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -359,3 +359,30 @@ def test_the_denominator_is_that_determinant_in_every_dimension(name):
     point = [fmpq(2 * k + 1, k + 2) for k in range(system.dim)]
     denominator = parse_polynomial(singularities(system, "1/7", steps=1).denominator, system.variables)
     assert evaluate(denominator, QQ, point) == KahanMap(system, "1/7").determinant(point)
+
+
+def test_steps_are_between_one_and_the_limit(monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.singularities.MAX_STEPS", 3)
+    system = load("riccati").system
+    for steps in (0, 4):
+        with pytest.raises(InputError, match=f"found {steps} steps, expected 1 to 3"):
+            singularities(system, "1/3", steps=steps)
+    assert [singularities(system, "1/3", steps=steps).stopped for steps in (1, 3)] == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("dim", "steps", "expected"),
+    [
+        (1, None, (12, 1000, 400)),
+        (2, None, (12, 1000, 400)),
+        (3, None, (12, 500, 150)),
+        (4, None, (12, 250, 60)),
+        (5, None, (12, 100, 30)),
+        (2, 1, (1, 1, 1)),
+        (3, 30, (30, 30, 30)),
+        (2, 300, (200, 300, 300)),
+    ],
+)
+def test_how_far_hypersurfaces_are_followed(dim, steps, expected):
+    found = _range(dim, steps, 0.0)
+    assert (found.shown, found.reach, found.along, found.end) == (*expected, 0.0)
