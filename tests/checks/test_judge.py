@@ -156,3 +156,11 @@ def test_an_orbit_makes_nothing_supported_that_random_points_left_undecided():
 def test_a_finding_carries_formula_source_and_whether_it_is_a_control():
     found = judge("c", TRUE, Settings(), PROOF, formula="x = x", source="somebody", control=True)
     assert (found.claim, found.formula, found.source, found.control) == ("c", "x = x", "somebody", True)
+
+
+@pytest.mark.parametrize(
+    ("identity", "control", "verdict"), [(FALSE, False, REFUTED), (NOWHERE, False, UNDECIDED), (TRUE, True, SUPPORTED)]
+)
+def test_what_fails_or_is_nowhere_defined_is_not_expanded_and_no_control_is(identity, control, verdict, monkeypatch):
+    monkeypatch.setattr(judge_module, "expansion", lambda identity: pytest.fail("it was expanded"))
+    assert judge("c", identity, Settings(), control=control).verdict is verdict

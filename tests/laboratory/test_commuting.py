@@ -400,3 +400,4 @@ def test_multiples_commute_in_dimension_one_by_a_proof(shape):
     found = commuting_systems(system("x", "x^2 - 2"), shape)
     ((family, verdict),) = [(family, family.finding.verdict) for family in found.families]
     assert (len(family.directions), verdict, found.verdict) == (1, Verdict.PROVED, Verdict.PROVED)
+    assert family.finding.evidence.data["theorem"] == "the lemma of Moebius maps"
