@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import arb, fmpq, fmpq_mat, fmpq_poly
 from helpers import HENON_HEILES
 
 from kahanmaps.algebra.fields import RR
@@ -19,7 +19,7 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
-from kahanmaps.maps.float_blocks import CUBES, GENERAL, LINES, planar_blocks
+from kahanmaps.maps.float_blocks import CUBES, GENERAL, LINES, _doubles, planar_blocks
 from kahanmaps.maps.float_ensemble import has_numba
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit
@@ -451,3 +451,8 @@ def test_a_function_that_is_no_integral_drifts_and_one_that_is_does_not(kernel):
     for _ in orbit:
         pass
     assert orbit.drift[1].largest == of_flow.largest[0]
+
+
+def test_entries_far_below_the_largest_of_a_row_are_zero():
+    row = [arb(1), arb(2) ** -121, arb(2) ** -120, arb(0), arb(-1)]
+    assert _doubles(row) == [1.0, 0.0, 2.0**-120, 0.0, -1.0]

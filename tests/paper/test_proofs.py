@@ -15,6 +15,7 @@ from paper.members import member, named, point
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
+from kahanmaps.invariants.sizes import Size
 from kahanmaps.paper import examiner, proofs, verify
 from kahanmaps.paper.evaluate import evaluate, witness_of
 from kahanmaps.paper.examiner import VerifyOptions
@@ -324,3 +325,21 @@ def test_a_witness_shows_the_first_entry_that_differs():
 
 def test_what_holds_has_no_witness():
     assert witness_of(evaluate(fabricated(true_claim), point("m=2, split"))) is None
+
+
+def test_every_random_point_is_another():
+    tried = []
+
+    def claim(o):
+        tried.append((o.K.characteristic, tuple(map(int, o.x.entries()))))
+        yield o.n, o.n
+
+    found = _MemberExaminer(member("m=2, split"), Settings(error_bits=400), VerifyOptions())
+    evidence = found._at_points(fabricated(claim), False, Size(1, 10.0), 0).evidence
+    assert len(evidence.data["primes"]) == evidence.data["points"] >= 6
+    assert len({prime for prime, _ in tried}) == len({x for _, x in tried}) == evidence.data["points"]
+
+
+def test_a_claim_is_given_up_after_forty_points_and_one_where_it_is_not_defined(examine):
+    finding = examine(fabricated(lambda o: [(o.inverse(o.x * o.x.transpose()), o.I)]))
+    assert finding.evidence.summary == "the claim is not defined at any of 41 random points over GF(p)"
