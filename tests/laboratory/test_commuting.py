@@ -401,3 +401,10 @@ def test_multiples_commute_in_dimension_one_by_a_proof(shape):
     ((family, verdict),) = [(family, family.finding.verdict) for family in found.families]
     assert (len(family.directions), verdict, found.verdict) == (1, Verdict.PROVED, Verdict.PROVED)
     assert family.finding.evidence.data["theorem"] == "the lemma of Moebius maps"
+
+
+@pytest.mark.parametrize(("rhs", "values"), [(["2*x"], 3), (["y", "-x"], 5), (["y", "z", "x + 1"], 7)])
+def test_affine_maps_are_looked_at_at_more_values_of_eps_than_their_symmetries_have_degrees(rhs, values):
+    f = system("x y z"[: 2 * len(rhs) - 1], *rhs)
+    first, second = affine(f, [f]).data["hypotheses"]
+    assert (first, second.rpartition(", at ")[2]) == ("f is affine", f"{values} values of eps")

@@ -7,6 +7,8 @@ the last bit; and each way in which an orbit can end has its status and its step
 
 from __future__ import annotations
 
+import random
+
 import numpy as np
 import pytest
 from flint import arb, fmpq, fmpq_mat, fmpq_poly
@@ -18,6 +20,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
+from kahanmaps.maps import float_steps
 from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
 from kahanmaps.maps.float_blocks import CUBES, GENERAL, LINES, _doubles, planar_blocks
 from kahanmaps.maps.float_ensemble import has_numba
@@ -456,3 +459,51 @@ def test_a_function_that_is_no_integral_drifts_and_one_that_is_does_not(kernel):
 def test_entries_far_below_the_largest_of_a_row_are_zero():
     row = [arb(1), arb(2) ** -121, arb(2) ** -120, arb(0), arb(-1)]
     assert _doubles(row) == [1.0, 0.0, 2.0**-120, 0.0, -1.0]
+
+
+# The operations, against the formulas written with complex numbers.
+
+BLOCKS = {
+    "lines": (0, 1, 1, 0),
+    "cubes": (1, 0, 0, 1),
+    "general": (0.7, -1.3, 0.4, 2.1),
+    "complex": (0.7 - 0.2j, -1.3 + 0.9j, 0.4 + 1.7j, 2.1 - 0.6j),
+}
+
+
+def plane(abcd, U, V):
+    """The image, w = (1 + B)(1 - B) + A C, A C, and h = (A U + 2 B V) U + C V^2."""
+    a, b, c, d = abcd
+    A, B, C = a * U + b * V, b * U + c * V, c * U + d * V
+    w = (1 + B) * (1 - B) + A * C
+    return ((1 + B) * U + C * V) / w, ((1 - B) * V - A * U) / w, w, A * C, (A * U + 2 * B * V) * U + C * V * V
+
+
+def parts(*numbers):
+    return [part for number in map(complex, numbers) for part in (number.real, number.imag)]
+
+
+@pytest.mark.parametrize("name", ["lines", "cubes", "general"])
+def test_a_real_step_is_that_of_the_formulas(name):
+    rng = random.Random(3)
+    for _ in range(20):
+        U, V = rng.uniform(-2, 2), rng.uniform(-2, 2)
+        *step, h = plane(BLOCKS[name], U, V)
+        k = parts(*BLOCKS[name])
+        assert getattr(float_steps, f"real_{name}")(U, V, k) == pytest.approx(step, rel=1e-9)
+        assert float_steps.real_integral(U, V, k, 0.3) == pytest.approx(0.3 * h / step[2], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["lines", "general", "complex"])
+def test_a_complex_step_is_that_of_the_formulas(name):
+    rng = random.Random(4)
+    function = getattr(float_steps, f"complex_{name if name != 'complex' else 'general'}")
+    for _ in range(20):
+        U, V, kappa = (complex(rng.uniform(-2, 2), rng.uniform(-2, 2)) for _ in range(3))
+        x, y, w, g, h = plane(BLOCKS[name], U, V)
+        k = parts(*BLOCKS[name])
+        found = function(*parts(U, V), k)
+        assert found == pytest.approx([*parts(x, y), abs(w) ** 2, abs(g) ** 2], rel=1e-9)
+        assert float_steps.complex_integral(*parts(U, V), k, *parts(kappa)) == pytest.approx(
+            parts(kappa * h / w), rel=1e-9
+        )
