@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import BadPrime, InputError, SingularStep
-from kahanmaps.laboratory.cycle_laws import LAWS, _critical, _distance, _reversible, compare
+from kahanmaps.laboratory.cycle_laws import LAWS, _critical, _distance, _passes_components, _reversible, compare
 from kahanmaps.laboratory.cycles import cycle_census, default_eps
 from kahanmaps.laboratory.reversors import find_reversor, is_reversor
 from kahanmaps.maps.kahan import KahanMap
@@ -500,3 +500,42 @@ def test_the_mean_length_is_that_of_all_cycles():
     lengths = [length for length, n in found.lengths.items() for _ in range(n)]
     assert len(set(lengths)) > 1
     assert (found.cycles, found.mean) == (len(lengths), sum(lengths) / len(lengths))
+
+
+def census_of(lengths, looked_at, **more):
+    """A census of the space over GF(101) with cycles of affine points alone; `lengths` with their numbers."""
+    usual = {"prime": 101, "dim": 3, "complete": True, "open": 0, "steps": 1000, "points": 10**6, "at_infinity": {}}
+    found = {"lengths": lengths, "looked_at": looked_at, "cycles": sum(lengths.values())}
+    return SimpleNamespace(**{**usual, **found, "fixed": None, "symmetric": None, **more})
+
+
+@pytest.mark.parametrize(
+    ("lengths", "looked_at", "more", "bound", "permutation"),
+    [
+        ({5: 1}, 100, {}, "compatible", "not tried"),  # one point in twenty is periodic
+        ({4: 1}, 100, {}, "not tried", "not tried"),
+        ({49: 1}, 100, {}, "compatible", "not tried"),
+        ({50: 1}, 100, {}, "compatible", "compatible"),  # 1 cycle, where 4.5 are expected: within 3 sqrt(4.5)
+        ({1: 50}, 100, {}, "compatible", "not compatible"),
+        ({2: 40, 100: 1}, 200, {}, "compatible", "not compatible"),
+        ({95: 1, 5: 1}, 100, {"open": 5}, "compatible", "compatible"),  # 5 of 105 points are still under way
+        ({95: 1, 4: 1}, 100, {"open": 6}, "not compatible", "compatible"),
+        ({95: 1, 5: 1}, 100, {"open": 5, "steps": 121}, "not tried", "compatible"),  # fewer than p + 1 + 2 sqrt p = 122
+        ({95: 1, 5: 1}, 100, {"open": 5, "steps": 122}, "compatible", "compatible"),
+        ({123: 1}, 123, {"dim": 2}, "not compatible", "compatible"),
+        ({122: 1}, 122, {"dim": 2}, "compatible", "compatible"),
+    ],
+)
+def test_laws_are_tried_where_there_are_points_enough(lengths, looked_at, more, bound, permutation):
+    found = compare(census_of(lengths, looked_at, **more))
+    assert found.bound == 122
+    assert (found.verdict("integrable bound"), found.verdict("random permutation")) == (bound, permutation)
+
+
+@pytest.mark.parametrize(
+    ("length", "passes"),
+    [(1, False), (2, True), (202, True), (909, True), (1010, False), (900, True), (1000, False), (918, True)]
+    + [(1020, False), (102, True), (119, True), (206, False), (123, False)],
+)
+def test_cycles_on_up_to_nine_rational_curves_have_multiples_of_orders_as_lengths(length, passes):
+    assert _passes_components(length, 101) == passes
