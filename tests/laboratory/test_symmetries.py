@@ -299,3 +299,11 @@ def test_equations_with_long_coefficients_are_not_set_up_and_nothing_is_called_c
     assert commuting.undecided == ["other g are searched for coefficients of up to 2000 digits only"]
     assert (symmetries.complete, commuting.complete, darboux.complete) == (False, False, False)
     assert [one.trivial for one in commuting.solutions] == ["0", "f", "-f"]
+
+
+@pytest.mark.parametrize(("rhs", "shift"), [(("2*x - 1", "2*y - 1"), 1), (("2*x + 1", "2*y + 1"), -1)])
+def test_symmetries_without_a_translation_come_first(rhs, shift):
+    found = [t for t in linear_symmetries(system("x y", *rhs)).signed if not t.reversing]
+    assert [bool(any(t.r)) for t in found] == [False] * 2 + [True] * 6
+    (both,) = [t.r for t in found if t.S == fmpq_mat([[-1, 0], [0, -1]])]
+    assert both == (shift, shift)
