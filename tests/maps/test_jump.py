@@ -249,6 +249,19 @@ def test_over_q_a_pole_on_the_way_is_said_with_its_step(name, more, last):
         assert coordinates(found.value(start, n)) == points[n]
 
 
+@pytest.mark.parametrize("more", [1, 8, 24])
+def test_beyond_its_pole_an_orbit_of_planes_has_values_again(more):
+    name = "a pole at step 2"
+    U, V, W = before(*STARTS[name], more)
+    _, structure, (_, u, _, v) = side_by_side(name, "a double root")
+    planes = rational_jump.RationalOrbit(structure, fmpq(1, 2), (fmpq(U, W), u, fmpq(V, W), v), None)._planes
+    pole = more + 2
+    with pytest.raises(SingularStep, match=f"no value at step {pole - 1}$"):
+        planes.point(pole)
+    for n in (pole - 1, pole + 1):
+        assert len(coordinates(planes.point(n))) == 4
+
+
 def test_a_start_without_an_image_is_singular_over_every_field():
     _, structure, start = side_by_side("no value at the start", "a double root")
     for field in (QQ, GF(10007), GF(2**89 - 1)):
