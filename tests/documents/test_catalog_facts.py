@@ -6,6 +6,7 @@ rank of monomial values along an orbit, codimensions by the rank of gradients. E
 
 from __future__ import annotations
 
+import math
 import random
 import re
 from itertools import chain, pairwise
@@ -20,6 +21,7 @@ from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.structured_facts import relation_functions, relations
+from kahanmaps.errors import InputError
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -338,3 +340,13 @@ def test_the_gradient_of_a_function_that_is_not_conserved_raises_the_rank():
     found = gradients(generic("euler_top", 4))
     assert nmod_mat(len(found), 3, [*chain(*found)], PRIME).rank() == 2
     assert nmod_mat(len(found) + 1, 3, [*chain(*found), 1, 2, 3], PRIME).rank() == 3
+
+
+@pytest.mark.parametrize(("dim", "top", "count"), [(2, 446, 100_128), (8, 50, math.comb(58, 8)), (3, 82, 98_770)])
+def test_functions_up_to_a_degree_are_counted_before_they_are_made(dim, top, count):
+    variables = [f"x{k}" for k in range(dim)]
+    if count <= 100_000:
+        assert len(relation_functions(f"degree <= {top}", variables)) == count == math.comb(top + dim, dim)
+    else:
+        with pytest.raises(InputError, match=f"which is {count} monomials, expected at most 100000$"):
+            relation_functions(f"degree <= {top}", variables)

@@ -6,6 +6,7 @@ import random
 from fractions import Fraction
 from functools import cache
 from itertools import islice
+from types import SimpleNamespace
 
 import pytest
 from flint import fmpq, fmpq_mat
@@ -260,3 +261,11 @@ def test_the_theorem_leaves_out_factors_without_variables_and_wants_numbers_in_f
     assert module._theorem(Laboratory(file, ())) is not None
     monkeypatch.setattr(module, "MAX_DIMENSION", 3)
     assert module._theorem(Laboratory(file, ())) is None
+
+
+def test_a_density_without_a_closed_form_is_told():
+    laboratory = SimpleNamespace(formulas=lambda *_: SimpleNamespace(bases=None, reason="too long"))
+    assert module._formulas(laboratory, None, 3, False, 0.0) == (
+        [],
+        "there is a density of degree 3 modulo primes, but no closed form: too long",
+    )
