@@ -305,7 +305,7 @@ def _polynomial_text(polynomial: fmpq_poly) -> str:
             body = number if not power else power if number == "1" else f"{number}*{power}"
             terms.append((" - " if c < 0 else " + ") + body)
     text = "".join(terms)
-    return text.removeprefix(" + ") if not text.startswith(" - ") else "-" + text[3:]
+    return "-" + text[3:] if text.startswith(" - ") else text.removeprefix(" + ") or "0"
 
 
 def _signed(number: Any) -> str:

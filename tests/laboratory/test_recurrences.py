@@ -122,6 +122,7 @@ def test_a_third_of_the_order_is_held_out_and_two_terms_at_least():
             [2 - (n % 12 == 5) for n in range(30)],
             ("; ".join(f"{2 - (r == 5)} for n = {r} mod 12" for r in range(12)), 0, "1"),
         ),
+        ([n % 2 * (n + 1) for n in range(12)], ("0 for n = 0 mod 2; n + 1 for n = 1 mod 2", 1, "1")),
         ([2 - (n % 13 == 5) for n in range(40)], (None, 0, "1")),
         ([2**520 - 1] * 4, (str(2**520 - 1), 0, "1")),
         ([(2**520 - 1) ** n for n in range(4)], (None, 0, str(2**520 - 1))),
