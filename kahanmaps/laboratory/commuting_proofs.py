@@ -56,7 +56,7 @@ def judge_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> F
 def judge_family(f: QuadraticSystem, space: CommutingSpace, family: Component, settings: Settings) -> Finding:
     """The finding that the Kahan maps of f and of every member of a linear family commute, for every eps."""
     members = [field_at(space, family.point), *(field_at(space, family.slopes(i)) for i in family.free)]
-    proof = affine(f, members) or (_in_dimension_one(f, f) if f.dim == 1 else None)
+    proof = affine(f, members) or _in_dimension_one(f, f)
     claim = "the Kahan maps of f and of every member g of the family commute"
     return judge(claim, _family_identity(f, space, family), settings, proof, formula=_FORMULA)
 

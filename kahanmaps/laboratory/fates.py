@@ -68,9 +68,9 @@ class Hypersurface:
     confined_at: int | None
     steps: tuple[Step, ...]
     primes: tuple[int, ...]
-    note: str = ""
-    followed: int = 0
-    settled_at: int | None = None
+    note: str
+    followed: int
+    settled_at: int | None
 
 
 @dataclass(frozen=True)
@@ -239,6 +239,7 @@ def _seen(
         fate.confined_at,
         fate.steps,
         primes,
+        note="",
         followed=fate.followed,
         settled_at=fate.settled_at,
     )

@@ -21,8 +21,7 @@ class Control:
     name: str
     breaks: str
     function: Callable[[PaperObjects], PaperObjects]
-    least_m: int = 1
-    changes_roots: bool = False
+    least_m: int
 
 
 CONTROLS: dict[str, Control] = {}

@@ -56,8 +56,8 @@ class MemberObjects(PaperObjects):
         eps: Any,
         draw: Draw,
         roots: tuple[Any, ...] | None,
-        sign_vectors: tuple[tuple[int, ...], ...] | None = None,
-        order: int = 3,
+        sign_vectors: tuple[tuple[int, ...], ...] | None,
+        order: int,
     ) -> MemberObjects:
         """The objects of a member over K; `roots` are those of chi, None where they do not lie in K."""
         chi = chi_of(member.A)
@@ -231,7 +231,7 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int = 3) -> Pape
 # ---- proofs: indeterminate data --------------------------------------------------------------------------------
 
 
-def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int = 3) -> PaperObjects:
+def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int) -> PaperObjects:
     """The normal form with indeterminate roots, planar cubics and eps; `vectors` are the further letters needed.
 
     Each block may still be changed by a matrix of determinant 1. It is used to put the point to (u, v) = (1, 0) and the
@@ -304,7 +304,7 @@ def member_functions(
     return MemberObjects.at(member, K, value, draw, lifted, signs, order)
 
 
-def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, order: int = 3) -> PaperObjects:
+def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, order: int) -> PaperObjects:
     """A member's normal form at a random exact point: one planar system over Q[t]/chi, every root of chi at once."""
     form = normal_form(member)
     K = EtaleAlgebra(form.chi)
@@ -341,7 +341,7 @@ def root_enclosures(member: FamilyMember, bits: int) -> list[str]:
         return [str(root.str(20)) for root in complex_roots(member, bits)]
 
 
-def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq | None, order: int = 3) -> PaperObjects:
+def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq | None, order: int) -> PaperObjects:
     """A member at a random rational point over complex balls, with all complex roots of chi enclosed."""
     K = CC(bits)
     roots = complex_roots(member, bits)
@@ -391,7 +391,7 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int = 3) -> Pap
     )
 
 
-def universal_bound_objects(m: int, order: int = 3) -> PaperObjects:
+def universal_bound_objects(m: int, order: int) -> PaperObjects:
     """Bounds for `random_objects`: roots, cubics, shears, x and eps are variables."""
     K = BoundField()
     n = 2 * m

@@ -422,7 +422,7 @@ def test_a_map_into_a_hypersurface_is_defined_and_one_without_values_is_not():
 
 def test_of_two_points_on_one_hypersurface_the_one_that_was_followed_less_counts():
     near, far = (
-        replace(Hypersurface("?", 1, False, 1, NOT_CONFINED, 1, None, (), (p,), ""), followed=steps)
+        Hypersurface("?", 1, False, 1, NOT_CONFINED, 1, None, (), (p,), "", steps, None)
         for p, steps in ((5, 40), (7, 90))
     )
     for one, other in ((near, far), (far, near)):
