@@ -219,11 +219,14 @@ def test_an_npz_file_is_the_old_one_or_the_new_one_whatever_ends_the_orbit(tmp_p
     target.write_bytes(b"before")
     words = f"orbit harmonic --start 1,2 --eps 1/10 --steps {10**12} --arithmetic mod:10007 --every 100 -q -o {target}"
     process = subprocess.Popen([*COMMAND, *shlex.split(words)])
-    while len(list(tmp_path.iterdir())) == 1:  # the new one, beside it
-        time.sleep(0.01)
-    time.sleep(0.3)
-    process.send_signal(number)
-    process.wait(30)
+    try:
+        while len(list(tmp_path.iterdir())) == 1:  # the new one, beside it
+            time.sleep(0.01)
+        time.sleep(0.3)
+        process.send_signal(number)
+        process.wait(60)
+    finally:
+        process.kill()  # it would go on for days
     if number == signal.SIGKILL:
         assert target.read_bytes() == b"before"
     else:
