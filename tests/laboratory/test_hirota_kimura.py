@@ -3,6 +3,8 @@ close."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 from search_helpers import random_system, system
 
@@ -11,6 +13,7 @@ from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.documents.structured_facts import relation_functions, relations
 from kahanmaps.laboratory import hirota_kimura as module
 from kahanmaps.laboratory.hirota_kimura import (
+    OrbitRelations,
     Profile,
     hirota_kimura_basis,
     orbit_profile,
@@ -182,3 +185,27 @@ def test_small_primes_agree_where_orbits_are_long_enough():
 def test_a_profile_is_settled_where_the_last_of_four_degrees_shows_no_more(nullities, codimensions, expected):
     found = Profile(3, nullities, codimensions, None, True, True)
     assert (found.degree, found.codimension, found.first_degree, found.is_settled) == expected
+
+
+@pytest.mark.parametrize(
+    ("degrees", "expected"),
+    [  # for each degree and map: how many vectors, the codimension, the period
+        ([[(0, 0, None), (0, 0, None)], [(1, 1, None), (1, 1, None)]], ((0, 1), (0, 1), None, True)),
+        ([[(1, 1, None), (0, 0, None)], [(1, 1, None), (1, 1, None)]], ((0, 1), (0, 1), None, False)),
+        ([[(0, 0, None), (0, 0, None)], [(1, 1, None), (1, 0, None)]], ((0, 1), (0, 0), None, False)),
+        ([[(2, 2, None), (2, 2, None)], [(9, 2, None), (9, 2, None)]], ((2,), (2,), None, True)),  # orbits on curves
+        ([[(2, 2, 6), (2, 2, 6)], [(9, 3, 6), (9, 3, 6)]], ((2, 9), (2, 3), 6, True)),  # orbits that close are points
+        ([[(1, 1, 5), (1, 1, 6)], [(4, 1, 6), (4, 1, 6)]], ((1, 4), (1, 1), 6, True)),
+    ],
+)
+def test_a_profile_has_the_least_numbers_of_all_maps(degrees, expected, monkeypatch):
+    maps = [SimpleNamespace(dim=3, prime=101, step=lambda x: x, random_point=lambda: (1, 2, 3)) for _ in range(2)]
+
+    def along(map_, degree):
+        count, codimension, period = degrees[degree - 1][next(k for k, one in enumerate(maps) if one is map_)]
+        return OrbitRelations(degree, [[]] * count, [[1, 0, 0]], codimension, period, (), ())
+
+    monkeypatch.setattr(module, "relations_on_orbit", along)
+    found = orbit_profile(maps, known=lambda map_, point: [[1, 1, 0]], max_degree=2)
+    assert (found.nullities, found.codimensions, found.period, found.agree) == expected
+    assert (found.complete, found.with_known) == (True, 2)
