@@ -18,7 +18,7 @@ from typing import Any, Self
 
 from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, quoted
 from kahanmaps.experiments.journals import is_mounted, journal_for
-from kahanmaps.experiments.locks import Lock, LockedByAnother, NotOurs, require_plain
+from kahanmaps.experiments.locks import Lock, LockedByAnother, NotOurs, require_journal, require_plain
 from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT, SCHEMA, UPGRADE
 from kahanmaps.whole_files import resolved
 
@@ -257,9 +257,10 @@ class Database:
             raise StoreError(
                 f"{self.name} may not be written to: change the permissions of the file, or work on a copy"
             )
-        for end in ("-wal", "-shm", "-journal"):
+        # Of -shm the bytes are not looked at: to close a descriptor of it would drop locks, as of the file itself.
+        for end, require in (("-wal", require_journal), ("-shm", require_plain), ("-journal", require_journal)):
             try:
-                require_plain(Path(f"{self.path}{end}"))
+                require(Path(f"{self.path}{end}"))
             except NotOurs as found:
                 raise self._in_the_way(found) from None
         if not self._is_readonly and not os.access(self.path.parent, os.W_OK | os.X_OK):

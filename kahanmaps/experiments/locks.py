@@ -114,6 +114,18 @@ class Lock:
         return "".join(c for c in line if c.isprintable()) or "which has only begun"
 
 
+def require_journal(path: Path) -> None:
+    """Raise NotOurs if there is something of this name that SQLite would remove, and did not write."""
+    require_plain(path)
+    try:
+        with path.open("rb") as stream:
+            begins = stream.read(4)
+    except FileNotFoundError:
+        return
+    if not _JOURNAL.fullmatch(begins):
+        raise NotOurs(f"{path} is not a journal of SQLite")
+
+
 def require_plain(path: Path) -> None:
     """Raise NotOurs if there is something of this name other than a file with this one name."""
     try:
@@ -126,6 +138,9 @@ def require_plain(path: Path) -> None:
 
 _LONGEST_LINE = 1000
 _LINE = re.compile(rb"(?:process [^\n]*\n)?")  # nothing: its writer was killed before it had written it
+
+# A rollback journal, a WAL in either order of bytes; nothing or zeros: its writer was killed before it was complete.
+_JOURNAL = re.compile(rb"\xd9\xd5\x05\xf9|\x37\x7f\x06[\x82\x83]|\0*")
 
 _held: set[Lock] = set()
 

@@ -173,8 +173,8 @@ NOT_OURS = {
 @pytest.mark.parametrize(
     ("kind", "end"),
     [
-        *product(NOT_OURS, ("-wal", "-shm", "-journal")),  # of another file of this name SQLite knows that it is not
-        *product([*NOT_OURS, "something else"], [".lock"]),
+        *product(NOT_OURS, ("-wal", "-shm", "-journal", ".lock")),
+        *product(["something else"], ("-wal", "-journal", ".lock")),
     ],
 )
 def test_what_lies_where_the_files_of_a_database_belong_is_left_alone(path, kind, end):
@@ -192,6 +192,18 @@ def test_what_lies_where_the_files_of_a_database_belong_is_left_alone(path, kind
     if end != ".lock":
         with pytest.raises(StoreError, match=rf"results\.db{end} is not .*remove it or move it away"):
             Store.open(path, readonly=True)
+
+
+@pytest.mark.parametrize("end", ["-wal", "-journal"])
+def test_what_lies_at_the_name_of_a_journal_before_there_is_a_database_is_left_alone(path, end):
+    """SQLite takes it for one that was left behind, and removes it."""
+    name = path.with_name(path.name + end)
+    name.write_text("notes on much work\n")
+    with pytest.raises(StoreError, match=rf"results\.db{end} is not a journal.*remove it or move it away"):
+        Store.open(path, create=True)
+    assert name.read_text() == "notes on much work\n"
+    name.write_bytes(b"")  # what a killed writer leaves may be
+    Store.open(path, create=True).close()
 
 
 def test_a_lock_file_that_cannot_be_written_is_no_lock(path, monkeypatch):
