@@ -60,8 +60,11 @@ def sync(stream: IO[Any]) -> None:
 
 
 def resolved(path: str | os.PathLike[str]) -> Path:
-    """The path without symbolic links; OSError where they lead round in a circle."""
-    found = os.path.realpath(path)
+    """The path without symbolic links; OSError where they lead round in a circle, or no file can have this name."""
+    try:
+        found = os.path.realpath(path)
+    except ValueError:  # a zero byte in it
+        raise OSError(errno.EINVAL, os.strerror(errno.EINVAL), os.fspath(path)) from None
     if os.path.islink(found):
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), os.fspath(path))
     return Path(found)

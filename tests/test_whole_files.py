@@ -32,6 +32,12 @@ def test_symbolic_links_in_a_circle_are_told_and_stay(tmp_path):
     assert loop.is_symlink()
 
 
+def test_a_name_that_no_file_can_have_is_told():
+    with pytest.raises(OSError, match="Invalid argument") as caught:
+        write_whole("a\0b", b"")
+    assert (caught.value.errno, caught.value.filename) == (errno.EINVAL, "a\0b")
+
+
 def test_a_symbolic_link_is_written_through(tmp_path):
     (tmp_path / "there").mkdir()
     link = tmp_path / "link.svg"

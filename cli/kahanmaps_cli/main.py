@@ -180,6 +180,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: Sequence[str] | None) -> int:
     try:
         have_standard_streams()
+        if any("\0" in word for word in argv or ()):  # a shell cannot say it, who calls this can
+            raise click.UsageError("found a zero byte among the arguments: no file and no name can have it")
         result = cli.main(args=None if argv is None else list(argv), prog_name="kahanmaps", standalone_mode=False)
         sys.stdout.flush()
         return result if isinstance(result, int) else HOLDS

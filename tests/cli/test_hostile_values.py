@@ -30,10 +30,23 @@ LONG = "x" * 200_000
 VALUES = {
     "integer": ["9" * 400, "-" + "9" * 400, "9" * 5000, "1e400", "nan", LONG],
     "number of machine": ["nan", "inf", "1e400", "-1", "9" * 400, LONG],
-    "path": ["\udcff.{end}", "loop.{end}", "folder.{end}", "loop.{end}/x.{end}", "no/x.{end}", "x" * 5000, LONG],
+    "path": [
+        "\udcff.{end}",
+        "a\0b.{end}",
+        "loop.{end}",
+        "folder.{end}",
+        "loop.{end}/x.{end}",
+        "no/x.{end}",
+        "x" * 5000,
+        LONG,
+    ],
     "text": ["", "\udcff", "\x1b[31m", "9" * 400, LONG],
 }
-QUICK = {"integer": ["9" * 400, LONG], "number of machine": ["nan", "1e400"], "path": ["\udcff.{end}", "loop.{end}"]}
+QUICK = {
+    "integer": ["9" * 400, LONG],
+    "number of machine": ["nan", "1e400"],
+    "path": ["\udcff.{end}", "a\0b.{end}", "loop.{end}"],
+}
 TAKE_THEIR_TIME = ("plot", "report", "analyze", "verify")
 ENDINGS = {
     "db": "db",
