@@ -99,7 +99,13 @@ class BoundField(Field):
         return sum(size.degree for size in self._denominators)
 
     def denominator(self, of: Any, size: Size) -> int:
-        """The number of the denominator that belongs to the object `of`; one object has one denominator."""
+        """The number of the denominator that belongs to the object `of`; one object has one denominator.
+
+        Not so the common bound of the entries of a matrix, which stands for another one each time.
+        """
+        if isinstance(of, Bound) and of.is_common:
+            self._denominators.append(size)
+            return len(self._denominators) - 1
         known = self._number_of.get(id(of))
         if known is None:
             known = self._number_of[id(of)] = (of, len(self._denominators))  # `of` is kept, so its id stays its own
@@ -149,9 +155,9 @@ class BoundField(Field):
 
 
 class Bound(Element):
-    """The bound of one rational function."""
+    """The bound of one rational function, or (`is_common`) of each entry of a matrix."""
 
-    __slots__ = ("above", "below", "scale")
+    __slots__ = ("above", "below", "is_common", "scale")
 
     field: BoundField
 
@@ -160,6 +166,7 @@ class Bound(Element):
         self.above = above
         self.scale = scale
         self.below = dict(below)
+        self.is_common = False
 
     def over(self, scale: int, below: Mapping[int, int]) -> Size:
         """The numerator over a larger denominator."""
@@ -198,6 +205,7 @@ class BoundMatrix:
         self.field = field
         self._rows, self._columns = rows, columns
         self.entry = entry
+        entry.is_common = rows * columns > 1
 
     def nrows(self) -> int:
         return self._rows

@@ -105,6 +105,19 @@ def test_two_denominators_are_both_counted():
     assert (K.one / K.polynomial(3, 1.0) + K.one / K.polynomial(2, 1.0)).pole_degree == 5
 
 
+def test_entries_of_a_matrix_with_one_bound_are_different_denominators():
+    # By hand: 1/p + 1/q is (q + p)/(p q), of degree 3 over 6; the bound of p and q is one object.
+    K = BoundField()
+    p, q = K.matrix(1, 2, [K.polynomial(3, 1.0), K.polynomial(2, 1.0)]).entries()
+    total = K.one / p + K.one / q
+    assert (total.above, total.pole_degree) == (Size(3, 2.0), 6)
+    assert not K.is_zero(p)
+    assert not K.is_zero(q)
+    assert K.pole_degree == 12
+    one = K.matrix(1, 1, [K.polynomial(3, 1.0)])
+    assert (K.one / one[0, 0] + K.one / one[0, 0]).pole_degree == 3
+
+
 def test_a_bound_never_says_that_something_is_zero():
     K = BoundField()
     assert not K.is_zero(K.zero)
