@@ -24,7 +24,7 @@ from typing import Any
 
 from flint import fmpq, fmpz
 
-from kahanmaps.algebra.bounds import ONE, BoundField, Size, bound_of
+from kahanmaps.algebra.bounds import BoundField, Size, bound_of
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, Field, PrimeField
 from kahanmaps.checks.claims import Evidence, Verdict, Witness
@@ -73,7 +73,8 @@ class Identity:
         field = BoundField()
         eps = field.variable() if self.eps is None else field.convert(self.eps)
         sides = self.at(field, tuple(field.variable() for _ in range(self.dim)), eps)
-        return (ONE, 0) if sides is None else bound_of(field, zip(*sides, strict=True))
+        # Without values no bound: such an identity is never supported, whatever it does over GF(p).
+        return (Size(0, math.inf), 0) if sides is None else bound_of(field, zip(*sides, strict=True))
 
     def at(self, field: Field, point: tuple[Any, ...], eps: Any) -> Sides | None:
         """Both sides, None where they are not defined."""
@@ -97,16 +98,12 @@ def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) 
     rng = random.Random(f"identity {identity.seed(seed)}")
     equation, pole_degree = identity.bound
     per_trial = log2_error(equation, pole_degree)
-    if per_trial >= -1:
-        return Decision(
-            Verdict.UNDECIDED,
-            Evidence(
-                "random points over GF(p)",
-                f"the degree bound {equation.degree} is too large for primes of 63 bits to decide anything",
-                {"degree_bound": equation.degree},
-            ),
-        )
-    trials = max(1, math.ceil(error_bits / -per_trial))
+    is_bounded = not math.isinf(per_trial)
+    if is_bounded and per_trial >= -1:
+        text = f"the degree bound {equation.degree} is too large for primes of 63 bits to decide anything"
+        evidence = Evidence("random points over GF(p)", text, {"degree_bound": equation.degree})
+        return Decision(Verdict.UNDECIDED, evidence)
+    trials = max(1, math.ceil(error_bits / -per_trial)) if is_bounded else 1
     poles = 0
     primes = []
     for _ in range(trials):
@@ -135,6 +132,9 @@ def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) 
         if not _equal(field, sides):
             return _refuted(identity, seed, field, point, eps, sides)
         primes.append(field.prime)
+    if not is_bounded:
+        text = "held at a random point, which says nothing: the two sides have no values over bounds, hence no bound"
+        return Decision(Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
     bound = per_trial * trials
     scope = identity.scope or ("for every eps" if identity.eps is None else f"for eps = {identity.eps}")
     return Decision(

@@ -22,7 +22,7 @@ from helpers import fraction, rationals
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.bounds import Size
+from kahanmaps.algebra.bounds import BoundField, Size
 from kahanmaps.algebra.fields import GF, QQ, Field
 from kahanmaps.checks import decide as decide_module
 from kahanmaps.checks.claims import Verdict
@@ -409,6 +409,16 @@ def test_an_identity_defined_nowhere_is_undecided(sides):
     assert decision.verdict is UNDECIDED
     assert decision.witness is None
     assert "a denominator seems to vanish identically" in decision.evidence.summary
+
+
+@pytest.mark.parametrize(("factor", "verdict"), [(1, UNDECIDED), (2, REFUTED)])
+def test_an_identity_without_values_over_bounds_has_no_bound_and_is_not_supported(factor, verdict):
+    def sides(field, point, eps):
+        return None if isinstance(field, BoundField) else (list(point), [factor * point[0]])
+
+    decision = decide(Identity(1, sides, None, subject=()), 0)
+    assert decision.verdict is verdict
+    assert ("no values over bounds" in decision.evidence.summary) == (verdict is UNDECIDED)
 
 
 def test_an_identity_defined_at_half_of_the_points_is_decided_there():
