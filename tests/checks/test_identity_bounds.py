@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from itertools import pairwise
 
 import pytest
 from bound_helpers import check, covers_polynomial, differences, true_size
@@ -12,13 +13,14 @@ from helpers import HENON_HEILES, LOTKA_VOLTERRA, matrices, rationals, systems
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kahanmaps.algebra.bounds import Size
+from kahanmaps.algebra.bounds import BoundField, Size
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.checks.commute import commutativity
 from kahanmaps.checks.conserve import conservation
 from kahanmaps.checks.preserve import density_identity, jacobi_identity, transformation_identity
 from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.invariants.measures import ClaimedDensity, DeterminantDensity
+from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 few = settings(max_examples=15)
@@ -87,6 +89,23 @@ def test_a_smaller_size_would_not_bound_the_difference():
     assert covers_polynomial(identity.bound[0], above)
     assert not covers_polynomial(Size(degree - 1, identity.bound[0].bits), above)
     assert not covers_polynomial(Size(identity.bound[0].degree, bits - 0.01), above)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("eps", [None, fmpq(1, 2)])
+def test_a_step_makes_degrees_as_large_as_the_documentation_says(n, eps):
+    K = BoundField()
+    names = ["x", "y", "z"][:n]
+    map_ = KahanMap(QuadraticSystem.from_text(names, ["x^2"] * n), K.variable() if eps is None else eps, K)
+    point = tuple(K.variable() for _ in names)
+    degrees = []
+    for _ in range(4):
+        point = map_.step(point)
+        degrees.append(point[0].above.degree)
+        assert point[0].pole_degree <= degrees[-1]
+    assert degrees[0] == (2 * n if eps is None else n)
+    for before, after in pairwise(degrees):
+        assert after == (n * (before + 1) + before if eps is None else (n + 1) * before)
 
 
 # Integrals and densities: of another system, so that the two sides differ
