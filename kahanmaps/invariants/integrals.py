@@ -116,7 +116,7 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None) -
         eps: an exact number, or None for every eps.
 
     Returns:
-        This in words; empty where I is no constant and has values at all of them, or at none.
+        This in words; empty where I has values at all of them, or at none, and is no constant.
 
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> for text in ("x/((10*eps - 1)*y)", "(2*x + 2*y)/(x + y)", "x/y"):
@@ -128,7 +128,8 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None) -
     above, below = at_eps(integral, eps)
     if below.is_zero():
         return ""
-    return constancy(eps) if is_constant(above, below, dim) else where(dim, below)
+    constant = constancy(eps) if is_constant(above, below, dim) else ""
+    return ", ".join(filter(None, [where(dim, below), constant]))
 
 
 def constancy(eps: fmpq | None) -> str:

@@ -117,6 +117,7 @@ def _identity(
 
     step = "for every eps" if eps is None else f"for eps = {eps}"
     symbols = f" and every {', '.join(system.symbols)}" if system.symbols else ""
-    scope = f"{step}{symbols} {condition}".strip()
+    told = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
+    scope = f"{step}{symbols}{told}"
     subject = (system.symbols, system.rhs, function, of_density)
     return Identity(n + len(system.symbols), sides, eps, scope=scope, subject=subject)

@@ -393,6 +393,8 @@ def test_claims_of_the_file_and_of_the_caller_are_both_checked():
         ("(10*eps - 1)*y/x + 3", None, ""),
         ("(x - y)/(2*y - 2*x)", None, ", being a constant"),
         ("0", None, ", being a constant"),
+        ("x/((10*eps - 1)*x)", None, ", where 10*eps - 1 is not 0, being a constant"),
+        ("x/((10*eps - 1)*x)", "1/9", ", being a constant at eps = 1/9"),
     ],
 )
 def test_the_claim_says_where_an_integral_has_values_and_when_it_is_a_constant(text, eps, condition):
