@@ -121,6 +121,8 @@ class BoundField(Field):
 
     def convert(self, value: Any) -> Bound:
         if isinstance(value, Bound):
+            if value.field is not self:
+                raise InputError("found a bound of another field of bounds, whose denominators have other numbers")
             return value
         number = rational(value)
         return Bound(self, Size(0, log2(number.p)), int(number.q), {})

@@ -118,6 +118,15 @@ def test_entries_of_a_matrix_with_one_bound_are_different_denominators():
     assert (K.one / one[0, 0] + K.one / one[0, 0]).pole_degree == 3
 
 
+def test_bounds_of_two_computations_are_not_mixed():
+    # Denominators are numbered within one field.
+    K, L = BoundField(), BoundField()
+    with pytest.raises(InputError, match="of another field of bounds"):
+        L.convert(K.variable())
+    with pytest.raises(TypeError):
+        K.one / K.variable() + L.one
+
+
 def test_a_bound_never_says_that_something_is_zero():
     K = BoundField()
     assert not K.is_zero(K.zero)
