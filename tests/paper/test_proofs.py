@@ -12,10 +12,10 @@ from dataclasses import replace
 import pytest
 from paper.members import member, named, point
 
+from kahanmaps.algebra.bounds import Size
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
-from kahanmaps.invariants.sizes import Size
 from kahanmaps.paper import examiner, proofs, verify
 from kahanmaps.paper.evaluate import evaluate, witness_of
 from kahanmaps.paper.examiner import VerifyOptions
