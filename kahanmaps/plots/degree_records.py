@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from kahanmaps.algebra.text import parse_number
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, printable
 from kahanmaps.laboratory.degrees import DegreeGrowth
 from kahanmaps.laboratory.singularities import Patterns
 
@@ -46,7 +46,7 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
             tuple(int(line["eps_residue"]) for line in record["lines"]),
             patterns=_patterns(record.get("singularities")),
         )
-        return str(record["system"]), growth
+        return printable(str(record["system"])), growth
     except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
         raise InputError(f"{where}: found degrees that cannot be read ({error}), expected those of degrees") from error
 

@@ -154,3 +154,17 @@ def test_the_recipe_of_a_picture_of_somebody_else_moves_no_terminal(option, fold
     assert outcome.status == 0
     assert r"\u202e" in outcome.out
     assert OBEYED.findall(outcome.out) == []
+
+
+@pytest.mark.parametrize("ending", ["svg", "text"])
+def test_pictures_of_records_have_nothing_that_a_terminal_obeys(kahanmaps, tmp_path, ending):
+    """An SVG file with a control character in it is none."""
+    pytest.importorskip("matplotlib")
+    degrees, orbit = (tmp_path / name for name in ("degrees.json", "orbit.jsonl"))
+    degrees.write_text(kahanmaps("degrees harmonic --json").out.replace('"harmonic"', '"a\\u001b[31m"'))
+    points = kahanmaps("orbit harmonic --start 1,2 --eps 1/10 --steps 3 --format jsonl").out
+    orbit.write_text(points.replace('"harmonic"', '"a\\u001b[31m"'))
+    for command, record in (("plot degrees --from", degrees), ("plot portrait --from", orbit)):
+        picture = tmp_path / "picture"
+        assert kahanmaps(command, record, "--format", ending, "-o", picture).status == 0
+        assert "\x1b" not in picture.read_text()

@@ -137,7 +137,7 @@ def _word(name: str) -> str:
 
 def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
     from kahanmaps.algebra.text import parse_number
-    from kahanmaps.errors import InputError
+    from kahanmaps.errors import InputError, printable
 
     file = None
     if system is not None or options["variables"] is not None or options["rhs"]:
@@ -150,7 +150,7 @@ def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
     try:
         if eps is None and isinstance(told, str):
             eps = parse_number(told)
-        return Orbits.of_file(stored, file, eps, stored.header.get("system", options["stored"]))
+        return Orbits.of_file(stored, file, eps, printable(str(stored.header.get("system", options["stored"]))))
     except InputError as error:
         raise InputError(f"{options['stored']}: {error}") from error
 
