@@ -195,8 +195,10 @@ def _run(argv: Sequence[str] | None) -> int:
     except (click.Abort, KeyboardInterrupt):
         say("interrupted")
         return INTERRUPTED
-    except (BrokenPipeError, SystemExit):  # click turns the one into the other
-        return UNDECIDED  # nobody reads the pipe that -o names any longer
+    except SystemExit as stop:  # click ends a completion with 0, and with 1 where nobody reads a pipe any longer
+        return UNDECIDED if stop.code else HOLDS
+    except BrokenPipeError:
+        return UNDECIDED
     except Exception as error:
         return INTERNAL if os.environ.get(COMPLETION) else _report(error)  # no traceback in the middle of a line
 

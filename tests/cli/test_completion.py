@@ -142,6 +142,11 @@ def test_nothing_that_computes_is_loaded():
     assert done.stderr == "[]\n"
 
 
+def test_an_answer_ends_with_0():
+    done = subprocess.run(COMMAND, env=environment(**question("kahanmaps orbit eul")), capture_output=True, text=True)
+    assert (done.returncode, done.stdout.split()) == (0, ["plain,euler_top"])
+
+
 @pytest.mark.slow  # a clock on a busy machine
 def test_the_answer_is_there_at_once():
     best = 9.0

@@ -258,7 +258,8 @@ def test_ctrl_c_at_any_moment_shows_no_traceback_of_ours():
         process.send_signal(signal.SIGINT)
         err = process.communicate(timeout=30)[1]
         assert not re.search(r"__main__.py\", line \d+, in main", err), err
-        assert process.returncode in (0, 130) or "Traceback" in err or not err
+        # Where it comes inside an exec of the standard library Python ends itself by the signal: 130 in a shell.
+        assert process.returncode in (0, 130, -signal.SIGINT) or "Traceback" in err or not err
 
 
 def test_the_program_gives_the_status_of_the_command():
