@@ -13,12 +13,13 @@ import random
 import resource
 import shlex
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator
-from contextlib import redirect_stdout
+from contextlib import closing, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +182,16 @@ def test_nothing_is_computed_before_the_output_is_refused(kahanmaps, given, monk
     monkeypatch.setattr("kahanmaps.laboratory.degrees.degree_growth", lambda *_, **__: pytest.fail("it was computed"))
     Path("system.svg").write_bytes(Path("system.toml").read_bytes())
     assert kahanmaps("plot degrees harmonic ./system.svg -o system.svg").status == 2
+
+
+def test_the_journal_of_a_database_belongs_to_it(kahanmaps, given):
+    with closing(sqlite3.connect("study.db")) as writer:
+        writer.execute("PRAGMA journal_mode = WAL")
+        writer.executescript("CREATE TABLE t (x); DROP TABLE t")
+        before = Path("study.db-wal").read_bytes()
+        outcome = kahanmaps("batch export --db study.db --csv -o study.db-wal")
+        assert (outcome.status, Path("study.db-wal").read_bytes()) == (2, before)
+        assert "it would be written over" in outcome.err
 
 
 def test_associated_systems_are_not_written_over_the_one_they_belong_to(kahanmaps, tmp_path):
