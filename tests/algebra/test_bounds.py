@@ -244,3 +244,15 @@ def test_a_matrix_of_numbers_has_their_common_denominator():
     assert (entry.scale, entry.above.degree) == (30, 0)
     assert entry.above.bits == pytest.approx(math.log2(30), abs=1e-6)  # 30/30: larger than 21/30
     assert K.convert_matrix(fmpq_mat(0, 3)).entry.above == ONE
+
+
+def test_denominators_of_a_determinant_and_of_cramers_rule_are_those_of_all_rows():
+    # By hand, entries x/(3 w): det = (x^2 - x^2)/(3 w)^2, and the solution of M y = b is 3 w adj(x) b / det(x).
+    K = BoundField()
+    x, w = K.variable(), K.polynomial(5, 0.0)
+    matrix = K.matrix(2, 2, [x / w * K.convert(fmpq(1, 3))] * 4)
+    det = matrix.det()
+    assert (det.above.degree, det.pole_degree, det.scale) == (2, 10, 9)
+    solution = matrix.solve(K.matrix(2, 1, [K.one] * 2)).entry
+    assert (solution.above.degree, solution.pole_degree) == (5 + 1, 2)
+    assert solution.above.bits == pytest.approx(math.log2(3 * 2), abs=1e-6)
