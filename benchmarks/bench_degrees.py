@@ -20,6 +20,7 @@ from work import Absent, Row, require_equal, row, run_gp, say, table, timed
 from kahanmaps import degree_growth, load
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import linear_forms
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -46,7 +47,7 @@ def _line(system: QuadraticSystem) -> list[list[int]]:
 
 def polynomials(system: QuadraticSystem, n: int) -> tuple[float, list[int]]:
     """The same by homogeneous coordinates that are polynomials in t: Cramer's rule, then the content."""
-    forms = linear_forms(system, EPS, GF(PRIME))
+    forms = linear_forms(KahanMap(system, EPS, GF(PRIME)))
 
     def run() -> list[int]:
         x = [nmod_poly(pair, PRIME) for pair in _line(system)]
@@ -73,7 +74,7 @@ def _combination(coefficients: list[Any], x: list[nmod_poly]) -> nmod_poly:
 
 def pari(system: QuadraticSystem, n: int) -> tuple[float, list[int]]:
     """The same by rational functions of t, which PARI reduces itself. Raises Absent."""
-    forms = linear_forms(system, EPS, GF(PRIME))
+    forms = linear_forms(KahanMap(system, EPS, GF(PRIME)))
     size = system.dim
     entries = ", ".join(
         "[" + ", ".join("[" + ", ".join(f"Mod({int(c)}, p)" for c in entry) + "]" for entry in line) + "]"

@@ -21,7 +21,7 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat
 from work import Absent, Row, Work, gp_version, peer, require_equal, row, run_gp, say, table, timed, work
 
-from kahanmaps import KahanMap, Orbit
+from kahanmaps import QQ, KahanMap, Orbit, QuadraticSystem
 from kahanmaps.maps.normal_steps import NormalSteps
 from kahanmaps.maps.planes_point import PlanesPoint
 
@@ -91,10 +91,16 @@ def fmpq_solve(work: Work, steps: int) -> tuple[float, Pairs]:
     return seconds, _pairs(x.entries())
 
 
+def integer_tensor(system: QuadraticSystem) -> tuple[fmpz, fmpz_mat]:
+    """L and L f'' as an n^2 x n matrix, for the least L > 0 with which it is integral."""
+    tensor, below = system.over(QQ).tensor.numer_denom()
+    return below, tensor
+
+
 def fmpz_solve(work: Work, steps: int) -> tuple[float, Pairs]:
     """Integers over one denominator and fmpz_mat.solve, content removed by gcds."""
     n, eps = work.system.dim, work.eps
-    common, tensor, _, _ = work.system.integer_form
+    common, tensor = integer_tensor(work.system)
 
     def run() -> tuple[fmpz_mat, fmpz]:
         column, below = fmpq_mat(n, 1, list(work.start)).numer_denom()
@@ -117,7 +123,7 @@ def fmpz_solve(work: Work, steps: int) -> tuple[float, Pairs]:
 def fmpz_rref(work: Work, steps: int) -> tuple[float, Pairs]:
     """Integers over one denominator and FLINT's fraction-free fmpz_mat.rref, content removed by gcds."""
     n, eps = work.system.dim, work.eps
-    common, tensor, _, _ = work.system.integer_form
+    common, tensor = integer_tensor(work.system)
 
     def run() -> tuple[list[fmpz], fmpz]:
         column, below = fmpq_mat(n, 1, list(work.start)).numer_denom()
@@ -264,7 +270,7 @@ _GP = [
 
 def _by_gp(work: Work, steps: int, orbit: str) -> tuple[float, Pairs]:
     n = work.system.dim
-    common, tensor, _, _ = work.system.integer_form
+    common, tensor = integer_tensor(work.system)
     slopes = tensor.tolist()
     matrices = [
         "[" + ";".join(",".join(str(slopes[i * n + j][k]) for j in range(n)) for i in range(n)) + "]" for k in range(n)

@@ -28,6 +28,10 @@ SOURCES: dict[str, str] = {
         "E. Celledoni, R. I. McLachlan, B. Owren, G. R. W. Quispel. Geometric properties of Kahan's method. "
         "J. Phys. A 46 (2013), 025201. arXiv:1209.1164"
     ),
+    "cmoq-2015": (
+        "E. Celledoni, R. I. McLachlan, D. I. McLaren, B. Owren, G. R. W. Quispel. Discretization of polynomial vector "
+        "fields by polarization. Proc. R. Soc. A 471 (2015), 20150390. arXiv:1506.03855"
+    ),
     "hirota-kimura-2000": (
         "R. Hirota, K. Kimura. Discretization of the Euler top. J. Phys. Soc. Japan 69 (2000), 627-630"
     ),

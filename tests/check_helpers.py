@@ -289,7 +289,7 @@ def side_by_side(first: QuadraticSystem, second: QuadraticSystem) -> QuadraticSy
     gens = context.gens()
     rhs = [polynomial.compose(*gens[:n], ctx=context) for polynomial in first.rhs]
     rhs += [polynomial.compose(*gens[n:], ctx=context) for polynomial in second.rhs]
-    return QuadraticSystem.from_polynomials(rhs)
+    return QuadraticSystem(rhs)
 
 
 def file_of(system: QuadraticSystem, name: str = "f", **claims: str) -> SystemFile:

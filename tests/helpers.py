@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import GF, QQ, RR, Field
+from kahanmaps.algebra.polynomials import ring
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -62,6 +63,15 @@ def points(dim: int, entries: st.SearchStrategy[Any] | None = None) -> st.Search
     return st.tuples(*[rationals() if entries is None else entries] * dim)
 
 
+def from_forms(variables: Sequence[str], forms: Sequence[fmpq_mat], B: fmpq_mat, c: Sequence[fmpq]) -> QuadraticSystem:
+    """The system x' = Q(x, x) + B x + c with the matrices `forms` of Q."""
+    x = ring(variables).gens()
+    n = len(x)
+    squares = [sum((Q[j, k] * x[j] * x[k] for j in range(n) for k in range(n)), 0 * x[0]) for Q in forms]
+    linear = [sum((B[i, j] * x[j] for j in range(n)), 0 * x[0]) for i in range(n)]
+    return QuadraticSystem([a + b + e for a, b, e in zip(squares, linear, c, strict=True)])
+
+
 @st.composite
 def systems(
     draw: Any,
@@ -83,7 +93,7 @@ def systems(
     if not homogeneous:
         linear = fmpq_mat(n, n, [fmpq(draw(one)) for _ in range(n * n)])
         constants = [fmpq(draw(one)) for _ in range(n)]
-    return QuadraticSystem(tuple(f"x{i + 1}" for i in range(n)), tuple(forms), linear, tuple(constants))
+    return from_forms(tuple(f"x{i + 1}" for i in range(n)), forms, linear, constants)
 
 
 @st.composite

@@ -12,13 +12,13 @@ import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly, fmpz
 
 from kahanmaps.algebra.matrices import det
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.structure import Structure, structure_of
 from kahanmaps.maps.planar_integers import IntegerBlock
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Cubic = tuple[int, int, int, int]

@@ -192,6 +192,12 @@ def the_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
     return eps
 
 
+def require_eps(file: SystemFile, eps: Any) -> None:
+    """Where a map depends on eps it has to be given."""
+    if eps is None and file.map.has_eps:
+        the_eps(None, None)
+
+
 def load_system(
     reference: str | None, variables: str | None, rhs: Sequence[str], parameters: Sequence[tuple[str, str]]
 ) -> SystemFile:

@@ -96,6 +96,14 @@ class Csv(Writer):
         self.stream.flush()
 
 
+def _eps(header: dict[str, Any]) -> str:
+    """The eps of an orbit, with the time step where the map has one, in words."""
+    if header["eps"] is None:
+        return ""
+    step = "" if header["time_step"] is None else f" (time step 2 eps = {header['time_step']})"
+    return f"eps = {header['eps']}{step}, "
+
+
 class Text(Writer):
     """Tab-separated columns; on a terminal of that many columns numbers are shortened so that a row fits a line.
 
@@ -111,8 +119,7 @@ class Text(Writer):
     def header(self, header: dict[str, Any]) -> None:
         names = [*self.columns, *self.integrals]
         title = (
-            f"# {header['system']}, eps = {header['eps']} (time step 2 eps = {header['time_step']}), "
-            f"{header['arithmetic']} arithmetic"
+            f"# {header['system']}, {_eps(header)}{header['arithmetic']} arithmetic"
             + (f" ({header['kernel']})" if "kernel" in header else "")
             + (", backward" if header["direction"] == "backward" else "")
         )

@@ -124,29 +124,19 @@ class NameValue(OptionType):
 
 
 class Arithmetic(OptionType):
-    """exact, float, mod:P (P a prime), ball:BITS or ball:auto; gives the pair (kind, number), 0 for auto."""
+    """exact, float, mod:P (P a prime), ball:BITS or ball:auto."""
 
     name = "kind"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if not isinstance(value, str):
             return value
-        kind, colon, number = value.partition(":")
-        if kind in ("exact", "float") and not colon:
-            return kind, 0
-        if value == "ball:auto":
-            return "ball", 0
-        if (
-            kind in ("mod", "ball")
-            and number.isascii()
-            and number.isdigit()
-            and len(number) <= 4000
-            and int(number) > 0
-        ):
-            return kind, int(number)
-        self.fail(
-            f"found {quoted(value)}, expected exact, float, mod:P with a prime P, ball:BITS or ball:auto", param, ctx
-        )
+        from kahanmaps.maps import arithmetic
+
+        try:
+            return arithmetic.Arithmetic.parse(value)
+        except InputError as error:
+            self.fail(str(error), param, ctx)
 
 
 class Steps(OptionType):

@@ -9,12 +9,16 @@ the hash stands for a random function (bellare-rogaway-1993), which is an assump
 from __future__ import annotations
 
 import hashlib
+import random
 from collections.abc import Sequence
 from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
 
+from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.polynomials import RationalFunction
+
+PRIME_BITS = 62
 
 
 def seed_for(seed: int, *subject: Any) -> int:
@@ -58,3 +62,11 @@ def _written(part: Any) -> str:
     else:
         raise TypeError(f"found a {type(part).__name__}, expected text, numbers, polynomials, matrices or sequences")
     return f"{len(text)} {text}"
+
+
+def random_prime_field(rng: random.Random) -> PrimeField:
+    """GF(p) for a prime drawn uniformly from [2^62, 2^63), which is where nmod still holds it."""
+    while True:
+        candidate = rng.getrandbits(PRIME_BITS) | (1 << PRIME_BITS)
+        if candidate % 2 and fmpz(candidate).is_prime():
+            return PrimeField(candidate)

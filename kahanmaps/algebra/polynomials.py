@@ -6,11 +6,11 @@ any field (`evaluate`), primitive integer forms, monomials up to a degree, and q
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
+from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
 
 from kahanmaps.errors import InputError, quoted
 
@@ -76,6 +76,21 @@ def common_denominator(polynomial: fmpq_mpoly) -> fmpz:
     for coefficient in polynomial.coeffs():
         common = common.lcm(coefficient.q)
     return common
+
+
+def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
+    """About how many decimal digits the longest coefficient has, all of them over one denominator.
+
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> digits_of([x/3, 1000*y])
+    4
+    """
+    coefficients = [coefficient for polynomial in polynomials for _, coefficient in polynomial.terms()]
+    below = fmpz(1)
+    for coefficient in coefficients:
+        below = below.lcm(coefficient.q)
+    longest = max([below, *(coefficient.p * (below // coefficient.q) for coefficient in coefficients)], key=abs)
+    return int(longest.bit_length() * 0.30103) + 1
 
 
 def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
@@ -144,6 +159,19 @@ def _power(table: list[Any], exponent: int) -> Any:
     while len(table) <= exponent:
         table.append(table[-1] * table[1])
     return table[exponent]
+
+
+def linear_combinations(matrix: fmpq_mat, polynomials: Sequence[fmpq_mpoly]) -> tuple[fmpq_mpoly, ...]:
+    """The entries of `matrix` times the column of `polynomials`."""
+    zero: Any = polynomials[0].context().constant(0)
+    combined = []
+    for i in range(matrix.nrows()):
+        total = zero
+        for j, polynomial in enumerate(polynomials):
+            if matrix[i, j] != fmpq(0):
+                total = total + matrix[i, j] * polynomial
+        combined.append(total)
+    return tuple(combined)
 
 
 def substitute(polynomial: fmpq_mpoly, values: Mapping[str, fmpq]) -> fmpq_mpoly:

@@ -18,11 +18,13 @@ from kahanmaps.checks.settings import OrbitRun, Settings, run_orbit
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SOURCE = "petrera-suris-2016, Theorem 9"
+SAME_STEP = fmpq(1)
 # All pairs of 2^(r-1) associated maps: 8128 of them for r = 8 rational factors.
 MAX_FACTORS = 8
 # The pairs that are also tried along an orbit and at random points; the proof covers all of them.
@@ -30,16 +32,26 @@ _PAIRS_TRIED = 30
 _PAIRS_TRIED_IN_HIGH_DIMENSION = 2  # beyond dimension 16 one pair takes many seconds
 
 
-def commutativity(f: QuadraticSystem, g: QuadraticSystem, eps: fmpq | None, names: tuple[str, str]) -> Identity:
-    """Phi_f o Phi_g = Phi_g o Phi_f as an identity, both maps with the same eps (scale g for another step)."""
+def commutativity(
+    f: QuadraticSystem | BirationalMap,
+    g: QuadraticSystem | BirationalMap,
+    eps: fmpq | None,
+    names: tuple[str, str],
+    ratio: fmpq = SAME_STEP,
+) -> Identity:
+    """Phi_f o Phi_g = Phi_g o Phi_f as an identity, systems standing for their Kahan maps; g is taken at ratio eps."""
+    first_map, second_map = as_map(f), as_map(g)
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
-        phi_f, phi_g = KahanMap(f, eps_value, field), KahanMap(g, eps_value, field)
+        with field.working():
+            other_eps = eps_value if ratio == 1 else eps_value * field.convert(ratio)
+        phi_f, phi_g = first_map.at(eps_value, field), second_map.at(other_eps, field)
         return phi_g.step(phi_f.step(point)), phi_f.step(phi_g.step(point))
 
     first, second = names
     labels = (f"Phi_{second}(Phi_{first}(x))", f"Phi_{first}(Phi_{second}(x))")
-    return Identity(f.dim, sides, eps, *labels, subject=(f.rhs, g.rhs))
+    subject = (first_map.subject, second_map.subject, *([] if ratio == 1 else [ratio]))
+    return Identity(f.dim, sides, eps, *labels, subject=subject)
 
 
 def check_commute(
@@ -65,32 +77,35 @@ def check_commute(
 
 
 def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: fmpq | None) -> Report:
-    f = file.system
+    f = file.map
     g, note = matched(file, other)
     notes = [note] if note else []
     as_they_are = set(f.variables) != set(other.variables) or f.variables == other.variables
-    same_step = True
+    ratio, is_same_step = SAME_STEP, True
     if eps2 is not None:
         if settings.eps is None:
             raise InputError("a second step needs the first one as well: give both --eps and --eps2")
         eps2 = rational(eps2)
         if eps2 == 0:
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")
-        # Phi_g at eps2 is the map of (eps2/eps) g at eps: the map depends on the product eps g only.
-        same_step = eps2 == settings.eps
-        g = g.scaled(eps2 / settings.eps)
-        notes.append(
-            f"the map of g at eps2 = {format_number(eps2)} is that of (eps2/eps) g at eps; the evidence names eps only"
-        )
+        ratio = eps2 / settings.eps
+        note = f"the map of g at eps2 = {format_number(eps2)} is that of (eps2/eps) g at eps"
+        if other.is_quadratic and isinstance(g, Kahan):
+            # For it depends on the product eps g only.
+            g, ratio, is_same_step = Kahan(g.system.scaled(ratio)), SAME_STEP, ratio == 1
+        else:
+            note = f"the map of g is taken at eps2 = {format_number(eps2)}"
+        notes.append(f"{note}; the evidence names eps only")
     proof = None
-    if same_step and as_they_are and file.member is not None and other.member is not None:
+    if is_same_step and as_they_are and file.member is not None and other.member is not None:
         proof = theorems.commuting_by_involution_of_members(file.member, other.member)
-    if proof is None:
-        proof = theorems.commuting_by_splitting(f, g)
-    identity = commutativity(f, g, settings.eps, ("f", "g"))
-    orbit = run_orbit(f, settings, g.rhs, proof is not None and file.member is not None)
+    if proof is None and file.is_quadratic and other.is_quadratic and isinstance(g, Kahan):
+        proof = theorems.commuting_by_splitting(file.system, g.system)
+    identity = commutativity(f, g, settings.eps, ("f", "g"), ratio)
+    orbit = run_orbit(f, settings, g.subject, proof is not None and file.member is not None)
+    kahan = "Kahan maps" if file.is_quadratic and other.is_quadratic else "maps"
     finding = judge(
-        f"the Kahan maps of f = {file.name} and g = {other.name} commute",
+        f"the {kahan} of f = {file.name} and g = {other.name} commute",
         identity,
         settings,
         proof,

@@ -8,13 +8,13 @@ from typing import Any
 
 from flint import fmpq
 
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks import theorems
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
-from kahanmaps.checks.decide import Identity, Sides, random_prime_field
+from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.judge import judge
 from kahanmaps.checks.settings import Settings, run_orbit
@@ -30,7 +30,8 @@ from kahanmaps.invariants.integrals import (
     is_constant,
 )
 from kahanmaps.invariants.phase_functions import PhaseFunction
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 # With more rational factors than this only the K~ with a single minus sign are listed; the others are their
@@ -41,21 +42,22 @@ _TRIED = 32
 _TRIED_IN_HIGH_DIMENSION = 2  # beyond dimension 16 one integral takes many seconds
 
 
-def conservation(system: QuadraticSystem, integral: PhaseFunction, eps: fmpq | None) -> Identity:
-    """I(x~) = I(x) as an identity, for an integral and the Kahan map of a system."""
+def conservation(system: QuadraticSystem | BirationalMap, integral: PhaseFunction, eps: fmpq | None) -> Identity:
+    """I(x~) = I(x) as an identity, for an integral and a map; a system stands for its Kahan map."""
+    map_ = as_map(system)
 
     last: list[Any] = []  # along an orbit I(x~) at one point is I(x) at the next
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        image = KahanMap(system, eps_value, field).step(point)
+        image = map_.at(eps_value, field).step(point)
         known = last and last[0] is field and last[1] == eps_value and last[2] == point
         before = last[3] if known else integral.value(field, eps_value, point)
         after = integral.value(field, eps_value, image)
         last[:] = [field, eps_value, image, after]
         return None if after is None or before is None else ([after], [before])
 
-    subject = (system.rhs, integral.subject)
-    return Identity(system.dim, sides, eps, "I(x~)", "I(x)", subject=subject)
+    subject = (map_.subject, integral.subject)
+    return Identity(map_.dim, sides, eps, "I(x~)", "I(x)", subject=subject)
 
 
 def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:
@@ -93,19 +95,19 @@ def check_integrals(
         if isinstance(integral, ModifiedHamiltonian):
             integral.condition = _constant(integral, settings)
     claimed = [integral.subject for integral, _, _ in candidates]
-    orbit = run_orbit(file.system, settings, claimed, file.member is not None)
+    orbit = run_orbit(file.map, settings, claimed, file.member is not None)
     findings = []
-    tried = _TRIED if file.system.dim <= 16 else _TRIED_IN_HIGH_DIMENSION
+    tried = _TRIED if file.dim <= 16 else _TRIED_IN_HIGH_DIMENSION
     for k, (integral, proof, source) in enumerate(candidates):
         settings.progress(f"integral {k + 1} of {len(candidates)}")
-        if proof is not None and k >= tried and file.system.dim > 16:
+        if proof is not None and k >= tried and file.dim > 16:
             claim = f"{integral.name} is conserved"
             findings.append(Finding(claim, Verdict.PROVED, proof, formula=integral.formula, source=source))
             continue
         findings.append(
             judge(
                 f"{integral.name} is conserved{f', {integral.condition}' if integral.condition else ''}",
-                conservation(file.system, integral, settings.eps),
+                conservation(file.map, integral, settings.eps),
                 settings,
                 proof,
                 orbit if k < tried or proof is None else None,

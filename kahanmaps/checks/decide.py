@@ -22,18 +22,17 @@ from dataclasses import field as dataclass_field
 from functools import cached_property
 from typing import Any
 
-from flint import fmpq, fmpz
+from flint import fmpq
 
 from kahanmaps.algebra.bounds import BoundField, Size, bound_of
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import PRIME_BITS, random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, PrimeField
 from kahanmaps.checks.claims import Evidence, Verdict, Witness
 from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep
 
 DEFAULT_ERROR_BITS = 100
-_PRIME_BITS = 62
 # Rosser and Schoenfeld: at least 3 N / (5 ln N) primes in (N, 2N] for N >= 21; here N = 2^62.
-_PRIMES_LOG2 = math.log2(0.6) + _PRIME_BITS - math.log2(_PRIME_BITS * math.log(2))
+_PRIMES_LOG2 = math.log2(0.6) + PRIME_BITS - math.log2(PRIME_BITS * math.log(2))
 _MAX_POLES = 200
 _WITNESS_TRIES = 400
 _HIGH_TRIES = 20  # beyond them: a function that is not 0 is hardly ever 0 at points of this many bits
@@ -164,22 +163,14 @@ def log2_error(equation: Size, poles: int, conjugates: int = 1) -> float:
     `conjugates`, and p be random among the primes that split there: of those there are at least half as many as
     Chebotarev's density gives, is assumed, and a nonzero coefficient is divided by one only if its norm is.
     """
-    if max(equation.degree, poles) >= 1 << (_PRIME_BITS - 2):
+    if max(equation.degree, poles) >= 1 << (PRIME_BITS - 2):
         return 0.0  # no bound: too many points may be roots, or have no value
     primes_log2 = _PRIMES_LOG2 - (math.log2(2 * conjugates) if conjugates > 1 else 0.0)
-    bad_primes = 2 ** (math.log2(max(1.0, conjugates * equation.bits / _PRIME_BITS)) - primes_log2)
-    scale = 2.0**_PRIME_BITS
+    bad_primes = 2 ** (math.log2(max(1.0, conjugates * equation.bits / PRIME_BITS)) - primes_log2)
+    scale = 2.0**PRIME_BITS
     # The factor 2 is for the condition that all denominators are defined and not zero at the point: that holds with
     # probability at least 1/2, since their degree is below 2^60 and their coefficients fit into a computer's memory.
     return math.log2(2 * (bad_primes + equation.degree / scale))
-
-
-def random_prime_field(rng: random.Random) -> PrimeField:
-    """GF(p) for a prime drawn uniformly from [2^62, 2^63), which is where nmod still holds it."""
-    while True:
-        candidate = rng.getrandbits(_PRIME_BITS) | (1 << _PRIME_BITS)
-        if candidate % 2 and fmpz(candidate).is_prime():
-            return PrimeField(candidate)
 
 
 def small_points(dim: int, rng: random.Random, count: int) -> list[tuple[fmpq, ...]]:

@@ -22,16 +22,21 @@ from kahanmaps.invariants.measures import (
 )
 from kahanmaps.invariants.phase_functions import PhaseFunction
 from kahanmaps.invariants.poisson import jacobi_defects, transformation_sides
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.kahan import Kahan, KahanMap, as_map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
-def density_identity(system: QuadraticSystem, density: PhaseFunction, eps: fmpq | None) -> Identity:
-    """phi(x~) det(I - eps f'(x)) = phi(x) det(I + eps f'(x~)): the measure dx/phi is invariant."""
+def density_identity(system: QuadraticSystem | BirationalMap, density: PhaseFunction, eps: fmpq | None) -> Identity:
+    """phi(x~) det M(x) = phi(x) det N(x, x~): the measure dx/phi is invariant; dPhi(x) is M^{-1} N.
+
+    A system stands for its Kahan map, with M = I - eps f'(x) and N = I + eps f'(x~).
+    """
+    map_ = as_map(system)
 
     def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        kahan = KahanMap(system, eps_value, field)
+        kahan = map_.at(eps_value, field)
         image = _image(kahan, point)
         after, before = density.value(field, eps_value, image), density.value(field, eps_value, point)
         if after is None or before is None:
@@ -42,11 +47,13 @@ def density_identity(system: QuadraticSystem, density: PhaseFunction, eps: fmpq 
         return [after * below], [before * above]
 
     labels = ("phi(x~) det(I - eps f'(x))", "phi(x) det(I + eps f'(x~))")
-    subject = (system.rhs, density.subject)
-    return Identity(system.dim, sides, eps, *labels, subject=subject)
+    if not isinstance(map_, Kahan):
+        labels = ("phi(x~) det M(x)", "phi(x) det N(x, x~)")
+    subject = (map_.subject, density.subject)
+    return Identity(map_.dim, sides, eps, *labels, subject=subject)
 
 
-def _image(kahan: KahanMap, point: tuple[Any, ...]) -> tuple[Any, ...]:
+def _image(kahan: MapOver, point: tuple[Any, ...]) -> tuple[Any, ...]:
     """x~, put into the defining equation.
 
     The formula for dPhi that both laws use comes from this equation; the laws themselves would not notice a wrong
@@ -54,10 +61,10 @@ def _image(kahan: KahanMap, point: tuple[Any, ...]) -> tuple[Any, ...]:
     """
     image = kahan.step(point)
     field = kahan.field
-    if field is not QQ and not field.characteristic:
+    if not isinstance(kahan, KahanMap) or (field is not QQ and not field.characteristic):
         return image  # expanding it would cost much and add nothing to what points have shown
     factor = field.convert(2) * kahan.eps
-    means = kahan.system.over(field).polarised(point, image)
+    means = kahan.local.polarised(point, image)
     for x, after, mean in zip(point, image, means, strict=True):
         if not field.equal(after - x, factor * mean):
             raise Contradiction("the point computed for x~ does not satisfy the defining equation of the Kahan map")
@@ -85,11 +92,11 @@ def check_measure(file: SystemFile, settings: Settings | None = None, extra: Rat
             "or give --density EXPRESSION (the measure is dx/phi)"
         )
     claimed = [density.subject for density, _, _ in candidates]
-    orbit = run_orbit(file.system, settings, claimed, file.member is not None)
+    orbit = run_orbit(file.map, settings, claimed, file.member is not None)
     findings = tuple(
         judge(
             f"the measure dx/phi is invariant{f', {density.condition}' if density.condition else ''}",
-            density_identity(file.system, density, settings.eps),
+            density_identity(file.map, density, settings.eps),
             settings,
             proof,
             orbit,
@@ -140,7 +147,7 @@ def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:
     settings = settings or Settings()
     if file.hamiltonian is None:
         raise InputError(
-            f"{file.name} is of kind [system]: Pi(x) = J - eps^2 f'(x)^2 J needs a Hamiltonian system, "
+            f"{file.name} is of kind [{file.kind}]: Pi(x) = J - eps^2 f'(x)^2 J needs a Hamiltonian system, "
             "expected a file of kind [hamiltonian] or [family]"
         )
     hamiltonian = file.hamiltonian

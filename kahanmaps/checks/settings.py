@@ -16,13 +16,15 @@ from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.orbits import Orbit, OrbitEnd, require_short
 from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
 
 MAX_STEPS = 10_000  # of the exact orbit, all of whose points are kept
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
+NO_TIME_STEP = "eps stands in the map as its file says; there is no time step"
 
 
 def _silent(_: str) -> None:
@@ -72,7 +74,7 @@ class Settings:
             **({"other": files[1].name} if len(files) > 1 else {}),
             "eps": "every" if self.eps is None else format_number(self.eps),
             "time_step": "every" if self.eps is None else format_number(2 * self.eps),
-            "convention": CONVENTION,
+            "convention": convention(files[0].map),
             "arithmetic": "exact",
             "seed": self.seed,
             "error_bits": self.error_bits,
@@ -80,6 +82,11 @@ class Settings:
             "document": files[0].document,
             **({"other_document": files[1].document} if len(files) > 1 else {}),
         }
+
+
+def convention(map_: BirationalMap) -> str:
+    """What eps is, in a sentence that every record carries."""
+    return CONVENTION if map_.has_time_step else NO_TIME_STEP
 
 
 @dataclass(frozen=True)
@@ -115,17 +122,20 @@ def random_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
 
 
 def run_orbit(
-    system: QuadraticSystem, settings: Settings, subject: Sequence[Any] = (), is_integrable: bool = False
+    system: QuadraticSystem | BirationalMap,
+    settings: Settings,
+    subject: Sequence[Any] = (),
+    is_integrable: bool = False,
 ) -> OrbitRun:
     """The exact orbit of the given start, or of random small rational starts until one has no singular point.
 
     A claim for every eps is tried at one that is drawn. Everything drawn follows the system and the `subject`, what
     is claimed of it: no claim can be written for an orbit that is known in advance.
     """
-    seed = seed_for(settings.seed, system.rhs, settings.eps, subject)
+    seed = seed_for(settings.seed, as_map(system).subject, settings.eps, subject)
     rng = random.Random(f"eps {seed}")
     eps = settings.eps if settings.eps is not None else fmpq(rng.randint(1, 3), rng.randint(7, 20))
-    kahan = KahanMap(system, eps)
+    kahan = as_map(system).at(eps)
     # A claim that takes two more steps of a map without structure multiplies the digits by dim^2, and elimination
     # by dim once more; for the family numbers hardly grow from one step to the next.
     by_dimension = 5_000 if is_integrable else max(100, 60_000 // kahan.dim**2)

@@ -12,13 +12,13 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
-from kahanmaps.algebra.polynomials import gradient
+from kahanmaps.algebra.polynomials import gradient, linear_combinations
 from kahanmaps.checks.claims import Evidence, Finding, Verdict
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.cubics import belongs
 from kahanmaps.family.skew_hamiltonian import defects, evaluate_at_matrix
 from kahanmaps.invariants.integrals import CommutantIntegral
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 METHOD = "hypotheses"
@@ -227,7 +227,7 @@ def _coefficients(system: QuadraticSystem) -> fmpq_mat:
 
 def _renamed(g: QuadraticSystem, f: QuadraticSystem) -> QuadraticSystem:
     """g in the variables of f: the names do not matter, their order does."""
-    return QuadraticSystem(f.variables, g.Q, g.B, g.c)
+    return g.renamed(f.variables)
 
 
 def _identity(n: int) -> fmpq_mat:

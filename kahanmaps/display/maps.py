@@ -79,7 +79,7 @@ def _plain(text: object) -> str:
 @html_form.register
 def orbit_html(orbit: Orbit) -> str:
     """The first points and the last one that were computed, and how the orbit ended."""
-    variables = orbit.map.system.variables
+    variables = orbit.map.variables
     shown, last = list(orbit.first), orbit.last
     head = ["step", *variables[:_COORDINATES], *(["…"] if len(variables) > _COORDINATES else []), "digits"]
     rows = [_cells(point, len(variables)) for point in shown]

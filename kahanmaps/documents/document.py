@@ -5,7 +5,7 @@ Every part is read as far as it can be, so that all mistakes of a file are told 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,24 +13,31 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.numerals import check_names
-from kahanmaps.algebra.polynomials import RationalFunction, degree
+from kahanmaps.algebra.polynomials import RationalFunction, substitute
 from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomial, parse_rational_function
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.documents.structured_facts import read_structured_facts
 from kahanmaps.errors import InputError, SystemFileError, counted, quoted, suggestion
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
+from kahanmaps.maps.bilinear import bilinear_map
+from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, why_no_map
+from kahanmaps.maps.kahan import Kahan
+from kahanmaps.maps.polarised import MAX_DEGREE, polarised_map
 from kahanmaps.sources import SOURCES
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
 
-KINDS = ("system", "hamiltonian", "family")
+KINDS = ("system", "hamiltonian", "family", "bilinear", "map")
 _LONGEST_NAME = 1000
 _KEYS = {
     "": {"name", "variables", "parameters", *KINDS, "integrals", "density", "catalog"},
-    "system": {"rhs"},
+    "system": {"rhs", "discretization", "degree"},
     "hamiltonian": {"H", "J"},
     "family": {"A", "H", "signs"},
+    "bilinear": {"new", "equations"},
+    "map": {"image", "inverse"},
     "density": {"phi"},
     "catalog": {"title", "sources", "convention", "facts", *STRUCTURED_KEYS},
 }
@@ -42,7 +49,7 @@ class Contents(NamedTuple):
     name: str
     kind: str
     parameters: Mapping[str, fmpq]
-    system: QuadraticSystem
+    map: BirationalMap
     hamiltonian: CubicHamiltonian | None
     member: FamilyMember | None
     integrals: Mapping[str, RationalFunction]
@@ -52,6 +59,8 @@ class Contents(NamedTuple):
 
 _EXPECTED = {
     ("system", "rhs"): "a list of polynomials of degree at most 2 in quotes, one for each variable",
+    ("bilinear", "equations"): "a list of equations in quotes, linear in the old point and in the new one",
+    ("map", "image"): "a list of rational functions in quotes, one for each variable",
     ("hamiltonian", "H"): "a polynomial of degree at most 3 in quotes",
     ("hamiltonian", "J"): '"standard", which is [[0, I], [-I, 0]], or the rows of a skew matrix',
     ("family", "A"): "the rows of a skew-Hamiltonian matrix",
@@ -79,7 +88,8 @@ class DocumentReader:
         if len(kinds) != 1:
             found = ", ".join(f"[{kind}]" for kind in kinds) or "none"
             self._mistake(
-                "file", f"found {found} of the sections [system], [hamiltonian], [family], expected exactly one"
+                "file",
+                f"found {found} of the sections {', '.join(f'[{kind}]' for kind in KINDS)}, expected exactly one",
             )
         self._read_parameters()
         name = self.document.get("name", self._default_name())
@@ -90,27 +100,32 @@ class DocumentReader:
             )
         kind = kinds[0] if len(kinds) == 1 else ""
         self._read_variables(kind)
-        system, hamiltonian, member = None, None, None
+        map_: BirationalMap | None = None
+        hamiltonian, member = None, None
         section = self._table(kind) if kind else None
         if section is not None:
             self._unknown_keys(kind, section)
             if kind == "system":
-                system = self._read_rhs(section)
+                map_ = self._read_system(section)
+            elif kind == "bilinear":
+                map_ = self._read_bilinear(section)
+            elif kind == "map":
+                map_ = self._read_map(section)
             elif kind == "hamiltonian":
                 hamiltonian = self._read_hamiltonian(section)
-                system = hamiltonian.system if hamiltonian else None
             else:
                 member = self._read_member(section)
                 hamiltonian = member.chosen.hamiltonian if member else None
-                system = hamiltonian.system if hamiltonian else None
+            if hamiltonian is not None:
+                map_ = Kahan(hamiltonian.system)
+            elif map_ is not None:
+                self.variables = map_.variables  # a polarised map has more of them
         integrals = self._read_integrals()
         density = self._read_density()
         self._read_catalog()
-        if self.mistakes or system is None:
+        if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
-        return Contents(
-            name, kind, self.parameters, system, hamiltonian, member, integrals, density, self._normalised()
-        )
+        return Contents(name, kind, self.parameters, map_, hamiltonian, member, integrals, density, self._normalised())
 
     def _mistake(self, key: str, sentence: str) -> None:
         # Keys come from the file: nothing in them may reach a terminal as an escape sequence.
@@ -198,17 +213,19 @@ class DocumentReader:
         self._mistake(path, f"found {_show(value)}, expected an expression in quotes")
         return None
 
-    def _polynomial(self, path: str, value: Any, at_most: int) -> fmpq_mpoly | None:
+    def _polynomial(self, path: str, value: Any, at_most: int, more: Sequence[str] = ()) -> fmpq_mpoly | None:
+        """A polynomial in the variables and `more` names, its degree in the variables bounded."""
         text = self._text(path, value)
         if text is None or self.variables is None:
             return None
         try:
-            polynomial = parse_polynomial(text, self.variables, self.parameters)
+            polynomial = parse_polynomial(text, (*self.variables, *more), self.parameters)
         except InputError as error:
             self._mistake(path, str(error))
             return None
-        if degree(polynomial) > at_most and not self.unsure:
-            self._mistake(path, f"found a polynomial of degree {degree(polynomial)}, expected at most {at_most}")
+        found = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
+        if found > at_most and not self.unsure:
+            self._mistake(path, f"found a polynomial of degree {found}, expected at most {at_most}")
             return None
         return polynomial
 
@@ -244,23 +261,103 @@ class DocumentReader:
             self._mistake(f"{section}.{key}", f"missing, expected {_EXPECTED[section, key]}")
         return table.get(key)
 
-    def _read_rhs(self, section: Mapping[str, Any]) -> QuadraticSystem | None:
-        rhs = self._required("system", section, "rhs")
-        if rhs is None:
+    def _list(self, section: str, key: str, value: Any, what: str) -> list[Any] | None:
+        """A list with one entry for each variable; None, and a mistake, where it is another or missing."""
+        path = f"{section}.{key}"
+        if value is None:
             return None
-        if not isinstance(rhs, list):
-            self._mistake("system.rhs", f"found {_show(rhs)}, expected a list of polynomials in quotes")
+        if not isinstance(value, list):
+            self._mistake(path, f"found {_show(value)}, expected {_EXPECTED.get((section, key), 'a list')}")
             return None
-        polynomials = [self._polynomial(f"system.rhs[{i + 1}]", value, 2) for i, value in enumerate(rhs)]
         if self.variables is None:
             return None
-        if len(rhs) != len(self.variables):
+        if len(value) != len(self.variables):
             count = len(self.variables)
-            found = counted(len(rhs), "right-hand side")
-            self._mistake("system.rhs", f"found {found}, expected {count}, one for each variable")
+            self._mistake(path, f"found {counted(len(value), what)}, expected {count}, one for each variable")
             return None
-        known = [polynomial for polynomial in polynomials if polynomial is not None]
-        return QuadraticSystem.from_polynomials(known) if len(known) == len(rhs) else None
+        return value
+
+    def _read_system(self, section: Mapping[str, Any]) -> BirationalMap | None:
+        method = section.get("discretization", "kahan")
+        if method not in ("kahan", "polarised"):
+            self._mistake("system.discretization", f'found {_show(method)}, expected "kahan" or "polarised"')
+            return None
+        degree = section.get("degree", 2 if method == "kahan" else 3)
+        if method == "kahan" and "degree" in section:
+            self._mistake("system.degree", 'found a degree, expected none but for discretization = "polarised"')
+        elif type(degree) is not int or not 2 <= degree <= MAX_DEGREE:
+            self._mistake("system.degree", f"found {_show(degree)}, expected a number from 2 to {MAX_DEGREE}")
+            return None
+        given = self._required("system", section, "rhs")
+        found = [
+            self._polynomial(f"system.rhs[{i + 1}]", value, degree, ["eps"])
+            for i, value in enumerate(given if isinstance(given, list) else ())
+        ]
+        rhs = self._list("system", "rhs", given, "right-hand side")
+        known = [polynomial for polynomial in found if polynomial is not None]
+        if rhs is None or len(known) != len(rhs) or self.variables is None or self.unsure:
+            return None
+        try:
+            if method == "polarised":
+                return polarised_map(known, degree)
+            if any("eps" not in polynomial.unused_gens() for polynomial in known):
+                return Kahan(QuadraticSystem(tuple(known), ("eps",)))
+            return Kahan(QuadraticSystem(tuple(substitute(p, {"eps": fmpq(1)}) for p in known)))
+        except InputError as error:
+            self._mistake("system.rhs", str(error))
+            return None
+
+    def _read_bilinear(self, section: Mapping[str, Any]) -> BirationalMap | None:
+        new = section.get("new", [name.upper() for name in self.variables or ()])
+        new = self._list("bilinear", "new", new, "name")
+        given = self._list("bilinear", "equations", self._required("bilinear", section, "equations"), "equation")
+        if new is None or given is None or self.variables is None:
+            return None
+        try:
+            check_names(new)
+            check_names((*self.variables, *new, *self.parameters, "eps"))
+        except InputError as error:
+            self._mistake("bilinear.new", f"{error} (names of the coordinates of the new point)")
+            return None
+        found = []
+        for i, value in enumerate(given):
+            path = f"bilinear.equations[{i + 1}]"
+            sides = (self._text(path, value) or "").split("=")
+            if len(sides) != 2:
+                self._mistake(path, f'found {_show(value)}, expected LEFT = RIGHT, e.g. "X - x = 2*eps*x*X"')
+                continue
+            left, right = (self._polynomial(path, side, 1, [*new, "eps"]) for side in sides)
+            if left is not None and right is not None:
+                found.append(left - right)
+        if len(found) != len(given) or self.unsure:
+            return None
+        return self._sound(bilinear_map, "bilinear", self.variables, found)
+
+    def _read_map(self, section: Mapping[str, Any]) -> BirationalMap | None:
+        functions: dict[str, list[RationalFunction] | None] = {"image": None, "inverse": None}
+        self._required("map", section, "image")
+        for key in functions:
+            given = self._list("map", key, section.get(key), "function")
+            found = [self._claim(f"map.{key}[{i + 1}]", value) for i, value in enumerate(given or ())]
+            functions[key] = (
+                known if (known := [f for f in found if f is not None]) and len(known) == len(found) else None
+            )
+        image, inverse = functions["image"], functions["inverse"]
+        if image is None or self.variables is None or self.unsure or ("inverse" in section and inverse is None):
+            return None
+        return self._sound(explicit_map, "map", self.variables, image, inverse)
+
+    def _sound(self, make: Callable[..., ImplicitMap], path: str, *given: Any) -> ImplicitMap | None:
+        """The map made of what is given, if it has values, and an inverse where one is given."""
+        try:
+            map_ = make(*given)
+        except InputError as error:
+            self._mistake(path, str(error))
+            return None
+        if reason := why_no_map(map_):
+            self._mistake(path, reason)
+            return None
+        return map_
 
     def _read_hamiltonian(self, section: Mapping[str, Any]) -> CubicHamiltonian | None:
         value = self._required("hamiltonian", section, "H")

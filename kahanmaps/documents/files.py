@@ -1,8 +1,8 @@
 """System files: a differential equation in TOML, all its mistakes told at once, written so that it reads back equal.
 
-A file has exactly one of [system] (right-hand sides), [hamiltonian] (H and J) and [family] (A, H, signs), and may have
-[parameters], [integrals] and [density]; docs/system-files.md describes them. Numbers are exact: decimals are read as
-decimals, quoted or not.
+A file has exactly one of [system] (right-hand sides), [hamiltonian] (H and J), [family] (A, H, signs), [bilinear] and
+[map], and may have [parameters], [integrals] and [density]; docs/system-files.md describes them. Numbers are exact:
+decimals are read as decimals, quoted or not.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from kahanmaps.documents.toml_text import to_toml
 from kahanmaps.errors import InputError, SystemFileError, reading
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -34,15 +36,15 @@ _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 class SystemFile(Displayed):
     """A system with everything that its file says of it.
 
-    `system` is the quadratic system whose Kahan map is meant; `hamiltonian` and `member` are there when the file
-    (or the Python object it was made from) says so. `integrals` and `density` are claims: rational functions in the
-    variables and `eps`. `document` is the file as plain data, parameters not yet inserted.
+    `map` is the map that is meant, of a differential equation its Kahan map; `hamiltonian` and `member` are there when
+    the file (or the Python object it was made from) says so. `integrals` and `density` are claims: rational functions
+    in the variables and `eps`. `document` is the file as plain data, parameters not yet inserted.
     """
 
     name: str
     kind: str
     parameters: Mapping[str, fmpq]
-    system: QuadraticSystem
+    map: BirationalMap
     hamiltonian: CubicHamiltonian | None
     member: FamilyMember | None
     integrals: Mapping[str, RationalFunction]
@@ -52,7 +54,30 @@ class SystemFile(Displayed):
     @property
     def variables(self) -> tuple[str, ...]:
         """The names of the variables."""
-        return self.system.variables
+        return self.map.variables
+
+    @property
+    def dim(self) -> int:
+        """The dimension of the phase space."""
+        return self.map.dim
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether the map is the Kahan map of a quadratic system without eps in its coefficients."""
+        return isinstance(self.map, Kahan) and not self.map.system.symbols
+
+    @property
+    def system(self) -> QuadraticSystem:
+        """The quadratic system whose Kahan map is meant. Raises InputError where it is another map."""
+        if self.is_quadratic and isinstance(self.map, Kahan):
+            return self.map.system
+        what = "has eps in its coefficients" if isinstance(self.map, Kahan) else f"is of kind [{self.kind}]"
+        if self.kind == "system" and not isinstance(self.map, Kahan):
+            what = 'has discretization = "polarised"'
+        raise InputError(
+            f"{self.name} {what}, expected a quadratic system of its own: other maps are for orbit, check-commute, "
+            "check-integrals, check-measure and degrees"
+        )
 
     def require_claim(self, what: str, function: RationalFunction) -> None:
         """Raises InputError unless the function is one of the system's variables and eps, in this order."""
@@ -74,7 +99,7 @@ class SystemFile(Displayed):
         """A quadratic system without further structure."""
         rhs = [format_polynomial(polynomial) for polynomial in system.rhs]
         document = {"name": name, "variables": list(system.variables), "system": {"rhs": rhs}}
-        return cls(name, "system", {}, system, None, None, {}, None, document)
+        return cls(name, "system", {}, Kahan(system), None, None, {}, None, document)
 
     @classmethod
     def from_hamiltonian(cls, hamiltonian: CubicHamiltonian, name: str = "system") -> SystemFile:
@@ -82,7 +107,7 @@ class SystemFile(Displayed):
         structure: Any = "standard" if hamiltonian.is_standard else _rows(hamiltonian.J)
         section = {"H": format_polynomial(hamiltonian.H), "J": structure}
         document = {"name": name, "variables": list(hamiltonian.variables), "hamiltonian": section}
-        return cls(name, "hamiltonian", {}, hamiltonian.system, hamiltonian, None, {}, None, document)
+        return cls(name, "hamiltonian", {}, Kahan(hamiltonian.system), hamiltonian, None, {}, None, document)
 
     @classmethod
     def from_member(cls, member: FamilyMember, name: str = "member") -> SystemFile:
@@ -94,7 +119,7 @@ class SystemFile(Displayed):
         if member.variables != default_variables(member.dim):
             document["variables"] = list(member.variables)
         chosen = member.chosen
-        return cls(name, "family", {}, chosen.system, chosen.hamiltonian, member, {}, None, document)
+        return cls(name, "family", {}, Kahan(chosen.system), chosen.hamiltonian, member, {}, None, document)
 
     def to_toml(self) -> str:
         """The file as text; `parse_system` reads it back equal."""
@@ -105,7 +130,7 @@ class SystemFile(Displayed):
             return NotImplemented
         return (
             (self.name, self.kind, self.parameters) == (other.name, other.kind, other.parameters)
-            and self.system == other.system
+            and self.map.subject == other.map.subject
             and self.hamiltonian == other.hamiltonian
             and self.member == other.member
             and self.integrals == other.integrals
@@ -161,17 +186,18 @@ def _rows(matrix: fmpq_mat) -> list[list[str]]:
     return [[format_number(entry) for entry in row] for row in matrix.tolist()]
 
 
-def matched(file: SystemFile, other: SystemFile) -> tuple[QuadraticSystem, str]:
-    """The second of two systems in the variables of the first, and a note where these are not the same in order.
+def matched(file: SystemFile, other: SystemFile) -> tuple[BirationalMap, str]:
+    """The second of two maps in the variables of the first, and a note where these are not the same in order.
 
-    Variables are matched by name where the names agree, otherwise by position. Raises InputError for two dimensions.
+    Variables are matched by name where the names agree, otherwise by position. Raises InputError for two dimensions,
+    and for maps other than Kahan's where variables would have to be exchanged.
     """
-    f, g = file.system, other.system
+    f, g = file.map, other.map
     if f.dim != g.dim:
         raise InputError(f"{file.name} has dimension {f.dim} and {other.name} {g.dim}, expected the same dimension")
     if f.variables == g.variables:
         return g, ""
     pair = f"{', '.join(f.variables)} with {', '.join(g.variables)}"
     if set(f.variables) == set(g.variables):
-        return g.reordered(f.variables), f"variables are matched by name: {pair}"
+        return Kahan(other.system.reordered(f.variables)), f"variables are matched by name: {pair}"
     return g, f"variables are matched by position: {pair}"

@@ -14,7 +14,6 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.fields import GF, QQ, RR, Field
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.claims import Report, Verdict
 from kahanmaps.checks.commute import check_commute
@@ -28,10 +27,12 @@ from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, task
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.invariants.heights import height_growth
+from kahanmaps.maps.arithmetic import Arithmetic
 from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.methods import choose_method
-from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitPoint
+from kahanmaps.maps.orbit import orbit as find_orbit
+from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, OrbitPoint
 from kahanmaps.maps.periods import period_of
 
 _WORTH_COMPILING = 5_000_000  # orbits times steps
@@ -149,62 +150,44 @@ def orbit(
 ) -> Result:
     """A summary of an orbit: how it ended, its period, how long its numbers are, its last point."""
     point = start if start is not None else _drawn(system, seed)
-    kind, _, number = arithmetic.partition(":")
-    if kind == "float":
-        if at is not None:
-            raise InputError("iterates reached directly (at) need exact, mod:P or ball:BITS arithmetic")
-        return {"start": _text(point), **_float_orbit(system, eps, point, steps, method)}
-    field: Field = QQ if kind == "exact" else GF(int(number)) if kind == "mod" else RR(int(number))
-    kahan = KahanMap(system.system, eps, field)
-    structure = NoStructure("as asked for") if method == "generic" else _structure(system)
-    chosen = choose_method(method, kind, structure, at)
-    walk: Orbit | Iterates
-    if chosen.name == "jump" and isinstance(structure, Structure):
-        walk = Iterates(kahan, point, at or (), structure=structure, max_digits=max_digits)
-    else:
-        used = structure if chosen.name == "normal-form" and isinstance(structure, Structure) else None
-        walk = Orbit(kahan, point, max(at) if at else steps, max_digits=max_digits, structure=used)
-    first = kahan.point(point)
-    last = OrbitPoint(0, field, IntegerPoint.from_rationals(first) if field is QQ else first)
+    numbers = Arithmetic.parse(arithmetic)
+    if numbers.kind == "float" and at is not None:
+        raise InputError("iterates reached directly (at) need exact, mod:P or ball:BITS arithmetic")
+    structure: Structure | NoStructure = NoStructure("as asked for")
+    if method != "generic" and system.is_quadratic:
+        structure = _float_structure(system, method) if numbers.kind == "float" else _structure(system)
+    walk = find_orbit(
+        system.map,
+        point,
+        eps,
+        steps=steps if at is None else None,
+        at=at,
+        arithmetic=numbers,
+        method=method,
+        max_digits=max_digits,
+        structure=structure,
+    )
+    last: OrbitPoint | None = None
     for reached in walk:
         last = reached
+    if last is None:  # of iterates reached directly there may be none
+        first = walk.orbit.start
+        exact = numbers.kind == "exact"
+        last = OrbitPoint(0, numbers.field, IntegerPoint.from_rationals(first) if exact else first)
     end = walk.end
-    if end is None:
-        raise AssertionError("an orbit ended without saying how")
     result: Result = {
         "start": _text(point),
-        "method": chosen.name,
+        "method": walk.method,
         "status": end.status,
         "reached": end.steps,
         "ending": end.message,
-        "period": end.period,
-        **_last(",".join(last.text)),
     }
-    if field is QQ:
+    if numbers.kind != "float":
+        result["period"] = end.period
+    result |= _last(",".join(last.text))
+    if numbers.kind == "exact":
         result["digits"] = last.digits
     return result
-
-
-def _float_orbit(system: SystemFile, eps: Any, start: Any, steps: int, method: str | None) -> Result:
-    from kahanmaps.maps.fast import FloatOrbit
-
-    structure = _float_structure(system, method)
-    chosen = choose_method(method, "float", structure, None)
-    form = structure.form if chosen.name == "normal-form" and isinstance(structure, Structure) else None
-    walk = FloatOrbit(system.system, eps, start, steps, form=form)
-    last = ""
-    for _, x in walk:
-        last = ",".join(map(repr, x.tolist()))
-    end = walk.end
-    if end is None:
-        raise AssertionError("an orbit ended without saying how")
-    return {
-        "method": chosen.name,
-        "status": end.status,
-        "reached": end.steps,
-        "ending": end.message,
-        **_last(last),
-    }
 
 
 @task("ensemble")

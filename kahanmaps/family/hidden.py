@@ -23,12 +23,12 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank, trace
-from kahanmaps.algebra.polynomials import gradient, names_of, ring
+from kahanmaps.algebra.polynomials import gradient, linear_combinations, names_of, ring
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember, sign_polynomial
 from kahanmaps.family.cubics import third_derivatives
 from kahanmaps.family.skew_hamiltonian import Factor, evaluate_at_matrix, factors_of_chi
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 32  # as for the members that are drawn; the unknowns are n(n-1)/2

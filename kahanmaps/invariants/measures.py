@@ -12,10 +12,12 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
+from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -86,6 +88,6 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None) -> str:
     return where(dim, above) if below.is_zero() else where(dim, above, below)
 
 
-def jacobian_determinant_sides(kahan: KahanMap, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
-    """Numerator and denominator of det dPhi(x): det(I + eps f'(x~)) and det(I - eps f'(x))."""
-    return kahan.inverse.determinant(image), kahan.determinant(x)
+def jacobian_determinant_sides(kahan: MapOver, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
+    """Numerator and denominator of det dPhi(x): for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x))."""
+    return det(kahan.numerator_matrix(x, image)), kahan.determinant(x)

@@ -25,8 +25,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
-from kahanmaps.algebra.polynomials import degree, primitive_part
-from kahanmaps.systems.hamiltonian import linear_combinations
+from kahanmaps.algebra.polynomials import degree, linear_combinations, primitive_part
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver
 
 # The determinant has degree m (m + 3)/2 along a line for m variables: 90 for this bound, a few seconds.

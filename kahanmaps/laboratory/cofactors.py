@@ -21,7 +21,6 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.algebra.text import format_polynomial
-from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
@@ -30,7 +29,7 @@ from kahanmaps.laboratory.modular_points import (
     monomial_values,
     null_space,
 )
-from kahanmaps.systems.quadratic import LONG_COEFFICIENTS
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 _SPARE = 8
 _DETERMINANT_BUDGET = 20_000_000
@@ -63,7 +62,7 @@ class Cofactor:
 DETERMINANT = Cofactor("det dPhi", 1, None)
 
 
-def determinant_polynomial(system: ParametricSystem) -> fmpq_mpoly | None:
+def determinant_polynomial(system: QuadraticSystem) -> fmpq_mpoly | None:
     """det(I - eps f'(x)) in (variables, symbols, eps); None where it is too large to be expanded."""
     # Over one denominator a right-hand side has coefficients of about so many bits.
     bits = max(sum(int(c.q.bit_length()) for c in p.coeffs()) for p in system.rhs)
@@ -85,7 +84,7 @@ def determinant_polynomial(system: ParametricSystem) -> fmpq_mpoly | None:
     return D
 
 
-def determinant_factors(system: ParametricSystem) -> tuple[Cofactor, ...]:
+def determinant_factors(system: QuadraticSystem) -> tuple[Cofactor, ...]:
     """The cofactors of the irreducible factors over Q of det(I - eps f'(x)); det dPhi alone where it is too large."""
     n = system.dim
     D = determinant_polynomial(system)
@@ -103,7 +102,7 @@ def determinant_factors(system: ParametricSystem) -> tuple[Cofactor, ...]:
     return tuple(sorted(found, key=lambda one: (one.weight, one.name)))
 
 
-def cofactor_of_affine(function: fmpq_mpoly, system: ParametricSystem) -> Cofactor:
+def cofactor_of_affine(function: fmpq_mpoly, system: QuadraticSystem) -> Cofactor:
     """The cofactor of an affine Darboux function, given in the variables of the system."""
     context = ring((*system.variables, *system.symbols, "eps"))
     images = context.gens()[: system.dim]

@@ -13,8 +13,9 @@ import random
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_mpoly
+from flint import fmpq, fmpq_mpoly
 
+from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import independent
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -42,19 +43,12 @@ def system_of(variables: Sequence[str], rows: Sequence[Sequence[fmpq]]) -> Quadr
     >>> print(system_of(["x"], [[fmpq(1), fmpq(0), fmpq(-3)]]))
     x' = x^2 - 3
     """
-    n = len(variables)
-    quadratic = n * (n + 1) // 2
-    forms: list[fmpq_mat] = []
-    linear: list[fmpq] = []
-    constants: list[fmpq] = []
-    for row in rows:
-        form = fmpq_mat(n, n)
-        for value, (j, k) in zip(row, _pairs(n), strict=False):
-            form[j, k] = form[k, j] = value if j == k else value / 2
-        forms.append(form)
-        linear += row[quadratic : quadratic + n]
-        constants.append(row[-1])
-    return QuadraticSystem(tuple(variables), tuple(forms), fmpq_mat(n, n, linear), tuple(constants))
+    n, context = len(variables), ring(variables)
+    squares = [(*(int(i == j) + int(i == k) for i in range(n)),) for j, k in _pairs(n)]
+    support = [*squares, *(tuple(int(i == j) for i in range(n)) for j in range(n)), (0,) * n]
+    return QuadraticSystem(
+        tuple(context.from_dict({m: v for m, v in zip(support, row, strict=True) if v != 0}) for row in rows)
+    )
 
 
 def combination(systems: Sequence[QuadraticSystem], weights: Sequence[Any], zero: Any) -> list[list[Any]]:

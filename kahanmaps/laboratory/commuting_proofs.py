@@ -110,24 +110,7 @@ def transported(h: QuadraticSystem, P: fmpq_mat, q: Sequence[fmpq]) -> list[list
     >>> transported(QuadraticSystem.from_text(["x"], ["x^2"]), fmpq_mat([[2]]), [fmpq(1)])
     [[4, 4, 1]]
     """
-    n = h.dim
-    column = fmpq_mat(n, 1, list(q))
-    forms, constants = [], []
-    linear = fmpq_mat(n, n)
-    for i, form in enumerate(h.Q):
-        forms.append(P.transpose() * form * P)
-        row = column.transpose() * form * P * fmpq(2)
-        for j in range(n):
-            linear[i, j] = row[0, j]
-        constants.append((column.transpose() * form * column)[0, 0])
-    moved = h.B * column
-    system = QuadraticSystem(
-        h.variables,
-        tuple(forms),
-        linear + h.B * P,
-        tuple(value + moved[i, 0] + h.c[i] for i, value in enumerate(constants)),
-    )
-    return coefficients_of(system)
+    return coefficients_of(h.composed(P, q))
 
 
 def _trivially(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
@@ -177,4 +160,4 @@ def _over(field: Field, table: Sequence[Sequence[fmpq_mpoly]], parameters: Seque
         linear += values[-n - 1 : -1]
         constants.append(values[-1])
     matrices = field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants)
-    return SystemOver.from_tensor(field, *matrices)
+    return SystemOver(field, *matrices)

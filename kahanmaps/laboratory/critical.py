@@ -1,8 +1,8 @@
-"""Points on the hypersurfaces that a Kahan map contracts, where their polynomials are too large to be written down.
+"""Points on the hypersurfaces that a map contracts, where their polynomials are too large to be written down.
 
-det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)), so that away from poles and infinity they are the zeros of
-E(X) = det(Z~ I + eps (f''(X~) + Z~ B)), where (X~ : Z~) is the image of X. On a line E is a polynomial of one variable.
-Source: petrera-suris-2016, eq. (Jac).
+For an equation M(x) x~ = r(x) that is linear in both points det dPhi(x) is det M'(x~)/det M(x) up to its sign, with the
+M' of the inverse map. So away from poles and infinity they are the zeros of E(X) = det M'(X~), where (X~ : Z~) is the
+image of X. On a line E is a polynomial of one variable. Source: petrera-suris-2016, eq. (Jac).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from flint import nmod_poly
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.laboratory.jets import Jet
-from kahanmaps.maps.projective import Forms
+from kahanmaps.maps.implicit import Equation
 
 
 @dataclass(frozen=True)
@@ -33,16 +33,17 @@ class CriticalPoint:
 
 
 def critical_points(
-    forms: Forms, inverse: Forms, field: PrimeField, rng: random.Random
+    equation: Equation, inverse: Equation, field: PrimeField, rng: random.Random
 ) -> tuple[list[CriticalPoint], dict[int, int]]:
     """The critical points modulo p on a random line that are neither poles nor at infinity; exact.
 
-    `forms` are the linear forms of the map at eps over the field, `inverse` those at -eps. Returns the points and, for
-    each multiplicity, the number of zeros of E over the closure of GF(p): there may be zeros without points in GF(p).
+    `equation` is that of the map over the field, linear in the point, and `inverse` that of its inverse. Returns the
+    points and, for each multiplicity, the number of zeros of E over the closure of GF(p): there may be zeros without
+    points in GF(p).
     """
-    a, b, line = _random_line(forms, field, rng)
+    a, b, line = _random_line(equation, field, rng)
     p = field.prime
-    image = kernel_minors(_entries(forms, line, nmod_poly([], p)))
+    image = kernel_minors(equation.rows(equation.monomials(line), nmod_poly([], p)))
     common = nmod_poly([], p)
     for entry in image:
         common = common.gcd(entry)
@@ -51,20 +52,24 @@ def critical_points(
     value = _without(_denominator(inverse, image, nmod_poly([], p)), image[-1] * common, line[-1])
 
     def E(X: Sequence[Any], zero: Any) -> Any:
-        return _denominator(inverse, kernel_minors(_entries(forms, X, zero)), zero)
+        return _denominator(inverse, kernel_minors(equation.rows(equation.monomials(X), zero)), zero)
 
     return _zeros(value, E, a, b, field, rng)
 
 
-def pole_points(forms: Forms, field: PrimeField, rng: random.Random) -> tuple[list[CriticalPoint], dict[int, int]]:
+def pole_points(
+    equation: Equation, field: PrimeField, rng: random.Random
+) -> tuple[list[CriticalPoint], dict[int, int]]:
     """The poles modulo p on a random line that are not at infinity, as `critical_points` gives critical points."""
-    a, b, line = _random_line(forms, field, rng)
-    value = _without(_denominator(forms, line, nmod_poly([], field.prime)), line[-1])
-    return _zeros(value, lambda X, zero: _denominator(forms, X, zero), a, b, field, rng)
+    a, b, line = _random_line(equation, field, rng)
+    value = _without(_denominator(equation, line, nmod_poly([], field.prime)), line[-1])
+    return _zeros(value, lambda X, zero: _denominator(equation, X, zero), a, b, field, rng)
 
 
-def _random_line(forms: Forms, field: PrimeField, rng: random.Random) -> tuple[list[int], list[int], list[nmod_poly]]:
-    a, b = ([rng.randrange(field.prime) for _ in range(len(forms) + 1)] for _ in range(2))
+def _random_line(
+    equation: Equation, field: PrimeField, rng: random.Random
+) -> tuple[list[int], list[int], list[nmod_poly]]:
+    a, b = ([rng.randrange(field.prime) for _ in range(equation.dim + 1)] for _ in range(2))
     return a, b, [nmod_poly([x, v], field.prime) for x, v in zip(a, b, strict=True)]
 
 
@@ -118,22 +123,7 @@ def _gradient(
     return [int(slope[power - 1]) for slope in value.slopes]
 
 
-def _entries(forms: Forms, X: Sequence[Any], zero: Any) -> list[list[Any]]:
-    """The matrix of linear forms at X, whose coordinates are polynomials or jets."""
-    rows = []
-    for row in forms:
-        entries = []
-        for form in row:
-            total = zero
-            for coefficient, x in zip(form, X, strict=True):
-                number = int(coefficient)
-                if number:
-                    total = total + (x.times(number) if isinstance(x, Jet) else x * number)
-            entries.append(total)
-        rows.append(entries)
-    return rows
-
-
-def _denominator(forms: Forms, X: Sequence[Any], zero: Any) -> Any:
-    """The last minor, det(Z I - eps (f''(X) + Z B)) for the eps of the forms."""
-    return kernel_minors([[*row[:-1], zero] for row in _entries(forms, X, zero)])[-1]
+def _denominator(equation: Equation, X: Sequence[Any], zero: Any) -> Any:
+    """The last minor of L at X, whose coordinates are polynomials or jets: up to its sign det M."""
+    rows = equation.rows(equation.monomials(X), zero)
+    return kernel_minors([[*row[:-1], zero] for row in rows])[-1]

@@ -1,10 +1,10 @@
-"""The curve t -> Phi^n(a + b t) that a Kahan map makes of a random line over GF(p), step after step, exactly.
+"""The curve t -> Phi^n(a + b t) that a birational map makes of a random line over GF(p), exactly.
 
-The curve is kept as dim + 1 polynomials without a common factor. The next one is the kernel of an n x (n + 1) matrix of
-linear forms in them (maps/projective.py), and there are two ways to it:
+The curve is kept as dim + 1 polynomials without a common factor. The next one is the kernel of the n x (n + 1) matrix
+of forms in them that is the equation of the map (maps/implicit.py), and there are two ways to it:
 
     minors  up to dimension 5: the maximal minors, and the gcd of two random combinations of them divided out;
-    series  above it, where minors are many: (I - eps f'(x)) x~ = (I + eps B) x + 2 eps c in power series in t, to as
+    series  above it, where minors are many: M(x) x~ = r(x) in power series in t, to as
             many terms as the next curve needs. Its polynomials follow from the shortest recurrence (massey-1969) of the
             series of a random quotient of two affine functions, whose generating function has the common denominator
             of the coordinates. All terms to spare of all coordinates are tried.
@@ -16,13 +16,13 @@ from __future__ import annotations
 
 import random
 import time
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
 
+from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.checks.decide import random_prime_field
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.maps.implicit import BirationalMap
 
 _MINORS = 5  # the largest dimension in which minors are taken
 _MARGIN = 8  # terms of a series beyond those that determine the curve: each is right by chance once in 2^62
@@ -36,41 +36,26 @@ class Stopped(Exception):
 
 
 class Line:
-    """The curve t -> Phi^n(a + b t) over GF(p) as polynomials (X_0 : ... : X_dim), X_0 below, without common factor."""
+    """The curve t -> Phi^n(a + b t) over GF(p) as polynomials (X : Z), Z below, without common factor."""
 
     def __init__(
-        self, system: QuadraticSystem, eps: fmpq | None, rng: random.Random, deadline: float, max_degree: int
+        self, map_: BirationalMap, eps: fmpq | None, rng: random.Random, deadline: float, max_degree: int
     ) -> None:
         field = random_prime_field(rng)
-        p, n = field.prime, system.dim
+        p, n = field.prime, map_.dim
         self.prime = p
         eps_p = field.random(rng) if eps is None else field.convert(eps)
         self.eps = int(eps_p)
         self._rng, self._deadline, self._max_degree = rng, deadline, max_degree
         self._context = fmpz_mod_poly_ctx(fmpz_mod_ctx(p))
-        local = system.over(field)
-        one = field.one
-        # Linear forms in X, as pairs (index, coefficient) of what is not zero; the constant goes with X_0.
-        self._matrix = [
-            [
-                _sparse(
-                    [(i == j) * one - eps_p * local.B[i, j], *(-eps_p * local.tensor[i * n + j, k] for k in range(n))]
-                )
-                for j in range(n)
-            ]
-            for i in range(n)
-        ]
-        self._right = [
-            _sparse([2 * eps_p * local.c[i, 0], *((i == j) * one + eps_p * local.B[i, j] for j in range(n))])
-            for i in range(n)
-        ]
+        self._equation = map_.at(eps_p, field).equation
         self.steps = 0
         self.degree = 1
-        self._X = [nmod_poly([1], p), *(nmod_poly([rng.randrange(p), rng.randrange(1, p)], p) for _ in range(n))]
+        self._X = [*(nmod_poly([rng.randrange(p), rng.randrange(1, p)], p) for _ in range(n)), nmod_poly([1], p)]
 
     def step(self, guess: int) -> None:
         """One step on. Raises ZeroDivisionError where points of the line have no image, Stopped at a limit."""
-        curve = self._by_minors() if len(self._right) <= _MINORS else self._by_series(guess)
+        curve = self._by_minors() if self._equation.dim <= _MINORS else self._by_series(guess)
         degree = max(0, *(int(entry.degree()) for entry in curve))
         if degree > self._max_degree:
             self._raise_degree()
@@ -78,21 +63,18 @@ class Line:
         self.steps += 1
 
     def _by_minors(self) -> list[nmod_poly]:
-        rows = [
-            [*(self._value(form) for form in forms), -self._value(right)]
-            for forms, right in zip(self._matrix, self._right, strict=True)
-        ]
+        rows = self._equation.rows(self._equation.monomials(self._X), nmod_poly([0], self.prime))
         *above, below = kernel_minors(rows, self._times)
         if below.is_zero():
             raise ZeroDivisionError("no point of the line has an image")
-        mixed = (self._mixture([below, *above]) for _ in range(2))
+        mixed = (self._mixture([*above, below]) for _ in range(2))
         common = next(mixed).gcd(next(mixed))
         self._require_time()
         curve = []
-        for entry in (below, *above):
+        for entry in (*above, below):
             quotient, rest = divmod(entry, common)
             if not rest.is_zero():  # two mixtures with a factor that is not in all: once in about p
-                return self._divided([below, *above])
+                return self._divided([*above, below])
             curve.append(quotient)
         return curve
 
@@ -109,9 +91,6 @@ class Line:
     def _mixture(self, entries: list[nmod_poly]) -> nmod_poly:
         zero = nmod_poly([0], self.prime)
         return sum((entry * nmod(self._rng.randrange(self.prime), self.prime) for entry in entries), zero)
-
-    def _value(self, form: list[tuple[int, nmod]]) -> nmod_poly:
-        return sum((self._X[k] * c for k, c in form), nmod_poly([0], self.prime))
 
     def _raise_degree(self) -> NoReturn:
         raise Stopped("degree", f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
@@ -135,14 +114,8 @@ class Line:
     def _image(self, length: int) -> list[nmod_poly]:
         """The coordinates of the next iterate as power series, to `length` terms."""
         X = [entry.truncate(length) for entry in self._X]
-        zero = nmod_poly([0], self.prime)
-
-        def value(form: list[tuple[int, nmod]]) -> nmod_poly:
-            return sum((X[k] * c for k, c in form), zero)
-
-        rows = [
-            [value(form) for form in (*forms, right)] for forms, right in zip(self._matrix, self._right, strict=True)
-        ]
+        values = [entry.truncate(length) for entry in self._equation.monomials(X)]
+        rows = self._equation.rows(values, nmod_poly([0], self.prime))
         n = len(rows)
         for column in range(n):
             candidates = [i for i in range(column, n) if int(rows[i][column][0])]
@@ -161,7 +134,7 @@ class Line:
         for column in range(n - 1, 0, -1):
             for row in rows[:column]:
                 self._eliminate(row, row[column], rows[column], range(n, n + 1), length)
-        return [row[n] for row in rows]
+        return [-row[n] for row in rows]
 
     def _eliminate(
         self, row: list[nmod_poly], factor: nmod_poly, pivot: list[nmod_poly], at: range, length: int
@@ -188,7 +161,7 @@ class Line:
                 return None
             denominator = nmod_poly([int(c) for c in reversed(minimal.coeffs())], self.prime)
             first = denominator.mul_low(inverse, length)
-            curve = [first, *(first.mul_low(entry, length) for entry in x)]
+            curve = [*(first.mul_low(entry, length) for entry in x), first]
             # Only for functionals in special position is the denominator not that of all coordinates.
             if all(entry.degree() <= degree for entry in curve):
                 return curve
@@ -199,7 +172,3 @@ class Line:
         for entry in x:
             total = total + entry * nmod(self._rng.randrange(self.prime), self.prime)
         return total
-
-
-def _sparse(coefficients: list[Any]) -> list[tuple[int, nmod]]:
-    return [(k, c) for k, c in enumerate(coefficients) if c != 0]

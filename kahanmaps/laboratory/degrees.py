@@ -34,6 +34,8 @@ from kahanmaps.laboratory.curves import Line, Stopped
 from kahanmaps.laboratory.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence, rate_json
 from kahanmaps.laboratory.singularities import MAX_STEPS, Patterns
 from kahanmaps.laboratory.singularities import patterns as patterns_of_map
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 DEFAULT_SECONDS = 10.0
@@ -198,7 +200,7 @@ class DegreeGrowth(Displayed):
 
 
 def degree_growth(
-    system: QuadraticSystem,
+    system: QuadraticSystem | BirationalMap,
     eps: Any = None,
     *,
     seconds: float = DEFAULT_SECONDS,
@@ -209,7 +211,7 @@ def degree_growth(
     patterns: Patterns | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DegreeGrowth:
-    """The degrees of the iterates of the Kahan map of `system`, for one exact `eps` (time step 2 eps) or generic eps.
+    """The degrees of the iterates of a map, for one exact `eps` or generic eps; a system stands for its Kahan map.
 
     Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare, and with terms enough
     beyond the last confinement; with `max_terms` instead after the degrees d_1, ..., d_max_terms. Stops in any case
@@ -236,7 +238,7 @@ def degree_growth(
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     if max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
-    return _Search(system, exact, time.monotonic() + seconds, max_degree, seed, steps, patterns).run(
+    return _Search(as_map(system), exact, time.monotonic() + seconds, max_degree, seed, steps, patterns).run(
         max_terms, progress
     )
 
@@ -246,7 +248,7 @@ class _Search:
 
     def __init__(
         self,
-        system: QuadraticSystem,
+        map_: BirationalMap,
         eps: fmpq | None,
         deadline: float,
         max_degree: int,
@@ -254,9 +256,9 @@ class _Search:
         steps: int | None,
         patterns: Patterns | None,
     ) -> None:
-        self._system, self._eps, self._steps, self._patterns = system, eps, steps, patterns
+        self._map, self._eps, self._steps, self._patterns = map_, eps, steps, patterns
         self._deadline, self._max_degree, self._seed = deadline, max_degree, seed
-        self._rng = random.Random(f"degrees {seed_for(seed, system.rhs, eps)}")
+        self._rng = random.Random(f"degrees {seed_for(seed, map_.subject, eps)}")
         self._replaced = 0
         self.degrees = [1]
         self.notes: list[str] = []
@@ -300,7 +302,7 @@ class _Search:
         if self._patterns is None and max(self.degrees) > 1:  # an affine map contracts nothing
             left = max(0.0, self._deadline - time.monotonic())
             self._patterns = patterns_of_map(
-                self._system, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
+                self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
             )
         known = self._patterns
         if not may_stop or found.checked < max(6, found.order):
@@ -313,7 +315,7 @@ class _Search:
     def _line(self) -> Line:
         while True:
             try:
-                return Line(self._system, self._eps, self._rng, self._deadline, self._max_degree)
+                return Line(self._map, self._eps, self._rng, self._deadline, self._max_degree)
             except BadPrime:
                 continue
 
@@ -354,7 +356,7 @@ class _Search:
         if n < len(known):
             return known[n]
         if n == 1:
-            return self._system.dim
+            return self._map.dim
         most = known[1] * known[-1]
         # Degrees are as good as log-concave, so that the last ratio bounds the next one.
         return min(most, known[-1] * known[-1] // known[-2] + 4) if known[-2] else most

@@ -14,15 +14,14 @@ from typing import Any
 
 from flint import fmpq, nmod_poly
 
+from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.matrices import nullspace
-from kahanmaps.checks.decide import random_prime_field
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.critical import critical_points, pole_points
-from kahanmaps.laboratory.jets import NotGeneric, PrecisionTooLow, SparseForms, Step, image_of, sparse_forms, walk
+from kahanmaps.laboratory.jets import NotGeneric, PrecisionTooLow, Step, image_of, walk
 from kahanmaps.laboratory.recurrences import find_recurrence
-from kahanmaps.maps.projective import linear_forms
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.maps.implicit import BirationalMap, Equation
 
 _MAX_PRECISION = 4096
 _MOST_ALONG = 1024  # where series are followed far
@@ -108,7 +107,7 @@ class _Fate:
 
 
 def fate_of(
-    system: QuadraticSystem,
+    map_: BirationalMap,
     eps: fmpq,
     factor: Any,
     text: str,
@@ -134,14 +133,14 @@ def fate_of(
             break
         field = random_prime_field(rng)
         try:
-            forms = linear_forms(system, eps, field)
+            equation = map_.at(eps, field).equation
             place = _point_on(factor, field, rng)
         except BadPrime:
             continue
         if place is None or field.prime in primes:
             continue
         try:
-            fates.append(_fate_at(forms, *place, field, rng, limits, len(fates[0].steps) if fates else None))
+            fates.append(_fate_at(equation, *place, field, rng, limits, len(fates[0].steps) if fates else None))
             primes.append(field.prime)
         except NotGeneric:
             continue
@@ -155,27 +154,34 @@ def fate_of(
     return told(fates[0])
 
 
-def unwritten(system: QuadraticSystem, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
+def untold(reason: str) -> Hypersurface:
+    """Contracted hypersurfaces of which nothing is known, and why."""
+    return replace(_seen("?", 0, False, None, _unknown(), ()), note=reason)
+
+
+def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
     """The contracted hypersurfaces without their polynomials, told apart by multiplicity and fate of random points.
 
     At one exact `eps` (half the time step), on lines modulo random primes. Poles and infinity are left out. One with a
     multiplicity of which no point was found is undecided. Source: zander-2021.
     """
-    return _at_random(system, eps, rng, limits, False, _LINES)
+    return _at_random(map_, eps, rng, limits, False, _LINES)
 
 
-def fates_at_random(system: QuadraticSystem, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
+def fates_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
     """As `unwritten`, with the poles and infinity: in every dimension, without any polynomial."""
-    found = _at_random(system, eps, rng, limits, True, _FEW_LINES)
-    found += _at_random(system, eps, rng, limits, False, _FEW_LINES)
+    found = _at_random(map_, eps, rng, limits, True, _FEW_LINES)
+    found += _at_random(map_, eps, rng, limits, False, _FEW_LINES)
     for _ in range(_TRIES):
         field = random_prime_field(rng)
         try:
-            forms = linear_forms(system, eps, field)
-            point = [rng.randrange(field.prime) for _ in range(system.dim)] + [0]
-            tangents = _tangents(point, [0] * system.dim + [1], field)
-            event = _first_event(forms, point, field, rng, limits)
-            fate = _unknown() if tangents is None else _fate_at(forms, point, tangents, field, rng, limits, event=event)
+            equation = map_.at(eps, field).equation
+            point = [rng.randrange(field.prime) for _ in range(map_.dim)] + [0]
+            tangents = _tangents(point, [0] * map_.dim + [1], field)
+            event = _first_event(equation, point, field, rng, limits)
+            fate = (
+                _unknown() if tangents is None else _fate_at(equation, point, tangents, field, rng, limits, event=event)
+            )
         except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
@@ -186,7 +192,7 @@ def fates_at_random(system: QuadraticSystem, eps: fmpq, rng: random.Random, limi
 
 
 def _at_random(
-    system: QuadraticSystem, eps: fmpq, rng: random.Random, limits: Range, poles: bool, lines: int
+    map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range, poles: bool, lines: int
 ) -> list[Hypersurface]:
     found: dict[tuple[Any, ...], Hypersurface] = {}
     degrees: dict[int, int] = {}
@@ -197,22 +203,23 @@ def _at_random(
             break
         field = random_prime_field(rng)
         try:
-            forms, inverse = linear_forms(system, eps, field), linear_forms(system, -eps, field)
+            here = map_.at(eps, field)
+            equation, inverse = here.equation, here.inverse.equation
         except BadPrime:
             continue
-        points, seen = pole_points(forms, field, rng) if poles else critical_points(forms, inverse, field, rng)
+        points, seen = pole_points(equation, field, rng) if poles else critical_points(equation, inverse, field, rng)
         degrees |= seen
         whole = whole or sum(seen.values()) == len(points)
         for critical in points:
             tangents = _tangents(critical.point, critical.gradient, field)
             if tangents is None or limits.is_over:
                 continue
-            event = _first_event(forms, critical.point, field, rng, limits) if limits.briefly else None
+            event = _first_event(equation, critical.point, field, rng, limits) if limits.briefly else None
             seen_so[critical.multiplicity, event] = seen_so.get((critical.multiplicity, event), 0) + 1
             if event and seen_so[critical.multiplicity, event] > _SAME:
                 continue
             try:
-                fate = _fate_at(forms, critical.point, tangents, field, rng, limits, event=event)
+                fate = _fate_at(equation, critical.point, tangents, field, rng, limits, event=event)
             except NotGeneric:
                 continue
             except PrecisionTooLow:
@@ -270,7 +277,7 @@ def _told(ranks: Sequence[int], full: int) -> tuple[str, int | None, int | None]
 
 
 def _fate_at(
-    forms: Any,
+    equation: Equation,
     point: Sequence[int],
     tangents: list[list[int]],
     field: PrimeField,
@@ -285,10 +292,9 @@ def _fate_at(
     """
     p, full = field.prime, len(tangents)
     direction = [rng.randrange(p) for _ in point]
-    sparse = sparse_forms(forms)
 
     def followed(steps: int) -> tuple[Step, ...]:
-        run, is_whole = _walked(sparse, point, direction, tangents, p, steps, limits.end)
+        run, is_whole = _walked(equation, point, direction, tangents, p, steps, limits.end)
         if not is_whole:
             raise PrecisionTooLow
         return tuple(run)
@@ -307,13 +313,13 @@ def _fate_at(
         # A hypersurface that comes back to one that is contracted shares the fate of that one from then on.
         return _Fate(status, down, up, run, len(run), again if again is not None else up or 0)
     reach = limits.reach if up is None else min(limits.reach, len(run) + _FREE_STEPS)
-    hit, reached = _next_hit(sparse, run[-1].limit, p, len(run), reach, limits)
+    hit, reached = _next_hit(equation, run[-1].limit, p, len(run), reach, limits)
     if hit is None:
         return _Fate(status, down, up, run, reached, up or last)
     if up is not None:
         return _Fate(status, down, up, run, hit, hit)
     orders, _ = _walked(
-        sparse, point, direction, [], p, min(limits.reach, max(limits.along, 2 * hit)), limits.end, most=_MOST_ALONG
+        equation, point, direction, [], p, min(limits.reach, max(limits.along, 2 * hit)), limits.end, most=_MOST_ALONG
     )
     # What a pattern without an end meets on its way may show in the order of the denominator only.
     known = [step.denominator for step in takewhile(lambda step: step.denominator is not None, orders)]
@@ -325,16 +331,15 @@ def _fate_at(
     return _Fate(status, down, up, run, len(orders), settled)
 
 
-def _first_event(forms: Any, point: Sequence[int], field: PrimeField, rng: random.Random, limits: Range) -> int:
+def _first_event(equation: Equation, point: Sequence[int], field: PrimeField, rng: random.Random, limits: Range) -> int:
     """The first step that divides by a power of t, 0 where none of the first steps does."""
     direction = [rng.randrange(field.prime) for _ in point]
-    forms = sparse_forms(forms)
-    run, _ = _walked(forms, point, direction, [], field.prime, limits.shown, limits.end, to_event=True)
+    run, _ = _walked(equation, point, direction, [], field.prime, limits.shown, limits.end, to_event=True)
     return len(run) if run and run[-1].common else 0
 
 
 def _walked(
-    forms: SparseForms,
+    equation: Equation,
     point: Sequence[int],
     direction: Sequence[int],
     tangents: Sequence[Sequence[int]],
@@ -352,7 +357,7 @@ def _walked(
     while True:
         run: list[Step] = []
         try:
-            for step in islice(walk(forms, point, direction, tangents, prime, precision), steps):
+            for step in islice(walk(equation, point, direction, tangents, prime, precision), steps):
                 run.append(step)
                 if to_event and step.common:
                     return run, True
@@ -366,12 +371,12 @@ def _walked(
 
 
 def _next_hit(
-    forms: SparseForms, limit: Sequence[int], prime: int, steps: int, reach: int, limits: Range
+    equation: Equation, limit: Sequence[int], prime: int, steps: int, reach: int, limits: Range
 ) -> tuple[int | None, int]:
     """The next step that a point of the image does not have, and the number of steps it was followed for."""
     at: Sequence[int] = limit
     for step in range(steps + 1, reach + 1):
-        image = image_of(forms, at, prime)
+        image = image_of(equation, at, prime)
         if image is None:
             return step, step
         at = image

@@ -20,14 +20,14 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz, nmod_mat
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals import ModifiedHamiltonian
 from kahanmaps.invariants.measures import DeterminantDensity
 from kahanmaps.laboratory.affine_functions import QuotientForms, affine_integrals, quotient_by
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_DIMENSION = 30  # n (n - 1)/2 unknowns: a few seconds for 435 of them

@@ -14,16 +14,16 @@ from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.expand import MAX_DIMENSION, METHOD, NotEqual, expansion
-from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.invariants.integrals import integral_condition
 from kahanmaps.invariants.measures import density_condition
 from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 _BUDGET = 60_000_000
 
 
 def integral_verdict(
-    system: ParametricSystem, integral: RationalFunction, eps: fmpq | None, seed: int = 0
+    system: QuadraticSystem, integral: RationalFunction, eps: fmpq | None, seed: int = 0
 ) -> tuple[Verdict, Evidence]:
     """Whether I(x~) = I(x), for every value of the symbols of the system and, if `eps` is None, every eps.
 
@@ -41,7 +41,7 @@ def integral_verdict(
 
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
-    >>> rotation = ParametricSystem.of_system(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]))
+    >>> rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
     >>> for text in ("x^2 + y^2", "x^2 - y^2"):
     ...     print(integral_verdict(rotation, parse_rational_function(text, ["x", "y", "eps"]), None)[0])
     proved
@@ -53,7 +53,7 @@ def integral_verdict(
 
 
 def density_verdict(
-    system: ParametricSystem, density: RationalFunction, eps: fmpq | None, seed: int = 0
+    system: QuadraticSystem, density: RationalFunction, eps: fmpq | None, seed: int = 0
 ) -> tuple[Verdict, Evidence]:
     """Whether phi(x~) det(I - eps f'(x)) = phi(x) det(I + eps f'(x~)), that is, whether dx/phi is invariant.
 
@@ -70,7 +70,7 @@ def density_verdict(
 
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
-    >>> system = ParametricSystem.of_system(QuadraticSystem.from_text(["x"], ["x^2"]))
+    >>> system = QuadraticSystem.from_text(["x"], ["x^2"])
     >>> str(density_verdict(system, parse_rational_function("x^2", ["x", "eps"]), None)[0])
     'proved'
     """
@@ -92,7 +92,7 @@ def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verd
 
 
 def _identity(
-    system: ParametricSystem, function: RationalFunction, eps: fmpq | None, condition: str, *, of_density: bool
+    system: QuadraticSystem, function: RationalFunction, eps: fmpq | None, condition: str, *, of_density: bool
 ) -> Identity:
     """P(x~) Q(x) = P(x) Q(x~) for P/Q, of a density times the determinants: in x, the symbols and eps."""
     n = system.dim

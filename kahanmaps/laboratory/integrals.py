@@ -23,7 +23,6 @@ from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.branches import Branches, Pattern, tell_apart
 from kahanmaps.laboratory.cofactors import Cofactor
@@ -34,6 +33,7 @@ from kahanmaps.laboratory.inherited import InheritedIntegrals, inherited_integra
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
 from kahanmaps.laboratory.search import AFFINE, Found, classes, may_be_conjugate, repeat, search
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
@@ -399,7 +399,7 @@ def _independent(
     return found
 
 
-def _is_affine_integral(system: ParametricSystem, function: RationalFunction) -> bool:
+def _is_affine_integral(system: QuadraticSystem, function: RationalFunction) -> bool:
     """Whether the function is v.x with v.f = 0; v may contain the symbols."""
     if not function.is_polynomial:
         return False

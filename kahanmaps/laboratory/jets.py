@@ -11,12 +11,10 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
-from flint import nmod_mat, nmod_poly
+from flint import nmod, nmod_mat, nmod_poly
 
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.maps.projective import Forms
-
-SparseForms = list[list[list[tuple[int, int]]]]
+from kahanmaps.maps.implicit import Equation
 
 
 class PrecisionTooLow(ArithmeticError):
@@ -45,15 +43,13 @@ class Jet:
     def __sub__(self, other: Jet) -> Jet:
         return self + (-other)
 
-    def __mul__(self, other: Jet) -> Jet:
+    def __mul__(self, other: Jet | nmod) -> Jet:
+        if not isinstance(other, Jet):
+            return Jet(self.value * other, [slope * other for slope in self.slopes], self.precision)
         n = min(self.precision, other.precision)
         a, b = self.value, other.value
         slopes = [a.mul_low(q, n) + b.mul_low(p, n) for p, q in zip(self.slopes, other.slopes, strict=True)]
         return Jet(a.mul_low(b, n), slopes, n)
-
-    def times(self, factor: int) -> Jet:
-        """The jet times a constant."""
-        return Jet(self.value * factor, [slope * factor for slope in self.slopes], self.precision)
 
     def over_power(self, power: int) -> Jet:
         """The jet divided by t^power. Raises NotGeneric where a slope is not divisible."""
@@ -90,7 +86,7 @@ class Step:
 
 
 def follow(
-    forms: Forms,
+    equation: Equation,
     point: Sequence[int],
     direction: Sequence[int],
     tangents: Sequence[Sequence[int]],
@@ -100,21 +96,21 @@ def follow(
 ) -> list[Step]:
     """The steps of the curve point + t direction and of its neighbours point + d_i tangent_i + t direction; exact.
 
-    `forms` are those of `linear_forms` over GF(p), points and vectors residues (X : Z); eps is in the forms.
+    The equation of the map is one over GF(p), points and vectors are residues (X : Z).
     Raises PrecisionTooLow and NotGeneric.
     """
-    return list(islice(walk(sparse_forms(forms), point, direction, tangents, prime, precision), steps))
+    return list(islice(walk(equation, point, direction, tangents, prime, precision), steps))
 
 
 def walk(
-    forms: SparseForms,
+    equation: Equation,
     point: Sequence[int],
     direction: Sequence[int],
     tangents: Sequence[Sequence[int]],
     prime: int,
     precision: int,
 ) -> Iterator[Step]:
-    """As `follow`, step after step without an end, for the forms of `sparse_forms`."""
+    """As `follow`, step after step without an end."""
     X = [
         Jet(
             nmod_poly([x, v], prime).truncate(precision),
@@ -126,7 +122,7 @@ def walk(
     zero = nmod_poly([], prime)
     while True:
         nothing = Jet(zero, [zero] * len(tangents), X[0].precision)
-        minors = kernel_minors([[_value(form, X) for form in row] for row in forms])
+        minors = kernel_minors(equation.rows(equation.monomials(X), None))
         image = [nothing if jet is None else jet for jet in minors]
         known = min(jet.precision for jet in image)
         sizes = [valuation(jet.value, known) for jet in image]
@@ -140,26 +136,12 @@ def walk(
         yield Step(common, pole, denominator, _rank(X, prime), tuple(int(jet.value[0]) for jet in X))
 
 
-def image_of(forms: SparseForms, point: Sequence[int], prime: int) -> list[int] | None:
+def image_of(equation: Equation, point: Sequence[int], prime: int) -> list[int] | None:
     """The image of a point of projective space modulo p; None where all minors vanish: there only curves have one."""
     size = len(point)
-    entries = [sum(c * point[k] for k, c in form) % prime for row in forms for form in row]
-    kernel, nullity = nmod_mat(size - 1, size, entries, prime).nullspace()
+    rows = equation.rows(equation.monomials([nmod(x, prime) for x in point]), nmod(0, prime))
+    kernel, nullity = nmod_mat(size - 1, size, [entry for row in rows for entry in row], prime).nullspace()
     return [int(kernel[k, 0]) for k in range(size)] if nullity == 1 else None
-
-
-def sparse_forms(forms: Forms) -> SparseForms:
-    """The coefficients that are not zero, as pairs (index, coefficient)."""
-    return [[[(k, int(c)) for k, c in enumerate(form) if c != 0] for form in row] for row in forms]
-
-
-def _value(form: list[tuple[int, int]], X: Sequence[Jet]) -> Jet | None:
-    """The form at X; None where it vanishes identically."""
-    total = None
-    for k, coefficient in form:
-        term = X[k].times(coefficient)
-        total = term if total is None else total + term
-    return total
 
 
 def _rank(X: Sequence[Jet], prime: int) -> int:

@@ -13,7 +13,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.documents.parametric import ParametricSystem
+from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.closed_forms import ClosedForms, Spaces, closed_forms
@@ -25,7 +25,7 @@ class Laboratory:
     """The maps on which a system is examined: two primes, each with its own eps and its own values of the symbols.
 
     With `eps` (exact; the time step is 2 eps) all maps are at that eps. Raises InputError for eps = 0, for eps both a
-    number and a symbol, and for symbols that `ParametricSystem.of` refuses.
+    number and a symbol, and for symbols that `with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
     >>> laboratory = Laboratory(load("euler_top"), ["a1"])
@@ -41,7 +41,7 @@ class Laboratory:
             raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
         if self.eps is not None and "eps" in symbols:
             raise InputError("found eps both as a number and as a symbol, expected one of the two")
-        self.system = ParametricSystem.of(file, self.symbols)
+        self.system = with_symbols(file, self.symbols)
         self.seed = seed_for(seed, self.symbols, self.system.rhs, self.eps)  # of all that is drawn for this system
         rng = random.Random(f"laboratory {self.seed}")
         self.maps: list[ModularMap] = []

@@ -10,9 +10,9 @@ from flint import nmod_mat
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import monomials
-from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.errors import KahanmapsError, SingularStep
 from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 Point = tuple[int, ...]
 _TRIES = 60
@@ -29,7 +29,7 @@ class ModularMap:
     """
 
     def __init__(
-        self, system: ParametricSystem, prime: int, eps: int, values: Sequence[int] = (), seed: int = 0
+        self, system: QuadraticSystem, prime: int, eps: int, values: Sequence[int] = (), seed: int = 0
     ) -> None:
         self.prime = prime
         self.eps = eps

@@ -20,7 +20,7 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.fields import GF, QQ, rational
+from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import ring
@@ -38,9 +38,11 @@ from kahanmaps.laboratory.fates import (
     Range,
     fate_of,
     fates_at_random,
+    untold,
     unwritten,
 )
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -124,7 +126,7 @@ class SingularityRun(Displayed):
 
 
 def singularities(
-    system: QuadraticSystem,
+    system: QuadraticSystem | BirationalMap,
     eps: Any,
     *,
     steps: int | None = None,
@@ -145,24 +147,24 @@ def singularities(
     >>> run.denominator, run.verdict
     ('-9/100*x + 11/100*y + 99/100', 'not confined')
     """
-    exact_eps = rational(eps)
-    if system.dim > MAX_DIMENSION:
-        raise InputError(f"found a system of dimension {system.dim}, expected at most {MAX_DIMENSION}")
-    most = _most_digits(system.dim, seconds)
-    if (digits := _digits(system, exact_eps)) > most:
+    map_, exact_eps = as_map(system), rational(eps)
+    if map_.dim > MAX_DIMENSION:
+        raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
+    most = _most_digits(map_.dim, seconds)
+    if (digits := _digits(map_, exact_eps)) > most:
         raise InputError(
             f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
-            f"in dimension {system.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
+            f"in dimension {map_.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
         )
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
-    limits = _range(system.dim, steps, time.monotonic() + seconds)
-    forms, common = homogeneous_map(system, exact_eps, QQ)
+    limits = _range(map_.dim, steps, time.monotonic() + seconds)
+    forms, common = homogeneous_map(map_.at(exact_eps))
     degree = max(int(form.total_degree()) for form in forms)
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
-    denominator = _affine(forms[-1] * common * (-1) ** system.dim, system)
+    denominator = _affine(forms[-1] * common * (-1) ** map_.dim, map_)
     is_undefined = bool(forms[-1].is_zero())  # det(I - eps f'(x)) = 0 for all x
-    if is_undefined or not _is_dominant(system, exact_eps):
+    if is_undefined or not _is_dominant(map_, exact_eps):
         return SingularityRun(exact_eps, denominator, degree, None, (), False, is_undefined, False)
     factors: dict[str, tuple[fmpq_mpoly, bool, int | None]] = {}
     for factor, _ in (forms[-1] * common).factor()[1]:
@@ -181,18 +183,21 @@ def singularities(
             for factor, multiplicity in critical.factor()[1]:
                 pole = factors.get(str(factor), (factor, False, 0))[1]
                 factors[str(factor)] = (factor, pole, int(multiplicity))
-    rng = random.Random(f"singularities {seed_for(seed, system.rhs, exact_eps)}")
+    rng = random.Random(f"singularities {seed_for(seed, map_.subject, exact_eps)}")
     found, stopped = [], False
     for factor, pole, multiplicity in factors.values():
         if limits.is_over:
             stopped = True
             break
-        text = "Z" if _is_infinity(factor) else _affine(factor, system)
+        text = "Z" if _is_infinity(factor) else _affine(factor, map_)
         progress(f"following {text[:40]}")
-        found.append(fate_of(system, exact_eps, factor, text, pole, multiplicity, rng, limits))
+        found.append(fate_of(map_, exact_eps, factor, text, pole, multiplicity, rng, limits))
     if critical_degree is None and not stopped:
         progress("following critical points")
-        found += unwritten(system, exact_eps, rng, limits)
+        if map_.at(exact_eps).equation.degree == 1:
+            found += unwritten(map_, exact_eps, rng, limits)
+        else:
+            found.append(untold("the hypersurfaces that this map contracts are too large to be written down"))
         stopped = limits.is_over
     return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
 
@@ -254,39 +259,47 @@ def patterns_of(runs: Sequence[SingularityRun]) -> Patterns:
 
 
 def patterns(
-    system: QuadraticSystem, eps: fmpq | None, *, steps: int | None = None, seed: int = 0, seconds: float = 60.0
+    system: QuadraticSystem | BirationalMap,
+    eps: fmpq | None,
+    *,
+    steps: int | None = None,
+    seed: int = 0,
+    seconds: float = 60.0,
 ) -> Patterns:
     """The patterns of the Kahan map at one exact eps (half the time step) or, where none is given, at two.
 
     Up to dimension 4 those of `singularities`; above it, and for an eps too long for formulas, random points stand for
     hypersurfaces.
     """
+    map_ = as_map(system)
     end = time.monotonic() + seconds
     found = _unknown("")
     for again in range(_DRAWS if eps is None else 1):
         if again and (not found.running or time.monotonic() > end):
             break
-        values = default_eps(system, seed + again) if eps is None else (eps,)
+        values = default_eps(map_, seed + again) if eps is None else (eps,)
         part = max(0.0, end - time.monotonic()) / len(values)
-        if system.dim <= WRITTEN_DIMENSION and all(can_be_written(system, value, part) for value in values):
-            runs = [singularities(system, value, steps=steps, seed=seed, seconds=part) for value in values]
+        if map_.dim <= WRITTEN_DIMENSION and all(can_be_written(map_, value, part) for value in values):
+            runs = [singularities(map_, value, steps=steps, seed=seed, seconds=part) for value in values]
             found = patterns_of(runs)
         else:
-            found = _one_of({_at_random(system, value, steps, seed, part) for value in values})
+            found = _one_of({_at_random(map_, value, steps, seed, part) for value in values})
     return found
 
 
-def _at_random(system: QuadraticSystem, eps: fmpq, steps: int | None, seed: int, seconds: float) -> Patterns:
-    limits = _range(system.dim, steps, time.monotonic() + seconds)
+def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, seconds: float) -> Patterns:
+    limits = _range(map_.dim, steps, time.monotonic() + seconds)
     limits = replace(limits, shown=min(limits.shown, FIRST_STEPS), briefly=True)
-    if not _is_dominant(system, eps):
+    if not _is_dominant(map_, eps):
         return _refused(eps, False, False) or _unknown("")
-    found = fates_at_random(system, eps, random.Random(f"patterns {seed_for(seed, system.rhs, eps)}"), limits)
+    if map_.at(eps).equation.degree > 1:
+        return _unknown(f"the singularities of a {map_.title} are followed in dimension {WRITTEN_DIMENSION} at most")
+    found = fates_at_random(map_, eps, random.Random(f"patterns {seed_for(seed, map_.subject, eps)}"), limits)
     return _refused(eps, True, limits.is_over) or _patterns(found)
 
 
-def _digits(system: QuadraticSystem, eps: fmpq) -> int:
-    return int(max(eps.p.bit_length(), eps.q.bit_length()) * 0.30103) + 1 + system.digits
+def _digits(map_: BirationalMap, eps: fmpq) -> int:
+    return int(max(eps.p.bit_length(), eps.q.bit_length()) * 0.30103) + 1 + map_.digits
 
 
 def _most_digits(dim: int, seconds: float) -> int:
@@ -294,9 +307,10 @@ def _most_digits(dim: int, seconds: float) -> int:
     return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_A_SECOND[dim] * min(seconds, MAX_DIGITS))))
 
 
-def can_be_written(system: QuadraticSystem, eps: fmpq, seconds: float) -> bool:
-    """Whether `singularities` takes a system and eps."""
-    return system.dim <= MAX_DIMENSION and _digits(system, eps) <= _most_digits(system.dim, seconds)
+def can_be_written(system: QuadraticSystem | BirationalMap, eps: fmpq, seconds: float) -> bool:
+    """Whether `singularities` takes a map and eps."""
+    map_ = as_map(system)
+    return map_.dim <= MAX_DIMENSION and _digits(map_, eps) <= _most_digits(map_.dim, seconds)
 
 
 def _one_of(several: set[Patterns]) -> Patterns:
@@ -337,46 +351,35 @@ def _range(dim: int, steps: int | None, end: float) -> Range:
     return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, steps or _ALONG.get(dim, _LEAST_ALONG), end)
 
 
-def symbolic_denominator(system: QuadraticSystem) -> list[tuple[str, int]] | None:
-    """The irreducible factors over Q of det(I - eps f'(x)) as a polynomial in x and eps, with multiplicities; exact.
+def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[str, int]] | None:
+    """The irreducible factors over Q of det M(x), for Kahan maps det(I - eps f'(x)), in x and eps, with multiplicities.
 
-    None above dimension 4, where it may be long, and where a variable is called eps.
+    Exact. None above dimension 4, where it may be long, and where a variable is called eps.
 
     >>> symbolic_denominator(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]))
     [('12*x*eps^2 - 1', 1)]
     """
-    n = system.dim
-    if n > 4 or "eps" in system.variables:
+    map_ = as_map(system)
+    if map_.dim > 4 or "eps" in map_.variables:
         return None
-    context = ring((*system.variables, "eps"))
-    x, eps = context.gens()[:-1], context.gens()[-1]
-    local = system.over(QQ)
-    rows = []
-    for i in range(n):
-        row = []
-        for j in range(n):
-            entry = context.constant(local.B[i, j])
-            for k in range(n):
-                entry = entry + x[k] * local.tensor[i * n + j, k]
-            row.append(context.constant(int(i == j)) - eps * entry)
-        rows.append([*row, context.constant(0)])
+    rows = [[*row, row[0] * 0] for row in map_.matrix]
     return [(format_polynomial(factor), int(power)) for factor, power in kernel_minors(rows)[-1].factor()[1]]
 
 
-def default_eps(system: QuadraticSystem, seed: int) -> tuple[fmpq, fmpq]:
+def default_eps(system: QuadraticSystem | BirationalMap, seed: int) -> tuple[fmpq, fmpq]:
     """Two different rational numbers of small height, the same ones for the same system and seed."""
-    rng = random.Random(f"singularities eps {seed_for(seed, system.rhs)}")
+    rng = random.Random(f"singularities eps {seed_for(seed, as_map(system).subject)}")
     first = fmpq(rng.randint(2, 9), 11)
     return first, fmpq(rng.randint(2, 11), 13)
 
 
-def _is_dominant(system: QuadraticSystem, eps: fmpq) -> bool:
+def _is_dominant(map_: BirationalMap, eps: fmpq) -> bool:
     """Whether det dPhi is not 0 at one of a few points: proved where it is, and false otherwise as good as never."""
-    rng = random.Random(f"dominant {seed_for(0, system.rhs, eps)}")
+    rng = random.Random(f"dominant {seed_for(0, map_.subject, eps)}")
     for _ in range(_POINTS):
         field = GF(random_prime(rng))  # what is not 0 there is not 0 over Q
         try:
-            if det(KahanMap(system, eps, field).jacobian([rng.randrange(field.prime) for _ in range(system.dim)])) != 0:
+            if det(map_.at(eps, field).jacobian([rng.randrange(field.prime) for _ in range(map_.dim)])) != 0:
                 return True
         except (SingularStep, BadPrime):
             continue
@@ -396,7 +399,7 @@ def _is_infinity(factor: Any) -> bool:
     return len(factor) == 1 and all(exponent == 0 for exponent in factor.monoms()[0][:-1])
 
 
-def _affine(form: Any, system: QuadraticSystem) -> str:
+def _affine(form: Any, map_: BirationalMap) -> str:
     """The form at Z = 1 in the variables of the system, as text."""
-    context = ring(system.variables)
+    context = ring(map_.variables)
     return format_polynomial(context.from_dict({tuple(m)[:-1]: c for m, c in form.terms()}))

@@ -16,7 +16,7 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.documents.parametric import ParametricSystem
+from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
 
 # The closed form of the map, all components together, before common factors are removed.
@@ -47,7 +47,7 @@ class Formulas:
         if not kept:
             H = None if hamiltonian is None else hamiltonian.H
             return cls(file, file.variables, (), file.system.rhs, file.integrals, file.density, H)
-        parametric = ParametricSystem.of(file, kept)
+        parametric = with_symbols(file, kept)
         symbols, names = parametric.symbols, (*parametric.variables, *parametric.symbols)
         constants = {name: value for name, value in file.parameters.items() if name not in symbols}
         document = file.document

@@ -31,9 +31,10 @@ from kahanmaps.maps.float_ensemble import (
     end_of,
     require_every,
 )
-from kahanmaps.maps.float_numbers import FloatArray, exact, to_float, to_floats
+from kahanmaps.maps.float_numbers import FloatArray, to_float, to_floats
 from kahanmaps.maps.float_steps import RUNNING
 from kahanmaps.maps.float_stream import NpyFile
+from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.orbits import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -41,47 +42,12 @@ __all__ = [
     "Drift",
     "FloatArray",
     "FloatEnsemble",
-    "FloatKahanMap",
     "FloatOrbit",
     "float_function",
     "stream_orbit",
     "to_float",
     "to_floats",
 ]
-
-
-class FloatKahanMap:
-    """Phi(., eps) in double precision, one linear solve by LAPACK a step; the time step is 2 eps."""
-
-    def __init__(self, system: QuadraticSystem, eps: Any) -> None:
-        n = system.dim
-        self.system = system
-        self.eps = to_float(rational(eps))
-        if self.eps == 0.0:
-            raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
-        forms = [2 * entry for form in system.Q for entry in form.entries()]
-        with np.errstate(all="ignore"):
-            self._tensor = to_floats(forms).reshape(n, n, n) * self.eps
-            self._linear = to_floats(system.B.entries()).reshape(n, n) * self.eps
-            self._constant = to_floats(system.c) * (2 * self.eps)
-        if not all(np.isfinite(part).all() for part in (self._tensor, self._linear, self._constant)):
-            raise InputError("eps times a coefficient leaves the range of machine floats: use exact arithmetic")
-        self._identity = np.eye(n)
-
-    @property
-    def inverse(self) -> FloatKahanMap:
-        """The inverse map, Phi(., -eps)."""
-        return FloatKahanMap(self.system, exact(-self.eps))
-
-    def step(self, x: FloatArray) -> FloatArray | None:
-        """The image, or None where the matrix I - eps f'(x) is singular in machine numbers."""
-        matrix = self._identity - self._tensor @ x - self._linear
-        right = x + self._linear @ x + self._constant
-        try:
-            image: FloatArray = np.linalg.solve(matrix, right).astype(np.float64, copy=False)
-            return image
-        except np.linalg.LinAlgError:
-            return None
 
 
 class FloatOrbit:
@@ -103,7 +69,7 @@ class FloatOrbit:
 
     def __init__(
         self,
-        system: QuadraticSystem,
+        system: QuadraticSystem | BirationalMap,
         eps: Any,
         start: Sequence[Any],
         steps: int | None,
@@ -122,8 +88,6 @@ class FloatOrbit:
                 f"found a point with {len(start)} coordinates, expected {system.dim}: {', '.join(system.variables)}"
             )
         epsilon = rational(eps)
-        forward = FloatKahanMap(system, epsilon)
-        self.map = forward.inverse if backward else forward
         self.start = to_floats(start)
         self.steps = steps
         self.every = every
@@ -132,7 +96,8 @@ class FloatOrbit:
         self.end: OrbitEnd | None = None
         self._stepping = Stepping(
             system,
-            -epsilon if backward else epsilon,
+            epsilon,
+            backward=backward,
             form=form,
             kernel=kernel,
             long=steps is None or steps > _LONG,
@@ -208,7 +173,7 @@ class FloatOrbit:
             yield step, x[:, 0]
             if ahead:
                 rows = min(2 * rows, ahead)
-        self.end = end_of(lanes, 0, step, self.backward)
+        self.end = end_of(lanes, 0, step, stepping.matrix_name)
 
 
 _LONG = 100_000  # steps, from which on loading compiled code pays
@@ -216,7 +181,7 @@ _AHEAD = 4096  # points
 
 
 class _Floats:
-    """Machine numbers, as far as evaluating a rational function needs a field."""
+    """Machine numbers, as far as evaluating a rational function, and printing a point, need a field."""
 
     zero = 0.0
     one = 1.0
@@ -231,8 +196,15 @@ class _Floats:
         return value == 0.0
 
     @staticmethod
+    def format(value: float) -> str:
+        return repr(value)
+
+    @staticmethod
     def working() -> AbstractContextManager[None]:
         return nullcontext()
+
+
+FLOATS: Any = _Floats()
 
 
 def float_function(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:

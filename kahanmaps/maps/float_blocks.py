@@ -36,8 +36,9 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.float_numbers import FloatArray
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
-from kahanmaps.systems.quadratic import QuadraticSystem
 
 LINES, CUBES, GENERAL = 0, 1, 2  # kinds of block
 
@@ -104,10 +105,10 @@ def planar_blocks(form: NormalForm, eps: Any) -> PlanarBlocks:
     raise InputError(f"the normal form needs more than {_BITS[-1]} bits: its coefficients are too long for doubles")
 
 
-def require_same_system(form: NormalForm, system: QuadraticSystem) -> None:
-    """Raises InputError where the normal form is that of another system."""
+def require_same_system(form: NormalForm, map_: BirationalMap) -> None:
+    """Raises InputError where the normal form is that of another map."""
     theirs = CubicHamiltonian(form.H, standard_structure(form.dim)).system
-    if (theirs.Q, theirs.B, theirs.c) != (system.Q, system.B, system.c):
+    if not isinstance(map_, Kahan) or theirs.dim != map_.dim or theirs.renamed(map_.variables) != map_.system:
         raise InputError(
             "the normal form belongs to another system: take normal_form(member) of the member that gave it"
         )

@@ -34,6 +34,8 @@ from kahanmaps.maps.float_steps import (
     generic_equation,
 )
 from kahanmaps.maps.float_stream import NpyFile
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.orbits import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -72,16 +74,19 @@ class Engine(Protocol):
 
 
 class Stepping:
-    """A system, eps and a method, with the kernel that advances lanes: what orbits and ensembles are made of.
+    """A map, eps and a method, with the kernel that advances lanes: what orbits and ensembles are made of.
+
+    A system stands for its Kahan map.
 
     `kernel` is "numpy", "numba" or None: numba if it is installed and `long` says that compiling pays.
     """
 
     def __init__(
         self,
-        system: QuadraticSystem,
+        system: QuadraticSystem | BirationalMap,
         eps: fmpq,
         *,
+        backward: bool = False,
         form: NormalForm | None = None,
         kernel: str | None = None,
         threads: int | None = 1,
@@ -95,29 +100,32 @@ class Stepping:
             raise InputError("the kernel numba needs numba: pip install 'kahanmaps[fast]'")
         if threads is not None and threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
-        self.system = system
+        map_ = as_map(system)
+        map_over = map_.at(eps)
+        self._map = map_over.inverse if backward else map_over
+        self.matrix_name = map_over.denominator_name(backward)
         self.dim = system.dim
         self.blocks: PlanarBlocks | None = None
         if form is not None:
-            require_same_system(form, system)
-            self.blocks = planar_blocks(form, eps)
+            require_same_system(form, map_)
+            self.blocks = planar_blocks(form, -eps if backward else eps)
         compiled = kernel == "numba" or (kernel is None and long and has_numba())
         self.compiled = compiled
         self.threads = (threads or _cores()) if compiled else 1
         method = "generic" if form is None else "normal form"
         self.name = f"numba {method}, {counted(self.threads, 'thread')}" if compiled else f"numpy {method}"
-        self._engine = self._made(eps)
+        self._engine = self._made()
 
-    def _made(self, eps: fmpq) -> Engine:
+    def _made(self) -> Engine:
         if self.compiled:
             from kahanmaps.maps.float_numba import GenericNumba, PlanarNumba
 
             if self.blocks is not None:
                 return PlanarNumba(self.blocks, self.threads)
-            return GenericNumba(generic_equation(self.system, eps), self.threads)
+            return GenericNumba(generic_equation(self._map), self.threads)
         from kahanmaps.maps.float_numpy import GenericNumpy, PlanarNumpy
 
-        return PlanarNumpy(self.blocks) if self.blocks is not None else GenericNumpy(generic_equation(self.system, eps))
+        return PlanarNumpy(self.blocks) if self.blocks is not None else GenericNumpy(generic_equation(self._map))
 
     def lanes(self, starts: FloatArray) -> Lanes:
         """Lanes at the starts, an array (n, dim) of finite numbers."""
@@ -188,7 +196,7 @@ class FloatEnsemble:
 
     def __init__(
         self,
-        system: QuadraticSystem,
+        system: QuadraticSystem | BirationalMap,
         eps: Any,
         starts: Any,
         *,
@@ -203,7 +211,7 @@ class FloatEnsemble:
         if sampled < 1:
             raise InputError(f"found a sample every {sampled} steps, expected at least 1")
         self._starts = _points(starts, system)
-        self._stepping = Stepping(system, -epsilon if backward else epsilon, form=form, kernel=kernel, threads=threads)
+        self._stepping = Stepping(system, epsilon, backward=backward, form=form, kernel=kernel, threads=threads)
         self._lanes = self._stepping.lanes(self._starts)
         self._watched = [Watched(name, function, self._starts) for name, function in (integrals or {}).items()]
         self._sampled = sampled
@@ -259,7 +267,7 @@ class FloatEnsemble:
 
     def end(self, orbit: int) -> OrbitEnd:
         """How one orbit stands, in the words of single orbits."""
-        return end_of(self._lanes, orbit, self.step, self.backward)
+        return end_of(self._lanes, orbit, self.step, self._stepping.matrix_name)
 
     def interrupt(self) -> None:
         """Ask `advance` or `run` to return after the portion in hand (safe to call from a signal handler)."""
@@ -384,14 +392,13 @@ def block_drifts(stepping: Stepping, lanes: Lanes) -> Iterator[Drift]:
         yield Drift(f"h/(1 + eps^2 D) at t = {label}", initial, largest[r], now[r])
 
 
-def end_of(lanes: Lanes, orbit: int, step: int, backward: bool) -> OrbitEnd:
-    """How an orbit that has been asked for `step` steps stands."""
+def end_of(lanes: Lanes, orbit: int, step: int, matrix: str) -> OrbitEnd:
+    """How an orbit that has been asked for `step` steps stands; `matrix` is the name of that of the equation."""
     code, last = int(lanes.status[orbit]), int(lanes.failed_at[orbit]) - 1
     if code == RUNNING:
         return OrbitEnd("completed", step, counted(step, "step"))
     if code == SINGULAR:
-        sign = "+" if backward else "-"
-        return OrbitEnd("singular", last, f"I {sign} eps f'(x) is singular in machine numbers at step {last}")
+        return OrbitEnd("singular", last, f"{matrix} is singular in machine numbers at step {last}")
     return OrbitEnd("overflow", last, f"step {last + 1} leaves the range of machine floats")
 
 
@@ -417,7 +424,7 @@ def _cores() -> int:
         return os.cpu_count() or 1
 
 
-def _points(starts: Any, system: QuadraticSystem) -> FloatArray:
+def _points(starts: Any, system: QuadraticSystem | BirationalMap) -> FloatArray:
     if isinstance(starts, np.ndarray) and starts.dtype.kind in "fiu":
         points = np.array(starts, dtype=np.float64, order="C")
     else:

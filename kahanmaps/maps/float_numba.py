@@ -465,32 +465,31 @@ def _alone(
     first: Any,
     columns: Any,
     factors: Any,
-    linear: Any,
-    shift: Any,
+    products: Any,
     M: Any,
     right: Any,
     sizes: Any,
 ) -> Any:
     """float_steps.PythonGeneric.step: the image of x into `right`; its status, and whether it was near-singular."""
-    n = len(shift)
+    n = len(constants)
     near = 0
     scale = 1.0
+    for t in range(len(products)):
+        x[n + t] = x[products[t, 0]] * x[products[t, 1]]
     for i in range(n):
         sizes[i] = 1.0
-        for j in range(n):
+        for j in range(n + 1):
             total = constants[i, j]
-            for t in range(first[i * n + j], first[i * n + j + 1]):
-                total -= factors[t] * x[columns[t]]
+            for t in range(first[i * (n + 1) + j], first[i * (n + 1) + j + 1]):
+                total += factors[t] * x[columns[t]]
+            if j == n:
+                right[i] = total
+                continue
             M[i, j] = total
             if abs(total) > sizes[i]:
                 sizes[i] = abs(total)
         if sizes[i] > scale:
             scale = sizes[i]
-        total = x[i] + shift[i]
-        for j in range(n):
-            if linear[i, j] != 0.0:
-                total += linear[i, j] * x[j]
-        right[i] = total
     if not scale <= LARGEST:
         return OVERFLOW, near
     for p in range(n):
@@ -529,8 +528,7 @@ def _together(
     first: Any,
     columns: Any,
     factors: Any,
-    linear: Any,
-    shift: Any,
+    products: Any,
     M: Any,
     right: Any,
     scale: Any,
@@ -544,20 +542,24 @@ def _together(
     compiler would have to test too many pairs of them for overlap. For the same reason the number of lanes is a
     constant.
     """
-    n = len(shift)
+    n = len(constants)
     for l in range(_GENERIC_WIDTH):
         scale[l] = 1.0
         fine[l] = 1.0
+    for t in range(len(products)):
+        target, A, B = x[n + t], x[products[t, 0]], x[products[t, 1]]
+        for l in range(_GENERIC_WIDTH):
+            target[l] = A[l] * B[l]
     for i in range(n):
-        for j in range(n):
+        for j in range(n + 1):
             entry = M[i * (n + 1) + j]
-            t, end = first[i * n + j], first[i * n + j + 1]
+            t, end = first[i * (n + 1) + j], first[i * (n + 1) + j + 1]
             constant = constants[i, j]
             if end - t >= 3:
                 a, b, c = factors[t], factors[t + 1], factors[t + 2]
                 A, B, C = x[columns[t]], x[columns[t + 1]], x[columns[t + 2]]
                 for l in range(_GENERIC_WIDTH):
-                    entry[l] = ((constant - a * A[l]) - b * B[l]) - c * C[l]
+                    entry[l] = ((constant + a * A[l]) + b * B[l]) + c * C[l]
                 t += 3
             else:
                 for l in range(_GENERIC_WIDTH):
@@ -566,13 +568,13 @@ def _together(
                 a, b, c = factors[t], factors[t + 1], factors[t + 2]
                 A, B, C = x[columns[t]], x[columns[t + 1]], x[columns[t + 2]]
                 for l in range(_GENERIC_WIDTH):
-                    entry[l] = ((entry[l] - a * A[l]) - b * B[l]) - c * C[l]
+                    entry[l] = ((entry[l] + a * A[l]) + b * B[l]) + c * C[l]
                 t += 3
-            if end - t == 3:
+            if end - t == 3 and j < n:
                 a, b, c = factors[t], factors[t + 1], factors[t + 2]
                 A, B, C = x[columns[t]], x[columns[t + 1]], x[columns[t + 2]]
                 for l in range(_GENERIC_WIDTH):
-                    total = ((entry[l] - a * A[l]) - b * B[l]) - c * C[l]
+                    total = ((entry[l] + a * A[l]) + b * B[l]) + c * C[l]
                     entry[l] = total
                     scale[l] = abs(total) if abs(total) > scale[l] else scale[l]
                 continue
@@ -580,19 +582,11 @@ def _together(
                 a = factors[t]
                 A = x[columns[t]]
                 for l in range(_GENERIC_WIDTH):
-                    entry[l] -= a * A[l]
+                    entry[l] += a * A[l]
                 t += 1
-            for l in range(_GENERIC_WIDTH):
-                scale[l] = abs(entry[l]) if abs(entry[l]) > scale[l] else scale[l]
-        target, source, constant = M[i * (n + 1) + n], x[i], shift[i]
-        for l in range(_GENERIC_WIDTH):
-            target[l] = source[l] + constant
-        for j in range(n):
-            a = linear[i, j]
-            if a != 0.0:
-                A = x[j]
+            if j < n:
                 for l in range(_GENERIC_WIDTH):
-                    target[l] += a * A[l]
+                    scale[l] = abs(entry[l]) if abs(entry[l]) > scale[l] else scale[l]
     for p in range(n):
         pivot = M[p * (n + 1) + p]
         for i in range(p + 1, n):
@@ -654,8 +648,7 @@ def _generic_kernel(stamp: int) -> Any:
         terms: Any,
         columns: Any,
         factors: Any,
-        linear: Any,
-        shift: Any,
+        products: Any,
         first: int,
         steps: int,
         every: int,
@@ -674,7 +667,7 @@ def _generic_kernel(stamp: int) -> Any:
         n = z.shape[0]
         wide = len(fine)
         few = wide == 1
-        x_alone = np.zeros(n)
+        x_alone = np.zeros(n + len(products))
         M_alone = np.zeros((n, n))
         right_alone = np.zeros(n)
         sizes = np.ones(n)
@@ -689,9 +682,7 @@ def _generic_kernel(stamp: int) -> Any:
                 if few:
                     fine[0] = 0.0
                 else:
-                    good = _together(
-                        x, constants, terms, columns, factors, linear, shift, M, right, scale, inverse, fine
-                    )
+                    good = _together(x, constants, terms, columns, factors, products, M, right, scale, inverse, fine)
                 if not good:
                     for i in range(width):
                         if fine[i] != 0.0:
@@ -701,7 +692,7 @@ def _generic_kernel(stamp: int) -> Any:
                             for j in range(n):
                                 x_alone[j] = x[j, i]
                             failed, close = _alone(
-                                x_alone, constants, terms, columns, factors, linear, shift, M_alone, right_alone, sizes
+                                x_alone, constants, terms, columns, factors, products, M_alone, right_alone, sizes
                             )
                             if failed != RUNNING:
                                 status[at + i] = failed
@@ -801,7 +792,7 @@ class PlanarNumba:
 
 
 class GenericNumba:
-    """Advances lanes of any quadratic system."""
+    """Advances lanes of any map."""
 
     def __init__(self, equation: GenericEquation, threads: int) -> None:
         self.equation = equation
@@ -825,8 +816,7 @@ class GenericNumba:
                 equation.first,
                 equation.columns,
                 equation.factors,
-                equation.linear,
-                equation.shift,
+                equation.products,
                 first,
                 steps,
                 every if record is not None else 0,
@@ -835,9 +825,9 @@ class GenericNumba:
                 lanes.failed_at,
                 lanes.near,
                 lanes.near_at,
-                _aligned(n, wide),
+                _aligned(n + len(equation.products), wide),
                 _aligned(n * (n + 1), wide),
-                _aligned(n, wide),
+                _aligned(n + len(equation.products), wide),
                 _aligned(1, wide)[0],
                 _aligned(1, wide)[0],
                 _aligned(1, wide)[0],

@@ -167,7 +167,7 @@ def _cubes(U: Any, V: Any, p: Any, q: Any, g: Any, w: Any, i: Any) -> None:
 
 
 class GenericNumpy:
-    """Advances lanes of any quadratic system."""
+    """Advances lanes of any map."""
 
     def __init__(self, equation: GenericEquation) -> None:
         self.equation = equation
@@ -175,11 +175,11 @@ class GenericNumpy:
         # Beyond some hundred terms even one lane is faster in arrays, which are then matrices.
         self.few = _FEW_GENERIC if len(equation.factors) + equation.rows**3 // 3 < 1000 else 0
         n = equation.rows
-        terms = np.zeros((n, n * n))
-        for entry in range(n * n):
+        terms = np.zeros((n + len(equation.products), n * (n + 1)))
+        for entry in range(n * (n + 1)):
             for t in range(equation.first[entry], equation.first[entry + 1]):
                 terms[equation.columns[t], entry] = equation.factors[t]
-        self._terms = terms.reshape(n, n, n, 1)  # by k, i, j
+        self._terms = terms.reshape(-1, n, n + 1, 1)  # by k, i, j
 
     def advance(
         self, lanes: Lanes, first: int, steps: int, every: int, sampled: int, record: FloatArray | None
@@ -199,15 +199,14 @@ class GenericNumpy:
     def _step(self, lanes: Lanes, lo: int, hi: int, index: int) -> None:
         equation, x = self.equation, lanes.z[:, lo:hi].copy()
         n = equation.rows
-        matrix = np.repeat(equation.constants[:, :, None], x.shape[1], axis=2)
-        product = np.empty_like(matrix)
-        for k in range(n):
-            matrix -= np.multiply(self._terms[k], x[k], out=product)
-        right = x + equation.shift[:, None]
-        for j in range(n):
-            column = equation.linear[:, j]
-            if column.any():
-                right += column[:, None] * x[j]
+        y = list(x)
+        for a, b in equation.products:
+            y.append(y[a] * y[b])
+        full = np.repeat(equation.constants[:, :, None], x.shape[1], axis=2)
+        product = np.empty_like(full)
+        for terms, value in zip(self._terms, y, strict=True):
+            full += np.multiply(terms, value, out=product)
+        matrix, right = full[:, :n], full[:, n].copy()
         # At least the row of the pivot, by which the single step judges: what may be near-singular is done again there.
         scale = np.fmax(np.fmax.reduce(np.abs(matrix).reshape(n * n, -1), axis=0), 1.0)
         good = np.ones(x.shape[1], dtype=bool)

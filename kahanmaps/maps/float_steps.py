@@ -13,11 +13,12 @@ at a complex root |w|^2 <= 2^-80 (1 + |A C|^2): then at most 13 of the 53 bits o
 counted, one for each block, and the orbit goes on. It ends *singular* where w is 0, and as an *overflow* where w or a
 coordinate of the image is no finite number.
 
-The generic step eliminates in the matrix I - eps f'(x). Going down a column, a row whose entry is more than 8 times
-the pivot found so far becomes the pivot row; so no row is subtracted more than 8 times from another, and where eps
-f'(x) is small no rows are exchanged. Such a step is near-singular if a pivot is at most 2^-40 of the largest of 1 and
-the entries of its row, as it was in the beginning. The orbit ends *singular* where a pivot is 0, and as an *overflow*
-where an entry, a pivot or a coordinate of the image is no finite number.
+The generic step, for any map, eliminates in the matrix M(x), which is I - eps f'(x) for Kahan maps. Going down a
+column, a row whose entry is more than 8 times the pivot found so far becomes the pivot row; so no row is subtracted
+more than 8 times from another, and where eps f'(x) is small no rows are exchanged. Such a step is near-singular if a
+pivot is at most 2^-40 of the largest of 1 and the entries of its row, as it was in the beginning. The orbit ends
+*singular* where a pivot is 0, and as an *overflow* where an entry, a pivot or a coordinate of the image is no finite
+number.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ from numpy.typing import NDArray
 from kahanmaps.errors import InputError
 from kahanmaps.maps.float_blocks import LINES, PlanarBlocks
 from kahanmaps.maps.float_numbers import FloatArray
-from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.kahan import KahanMapOver
 
 IntArray = NDArray[np.int64]
 
@@ -169,45 +171,69 @@ def complex_integral(Ur: Any, Ui: Any, Vr: Any, Vi: Any, k: Any, kappa_r: Any, k
 
 @dataclass(frozen=True, eq=False)
 class GenericEquation:
-    """(I - eps f'(x)) x~ = (I + eps B) x + 2 eps c in doubles, with the terms that are there.
+    """The equation M(x) x~ = r(x) in doubles, with the terms that are there; r is the last column of (M | r).
 
-    Entry (i, j) of the matrix is `constants[i, j]` minus the sum of `factors[t] x[columns[t]]` over
-    `first[i n + j] <= t < first[i n + j + 1]`; the right-hand side is x + `linear` x + `shift`.
+    Entry (i, j) is `constants[i, j]` plus the sum of `factors[t] y[columns[t]]` over
+    `first[i (n + 1) + j] <= t < first[i (n + 1) + j + 1]`, where y is x and behind it y[a] y[b] for every pair (a, b)
+    of `products`.
     """
 
     constants: FloatArray
     first: IntArray
     columns: IntArray
     factors: FloatArray
-    linear: FloatArray
-    shift: FloatArray
+    products: IntArray
 
     @property
     def rows(self) -> int:
         """The dimension."""
-        return len(self.shift)
+        return len(self.constants)
 
 
-def generic_equation(system: QuadraticSystem, eps: fmpq) -> GenericEquation:
-    """The equation of one step; each number is rounded once. Raises InputError where one is out of range."""
-    n = system.dim
+def generic_equation(map_over: MapOver) -> GenericEquation:
+    """The equation of a step of a map over QQ, each number rounded once. Raises InputError where one is out of range.
+
+    A row of a Kahan map is of the size of 1 where eps is small, that of another map is divided by its largest
+    coefficient in M: near-singular steps are told by the size of pivots.
+    """
+    equation = map_over.equation
+    n = equation.dim
+    index: dict[tuple[int, ...], int] = {tuple(int(i == k) for i in range(n)): k for k in range(n)}
+    products: list[tuple[int, int]] = []
+
+    def place(exponent: tuple[int, ...]) -> int:
+        """Where the value of a monomial stands in y."""
+        if exponent not in index:
+            last = max(k for k, e in enumerate(exponent) if e)
+            smaller = place((*exponent[:last], exponent[last] - 1, *exponent[last + 1 :]))
+            index[exponent] = n + len(products)
+            products.append((smaller, last))
+        return index[exponent]
+
+    constants = np.zeros((n, n + 1))
     first, columns, factors = [0], [], []
-    for i in range(n):
-        for j in range(n):
-            for k in range(n):
-                entry = system.Q[i][j, k]
-                if entry != 0:
-                    columns.append(k)
-                    factors.append(_nearest(2 * eps * entry))
+    for i, row in enumerate(equation.terms):
+        largest = max((abs(c) for entry in row[:n] for _, c in entry), default=fmpq(1))
+        scale = fmpq(1) if isinstance(map_over, KahanMapOver) else 1 / largest
+        for j, entry in enumerate(row):
+            found = []
+            for k, coefficient in entry:
+                value = _nearest(coefficient * scale if j < n else -coefficient * scale)
+                exponent = equation.exponents[k][:n]
+                if any(exponent):
+                    found.append((place(exponent), value))
+                else:
+                    constants[i, j] = value
+            for column, value in sorted(found):  # the order in which whole arrays are added
+                columns.append(column)
+                factors.append(value)
             first.append(len(columns))
-    B = [[eps * system.B[i, j] for j in range(n)] for i in range(n)]
     return GenericEquation(
-        np.array([[_nearest((i == j) - B[i][j]) for j in range(n)] for i in range(n)], dtype=np.float64),
+        constants,
         np.array(first, dtype=np.int64),
         np.array(columns, dtype=np.int64),
         np.array(factors, dtype=np.float64),
-        np.array([[_nearest(entry) for entry in row] for row in B], dtype=np.float64),
-        np.array([_nearest(2 * eps * entry) for entry in system.c], dtype=np.float64),
+        np.array(products, dtype=np.int64).reshape(-1, 2),
     )
 
 
@@ -389,7 +415,7 @@ _INFINITY = float("inf")
 
 
 class PythonGeneric:
-    """Steps of single lanes of any quadratic system, in Python's own floats."""
+    """Steps of single lanes of any map, in Python's own floats."""
 
     def __init__(self, equation: GenericEquation) -> None:
         n = equation.rows
@@ -397,35 +423,26 @@ class PythonGeneric:
         columns: list[int] = equation.columns.tolist()
         factors: list[float] = equation.factors.tolist()
         constants: list[list[float]] = equation.constants.tolist()
-        linear: list[list[float]] = equation.linear.tolist()
         terms = [list(zip(columns[s:e], factors[s:e], strict=True)) for s, e in pairwise(first)]
-        self._entries = [[(constants[i][j], terms[i * n + j]) for j in range(n)] for i in range(n)]
-        self._linear = [[(j, entry) for j, entry in enumerate(row) if entry] for row in linear]
-        self._shift = equation.shift.tolist()
+        self._entries = [[(constants[i][j], terms[i * (n + 1) + j]) for j in range(n + 1)] for i in range(n)]
+        self._products: list[list[int]] = equation.products.tolist()
 
     def step(self, x: list[float]) -> tuple[list[float], int, int]:
         """The image, the status code and whether the step is near-singular."""
-        return _solved(*self._equation(x))
-
-    def _equation(self, x: list[float]) -> tuple[list[list[float]], list[float], list[float]]:
-        matrix, sizes = [], []
+        y = x if not self._products else [*x]
+        for a, b in self._products:
+            y.append(y[a] * y[b])
+        matrix, right, sizes = [], [], []
         for row in self._entries:
-            entries, size = [], 1.0
+            entries = []
             for total, terms in row:
                 for k, factor in terms:
-                    total -= factor * x[k]
+                    total += factor * y[k]
                 entries.append(total)
-                if abs(total) > size:
-                    size = abs(total)
+            right.append(entries.pop())
             matrix.append(entries)
-            sizes.append(size)
-        right = []
-        for i, entries_of_B in enumerate(self._linear):
-            total = x[i] + self._shift[i]
-            for j, entry in entries_of_B:
-                total += entry * x[j]
-            right.append(total)
-        return matrix, right, sizes
+            sizes.append(max(1.0, *map(abs, entries)))
+        return _solved(matrix, right, sizes)
 
 
 def _solved(matrix: list[list[float]], right: list[float], sizes: list[float]) -> tuple[list[float], int, int]:

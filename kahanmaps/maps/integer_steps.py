@@ -1,11 +1,8 @@
-"""The Kahan map over Q on integer points: numerators over ONE common denominator.
+"""A map over Q on integer points: numerators over ONE common denominator.
 
-A point is x = X / W with integers X and W > 0 without a common factor. With eps = p/q, L a common denominator of the
-system, and F = L f'(X / W) W an integer matrix, the step solves
-
-    (q L W I - p F) x~ = q L X + p (L B) X + 2 p W (L c).
-
-No rational number is formed on the way: a rational constructor runs a gcd that costs more than the rest of the step.
+A point is x = X / W with integers X and W > 0 without a common factor. The equation M(x) x~ = r(x), times a power of W
+and a common denominator of its coefficients, is a linear system with integers that are forms of (X, W). No rational
+number is formed on the way: a rational constructor runs a gcd that costs more than the rest of the step.
 """
 
 from __future__ import annotations
@@ -16,7 +13,8 @@ from functools import lru_cache, partial
 
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 
-from kahanmaps.systems.quadratic import QuadraticSystem
+Exponents = tuple[int, ...]
+Terms = tuple[tuple[int, fmpq], ...]
 
 
 @dataclass(frozen=True)
@@ -62,38 +60,61 @@ class IntegerPoint:
 
 
 class IntegerSteps:
-    """Steps of Phi(., eps) on integer points."""
+    """Steps of the map with the equation (M | -r) on integer points.
 
-    def __init__(self, system: QuadraticSystem, eps: fmpq) -> None:
-        common, tensor, linear, constant = system.integer_form
-        self._dim = system.dim
-        self._numerator, self._scale = eps.p, eps.q * common
-        self._tensor = tensor * -eps.p
-        self._linear = linear * eps.p if not system.is_homogeneous else None
-        self._constant = constant * (2 * eps.p)
+    `exponents` are those of the monomials in (X, W), all of one degree; the rational coefficients of entry (i, j) are
+    the pairs (monomial, coefficient) of `terms[i][j]`.
+    """
+
+    def __init__(self, exponents: Sequence[Exponents], terms: Sequence[Sequence[Terms]]) -> None:
+        n = self._dim = len(terms)
+        self._degree = sum(exponents[0])
+        self._exponents = exponents
+        entries = [fmpz(0)] * (n * (n + 1) * len(exponents))
+        self._scale = fmpz(1)
+        for i, row in enumerate(terms):
+            below = fmpz(1)
+            for entry in row:
+                for _, coefficient in entry:
+                    below = below.lcm(coefficient.q)
+            self._scale *= below
+            for j, entry in enumerate(row):
+                for k, coefficient in entry:
+                    sign = 1 if j < n else -1
+                    entries[(i * (n + 1) + j) * len(exponents) + k] = sign * coefficient.p * (below // coefficient.q)
+        self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
+        self._trials = _TRIALS  # of the elimination that are left; none is counted where it is right
 
     def step(self, point: IntegerPoint) -> IntegerPoint | None:
-        """The image, or None where det(I - eps f'(x)) = 0."""
-        column = fmpz_mat(self._dim, 1, point.numerators)
-        right = column * self._scale
-        if self._linear is not None:
-            right = right + self._linear * column + self._constant * point.denominator
-        return _divide(self._matrix(point), right, point.denominator)
+        """The image, or None where the map has no value."""
+        matrix, right = self._equation(point)
+        if self._trials and _worth_eliminating(matrix, point.denominator):
+            found = _eliminated(matrix, right, point.denominator)
+            if found is not None:
+                return found
+            self._trials -= 1
+        return _solved(matrix, right)
 
     def determinant(self, point: IntegerPoint) -> fmpq:
-        """det(I - eps f'(x))."""
-        return fmpq(self._matrix(point).det(), (self._scale * point.denominator) ** self._dim)
+        """det M(x)."""
+        matrix, _ = self._equation(point)
+        return fmpq(matrix.det(), self._scale * point.denominator ** (self._dim * self._degree))
 
-    def _matrix(self, point: IntegerPoint) -> fmpz_mat:
-        """q L W (I - eps f'(x))."""
-        n, W = self._dim, point.denominator
-        matrix = fmpz_mat(n, n, (self._tensor * fmpz_mat(n, 1, point.numerators)).entries())
-        if self._linear is not None:
-            matrix = matrix - self._linear * W
-        scaled = self._scale * W
-        for i in range(n):
-            matrix[i, i] += scaled
-        return matrix
+    def _equation(self, point: IntegerPoint) -> tuple[fmpz_mat, fmpz_mat]:
+        """W^d M(x) and W^d r(x), each row times a common denominator of its coefficients."""
+        n, X = self._dim, [*point.numerators, point.denominator]
+        if self._degree != 1:
+            X = [_monomial(X, exponent) for exponent in self._exponents]
+        values = fmpz_mat(n, n + 1, (self._forms * fmpz_mat(len(X), 1, X)).entries()).tolist()
+        return fmpz_mat([row[:n] for row in values]), fmpz_mat([[row[n]] for row in values])
+
+
+def _monomial(X: Sequence[fmpz], exponents: Exponents) -> fmpz:
+    total = fmpz(1)
+    for entry, exponent in zip(X, exponents, strict=True):
+        if exponent:
+            total *= entry**exponent
+    return total
 
 
 # Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact.py).
@@ -102,22 +123,30 @@ _ELIMINATION_DIMENSION = 16  # and above this dimension as well
 # A common divisor shorter than this is not worth a division of every entry.
 _USEFUL_BITS = 64
 _PRIME = 2**61 - 1
+_TRIALS = 2  # where minors share nothing with W for good, elimination and what makes it certain are lost time
 
 
-def _divide(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
-    """The solution of matrix x = right in lowest terms; `likely` is an integer whose powers may divide the minors."""
+def _worth_eliminating(matrix: fmpz_mat, likely: fmpz) -> bool:
+    return 3 < matrix.nrows() <= _ELIMINATION_DIMENSION and likely.bit_length() >= _ELIMINATION_BITS
+
+
+def _eliminated(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
+    """The solution of matrix x = right; `likely` is an integer whose powers may divide the minors. None if in doubt.
+
+    The elimination assumes that certain divisions are exact. What makes the result certain is this: it is a
+    solution, and there is no other, since the determinant does not vanish modulo a prime.
+    """
+    found = _eliminate(matrix, right, likely)
+    if found is None or int(nmod_mat(matrix, _PRIME).det()) == 0:
+        return None
+    column = fmpz_mat(right.nrows(), 1, found.numerators)
+    return found if matrix * column == right * found.denominator else None
+
+
+def _solved(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
+    """The solution of matrix x = right in lowest terms; None where the matrix is singular."""
     if matrix.nrows() <= 3:
         return _cramer(matrix, right)
-    if matrix.nrows() <= _ELIMINATION_DIMENSION and likely.bit_length() >= _ELIMINATION_BITS:
-        found = _eliminate(matrix, right, likely)
-        # The elimination assumes that certain divisions are exact. What makes the result certain is this: it is a
-        # solution, and there is no other, since the determinant does not vanish modulo a prime.
-        if (
-            found is not None
-            and matrix * fmpz_mat(right.nrows(), 1, found.numerators) == right * found.denominator
-            and int(nmod_mat(matrix, _PRIME).det()) != 0
-        ):
-            return found
     try:
         solution: fmpq_mat = matrix.solve(right)  # type: ignore[assignment]  # the stub promises less
         column, denominator = solution.numer_denom()

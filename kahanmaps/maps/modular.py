@@ -1,9 +1,9 @@
 """Many orbits modulo a prime p < 2^61 at once, as arrays, and long single ones.
 
 Stepping takes no inverse. Where chi splits into linear factors modulo p, every plane of the normal form goes by itself
-in homogeneous coordinates (maps/planar_block.py). Any other system, homogeneous or not, goes as (X : Z), x = X/Z: the
-matrix I - eps f'(x), times Z, and the right side are linear forms of (X, Z), and the elimination multiplies rows
-instead of dividing them. The results are the same, and those of `Orbit` over GF(p).
+in homogeneous coordinates (maps/planar_block.py). Any other map goes as (X : Z), x = X/Z: its equation (M | -r) is a
+matrix of forms of (X, Z), and the elimination multiplies rows instead of dividing them. The results are the same, and
+those of `Orbit` over GF(p).
 
 Two kernels: "numpy" works on whole arrays; "numba" is compiled, and needs the extra `fast`.
 """
@@ -22,11 +22,12 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import GF, PrimeField
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.float_blocks import require_same_system
+from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.orbits import require_steps
 from kahanmaps.maps.planar_block import Triple
 from kahanmaps.maps.splitting import Splitting
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Residues = NDArray[np.uint64]
@@ -135,7 +136,7 @@ class Arithmetic:
 
 
 class ModularEnsemble:
-    """Orbits of many starts under the Kahan map of one system modulo p < 2^61; the time step is 2 eps.
+    """Orbits of many starts under one map modulo p < 2^61; a system stands for its Kahan map, with the time step 2 eps.
 
     `starts` is a sequence of points of exact numbers, or an integer array with a point in each row. With the normal
     form `form` of the system (`normal_form`) and where chi splits modulo p, `method` is "planes"; else "elimination".
@@ -152,7 +153,7 @@ class ModularEnsemble:
 
     def __init__(
         self,
-        system: QuadraticSystem,
+        system: QuadraticSystem | BirationalMap,
         eps: Any,
         starts: Any,
         prime: int,
@@ -173,12 +174,17 @@ class ModularEnsemble:
         self.kernel = _chosen(kernel, prime)
         if threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
-        self.threads = threads if self.kernel == "numba" else 1
-        forward = KahanMap(system, eps, field)
+        map_ = as_map(system)
+        forward = map_.at(eps, field)
         chosen = forward.inverse if backward else forward
+        if chosen.equation.degree > 1:
+            if kernel == "numba":
+                raise InputError("the kernel numba is for equations that are linear in the old point: take numpy")
+            self.kernel = "numpy"
+        self.threads = threads if self.kernel == "numba" else 1
         x = _residues(starts, system.dim, field)
         if form is not None:
-            _require_same_system(form, system)
+            require_same_system(form, map_)
         splitting = _split(form, field, chosen.eps)
         self._walker: _Planes | _General
         if splitting is None:
@@ -253,12 +259,6 @@ def _residues(starts: Any, dim: int, field: PrimeField) -> Residues:
         if len(row) != dim:
             raise InputError(f"found a start with {len(row)} coordinates, expected {dim}")
     return np.array([[int(field.convert(value)) for value in row] for row in rows], dtype=np.uint64).reshape(-1, dim)
-
-
-def _require_same_system(form: NormalForm, system: QuadraticSystem) -> None:
-    theirs = CubicHamiltonian(form.H, standard_structure(form.dim)).system
-    if (theirs.Q, theirs.B, theirs.c) != (system.Q, system.B, system.c):
-        raise InputError("the normal form belongs to another system: take that of the member that gave the system")
 
 
 def _split(form: NormalForm | None, field: PrimeField, eps: Any) -> Splitting | None:
@@ -370,22 +370,18 @@ class _General:
 
     method = "elimination"
 
-    def __init__(self, kahan_map: KahanMap, arithmetic: Arithmetic, kernel: str) -> None:
+    def __init__(self, map_over: MapOver, arithmetic: Arithmetic, kernel: str) -> None:
+        equation = map_over.equation
+        assert map_over.field.characteristic == arithmetic.prime
         self.arithmetic, self.compiled = arithmetic, kernel == "numba"
-        p, n = arithmetic.prime, kahan_map.dim
-        field, eps, local = kahan_map.field, int(kahan_map.eps), kahan_map.system.over(kahan_map.field)
-        tensor, B = [int(e) for e in local.tensor.entries()], [int(e) for e in local.B.entries()]
-        constants = [int(e) for e in local.c.entries()]
-        assert field.characteristic == p
+        p, n = arithmetic.prime, equation.dim
         self.size = n
-        forms = np.zeros((n, n + 1, n + 1), dtype=object)
-        for i in range(n):
-            for j in range(n):
-                forms[i, j, :n] = [-eps * e % p for e in tensor[(i * n + j) * n : (i * n + j + 1) * n]]
-                forms[i, j, n] = ((i == j) - eps * B[i * n + j]) % p
-                forms[i, n, j] = ((i == j) + eps * B[i * n + j]) % p
-            forms[i, n, n] = 2 * eps * constants[i] % p
-        self._forms = forms.astype(np.uint64)
+        self._exponents = equation.exponents if equation.degree > 1 else None
+        self._forms = np.zeros((n, n + 1, len(equation.exponents)), dtype=np.uint64)
+        for i, row in enumerate(equation.terms):
+            for j, entry in enumerate(row):
+                for k, coefficient in entry:
+                    self._forms[i, j, k] = int(coefficient) if j < n else -int(coefficient) % p
         if self.compiled:
             from kahanmaps.maps.modular_numba import kernels
 
@@ -437,7 +433,8 @@ class _General:
     def _step(self, X: Residues) -> Residues:
         """The images, the last coordinate 0 where there is none."""
         arithmetic, n, lanes = self.arithmetic, self.size, X.shape[1]
-        M = arithmetic.linear(self._forms.reshape(n * (n + 1), n + 1), X).reshape(n, n + 1, lanes)
+        values = X if self._exponents is None else self._monomials(X, self._exponents)
+        M = arithmetic.linear(self._forms.reshape(n * (n + 1), -1), values).reshape(n, n + 1, lanes)
         for column in range(n):
             self._pivot(M, column)
             pivot = M[column, column]
@@ -462,6 +459,15 @@ class _General:
             image[i] = arithmetic.mul(image[i], total)
             total = arithmetic.mul(total, M[i, i])
         return image
+
+    def _monomials(self, X: Residues, exponents: Sequence[tuple[int, ...]]) -> Residues:
+        """The values of monomials at the points in the columns of X."""
+        values = np.ones((len(exponents), X.shape[1]), dtype=np.uint64)
+        for value, exponent in zip(values, exponents, strict=True):
+            for x, power in zip(X, exponent, strict=True):
+                for _ in range(power):
+                    value[:] = self.arithmetic.mul(value, x)
+        return values
 
     @staticmethod
     def _pivot(M: Residues, column: int) -> None:

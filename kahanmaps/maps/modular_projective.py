@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.errors import InputError
+from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map, linear_forms
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -52,14 +53,15 @@ class ProjectiveMap:
             raise InputError(f"found a system of dimension {system.dim}, expected at most {MAX_DIMENSION}")
         self.prime, self.dim = prime, system.dim
         self._forms = np.array(
-            [[[int(e) for e in entry] for entry in row] for row in linear_forms(system, eps, field)], dtype=np.int64
+            [[[int(e) for e in entry] for entry in row] for row in linear_forms(KahanMap(system, eps, field))],
+            dtype=np.int64,
         )
         self.factor: str | None = None
         self.degree = system.dim
         self.is_undefined = False
         self._reduced: list[list[tuple[tuple[int, ...], int]]] | None = None
         if system.dim <= MAX_FACTORED:
-            forms, factor = homogeneous_map(system, eps, field)
+            forms, factor = homogeneous_map(KahanMap(system, eps, field))
             self.factor = str(factor)
             self.is_undefined = bool(forms[-1].is_zero())
             self.degree = max((int(form.total_degree()) for form in forms if not form.is_zero()), default=0)

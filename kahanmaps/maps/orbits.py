@@ -20,9 +20,9 @@ from kahanmaps.algebra.fields import QQ, BallField, Field
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.family.structure import Structure
+from kahanmaps.maps.implicit import MapOver, det_of
 from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.jump import Jump
-from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_steps import NormalSteps
 from kahanmaps.maps.planes_point import PlanesPoint
 from kahanmaps.maps.rational_jump import OverBudget
@@ -93,6 +93,7 @@ class Orbit(Displayed):
     step. `first` and `last` are the first points and the last one that were delivered so far.
 
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> from kahanmaps.maps.kahan import KahanMap
     >>> orbit = Orbit(KahanMap(QuadraticSystem.from_text(["x"], ["x^2"]), "1/2"), ["1/5"], 3)
     >>> [point.text for point in orbit]
     [['1/5'], ['1/4'], ['1/3'], ['1/2']]
@@ -102,7 +103,7 @@ class Orbit(Displayed):
 
     def __init__(
         self,
-        kahan_map: KahanMap,
+        kahan_map: MapOver,
         start: Sequence[Any],
         steps: int | None,
         *,
@@ -201,8 +202,7 @@ class Orbit(Displayed):
         return 0 if limit is None or isinstance(value, tuple) else value.exceeding(limit)
 
     def _singular_message(self, step: int) -> str:
-        sign = "+" if self.backward else "-"
-        return f"det(I {sign} eps f'(x)) = 0 at step {step}: the map has no value there"
+        return f"{det_of(self.map.denominator_name(self.backward))} = 0 at step {step}: the map has no value there"
 
 
 class _GivenUp(Exception):
@@ -219,6 +219,7 @@ class Iterates:
     >>> from kahanmaps.family.draw import draw_with_eigenvalues
     >>> from kahanmaps.family.structure import structure_of
     >>> system = draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system
+    >>> from kahanmaps.maps.kahan import KahanMap
     >>> kahan = KahanMap(system, "1/10", GF(10007))
     >>> [point.text for point in Iterates(kahan, [1, 2, 3, 4, 5, 6], [10**30], structure=structure_of(system))]
     [['5212', '9799', '6471', '5788', '2175', '9896']]
@@ -226,7 +227,7 @@ class Iterates:
 
     def __init__(
         self,
-        kahan_map: KahanMap,
+        kahan_map: MapOver,
         start: Sequence[Any],
         at: Sequence[int],
         *,

@@ -68,7 +68,7 @@ def broken_f(o: PaperObjects) -> PaperObjects:
     p, u, n = o.vector("break 1"), o.vector("break 2"), o.n
     entries = [p[i, 0] * u[j, 0] * u[k, 0] for i in range(n) for j in range(n) for k in range(n)]
     tensor = o.f.tensor + o.K.matrix(n * n, n, entries)
-    return o.changed(base=SystemOver.from_tensor(o.K, tensor, o.f.B, o.f.c))
+    return o.changed(base=SystemOver(o.K, tensor, o.f.B, o.f.c))
 
 
 @control("f''", "f'' is not the derivative of f'")

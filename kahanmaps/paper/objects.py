@@ -136,10 +136,8 @@ class PaperObjects(Calculus):
         left = self.J * matrix
         tensor = K.matrix(n * n, n, (left * K.matrix(n, n * n, self.third.entries())).entries())
         if self.hessian_of_quadratic_part is None:
-            return SystemOver.from_tensor(K, tensor)
-        return SystemOver.from_tensor(
-            K, tensor, left * self.hessian_of_quadratic_part, left * self.gradient_of_linear_part
-        )
+            return SystemOver(K, tensor)
+        return SystemOver(K, tensor, left * self.hessian_of_quadratic_part, left * self.gradient_of_linear_part)
 
     # ---- the associated systems ---------------------------------------------------------------------------------
 
@@ -375,7 +373,7 @@ class PaperObjects(Calculus):
                 lower_terms=self.lower_terms and (lift(self.lower_terms[0]), lift(self.lower_terms[1])),
                 step_eps=dual.convert(self.step_eps),
                 minus=dual.convert(self.minus),
-                base=base and SystemOver.from_tensor(dual, lift(base.tensor), lift(base.B), lift(base.c)),
+                base=base and SystemOver(dual, lift(base.tensor), lift(base.B), lift(base.c)),
                 error_of_second=lift(self.error_of_second),
             )
         lifted: PaperObjects = self._memory["lifted"]
@@ -409,7 +407,7 @@ class PaperObjects(Calculus):
             self._memory["inhomogeneous"] = self.changed(
                 hessian_of_quadratic_part=X,
                 gradient_of_linear_part=linear,
-                base=base and SystemOver.from_tensor(self.K, base.tensor, self.J * X, self.J * linear),
+                base=base and SystemOver(self.K, base.tensor, self.J * X, self.J * linear),
                 draw=self.vector,
             )
         found: PaperObjects = self._memory["inhomogeneous"]
@@ -424,9 +422,9 @@ class PaperObjects(Calculus):
                 rows[j, k] = rows[k, j] = self.vector(f"f'' {j} {k}")
         tensor = [rows[j, k][i, 0] for i in range(n) for j in range(n) for k in range(n)]
         if homogeneous:
-            return SystemOver.from_tensor(K, K.matrix(n * n, n, tensor))
+            return SystemOver(K, K.matrix(n * n, n, tensor))
         linear = self.columns([self.vector(f"B {j}") for j in range(n)])
-        return SystemOver.from_tensor(K, K.matrix(n * n, n, tensor), linear, self.vector("c"))
+        return SystemOver(K, K.matrix(n * n, n, tensor), linear, self.vector("c"))
 
     def arbitrary_hamiltonian(self, standard: bool = False) -> PaperObjects:
         """A cubic H with terms of all degrees and (unless it is to be standard) a skew J, without any structure."""

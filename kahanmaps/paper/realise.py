@@ -19,11 +19,11 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpq_poly, fmpz, nmod_poly
 
 from kahanmaps.algebra.bounds import BoundField
+from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import CC, QQ, Field, PrimeField
 from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.checks.decide import random_prime_field
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.cubics import third_derivatives
 from kahanmaps.family.planar import normal_form

@@ -25,12 +25,11 @@ from typing import Any
 from flint import fmpq_poly
 
 from kahanmaps.algebra.bounds import Size
-from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.claims import Evidence, Report
-from kahanmaps.checks.decide import random_prime_field
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import CONVENTION, Settings
 from kahanmaps.documents.files import SystemFile

@@ -16,7 +16,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.kahan import Kahan, KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -153,7 +153,8 @@ def pairs_of_member(file: SystemFile) -> tuple[Pair, Pair]:
 
 def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> Pair:
     """Two systems of one dimension; with `eps2` the second has this step: it is scaled by eps2/eps."""
-    g, note = matched(file, other)
+    map_, note = matched(file, other)
+    g = map_.system if isinstance(map_, Kahan) else other.system  # which raises
     if eps2 is not None:
         if rational(eps2) == 0:
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")

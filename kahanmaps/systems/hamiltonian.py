@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_mpoly
+from flint import fmpq_mat, fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import degree, gradient, is_homogeneous, names_of
+from kahanmaps.algebra.polynomials import degree, gradient, is_homogeneous, linear_combinations, names_of
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -85,7 +84,7 @@ class CubicHamiltonian(DisplayedAsFormula):
     @cached_property
     def system(self) -> QuadraticSystem:
         """The quadratic system x' = J grad H(x)."""
-        return QuadraticSystem.from_polynomials(linear_combinations(self.J, self.gradient))
+        return QuadraticSystem(linear_combinations(self.J, self.gradient))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, CubicHamiltonian):
@@ -94,16 +93,3 @@ class CubicHamiltonian(DisplayedAsFormula):
 
     def __hash__(self) -> int:
         return hash((self.variables, str(self.H)))
-
-
-def linear_combinations(matrix: fmpq_mat, polynomials: tuple[fmpq_mpoly, ...]) -> tuple[fmpq_mpoly, ...]:
-    """The entries of `matrix` times the column of `polynomials`."""
-    zero: Any = polynomials[0].context().constant(0)
-    combined = []
-    for i in range(matrix.nrows()):
-        total = zero
-        for j, polynomial in enumerate(polynomials):
-            if matrix[i, j] != fmpq(0):
-                total = total + matrix[i, j] * polynomial
-        combined.append(total)
-    return tuple(combined)

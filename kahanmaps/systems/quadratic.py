@@ -1,8 +1,8 @@
-"""Quadratic systems x' = f(x) = Q(x, x) + B x + c with rational coefficients.
+"""Quadratic systems x' = f(x) = Q(x, x) + B x + c, exact, with symbols in the coefficients where they are wanted.
 
-Source: petrera-suris-2016, eq. (eq: diff eq gen). `QuadraticSystem` is the system over Q, in the named variables;
-`SystemOver` is the same carried into a field, with everything the Kahan map needs: value, Jacobian, polarisation.
-Both work from the constant tensor f'' instead of Q = f''/2, so that they make sense modulo 2 as well.
+Source: petrera-suris-2016, eq. (eq: diff eq gen). `QuadraticSystem` is the system over Q, in named variables and
+symbols; `SystemOver` is the same carried into a field, with everything the Kahan map needs: value, Jacobian,
+polarisation. It works from the constant tensor f'' instead of Q = f''/2, so that it makes sense modulo 2 as well.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz, fmpz_mat
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import Field, rational
 from kahanmaps.algebra.numerals import check_names
-from kahanmaps.algebra.polynomials import degree, evaluate, names_of, ring
+from kahanmaps.algebra.polynomials import digits_of, evaluate, linear_combinations, names_of, ring
 from kahanmaps.algebra.text import format_polynomial, parse_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
@@ -28,7 +28,10 @@ LONG_COEFFICIENTS = 2_000  # digits, with which equations in them are no longer 
 
 @dataclass(frozen=True, eq=False)
 class QuadraticSystem(DisplayedAsFormula):
-    """x' = Q(x, x) + B x + c: one symmetric matrix `Q[i]` a component, the matrix `B`, the vector `c`, all over Q.
+    """x' = f(x), its right-hand sides of degree at most 2 in the variables.
+
+    `rhs` are polynomials over Q in the variables, then in `symbols`: constants without a value, eps possibly among
+    them. Raises InputError where their number is not that of the variables, or a degree exceeds 2.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y - x", "1/2*x^2"])
     >>> system.Q[0]
@@ -38,61 +41,34 @@ class QuadraticSystem(DisplayedAsFormula):
     False
     """
 
-    variables: tuple[str, ...]
-    Q: tuple[fmpq_mat, ...]
-    B: fmpq_mat
-    c: tuple[fmpq, ...]
+    rhs: tuple[fmpq_mpoly, ...]
+    symbols: tuple[str, ...] = ()
     _over: dict[Field, SystemOver] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        n = len(self.variables)
-        if n == 0:
-            raise InputError("found a system without variables, expected at least one")
+        object.__setattr__(self, "rhs", tuple(self.rhs))
+        if not self.rhs:
+            raise InputError("found no right-hand side, expected one for every variable")
+        names, n = self.variables, self.dim
         if n > MAX_DIMENSION:
             raise InputError(f"found a system of dimension {n}, expected at most {MAX_DIMENSION}")
-        check_names(self.variables)
-        if len(self.Q) != n or len(self.c) != n or (self.B.nrows(), self.B.ncols()) != (n, n):
+        check_names(names)
+        if len(self.rhs) != n:
             raise InputError(
-                f"found {len(self.Q)} quadratic forms, a {self.B.nrows()} x {self.B.ncols()} matrix B and "
-                f"{len(self.c)} constants, expected {n}, {n} x {n} and {n} for {n} variables"
+                f"found {len(self.rhs)} right-hand sides for the {n} variables {', '.join(names)}, expected {n}"
             )
-        for name, form in zip(self.variables, self.Q, strict=True):
-            if (form.nrows(), form.ncols()) != (n, n) or form != form.transpose():
-                raise InputError(f"the quadratic form of {name}' must be a symmetric {n} x {n} matrix")
-
-    @classmethod
-    def from_polynomials(cls, rhs: Sequence[fmpq_mpoly]) -> QuadraticSystem:
-        """The system with these right-hand sides, in the variables of their ring.
-
-        Raises InputError where their number is not that of the variables, or a degree exceeds 2.
-        """
-        if not rhs:
-            raise InputError("found no right-hand side, expected one for every variable")
-        names = names_of(rhs[0])
-        n = len(names)
-        if len(rhs) != n:
-            raise InputError(
-                f"found {len(rhs)} right-hand sides for the {n} variables {', '.join(names)}, expected {n}"
-            )
-        forms, linear, constants = [], [fmpq(0)] * (n * n), [fmpq(0)] * n
-        for i, polynomial in enumerate(rhs):
-            if degree(polynomial) > 2:
+        for name, polynomial in zip(names, self.rhs, strict=True):
+            found = max((sum(m[:n]) for m in polynomial.monoms()), default=0)
+            if found > 2 and self.symbols:
                 raise InputError(
-                    f"the right-hand side of {names[i]}' has degree {degree(polynomial)}, expected at most 2: "
+                    f"found right-hand sides of degree {found} in the variables with {', '.join(self.symbols)} as "
+                    "symbols, expected at most 2: leave the parameter that makes them cubic a number"
+                )
+            if found > 2:
+                raise InputError(
+                    f"the right-hand side of {name}' has degree {found}, expected at most 2: "
                     "Kahan's discretization is defined for quadratic systems"
                 )
-            form = [fmpq(0)] * (n * n)
-            for monomial, coefficient in polynomial.terms():
-                where = [j for j, exponent in enumerate(monomial) for _ in range(exponent)]
-                if len(where) == 2:
-                    form[where[0] * n + where[1]] += coefficient / 2
-                    form[where[1] * n + where[0]] += coefficient / 2
-                elif len(where) == 1:
-                    linear[i * n + where[0]] = coefficient
-                else:
-                    constants[i] = coefficient
-            forms.append(fmpq_mat(n, n, form))
-        return cls(names, tuple(forms), fmpq_mat(n, n, linear), tuple(constants))
 
     @classmethod
     def from_text(
@@ -101,7 +77,13 @@ class QuadraticSystem(DisplayedAsFormula):
         """The system with these right-hand sides written as text; parameters are exact numbers."""
         check_names(variables)
         constants = {name: rational(value) for name, value in (parameters or {}).items()}
-        return cls.from_polynomials([parse_polynomial(text, variables, constants) for text in rhs])
+        return cls(tuple(parse_polynomial(text, variables, constants) for text in rhs))
+
+    @cached_property
+    def variables(self) -> tuple[str, ...]:
+        """The names of the variables."""
+        names = names_of(self.rhs[0])
+        return names[: len(names) - len(self.symbols)]
 
     @property
     def dim(self) -> int:
@@ -109,34 +91,58 @@ class QuadraticSystem(DisplayedAsFormula):
         return len(self.variables)
 
     @cached_property
-    def is_homogeneous(self) -> bool:
-        """Whether B = 0 and c = 0."""
-        return not any(entry != 0 for entry in self.B.entries()) and not any(entry != 0 for entry in self.c)
+    def degree(self) -> int:
+        """The degree of f in the variables; 0 for f = 0."""
+        return max((sum(m[: self.dim]) for polynomial in self.rhs for m in polynomial.monoms()), default=0)
 
     @cached_property
-    def rhs(self) -> tuple[fmpq_mpoly, ...]:
-        """The components of f as polynomials."""
-        n, context = self.dim, ring(self.variables)
-        polynomials = []
-        for i in range(n):
-            terms: dict[tuple[int, ...], fmpq] = {(0,) * n: self.c[i]}
-            for j in range(n):
-                terms[_exponents(n, j)] = self.B[i, j]
-                for k in range(j, n):
-                    entry = self.Q[i][j, k]
-                    if entry != 0:
-                        terms[_exponents(n, j, k)] = entry if j == k else 2 * entry
-            polynomials.append(context.from_dict({m: value for m, value in terms.items() if value != 0}))
-        return tuple(polynomials)
+    def is_homogeneous(self) -> bool:
+        """Whether B = 0 and c = 0."""
+        return all(sum(m[: self.dim]) == 2 for polynomial in self.rhs for m in polynomial.monoms())
+
+    @cached_property
+    def Q(self) -> tuple[fmpq_mat, ...]:
+        """The symmetric matrix of each quadratic form, without symbols."""
+        n = self.dim
+        entries = [fmpq(0)] * n**3
+        for i, indices, coefficient in self._coefficients(2):
+            j, k = indices
+            entries[(i * n + j) * n + k] += coefficient / 2
+            entries[(i * n + k) * n + j] += coefficient / 2
+        return tuple(fmpq_mat(n, n, entries[i * n * n : (i + 1) * n * n]) for i in range(n))
+
+    @cached_property
+    def B(self) -> fmpq_mat:
+        """The matrix of the linear part, without symbols."""
+        n = self.dim
+        entries = [fmpq(0)] * (n * n)
+        for i, (j,), coefficient in self._coefficients(1):
+            entries[i * n + j] = coefficient
+        return fmpq_mat(n, n, entries)
+
+    @cached_property
+    def c(self) -> tuple[fmpq, ...]:
+        """The constants, without symbols."""
+        entries = [fmpq(0)] * self.dim
+        for i, _, coefficient in self._coefficients(0):
+            entries[i] = coefficient
+        return tuple(entries)
+
+    def _coefficients(self, of_degree: int) -> list[tuple[int, list[int], fmpq]]:
+        """Component, indices of the variables and coefficient of every term of one degree."""
+        if self.symbols:
+            raise InputError(f"found the symbols {', '.join(self.symbols)} in the coefficients, expected numbers")
+        return [
+            (i, _indices(monomial), coefficient)
+            for i, polynomial in enumerate(self.rhs)
+            for monomial, coefficient in polynomial.terms()
+            if sum(monomial) == of_degree
+        ]
 
     @cached_property
     def divergence(self) -> fmpq_mpoly:
         """The trace of f'(x), a polynomial of degree at most 1."""
-        context = ring(self.variables)
-        total = context.constant(0)
-        for i, polynomial in enumerate(self.rhs):
-            total = total + polynomial.derivative(i)
-        return total
+        return sum((p.derivative(i) for i, p in enumerate(self.rhs)), self.rhs[0].context().constant(0))
 
     @property
     def is_divergence_free(self) -> bool:
@@ -146,22 +152,26 @@ class QuadraticSystem(DisplayedAsFormula):
     def scaled(self, factor: Any) -> QuadraticSystem:
         """The system x' = factor f(x). Its Kahan map at eps is that of f at factor eps."""
         by = rational(factor)
-        return QuadraticSystem(
-            self.variables, tuple(form * by for form in self.Q), self.B * by, tuple(entry * by for entry in self.c)
-        )
+        return QuadraticSystem(tuple(polynomial * by for polynomial in self.rhs), self.symbols)
 
     def transformed(self, matrix: fmpq_mat) -> QuadraticSystem:
         """The system x' = C f(x) for a constant matrix C = `matrix`."""
-        n = self.dim
-        forms = []
-        for i in range(n):
-            form = fmpq_mat(n, n)
-            for j in range(n):
-                if matrix[i, j] != 0:
-                    form = form + self.Q[j] * matrix[i, j]
-            forms.append(form)
-        constants = (matrix * fmpq_mat(n, 1, list(self.c))).entries()
-        return QuadraticSystem(self.variables, tuple(forms), matrix * self.B, tuple(constants))
+        return QuadraticSystem(linear_combinations(matrix, self.rhs), self.symbols)
+
+    def composed(self, matrix: fmpq_mat, shift: Sequence[fmpq]) -> QuadraticSystem:
+        """The system x' = f(P x + q) for P = `matrix` and q = `shift`, without symbols.
+
+        >>> print(QuadraticSystem.from_text(["x"], ["x^2"]).composed(fmpq_mat([[2]]), [fmpq(1)]))
+        x' = 4*x^2 + 4*x + 1
+        """
+        context = ring(self.variables)
+        images = [a + q for a, q in zip(linear_combinations(matrix, context.gens()), shift, strict=True)]
+        return QuadraticSystem(tuple(polynomial.compose(*images, ctx=context) for polynomial in self.rhs))
+
+    def renamed(self, variables: Sequence[str]) -> QuadraticSystem:
+        """The same system, without symbols, with other names for its variables."""
+        context = ring(variables)
+        return QuadraticSystem(tuple(p.compose(*context.gens(), ctx=context) for p in self.rhs))
 
     def reordered(self, variables: Sequence[str]) -> QuadraticSystem:
         """The same system with its variables in another order.
@@ -169,113 +179,126 @@ class QuadraticSystem(DisplayedAsFormula):
         >>> QuadraticSystem.from_text(["y", "x"], ["x^2", "x*y"]).reordered(["x", "y"]).rhs
         (x*y, x^2)
         """
-        n, at = self.dim, [self.variables.index(name) for name in variables]
-        if len(at) != n or len(set(at)) != n:
+        at = [self.variables.index(name) for name in variables]
+        if len(at) != self.dim or len(set(at)) != self.dim:
             raise InputError(f"found the variables {', '.join(variables)}, expected {', '.join(self.variables)}")
+        context = ring((*variables, *self.symbols))
+        images = [context.gen(context.names().index(name)) for name in (*self.variables, *self.symbols)]
+        return QuadraticSystem(tuple(self.rhs[i].compose(*images, ctx=context) for i in at), self.symbols)
 
-        def moved(matrix: fmpq_mat) -> fmpq_mat:
-            return fmpq_mat(n, n, [matrix[i, j] for i in at for j in at])
+    def at(self, values: Sequence[Any]) -> QuadraticSystem:
+        """The system with numbers for its symbols."""
+        context = ring(self.variables)
+        images = [*context.gens(), *(context.constant(value) for value in values)]
+        return QuadraticSystem(tuple(polynomial.compose(*images, ctx=context) for polynomial in self.rhs))
 
-        return QuadraticSystem(
-            tuple(variables), tuple(moved(self.Q[i]) for i in at), moved(self.B), tuple(self.c[i] for i in at)
-        )
+    def jacobian(self, names: Sequence[str]) -> list[list[fmpq_mpoly]]:
+        """f'(x) as polynomials in `names`, which contain the variables and the symbols."""
+        context = ring(names)
+        images = [context.gen(list(names).index(name)) for name in names_of(self.rhs[0])]
+        return [[p.derivative(k).compose(*images, ctx=context) for k in range(self.dim)] for p in self.rhs]
 
-    def over(self, field_of_numbers: Field) -> SystemOver:
-        """The same system with its coefficients in another field. Raises BadPrime where GF(p) does not allow it."""
+    def over(self, field_of_numbers: Field, values: Sequence[Any] = ()) -> SystemOver:
+        """The system over a field, with elements of the field for the symbols.
+
+        Raises BadPrime where GF(p) does not allow it.
+        """
+        if self.symbols:
+            return SystemOver.of(field_of_numbers, self, values)
         found = self._over.get(field_of_numbers)
         if found is None:
             if len(self._over) >= 8:  # random primes come and go
                 self._over.clear()
-            found = self._over[field_of_numbers] = SystemOver(field_of_numbers, self)
+            found = self._over[field_of_numbers] = SystemOver.of(field_of_numbers, self)
         return found
 
     @cached_property
-    def integer_form(self) -> tuple[fmpz, fmpz_mat, fmpz_mat, fmpz_mat]:
-        """(L, T, LB, Lc): the least L > 0 with L f'', L B, L c integral, L f'' as the n^2 x n matrix T,
-        row i n + j of which gives the coefficients of the linear form L (f' - B)[i, j]."""
-        n = self.dim
-        tensor = _tensor(self)
-        below = fmpz(1)
-        for entry in [*tensor, *self.B.entries(), *self.c]:
-            below = below.lcm(entry.q)
-
-        def integers(entries: Sequence[fmpq]) -> list[fmpz]:
-            return [entry.p * (below // entry.q) for entry in entries]
-
-        return (
-            below,
-            fmpz_mat(n * n, n, integers(tensor)),
-            fmpz_mat(n, n, integers(self.B.entries())),
-            fmpz_mat(n, 1, integers(self.c)),
-        )
-
-    @cached_property
     def digits(self) -> int:
-        """About how many decimal digits the longest of the integers in `integer_form` has."""
-        below, *matrices = self.integer_form
-        entries = (entry for matrix in matrices for entry in matrix.entries())
-        return int(max(below.bit_length(), *(entry.bit_length() for entry in entries)) * 0.30103) + 1
+        """About how many decimal digits the longest coefficient has, over one denominator."""
+        return digits_of(self.rhs)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, QuadraticSystem):
             return NotImplemented
-        mine = (self.variables, self.Q, self.B, self.c)
-        return mine == (other.variables, other.Q, other.B, other.c)
+        return (self.variables, self.symbols) == (other.variables, other.symbols) and self.rhs == other.rhs
 
     def __hash__(self) -> int:
-        # B and Q would make it slow; equal systems have equal hashes all the same.
-        return hash((self.variables, self.c))
+        # All terms would make it slow; equal systems have equal hashes all the same.
+        return hash((self.variables, self.symbols, *(len(polynomial) for polynomial in self.rhs)))
 
     def __str__(self) -> str:
         pairs = zip(self.variables, self.rhs, strict=True)
         return "\n".join(f"{name}' = {format_polynomial(polynomial)}" for name, polynomial in pairs)
 
 
+@dataclass(frozen=True, eq=False)
 class SystemOver:
     """A quadratic system with coefficients in `field`; points are sequences of its elements, matrices FLINT's.
 
-    Made from a rational system, or by `from_tensor` from coefficients that the rationals do not hold.
+    `tensor` is f'' as an n^2 x n matrix: entry (i n + j, k) is the derivative of f_i by x_j and x_k. Without `B` and
+    `c` the system is homogeneous.
     """
 
-    def __init__(self, field: Field, system: QuadraticSystem) -> None:
-        n = system.dim
-        self.field = field
-        self.dim = n
-        self._rhs: tuple[fmpq_mpoly, ...] | None = system.rhs
-        self.B = field.convert_matrix(system.B)
-        self.c = field.column([field.convert(entry) for entry in system.c])
-        self._tensor = field.convert_matrix(fmpq_mat(n * n, n, _tensor(system)))
+    field: Field
+    tensor: Any
+    B: Any = None
+    c: Any = None
+    exact: QuadraticSystem | None = None  # the rational system without symbols that this is, in a field
+
+    def __post_init__(self) -> None:
+        n, field = self.dim, self.field
+        if self.B is None:
+            object.__setattr__(self, "B", field.matrix(n, n, [field.zero] * (n * n)))
+        if self.c is None:
+            object.__setattr__(self, "c", field.column([field.zero] * n))
 
     @classmethod
-    def from_tensor(cls, field: Field, tensor: Any, B: Any = None, c: Any = None) -> SystemOver:
-        """The system with f'' = `tensor`, an n^2 x n matrix over the field; row i n + j gives d f_i'/dx_j.
+    def of(cls, field: Field, system: QuadraticSystem, values: Sequence[Any] = ()) -> SystemOver:
+        """A system with its symbols at these elements of the field. Raises BadPrime where a coefficient has none."""
+        n, zero = system.dim, field.zero
+        tensor, linear, constants = [zero] * n**3, [zero] * (n * n), [zero] * n
 
-        Without `B` and `c` it is homogeneous. The characteristic must not be 2.
-        """
-        system = cls.__new__(cls)
-        n = tensor.ncols()
-        system.field, system.dim, system._rhs, system._tensor = field, n, None, tensor
-        system.B = field.matrix(n, n, [field.zero] * (n * n)) if B is None else B
-        system.c = field.column([field.zero] * n) if c is None else c
-        return system
+        def add(entries: list[Any], at: int, value: Any) -> None:
+            entries[at] = value if entries[at] is zero else entries[at] + value
+
+        with field.working():
+            for i, polynomial in enumerate(system.rhs):
+                for monomial, coefficient in polynomial.terms():
+                    where = _indices(monomial[:n])
+                    # Twice x_j^2/2 is an integer: f'' makes sense modulo 2 where Q does not.
+                    is_square = len(where) == 2 and where[0] == where[1]
+                    value = field.convert(coefficient * 2 if is_square else coefficient)
+                    for exponent, at in zip(monomial[n:], values, strict=True):
+                        if exponent:
+                            value = value * at ** int(exponent)
+                    if len(where) == 2:
+                        j, k = where
+                        add(tensor, (i * n + j) * n + k, value)
+                        if j != k:
+                            add(tensor, (i * n + k) * n + j, value)
+                    elif len(where) == 1:
+                        add(linear, i * n + where[0], value)
+                    else:
+                        add(constants, i, value)
+            parts = field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants)
+        return cls(field, *parts, None if system.symbols else system)
 
     @property
-    def tensor(self) -> Any:
-        """f'' as an n^2 x n matrix: entry (i n + j, k) is the derivative of f_i by x_j and x_k."""
-        return self._tensor
+    def dim(self) -> int:
+        """The number of variables."""
+        return int(self.tensor.ncols())
 
     def transformed(self, matrix: Any) -> SystemOver:
         """The system x' = C f(x) for a constant matrix C = `matrix` over the field."""
         n, field = self.dim, self.field
         with field.working():
-            rows = matrix * field.matrix(n, n * n, self._tensor.entries())
-            tensor = field.matrix(n * n, n, rows.entries())
-            return SystemOver.from_tensor(field, tensor, matrix * self.B, matrix * self.c)
+            rows = matrix * field.matrix(n, n * n, self.tensor.entries())
+            return SystemOver(field, field.matrix(n * n, n, rows.entries()), matrix * self.B, matrix * self.c)
 
     def hessian_times(self, vector: Sequence[Any]) -> Any:
         """The matrix f''(v), with f'(x + v) = f'(x) + f''(v)."""
         with self.field.working():
-            return self.field.matrix(self.dim, self.dim, (self._tensor * self.field.column(vector)).entries())
+            return self.field.matrix(self.dim, self.dim, (self.tensor * self.field.column(vector)).entries())
 
     def jacobian(self, point: Sequence[Any]) -> Any:
         """The Jacobi matrix f'(x)."""
@@ -284,9 +307,9 @@ class SystemOver:
 
     def value(self, point: Sequence[Any]) -> tuple[Any, ...]:
         """f(x)."""
-        if self._rhs is None:
+        if self.exact is None:
             return self.polarised(point, point)
-        return tuple(evaluate(polynomial, self.field, point) for polynomial in self._rhs)
+        return tuple(evaluate(polynomial, self.field, point) for polynomial in self.exact.rhs)
 
     def polarised(self, x: Sequence[Any], y: Sequence[Any]) -> tuple[Any, ...]:
         """Q(x, y) + B (x + y)/2 + c, the right-hand side of the Kahan map's defining equation (not modulo 2)."""
@@ -298,13 +321,6 @@ class SystemOver:
             )
 
 
-def _tensor(system: QuadraticSystem) -> list[fmpq]:
-    """The entries 2 Q[i][j, k] of f'', i slowest."""
-    return [2 * entry for form in system.Q for entry in form.entries()]
-
-
-def _exponents(n: int, *indices: int) -> tuple[int, ...]:
-    exponents = [0] * n
-    for index in indices:
-        exponents[index] += 1
-    return tuple(exponents)
+def _indices(monomial: Sequence[int]) -> list[int]:
+    """Of the variables in a monomial, each as often as it occurs."""
+    return [j for j, exponent in enumerate(monomial) for _ in range(exponent)]

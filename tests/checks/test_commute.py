@@ -24,7 +24,7 @@ from check_helpers import (
     verify_commute_witness,
 )
 from flint import fmpq, fmpq_mat, fmpq_poly
-from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, points, rationals, systems
+from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, from_forms, points, rationals, systems
 from hypothesis import assume, given, settings
 
 from kahanmaps.algebra.fields import GF
@@ -276,7 +276,7 @@ def test_a_pair_without_a_reason_to_commute_is_refuted(f, g, eps):
 def test_a_commuting_pair_disturbed_in_a_far_digit_is_refuted(monomial, power):
     f, g = SPLIT3.associate((1, 1, 1)).system, SPLIT3.associate((1, 1, -1)).system
     tiny = system_of(" ".join(f.variables), *[f"({monomial})/10^{power}"] + ["0"] * 5)
-    disturbed = QuadraticSystem.from_polynomials([a + b for a, b in zip(g.rhs, tiny.rhs, strict=True)])
+    disturbed = QuadraticSystem([a + b for a, b in zip(g.rhs, tiny.rhs, strict=True)])
     found = only(pair(f, disturbed, Settings(steps=1)))
     assert found.verdict is REFUTED
     verify_commute_witness(found.witness, f, disturbed)
@@ -308,7 +308,7 @@ def test_a_coupling_of_the_two_parts_is_refuted():
 def linear(rows: list[list[int]]) -> QuadraticSystem:
     n = len(rows)
     names = tuple("xyz"[:n])
-    return QuadraticSystem(names, (fmpq_mat(n, n),) * n, fmpq_mat(rows), (fmpq(0),) * n)
+    return from_forms(names, [fmpq_mat(n, n)] * n, fmpq_mat(rows), [fmpq(0)] * n)
 
 
 @pytest.mark.parametrize(
@@ -377,7 +377,7 @@ def test_every_map_commutes_with_itself_and_with_its_inverse(f, eps):
 
 
 def test_variables_are_matched_by_position_and_that_is_noted():
-    g = QuadraticSystem(("a", "b"), FORCED_PLANE.Q, FORCED_PLANE.B, FORCED_PLANE.c)
+    g = FORCED_PLANE.renamed(["a", "b"])
     report = pair(FORCED_PLANE, g)
     assert report.verdict is PROVED
     assert report.notes == ["variables are matched by position: x, y with a, b"]

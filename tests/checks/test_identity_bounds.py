@@ -50,7 +50,7 @@ def test_commutativity_is_bounded_for_dense_systems_and_not_far_from_the_truth(s
         rhs = ring(["x", "y"])
         exponents = [e for d in range(3) for e in monomials(2, d)]
         rows = [{e: fmpq(rng.randint(-99, 99), rng.randint(1, 9)) for e in exponents} for _ in range(2)]
-        return QuadraticSystem.from_polynomials([rhs.from_dict(row) for row in rows])
+        return QuadraticSystem([rhs.from_dict(row) for row in rows])
 
     identity = commutativity(dense(), dense(), None if seed % 2 else fmpq(rng.randint(1, 9), 7), ("f", "g"))
     equation, poles = check(identity, differs=True)

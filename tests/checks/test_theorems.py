@@ -308,7 +308,7 @@ def test_a_relation_up_to_a_tiny_term_is_none(f, power, data):
     # A linear term leaves the span of homogeneous components, however small it is.
     rhs, i = list(f.rhs), data.draw(st.integers(0, f.dim - 1))
     rhs[i] = rhs[i] + fmpq(1, 10**power) * ring(f.variables).gens()[0]
-    assert theorems.linear_relation(f, QuadraticSystem.from_polynomials(rhs)) is None
+    assert theorems.linear_relation(f, QuadraticSystem(rhs)) is None
 
 
 DEPENDENT = system_of("x y", "x^2 + y", "2*x^2 + 2*y")
@@ -339,7 +339,7 @@ def hidden(system: QuadraticSystem, S: fmpq_mat) -> QuadraticSystem:
     old = [sum((back[i, j] * x[j] for j in range(system.dim)), 0 * x[0]) for i in range(system.dim)]
     moved = [polynomial.compose(*old) for polynomial in system.rhs]
     n = system.dim
-    return QuadraticSystem.from_polynomials([sum((S[i, j] * moved[j] for j in range(n)), 0 * x[0]) for i in range(n)])
+    return QuadraticSystem([sum((S[i, j] * moved[j] for j in range(n)), 0 * x[0]) for i in range(n)])
 
 
 def test_a_decoupled_inhomogeneous_system_and_its_flip_commute_by_the_lemma():
@@ -362,7 +362,7 @@ def test_the_lemma_sees_through_a_change_of_coordinates():
 
 def test_the_names_of_the_variables_do_not_matter_to_the_lemma():
     g = DECOUPLED.transformed(SPLIT)
-    renamed = QuadraticSystem(("a", "b", "c"), g.Q, g.B, g.c)
+    renamed = g.renamed(["a", "b", "c"])
     assert theorems.commuting_by_splitting(DECOUPLED, renamed) is not None
 
 

@@ -571,7 +571,7 @@ def test_an_interrupted_npz_file_can_be_read(kahanmaps, npz, monkeypatch):
                     signal.raise_signal(signal.SIGINT)
                 yield value
 
-    monkeypatch.setattr("kahanmaps.maps.orbits.Orbit", Interrupted)
+    monkeypatch.setattr("kahanmaps.maps.orbit.Orbit", Interrupted)
     found = npz(f"{TOP} --steps 100")
     assert (found.status, found.meta["end"]["status"]) == (130, "interrupted")
     assert found.step.tolist() == list(range(found.meta["end"]["steps"] + 1))

@@ -25,7 +25,7 @@ CATALOG = ROOT / "kahanmaps" / "documents" / "catalog"
 def test_a_system_file_has_the_same_keys_for_the_schema_and_for_the_reader() -> None:
     parts = schema("system-file")["$defs"]
     found = {"": parts["system_file"], "catalog": parts["catalog_section"]}
-    found |= {key: parts["system_file"]["properties"][key] for key in ("system", "hamiltonian", "family", "density")}
+    found |= {key: parts["system_file"]["properties"][key] for key in (*document.KINDS, "density")}
     assert {key: set(part["properties"]) for key, part in found.items()} == document._KEYS
 
 

@@ -21,7 +21,7 @@ from helpers import random_point
 
 import kahanmaps
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.polynomials import RationalFunction, gradient, ring
+from kahanmaps.algebra.polynomials import RationalFunction, gradient, linear_combinations, ring
 from kahanmaps.algebra.text import parse_number, parse_polynomial, parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.commute import check_commute
@@ -35,7 +35,7 @@ from kahanmaps.family.draw import draw_generic, draw_with_eigenvalues
 from kahanmaps.invariants.integrals import ModifiedHamiltonian
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.sources import SOURCES
-from kahanmaps.systems.hamiltonian import linear_combinations, standard_structure
+from kahanmaps.systems.hamiltonian import standard_structure
 
 PACKAGE = Path(kahanmaps.__file__).parent
 HOLDS = {Verdict.PROVED, Verdict.SUPPORTED}

@@ -14,7 +14,7 @@ from flint import fmpq_mat, fmpq_poly
 from helpers import random_point, step_or_none
 
 from kahanmaps.algebra.fields import GF, QQ
-from kahanmaps.algebra.polynomials import gradient
+from kahanmaps.algebra.polynomials import gradient, linear_combinations
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember, sign_polynomial
@@ -22,7 +22,7 @@ from kahanmaps.family.cubics import belongs, cubic_space
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import Factor, defects, evaluate_at_matrix
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 t = fmpq_poly([0, 1])
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
-from kahanmaps.algebra.polynomials import gradient, monomials, ring
+from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import HypothesisError
 from kahanmaps.family.cubics import (
@@ -33,7 +33,7 @@ from kahanmaps.family.cubics import (
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import diagnosis, is_generic, minimal_degree, random_skew_hamiltonian
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 t = fmpq_poly([0, 1])
 DIAGONAL = fmpq_mat([[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]])

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import det, rank
-from kahanmaps.algebra.polynomials import monomials, ring
+from kahanmaps.algebra.polynomials import linear_combinations, monomials, ring
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import HypothesisError, InputError
@@ -41,7 +41,7 @@ from kahanmaps.family.hidden import (
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi, defects, evaluate_at_matrix, random_symplectic
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 t = fmpq_poly([0, 1])

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import kahanmaps
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
-from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.polynomials import evaluate, linear_combinations
 from kahanmaps.documents.files import read_system
 from kahanmaps.laboratory.affine_functions import (
     affine_cofactor,
@@ -22,7 +22,6 @@ from kahanmaps.laboratory.affine_functions import (
     quotient_by,
 )
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.hamiltonian import linear_combinations
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 CATALOG = Path(kahanmaps.__file__).parent / "documents" / "catalog"
@@ -96,7 +95,7 @@ def test_a_hyperplane_of_equilibria() -> None:
 
 def test_cofactors_are_those_of_the_flow() -> None:
     x, y = QuadraticSystem.from_text(["x", "y"], ["x*y", "y^2 - 1"]).rhs[0].context().gens()
-    system = QuadraticSystem.from_polynomials([x * y, y**2 - 1])
+    system = QuadraticSystem([x * y, y**2 - 1])
     assert affine_cofactor(system, y - 1) == y + 1
     assert affine_cofactor(system, x + y) is None
 
@@ -116,7 +115,7 @@ def with_hyperplane(draw: st.DrawFn) -> tuple[QuadraticSystem, fmpq_mat]:
     moved = linear_combinations(T, gens)  # y = T x
     context = gens[0].context()
     in_x = tuple(component.compose(*moved, ctx=context) for component in rhs)
-    return QuadraticSystem.from_polynomials(linear_combinations(T.inv(), in_x)), T
+    return QuadraticSystem(linear_combinations(T.inv(), in_x)), T
 
 
 @settings(max_examples=40)

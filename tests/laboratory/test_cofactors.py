@@ -8,7 +8,7 @@ from search_helpers import random_system, system
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import parse_system
-from kahanmaps.documents.parametric import ParametricSystem
+from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory import cofactors as module
 from kahanmaps.laboratory.affine_functions import affine_darboux
 from kahanmaps.laboratory.cofactors import (
@@ -49,15 +49,15 @@ def test_the_factors_of_the_determinant_make_up_its_cofactor(name):
 
 
 def test_symbols_stay_in_the_factors():
-    system_ = ParametricSystem.of(load("weierstrass"), ["g2"])
+    system_ = with_symbols(load("weierstrass"), ["g2"])
     assert [one.name for one in determinant_factors(system_)] == ["12*x*eps^2 - 1"]
-    euler = ParametricSystem.of(load("euler_top"), ["a1", "a2"])
+    euler = with_symbols(load("euler_top"), ["a1", "a2"])
     assert "a1" in determinant_factors(euler)[0].name
 
 
 def test_a_determinant_too_large_to_expand_is_one_cofactor(monkeypatch):
     monkeypatch.setattr(module, "_DETERMINANT_BUDGET", 5)
-    system_ = ParametricSystem.of(load("euler_top"))
+    system_ = with_symbols(load("euler_top"))
     assert determinant_polynomial(system_) is None
     [one] = determinant_factors(system_)
     assert (one.weight, one.polynomial) == (3, None)
@@ -119,5 +119,5 @@ def test_a_cofactor_that_none_has_finds_nothing():
 @pytest.mark.parametrize(("digits", "is_written"), [(800, True), (1200, False)])
 def test_a_determinant_is_not_expanded_where_coefficients_are_long(digits, is_written):
     text = f'variables = ["x"]\n[system]\nrhs = ["x^2*{10**digits + 1}/{7**digits}"]'
-    system_ = ParametricSystem.of(parse_system(text))
+    system_ = with_symbols(parse_system(text))
     assert (determinant_polynomial(system_) is not None) == is_written

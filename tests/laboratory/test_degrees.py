@@ -295,5 +295,5 @@ def test_a_line_of_other_degrees_than_are_known_tells_nothing(degrees, n, steps,
     [((1, 2, 4), {0: 1, 2: 4, 3: 8}), ((1, 3, 5), {3: 12}), ((1, 2, 0), {3: 0}), ((1, 0, 0), {3: 0}), ((1,), {1: 5})],
 )
 def test_the_degree_that_is_guessed_is_bounded_by_the_last_ratio(degrees, guesses):
-    search = SimpleNamespace(degrees=list(degrees), _system=SimpleNamespace(dim=5))
+    search = SimpleNamespace(degrees=list(degrees), _map=SimpleNamespace(dim=5))
     assert {n: _Search._guess(search, n) for n in guesses} == guesses

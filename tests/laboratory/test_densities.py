@@ -17,7 +17,7 @@ from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.parametric import ParametricSystem
+from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.laboratory import densities as module
 from kahanmaps.laboratory.densities import _space, find_densities
@@ -107,7 +107,7 @@ def test_reciprocals():
     assert space.basis == [[0, 1, 0, 0]]
     for text, verdict in (("1/x", Verdict.PROVED), ("y", Verdict.PROVED), ("x", Verdict.REFUTED)):
         function = parse_rational_function(text, ["x", "y", "z", "eps"])
-        assert density_verdict(ParametricSystem.of(file), function, None)[0] is verdict
+        assert density_verdict(with_symbols(file), function, None)[0] is verdict
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_lorenz_has_none():
 )
 def test_identities_of_lotka_volterra(text, verdict):
     function = parse_rational_function(text, ["x", "y", "eps"])
-    assert str(density_verdict(ParametricSystem.of(load("lotka_volterra")), function, None)[0]) == verdict
+    assert str(density_verdict(with_symbols(load("lotka_volterra")), function, None)[0]) == verdict
 
 
 def test_a_perturbed_system_loses_its_density():
@@ -161,7 +161,7 @@ def test_maps_that_are_not_invertible_have_no_density():
     found = find_densities(file, eps=1)
     assert (found.densities, "not invertible" in found.reason) == ((), True)
     function = parse_rational_function("x", ["x", "y", "eps"])
-    assert density_verdict(ParametricSystem.of(file), function, fmpq(1))[0] is Verdict.UNDECIDED
+    assert density_verdict(with_symbols(file), function, fmpq(1))[0] is Verdict.UNDECIDED
     assert "no value anywhere" in find_densities(system("x y", "x", "3*y"), eps=1).reason
 
 

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 import kahanmaps
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
-from kahanmaps.algebra.polynomials import gradient, monomials, ring
+from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
 from kahanmaps.documents.files import read_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, _invertible, _small, constant_structures
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 CATALOG = Path(kahanmaps.__file__).parent / "documents" / "catalog"

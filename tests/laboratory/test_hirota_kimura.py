@@ -9,8 +9,8 @@ import pytest
 from search_helpers import random_system, system
 
 from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.parametric import ParametricSystem
 from kahanmaps.documents.structured_facts import relation_functions, relations
+from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory import hirota_kimura as module
 from kahanmaps.laboratory.hirota_kimura import (
     OrbitRelations,
@@ -167,7 +167,7 @@ def test_higher_degrees_show_no_more(name):
 def test_small_primes_agree_where_orbits_are_long_enough():
     file = load("euler_top")
     for prime in (10007, 20011, 30011):
-        map_ = ModularMap(ParametricSystem.of(file), prime, 5)
+        map_ = ModularMap(with_symbols(file), prime, 5)
         assert len(relations_on_orbit(map_, 2).vectors) == 2
 
 

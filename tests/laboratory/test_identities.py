@@ -10,7 +10,7 @@ from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Decision
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
-from kahanmaps.documents.parametric import ParametricSystem
+from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory import identities
 from kahanmaps.laboratory.darboux import darboux_polynomials
@@ -19,8 +19,8 @@ from kahanmaps.laboratory.identities import density_verdict, integral_verdict
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-ROTATION = ParametricSystem.of_system(QuadraticSystem.from_text(["x", "y"], ["y", "-x"]))
-LOTKA_VOLTERRA = ParametricSystem.of_system(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]))
+ROTATION = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
+LOTKA_VOLTERRA = QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"])
 VERDICTS = {False: integral_verdict, True: density_verdict}
 
 
@@ -79,7 +79,7 @@ def test_a_density_with_symbols_is_for_those_at_which_it_is_not_zero():
 
 
 def test_an_integral_with_symbols_is_for_those_at_which_it_has_values():
-    system = ParametricSystem.of(file_with('["a*y", "-a*x"]', a="1"), ["a"])
+    system = with_symbols(file_with('["a*y", "-a*x"]', a="1"), ["a"])
     I = parse_rational_function("(x^2 + y^2)/((a^2 - 1)*eps)", ["x", "y", "a", "eps"])
     verdict, evidence = integral_verdict(system, I, None)
     assert verdict is Verdict.PROVED
@@ -87,7 +87,7 @@ def test_an_integral_with_symbols_is_for_those_at_which_it_has_values():
 
 
 def test_a_constant_with_symbols_is_told_as_such_where_it_has_values():
-    system = ParametricSystem.of(file_with('["a*y", "-a*x"]', a="1"), ["a"])
+    system = with_symbols(file_with('["a*y", "-a*x"]', a="1"), ["a"])
     for text, told in (("3", ", being a constant"), ("x/(a*x - x)", " where a - 1 is not 0, being a constant")):
         verdict, evidence = integral_verdict(system, parse_rational_function(text, ["x", "y", "a", "eps"]), None)
         assert verdict is Verdict.PROVED
@@ -96,7 +96,7 @@ def test_a_constant_with_symbols_is_told_as_such_where_it_has_values():
 
 def test_points_support_what_is_too_large_to_expand_for_every_symbol_with_a_bound(monkeypatch):
     monkeypatch.setattr(identities, "_BUDGET", 10)
-    system = ParametricSystem.of(file_with('["a*y", "-a*x"]', a="1"), ["a"])
+    system = with_symbols(file_with('["a*y", "-a*x"]', a="1"), ["a"])
     I = parse_rational_function("(x^2 + y^2)/(a^2 - 1)", ["x", "y", "a", "eps"])
     verdict, evidence = integral_verdict(system, I, None)
     assert verdict is Verdict.SUPPORTED

@@ -16,7 +16,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load, names
-from kahanmaps.documents.parametric import ParametricSystem
+from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.hirota_kimura import Profile
 from kahanmaps.laboratory.identities import integral_verdict
@@ -150,7 +150,7 @@ def test_a_perturbed_system_loses_its_integral(names_, rhs):
     assert find_integrals(system(names_, *rhs), max_degree=5).integrals == ()
 
 
-EULER = ParametricSystem.of(load("euler_top"))
+EULER = with_symbols(load("euler_top"))
 
 
 @pytest.mark.parametrize(
@@ -170,7 +170,7 @@ def test_identities_of_the_euler_top(text, verdict):
 
 
 def test_identities_with_symbols():
-    general = ParametricSystem.of(load("euler_top"), ["a1", "a2", "a3"])
+    general = with_symbols(load("euler_top"), ["a1", "a2", "a3"])
     ring = ["x1", "x2", "x3", "a1", "a2", "a3", "eps"]
     right = parse_rational_function("(1 - eps^2*a3*a1*x2^2)/(1 - eps^2*a1*a2*x3^2)", ring)
     # right for the numbers of the file, a1 = a3, but for no others
@@ -180,7 +180,7 @@ def test_identities_with_symbols():
 
 
 def test_what_holds_at_one_eps_is_not_claimed_for_others():
-    oscillator = ParametricSystem.of(system("x y", "y", "-x + x^2"))
+    oscillator = with_symbols(system("x y", "y", "-x + x^2"))
     function = parse_rational_function("x^2*y^2/(x - 1)^2", ["x", "y", "eps"])
     assert integral_verdict(oscillator, function, fmpq(1))[0] is Verdict.PROVED
     assert integral_verdict(oscillator, function, fmpq(1, 2))[0] is Verdict.REFUTED
@@ -196,7 +196,7 @@ def test_what_holds_at_one_eps_is_not_claimed_for_others():
 )
 def test_identities_without_values_are_undecided(rhs, eps, text):
     verdict, evidence = integral_verdict(
-        ParametricSystem.of(system("x y", *rhs)), parse_rational_function(text, ["x", "y", "eps"]), fmpq(eps)
+        with_symbols(system("x y", *rhs)), parse_rational_function(text, ["x", "y", "eps"]), fmpq(eps)
     )
     assert verdict is Verdict.UNDECIDED
     assert "not defined at any" in evidence.summary

@@ -13,7 +13,7 @@ from search_helpers import PRIME, system
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.parametric import ParametricSystem
+from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
     NoPoint,
@@ -32,7 +32,7 @@ residues = st.integers(0, SMALL - 1)
 
 
 def modular(file, eps=7, prime=PRIME, seed=0):
-    return ModularMap(ParametricSystem.of(file), prime, eps, seed=seed)
+    return ModularMap(with_symbols(file), prime, eps, seed=seed)
 
 
 @given(st.lists(residues, min_size=3, max_size=3), st.integers(0, 4))

@@ -21,12 +21,11 @@ from kahanmaps.laboratory.jets import (
     PrecisionTooLow,
     follow,
     image_of,
-    sparse_forms,
     valuation,
 )
 from kahanmaps.laboratory.singularities import _range, default_eps, singularities, symbolic_denominator
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.projective import homogeneous_map, linear_forms
+from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PRIME = 2_305_843_009_213_693_951
@@ -40,7 +39,7 @@ def runs(name: str, **options):
 def test_the_forms_are_those_of_the_map():
     for name in ("lorenz", "weierstrass", "henon_heiles", "paper_m2"):
         system = load(name).system
-        forms, _ = homogeneous_map(system, "1/7", QQ)
+        forms, _ = homogeneous_map(KahanMap(system, "1/7", QQ))
         point = [fmpq(2, k + 3) for k in range(system.dim)]
         values = [form(*point, fmpq(1)) for form in forms]
         assert tuple(value / values[-1] for value in values[:-1]) == KahanMap(system, "1/7").step(point)
@@ -247,7 +246,7 @@ def test_poles_and_critical_points_on_a_line_are_neither_at_infinity_nor_of_the_
     """x' = y, y' = 6 x^2 - 2 with eps = 1/2: det(I - eps f') = 1 - 3 x at a point and at its image."""
     field, rng = GF(PRIME), random.Random(3)
     system = load("weierstrass").system
-    forms, back = (linear_forms(system, eps, field) for eps in ("1/2", "-1/2"))
+    forms, back = (KahanMap(system, eps, field).equation for eps in ("1/2", "-1/2"))
     phi = KahanMap(system, "1/2", field)
     poles, number = pole_points(forms, field, rng)
     assert number == {1: 1}
@@ -268,13 +267,13 @@ def test_poles_and_critical_points_on_a_line_are_neither_at_infinity_nor_of_the_
 def test_a_generic_point_loses_no_rank_and_follows_the_map():
     system = load("lorenz").system
     field = GF(PRIME)
-    forms = linear_forms(system, "1/7", field)
+    forms = KahanMap(system, "1/7", field).equation
     steps = follow(forms, [3, 5, 7, 1], [11, 2, 9, 4], [[1, 0, 0, 0], [0, 1, 0, 0]], PRIME, 4, 8)
     assert [(step.common, step.pole, step.denominator, step.rank) for step in steps] == [(0, 0, 0, 2)] * 4
 
 
 def test_dependent_tangents_have_a_smaller_rank():
-    forms = linear_forms(load("lorenz").system, "1/7", GF(PRIME))
+    forms = KahanMap(load("lorenz").system, "1/7", GF(PRIME)).equation
     steps = follow(forms, [3, 5, 7, 1], [11, 2, 9, 4], [[1, 0, 0, 0], [2, 0, 0, 0]], PRIME, 2, 8)
     assert [step.rank for step in steps] == [1, 1]
 
@@ -282,7 +281,7 @@ def test_dependent_tangents_have_a_smaller_rank():
 def test_series_too_short_say_so_and_special_points_too():
     """On the pole of the Weierstrass map four steps divide by t twice; a direction along it never leaves it."""
     system = load("weierstrass").system
-    forms = linear_forms(system, "1/2", GF(PRIME))
+    forms = KahanMap(system, "1/2", GF(PRIME)).equation
     third = pow(3, -1, PRIME)
     with pytest.raises(PrecisionTooLow):
         follow(forms, [third, 5, 1], [1, 1, 0], [[0, 1, 0]], PRIME, 12, 2)
@@ -310,9 +309,9 @@ def test_a_series_divides_as_rational_numbers_at_a_large_prime_do(name, eps, poi
     system, field = load(name).system, GF(PRIME)
     start, direction = [*map(fmpq, point), fmpq(1)], [*range(1, system.dim + 1), 0]
     X = [x + PRIME * v for x, v in zip(start, direction, strict=True)]
-    forms, _ = homogeneous_map(system, eps, QQ)
+    forms, _ = homogeneous_map(KahanMap(system, eps, QQ))
     residues = [int(field.convert(x)) for x in start]
-    for step in follow(linear_forms(system, eps, field), residues, direction, [], PRIME, steps, 32):
+    for step in follow(KahanMap(system, eps, field).equation, residues, direction, [], PRIME, steps, 32):
         image = [form(*X) for form in forms]
         powers = [power_of(entry, PRIME) for entry in image]
         common = min(power for power in powers if power is not None)
@@ -326,13 +325,13 @@ def test_a_series_divides_as_rational_numbers_at_a_large_prime_do(name, eps, poi
 
 def test_a_point_has_the_image_of_the_map_and_none_where_all_minors_vanish():
     system = load("lorenz").system
-    forms = sparse_forms(linear_forms(system, "1/7", GF(PRIME)))
+    forms = KahanMap(system, "1/7", GF(PRIME)).equation
     image = image_of(forms, [3, 5, 7, 1], PRIME)
     inverse = pow(image[-1], -1, PRIME)
     expected = KahanMap(system, "1/7", GF(PRIME)).step([GF(PRIME).convert(c) for c in (3, 5, 7)])
     assert [c * inverse % PRIME for c in image[:-1]] == [int(c) for c in expected]
     # x' = x^2, y' = x y at eps = 1: x (Z - x) : y (Z - x) : (Z - 2 x) (Z - x), 0 on a line where curves have images
-    special = sparse_forms(linear_forms(QuadraticSystem.from_text(["x", "y"], ["x^2", "x*y"]), 1, GF(PRIME)))
+    special = KahanMap(QuadraticSystem.from_text(["x", "y"], ["x^2", "x*y"]), 1, GF(PRIME)).equation
     assert [image_of(special, [1, y, 1], PRIME) for y in (0, 5)] == [None, None]
     assert image_of(special, [0, 5, 1], PRIME) is not None
 

@@ -13,6 +13,7 @@ from math import ldexp, log2, nextafter
 import numpy as np
 import pytest
 from flint import fmpq
+from float_reference import FloatKahanMap
 from helpers import (
     EULER_TOP,
     HENON_HEILES,
@@ -27,7 +28,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.errors import InexactNumber, InputError
-from kahanmaps.maps.fast import FloatKahanMap, FloatOrbit, float_function, to_float, to_floats
+from kahanmaps.maps.fast import FloatOrbit, float_function, to_float, to_floats
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem

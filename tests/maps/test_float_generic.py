@@ -10,11 +10,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from flint import fmpq
+from float_reference import FloatKahanMap
 from helpers import EULER_TOP, FORCED_PLANE, LORENZ, NAMED_SYSTEMS, over_named_systems
 
 from kahanmaps.errors import InexactNumber, InputError
 from kahanmaps.family.draw import draw_with_eigenvalues
-from kahanmaps.maps.fast import FloatEnsemble, FloatKahanMap, FloatOrbit, to_floats
+from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit, to_floats
 from kahanmaps.maps.float_ensemble import has_numba
 from kahanmaps.maps.float_numbers import exact
 from kahanmaps.maps.kahan import KahanMap

@@ -431,7 +431,7 @@ def test_affine_changes_of_variables_commute_with_the_map(pair, data, eps):
         for row in M.inv().tolist()
     ]
     pulled = [f.compose(*back) for f in system.rhs]
-    changed = QuadraticSystem.from_polynomials(
+    changed = QuadraticSystem(
         [sum((entry * f for entry, f in zip(row, pulled, strict=True)), 0 * names[0]) for row in M.tolist()]
     )
 
@@ -474,7 +474,7 @@ def test_the_map_agrees_with_the_flow_to_second_order(pair, eps):
 def test_a_point_stays_put_exactly_when_it_is_an_equilibrium(pair, eps):
     system, x = pair
     moved = [system.over(QQ).value(x)[i] for i in range(system.dim)]
-    still = QuadraticSystem(system.variables, system.Q, system.B, combine((1, system.c), (-1, moved)))
+    still = QuadraticSystem([p - fmpq(c) for p, c in zip(system.rhs, moved, strict=True)])
     for here in (system, still):  # the second has an equilibrium at x
         y = step_or_none(KahanMap(here, eps), x)
         assume(y is not None)

@@ -180,7 +180,7 @@ WRONG = [
     ({"kernel": "fortran"}, "numpy or numba"),
     ({"starts": [[1, 2]]}, "2 coordinates"),
     ({"starts": np.array([[1, 2]])}, "shape"),
-    ({"form": FORMS["1,-2,3"]}, "another system"),
+    ({"form": FORMS["1,-2,3"]}, "belongs to another system"),
     ({"eps": 0}, "eps = 0"),
     ({"eps": 101}, "divides"),
     ({"eps": 0.5}, "0.5"),

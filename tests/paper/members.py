@@ -8,7 +8,7 @@ from typing import Any
 
 from flint import fmpq_poly
 
-from kahanmaps.checks.decide import random_prime_field
+from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import BadPrime
 from kahanmaps.family.associated import FamilyMember

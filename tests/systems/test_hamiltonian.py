@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.polynomials import gradient, monomials, ring
+from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import InputError
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, linear_combinations, standard_structure
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 PLANE = ring(["q", "p"])
 q, p = PLANE.gens()

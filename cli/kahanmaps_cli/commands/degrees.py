@@ -64,7 +64,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     with Progress(quiet) as progress:
         found = degree_growth(
-            file.system,
+            file.map,
             eps,
             seconds=options["seconds"],
             max_terms=options["terms"],
@@ -78,7 +78,10 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     else:
         lines = f"{len(found.primes)} random lines modulo primes of 63 bits"
         at = "generic eps" if eps is None else f"eps = {eps} (time step 2 eps = {2 * eps})"
-        tell(f"# {file.name}, {at}, {lines}: measured, not proved")
+        if not file.map.has_time_step:
+            at = at if eps is None else f"eps = {eps}"
+        at = f"{at}, " if file.map.has_eps else ""
+        tell(f"# {file.name}, {at}{lines}: measured, not proved")
         tell(found.text)
     if _is_done(found, options["terms"]):
         return 0
@@ -93,17 +96,24 @@ def _is_done(found: DegreeGrowth, terms: int | None) -> bool:
     return terms is None and found.recurrence is not None
 
 
-def _record(file: SystemFile, options: dict[str, Any], found: DegreeGrowth) -> dict[str, Any]:
+def _time_step(file: SystemFile, found: DegreeGrowth) -> str | None:
     from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import CONVENTION
+
+    if not file.map.has_time_step:
+        return None
+    return "generic" if found.eps is None else format_number(2 * found.eps)
+
+
+def _record(file: SystemFile, options: dict[str, Any], found: DegreeGrowth) -> dict[str, Any]:
+    from kahanmaps.checks.settings import convention
     from kahanmaps.version import __version__
 
     return {
         "command": "degrees",
         "version": __version__,
         "system": file.name,
-        "time_step": "generic" if found.eps is None else format_number(2 * found.eps),
-        "convention": CONVENTION,
+        "time_step": _time_step(file, found),
+        "convention": convention(file.map),
         "arithmetic": "modulo the primes of the lines",
         "seconds": options["seconds"],
         "terms_asked": options["terms"],

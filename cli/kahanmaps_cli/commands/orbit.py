@@ -20,6 +20,7 @@ from kahanmaps_cli.options import (
     integral_option,
     load_system,
     quiet_option,
+    require_eps,
     system_options,
     the_eps,
 )
@@ -98,7 +99,7 @@ def command(
 
     Exit status: 0 done, 2 wrong use, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
     """
-    eps = the_eps(options["eps"], options["time_step"])
+    eps = the_eps(options["eps"], options["time_step"], required=False)
     steps, at, every = options["steps"], options["at"], options["every"]
     if (steps is None) == (at is None):
         raise click.UsageError("give --steps N or --at N1,N2,..., one of the two")
@@ -113,6 +114,7 @@ def command(
     from kahanmaps.maps.orbits import OrbitEnd
 
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    require_eps(file, eps)
     if options["accuracy"] is not None and options["arithmetic"] != ("ball", 0):
         raise click.UsageError("--accuracy is for --arithmetic ball:auto")
     if options["kernel"] is not None and options["arithmetic"][0] != "float":
@@ -126,13 +128,13 @@ def command(
     with interruptible(_stop), Progress(quiet) as progress:
         run = OrbitRun(file, eps, {**options, "progress": progress})
     if verbose and not quiet:
-        say(run.method.text)
+        say(run.walk.why)
     if form == "npy" and output is not None:
         return _stream(run, output, quiet)
     with (
         _opened(output, form) as stream,
         _waiting(form, stream) as rows,
-        interruptible(run.interrupt),
+        interruptible(run.walk.interrupt),
         Progress(hidden) as progress,
     ):
         writer = _writer(form, stream, rows, run, to_file=output is not None)
@@ -144,7 +146,7 @@ def command(
                     writer.point(step, texts, values)
                 if output is None and not is_read():
                     return 3  # the reader (head, say) has what it wanted, and the orbit may be long
-            end = run.end
+            end = run.walk.end
         except OutputFull as full:
             end = OrbitEnd("budget", full.steps, str(full))
         record = _end_record(end, run)
@@ -171,8 +173,8 @@ def _stream(run: OrbitRun, output: str, quiet: bool) -> int:
     from kahanmaps.maps.fast import stream_orbit
 
     try:
-        with interruptible(run.interrupt), Progress(quiet) as progress:
-            end = stream_orbit(run.orbit, output, progress=lambda step: progress(f"step {step} of {run.steps}"))
+        with interruptible(run.walk.interrupt), Progress(quiet) as progress:
+            end = stream_orbit(run.walk.orbit, output, progress=lambda step: progress(f"step {step} of {run.steps}"))
     except OSError as error:  # a full disk comes without a name
         error.filename = error.filename or output
         raise
@@ -191,14 +193,14 @@ def _end_record(end: OrbitEnd, run: OrbitRun) -> dict[str, Any]:
     if end.period is not None:
         record["period"] = end.period
     if run.kind == "float":
-        record["near_singular"] = near = run.orbit.near_singular
-        drift = {drift.name: json_float(drift.largest) for drift in run.orbit.drift}
+        record["near_singular"] = near = run.walk.orbit.near_singular
+        drift = {drift.name: json_float(drift.largest) for drift in run.walk.orbit.drift}
         if drift:
             record["drift"] = drift
-            largest = max(float(drift.largest) for drift in run.orbit.drift)
+            largest = max(float(drift.largest) for drift in run.walk.orbit.drift)
             record["message"] += f"; block integrals moved by at most {short_float(largest)} where looked at"
         if near:
-            record["message"] += f"; near-singular steps: {near}, the first from step {run.orbit.near_singular_at}"
+            record["message"] += f"; near-singular steps: {near}, the first from step {run.walk.orbit.near_singular_at}"
     return record
 
 

@@ -68,18 +68,18 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     with Progress(quiet) as progress:
         runs = [
             singularities(
-                file.system,
+                file.map,
                 value,
                 steps=options["steps"],
                 seed=options["seed"],
                 seconds=options["seconds"],
                 progress=progress,
             )
-            for value in ((eps,) if eps is not None else default_eps(file.system, options["seed"]))
+            for value in ((eps,) if eps is not None else default_eps(file.map, options["seed"]))
         ]
     agree = len({run.shape for run in runs}) == 1
     verdict = runs[0].verdict if agree else UNDECIDED
-    symbolic = symbolic_denominator(file.system) if eps is None else None
+    symbolic = symbolic_denominator(file.map) if eps is None else None
     if as_json:
         print_json(_record(file, options, runs, symbolic, verdict))
     else:
@@ -119,13 +119,14 @@ def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[st
     def cut(text: str) -> str:
         return shorten(text, 200) if on_terminal() else text
 
-    tell(f"# {file.name}, dimension {file.system.dim}, eps is half the time step")
+    name = file.map.denominator_name
+    tell(f"# {file.name}, dimension {file.map.dim}" + (", eps is half the time step" if file.map.has_time_step else ""))
     if symbolic is not None:
         factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
-        tell(f"factors of det(I - eps f')\t{cut(factors) or 'none'}")
+        tell(f"factors of {name}\t{cut(factors) or 'none'}")
     for run in runs:
         tell(f"\n# eps = {format_number(run.eps)}: map of degree {run.map_degree}, {run.text}")
-        tell(f"det(I - eps f')\t{cut(run.denominator)}")
+        tell(f"{name}\t{cut(run.denominator)}")
         for found in run.hypersurfaces:
             kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
             kind += " in all" if found.polynomial == "?" else ""
@@ -143,7 +144,7 @@ def _record(
     verdict: str,
 ) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.checks.settings import convention
     from kahanmaps.laboratory.singularities import steps_by_default
     from kahanmaps.version import __version__
 
@@ -151,10 +152,10 @@ def _record(
         "command": "singularities",
         "version": __version__,
         "system": file.name,
-        "convention": CONVENTION,
+        "convention": convention(file.map),
         "arithmetic": "exact; series modulo primes",
         "seed": options["seed"],
-        "steps": options["steps"] or steps_by_default(file.system.dim),
+        "steps": options["steps"] or steps_by_default(file.map.dim),
         "seconds": options["seconds"],
         "verdict": verdict,
         "symbolic_denominator": symbolic,

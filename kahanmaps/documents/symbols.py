@@ -1,0 +1,60 @@
+"""The system of a file with some of its parameters left as symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError, quoted
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSystem:
+    """The system of a file, the parameters named in `symbols` without values, the others with theirs.
+
+    Args:
+        file: the system.
+        symbols: names of its parameters; eps is a symbol anyway and is not to be named.
+
+    Returns:
+        The system, its right-hand sides exact.
+
+    Raises:
+        InputError: for a name that is no parameter, for right-hand sides that with the symbols free have a degree
+            above 2 or are no polynomials, and for a member of the family, whose A and H must fit together at
+            every value.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> with_symbols(load("euler_top"), ["a1"]).rhs
+    (x2*x3*a1, -2*x1*x3, x1*x2)
+    """
+    system, symbols = file.system, tuple(dict.fromkeys(symbols))
+    for name in symbols:
+        if name not in file.parameters:
+            known = ", ".join(file.parameters) or "none"
+            raise InputError(f"found the symbol {quoted(name)}, expected eps or a parameter of the system: {known}")
+    names = (*file.variables, *symbols)
+    if not symbols:
+        return system
+    constants = {name: value for name, value in file.parameters.items() if name not in symbols}
+    section = file.document[file.kind]
+    if file.kind == "system":
+        return QuadraticSystem(tuple(parse_polynomial(str(text), names, constants) for text in section["rhs"]), symbols)
+    if file.kind == "family":
+        raise InputError(
+            f"found the symbols {', '.join(symbols)} in a [family] file, expected numbers: "
+            "write the system as [hamiltonian]"
+        )
+    H = parse_polynomial(str(section["H"]), names, constants)
+    gradient = [H.derivative(k) for k in range(len(file.variables))]
+    if isinstance(section["J"], str):
+        assert file.hamiltonian is not None
+        J: list[list[Any]] = [[ring(names).constant(entry) for entry in row] for row in file.hamiltonian.J.tolist()]
+    else:
+        J = [[parse_polynomial(str(entry), names, constants) for entry in row] for row in section["J"]]
+    zero = ring(names).constant(0)
+    rhs = tuple(sum((a * g for a, g in zip(row, gradient, strict=True)), zero) for row in J)
+    return QuadraticSystem(rhs, symbols)

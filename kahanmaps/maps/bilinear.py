@@ -1,0 +1,57 @@
+"""Discretizations given by equations that are linear in the old point and linear in the new one.
+
+Kahan's is among them, and so are its repaired and pseudo-Kahan relatives, with other coefficients or with skew terms
+like x Y - X y. The inverse map has the equations with the two points exchanged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.errors import InputError
+from kahanmaps.maps.implicit import ImplicitMap
+
+TITLE = "bilinear map"
+
+
+def bilinear_map(variables: Sequence[str], equations: Sequence[fmpq_mpoly]) -> ImplicitMap:
+    """The map x -> x~ where n polynomials vanish, each of degree at most 1 in x and at most 1 in x~.
+
+    Args:
+        variables: the names of the n coordinates of x.
+        equations: polynomials over Q in the n coordinates of x, the n of x~ and eps, in this order.
+
+    Returns:
+        The map, exact; its inverse is known.
+
+    Raises:
+        InputError: for another number of equations than of variables, and for one that is not linear in each point.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> equation = parse_polynomial("X - x - 2*eps*x*X", ["x", "X", "eps"])
+    >>> riccati = bilinear_map(["x"], [equation]).at("1/2")
+    >>> riccati.step(["1/5"]), riccati.inverse_step(["1/4"])
+    ((1/4,), (1/5,))
+    """
+    names, n = tuple(variables), len(variables)
+    if len(equations) != n:
+        raise InputError(f"found {len(equations)} equations for {n} variables, expected as many")
+    context = ring((*names, "eps"))
+    rows = []
+    for equation in equations:
+        row = [context.constant(0)] * (n + 1)
+        for monomial, coefficient in equation.terms():
+            old, new = monomial[:n], monomial[n : 2 * n]
+            if sum(old) > 1 or sum(new) > 1:
+                term = format_polynomial(equation.context().from_dict({monomial: coefficient}))
+                raise InputError(
+                    f"found the term {term}, expected terms of degree at most 1 in the old point and in the new one"
+                )
+            column = next((j for j, exponent in enumerate(new) if exponent), n)
+            row[column] = row[column] + context.from_dict({(*old, monomial[2 * n]): coefficient})
+        rows.append(tuple(row))
+    return ImplicitMap(names, tuple(rows), TITLE)

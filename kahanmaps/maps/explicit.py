@@ -1,0 +1,52 @@
+"""Maps that are given by rational functions: x~_i = P_i(x, eps)/Q_i(x, eps).
+
+As an equation M is the diagonal of the denominators Q_i and r the column of the numerators P_i.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.errors import InputError
+from kahanmaps.maps.implicit import ImplicitMap
+
+TITLE = "explicit map"
+
+
+def explicit_map(
+    variables: Sequence[str], image: Sequence[RationalFunction], inverse: Sequence[RationalFunction] | None = None
+) -> ImplicitMap:
+    """The map x -> (P_1/Q_1, ..., P_n/Q_n).
+
+    Args:
+        variables: the names of the n coordinates.
+        image: n rational functions of the variables, then eps.
+        inverse: the same for the inverse map, where it is known. That it is the inverse is not tested here.
+
+    Returns:
+        The map, exact. Without `inverse` it has one only if all functions are quotients of affine ones.
+
+    Raises:
+        InputError: for another number of functions than of variables, or other names in them.
+
+    >>> from kahanmaps.algebra.text import parse_rational_function
+    >>> lyness = [parse_rational_function(text, ["x", "y", "eps"]) for text in ("y", "(y + 2)/x")]
+    >>> explicit_map(["x", "y"], lyness).at(1).step([1, 3])
+    (3, 5)
+    """
+    names = tuple(variables)
+    for functions in (image, inverse or image):
+        if len(functions) != len(names):
+            raise InputError(f"found {len(functions)} functions for {len(names)} variables, expected as many")
+    return ImplicitMap(names, _rows(image), TITLE, backward=None if inverse is None else _rows(inverse))
+
+
+def _rows(functions: Sequence[RationalFunction]) -> tuple[tuple[fmpq_mpoly, ...], ...]:
+    n = len(functions)
+    return tuple(
+        (*(f.denominator if i == j else f.denominator * 0 for j in range(n)), -f.numerator)
+        for i, f in enumerate(functions)
+    )

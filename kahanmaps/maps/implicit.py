@@ -1,0 +1,455 @@
+"""A birational map as data: the equation M(x, eps) x~ = r(x, eps) for the image x~ of a point x.
+
+M is a matrix and r a vector of polynomials. Kahan's choice is M = I - eps f', r = (I + eps B) x + 2 eps c; a map given
+by rational functions has for M the diagonal of their denominators; discretizations that are linear in the new point
+have it as they stand. Three values say it all, and everything else asks them:
+
+* `BirationalMap` is the map over Q, eps and all. A new discretization is a function that returns an `ImplicitMap`.
+* `MapOver` is the map over one field at one eps: images, the inverse map, Jacobi matrices.
+* `Equation` has the coefficients of M and r over that field. The evaluators start from it: integers over one
+  denominator (integer_steps.py), residues (modular.py), machine numbers (float_steps.py), curves and forms in
+  projective space (projective.py), and the generic one here, over any field.
+
+In homogeneous coordinates (X : Z), x = X/Z, the equation says that L(X, Z) (X~ : Z~) = 0 for an n x (n + 1) matrix
+L = (M | -r) of forms of one degree. Where that degree is 1, exchanging the two points gives the inverse map.
+"""
+
+from __future__ import annotations
+
+import random
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly, fmpz
+
+from kahanmaps.algebra.chance import random_prime_field, seed_for
+from kahanmaps.algebra.fields import QQ, Field, rational
+from kahanmaps.algebra.matrices import det, solve
+from kahanmaps.algebra.polynomials import digits_of, evaluate, names_of, ring
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.displayed import DisplayedAsFormula
+from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
+from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
+
+Exponents = tuple[int, ...]
+Terms = tuple[tuple[int, Any], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """The matrix L = (M | -r) over a field, its entries forms of one degree in (X_1, ..., X_n, Z).
+
+    `exponents` lists monomials of that degree in X_1, ..., X_n, Z; entry (i, j) of L is the sum of c times monomial k
+    over the pairs (k, c) of `terms[i][j]`. In degree 1 the monomials are X_1, ..., X_n, Z in this order.
+    """
+
+    over: Field
+    exponents: tuple[Exponents, ...]
+    terms: tuple[tuple[Terms, ...], ...]
+
+    @property
+    def dim(self) -> int:
+        """n."""
+        return len(self.terms)
+
+    @cached_property
+    def degree(self) -> int:
+        """The degree of the forms."""
+        return sum(self.exponents[0])
+
+    def monomials(self, X: Sequence[Any]) -> list[Any]:
+        """The values of the monomials at (X_1, ..., X_n, Z), elements of any ring."""
+        if self.degree == 1:
+            return list(X)
+        powers: list[list[Any]] = [[None, entry] for entry in X]
+        found = []
+        for exponent in self.exponents:
+            total = None
+            for table, e in zip(powers, exponent, strict=True):
+                while len(table) <= e:
+                    table.append(table[-1] * table[1])
+                if e:
+                    total = table[e] if total is None else total * table[e]
+            found.append(total)
+        return found
+
+    def rows(self, monomials: Sequence[Any], zero: Any) -> list[list[Any]]:
+        """L at the point where the monomials have these values."""
+        return [
+            [sum((monomials[k] * c for k, c in entry[1:]), monomials[entry[0][0]] * entry[0][1]) if entry else zero
+             for entry in row]
+            for row in self.terms
+        ]  # fmt: skip
+
+    def transposed(self) -> Equation:
+        """The equation with x and x~ exchanged (and another sign), that of the inverse map; in degree 1 only."""
+        if self.degree != 1:
+            raise InputError("the inverse of this map is not known: give it as well")
+        n = self.dim
+        terms = []
+        for row in self.terms:
+            columns: list[list[tuple[int, Any]]] = [[] for _ in range(n + 1)]
+            for j, entry in enumerate(row):
+                for k, coefficient in entry:
+                    columns[k].append((j, -coefficient))
+            terms.append(tuple(tuple(column) for column in columns))
+        return Equation(self.over, self.exponents, tuple(terms))
+
+
+class MapOver(ABC):
+    """A birational map over a field, at one eps (an element of the field).
+
+    A map has to give `denominator_matrix` M(x), `right_side` r(x), `numerator_matrix`, `inverse` and `equation`.
+    """
+
+    field: Field
+    eps: Any
+    dim: int
+    variables: tuple[str, ...] = ()
+
+    @abstractmethod
+    def denominator_matrix(self, point: Sequence[Any]) -> Any:
+        """The matrix M(x)."""
+
+    @abstractmethod
+    def right_side(self, x: tuple[Any, ...]) -> Any:
+        """r(x), a column."""
+
+    @abstractmethod
+    def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
+        """The matrix N(x, x~) = d(r - M x~)/dx at fixed x~, with dPhi(x) = M(x)^{-1} N(x, x~)."""
+
+    @property
+    @abstractmethod
+    def inverse(self) -> MapOver:
+        """The inverse map. Raises InputError where it is not known."""
+
+    @property
+    @abstractmethod
+    def equation(self) -> Equation:
+        """The equation of a step."""
+
+    def denominator_name(self, backward: bool = False) -> str:
+        """What the matrix M(x) is called, for the map or, seen from it, for its inverse."""
+        return "M'(x)" if backward else "M(x)"
+
+    def point(self, values: Sequence[Any]) -> tuple[Any, ...]:
+        """The values as a point over the map's field. Raises InputError for a wrong length or inexact numbers."""
+        if isinstance(values, str):
+            raise InputError(f"found the text {values[:60]!r}, expected a sequence: parse_point reads points from text")
+        if len(values) != self.dim:
+            named = f": {', '.join(self.variables)}" if self.variables else ""
+            raise InputError(f"found a point with {len(values)} coordinates, expected {self.dim}{named}")
+        return tuple(self.field.convert(value) for value in values)
+
+    def step(self, point: Sequence[Any]) -> tuple[Any, ...]:
+        """The image x~ of a point. Raises SingularStep where det M(x) = 0."""
+        x = self.point(point)
+        if self.field is QQ:
+            image = self.integer_steps.step(IntegerPoint.from_rationals(x))
+            if image is None:
+                raise self._singular(x)
+            return image.rationals()
+        return self.generic_step(x)
+
+    def generic_step(self, x: tuple[Any, ...]) -> tuple[Any, ...]:
+        """The image of a point, by one linear system over the field, whatever the field is."""
+        with self.field.working():
+            try:
+                return tuple(solve(self.denominator_matrix(x), self.right_side(x)).entries())
+            except SingularMatrix as error:
+                raise self._singular(x) from error
+
+    def inverse_step(self, point: Sequence[Any]) -> tuple[Any, ...]:
+        """The preimage of a point. Raises SingularStep where the inverse map has no value there."""
+        return self.inverse.step(point)
+
+    def determinant(self, point: Sequence[Any]) -> Any:
+        """det M(x), the denominator of the map."""
+        if self.field is QQ:
+            return self.integer_steps.determinant(IntegerPoint.from_rationals(self.point(point)))
+        with self.field.working():
+            return det(self.denominator_matrix(point))
+
+    def jacobian(self, point: Sequence[Any]) -> Any:
+        """The Jacobi matrix dPhi(x) = M(x)^{-1} N(x, x~). Raises SingularStep."""
+        x = self.point(point)
+        image = self.step(x)
+        with self.field.working():
+            return solve(self.denominator_matrix(x), self.numerator_matrix(x, image))
+
+    @cached_property
+    def integer_steps(self) -> IntegerSteps:
+        """The stepper on integer points, for maps over QQ."""
+        equation = self.equation
+        return IntegerSteps(equation.exponents, equation.terms)
+
+    def _singular(self, point: tuple[Any, ...]) -> SingularStep:
+        shown = ",".join(self.field.format(entry) for entry in point)
+        if len(shown) > 200:
+            shown = f"{shown[:100]}...{shown[-80:]}"
+        return SingularStep(
+            f"{det_of(self.denominator_name())} = 0 at the point {shown} for eps = {self.field.format(self.eps)}: "
+            "the map has no value there",
+            point,
+            self.eps,
+        )
+
+
+def det_of(name: str) -> str:
+    """The determinant of a matrix with this name, in words.
+
+    >>> det_of("M(x)"), det_of("I - eps f'(x)")
+    ('det M(x)', "det(I - eps f'(x))")
+    """
+    return f"det({name})" if " " in name else f"det {name}"
+
+
+class EquationMap(MapOver):
+    """The map of an equation over a field; `backward` is the equation of its inverse, where that is known."""
+
+    def __init__(
+        self, equation: Equation, eps: Any, backward: Equation | None = None, variables: tuple[str, ...] = ()
+    ) -> None:
+        self.field, self.dim, self.eps, self.variables = equation.over, equation.dim, eps, variables
+        self._equation, self._backward = equation, backward
+
+    @property
+    def equation(self) -> Equation:
+        return self._equation
+
+    @cached_property
+    def inverse(self) -> EquationMap:
+        """The inverse map. Raises InputError where it is not known."""
+        backward = self._equation.transposed() if self._backward is None else self._backward
+        return EquationMap(backward, self.eps, self._equation, self.variables)
+
+    def _at(self, x: Sequence[Any]) -> list[list[Any]]:
+        with self.field.working():
+            return self._equation.rows(self._equation.monomials([*x, self.field.one]), self.field.zero)
+
+    def denominator_matrix(self, point: Sequence[Any]) -> Any:
+        """The matrix M(x)."""
+        n = self.dim
+        return self.field.matrix(n, n, [entry for row in self._at(self.point(point)) for entry in row[:n]])
+
+    def right_side(self, x: tuple[Any, ...]) -> Any:
+        return self.field.column([-row[-1] for row in self._at(x)])
+
+    def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
+        """The matrix N(x, x~) = d(r - M x~)/dx at fixed x~."""
+        one, zero, n = self.field.one, self.field.zero, self.dim
+        after = [*image, one]
+        columns = []
+        with self.field.working():
+            for k in range(n):
+                slopes = self._slopes([*point, one], k)
+                L = self._equation.rows(slopes, zero)
+                columns.append([-sum((a * b for a, b in zip(row, after, strict=True)), zero) for row in L])
+            return self.field.matrix(n, n, [columns[k][i] for i in range(n) for k in range(n)])
+
+    def _slopes(self, X: Sequence[Any], k: int) -> list[Any]:
+        """The derivatives of the monomials by X_k."""
+        exponents = self._equation.exponents
+        found = []
+        for exponent in exponents:
+            total = self.field.convert(exponent[k])
+            if exponent[k]:
+                for i, (entry, e) in enumerate(zip(X, exponent, strict=True)):
+                    for _ in range(e - (i == k)):
+                        total = total * entry
+            found.append(total)
+        return found
+
+    def __repr__(self) -> str:
+        return f"EquationMap({', '.join(self.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
+
+
+class BirationalMap(DisplayedAsFormula, ABC):
+    """A birational map over Q in named variables, which may depend on eps."""
+
+    variables: tuple[str, ...]
+    title: str  # what kind of map it is, in a word or two
+    has_eps: bool = True
+    has_time_step: bool = True  # which is 2 eps
+    denominator_name = "det M"
+
+    @property
+    def dim(self) -> int:
+        """The number of variables."""
+        return len(self.variables)
+
+    @property
+    @abstractmethod
+    def subject(self) -> tuple[Any, ...]:
+        """All that determines the map, as `seed_for` takes it."""
+
+    @property
+    @abstractmethod
+    def digits(self) -> int:
+        """About how many decimal digits the longest coefficient has, over one denominator."""
+
+    @abstractmethod
+    def at(self, eps: Any, over: Field = QQ) -> MapOver:
+        """The map over a field, at eps: an exact number, or an element of the field, not zero."""
+
+    @property
+    @abstractmethod
+    def matrix(self) -> list[list[fmpq_mpoly]]:
+        """The entries of M, polynomials in the variables, then eps."""
+
+    @abstractmethod
+    def written(self) -> dict[str, list[str]]:
+        """The map as text, for records."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImplicitMap(BirationalMap):
+    """The map of M(x, eps) x~ = r(x, eps): `rows` are those of (M | -r).
+
+    Entries are polynomials over Q in the variables, then eps. `backward` are the rows of the inverse map where they are
+    known; they are not needed where M and r are of degree 1 in the variables. `title` says in a word or two what kind
+    of map it is, `has_time_step` that it approximates a flow for the time 2 eps.
+
+    >>> x, y, eps = ring(["x", "y", "eps"]).gens()
+    >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")
+    >>> shear.at("1/2").step([1, 2])
+    (3, 2)
+    """
+
+    variables: tuple[str, ...]
+    rows: tuple[tuple[fmpq_mpoly, ...], ...]
+    title: str
+    has_time_step: bool = False
+    backward: tuple[tuple[fmpq_mpoly, ...], ...] | None = None
+    _last: list[tuple[Field, Any, EquationMap]] = field(default_factory=list, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.variables)
+        names = (*self.variables, "eps")
+        for rows in (self.rows, self.backward or self.rows):
+            if len(rows) != n or any(len(row) != n + 1 or any(names_of(e) != names for e in row) for row in rows):
+                raise InputError(f"expected {n} rows of {n + 1} polynomials in {', '.join(names)}")
+
+    @cached_property
+    def has_eps(self) -> bool:  # type: ignore[override]
+        """Whether eps occurs."""
+        return any("eps" not in entry.unused_gens() for row in self.rows for entry in row)
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return (self.variables, *(entry for row in self.rows for entry in row))
+
+    @property
+    def matrix(self) -> list[list[fmpq_mpoly]]:
+        return [list(row[:-1]) for row in self.rows]
+
+    @cached_property
+    def equations(self) -> tuple[fmpq_mpoly, ...]:
+        """M x~ - r, polynomials in x, the new point with names like x_new, and eps; all of them are 0.
+
+        >>> x, eps = ring(["x", "eps"]).gens()
+        >>> ImplicitMap(("x",), ((1 - eps*x, -x),), "Riccati").equations
+        (-x*x_new*eps - x + x_new,)
+        """
+        n = len(self.variables)
+        context = ring((*self.variables, *(f"{name}_new" for name in self.variables), "eps"))
+        old = [*context.gens()[:n], context.gens()[-1]]
+        new = [*context.gens()[n : 2 * n], context.constant(1)]
+        return tuple(
+            sum((entry.compose(*old, ctx=context) * y for entry, y in zip(row, new, strict=True)), context.constant(0))
+            for row in self.rows
+        )
+
+    def written(self) -> dict[str, list[str]]:
+        return {"equations": str(self).split("\n")}
+
+    def __str__(self) -> str:
+        return "\n".join(f"{format_polynomial(equation)} = 0" for equation in self.equations)
+
+    @cached_property
+    def digits(self) -> int:
+        return digits_of(entry for row in self.rows for entry in row)
+
+    def at(self, eps: Any, over: Field = QQ) -> EquationMap:
+        """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where it has no reduction."""
+        element = nonzero_eps(eps, over)
+        for known, at, found in self._last:
+            if known is over and at is element:
+                return found
+        backward = None if self.backward is None else equation_of(self.backward, over, element)
+        found = EquationMap(equation_of(self.rows, over, element), element, backward, self.variables)
+        self._last[:] = [(over, element, found)]
+        return found
+
+    def __repr__(self) -> str:
+        return f"ImplicitMap({self.title} in {', '.join(self.variables)})"
+
+
+def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, eps: Any) -> Equation:
+    """The equation of (M | -r), polynomials in the variables, then eps, over a field. Raises BadPrime."""
+    rows = list(rows)
+    n = len(rows)
+    context = ring(("eps",))
+    by_monomial: list[list[dict[Exponents, Any]]] = []
+    for row in rows:
+        found: list[dict[Exponents, Any]] = []
+        for entry in row:
+            collected: dict[Exponents, dict[tuple[int, ...], fmpq]] = {}
+            for monomial, coefficient in entry.terms():
+                collected.setdefault(tuple(monomial[:n]), {})[(monomial[n],)] = coefficient
+            with over.working():
+                found.append({m: evaluate(context.from_dict(c), over, (eps,)) for m, c in collected.items()})
+        by_monomial.append(found)
+    degree = max((sum(m) for row in by_monomial for entry in row for m in entry), default=0)
+    if degree <= 1:
+        exponents = [tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1)]
+    else:
+        seen = dict.fromkeys(m for row in by_monomial for entry in row for m in entry)
+        exponents = [(*m, degree - sum(m)) for m in seen]
+    place = {exponent[:n]: k for k, exponent in enumerate(exponents)}
+    terms = tuple(
+        tuple(tuple((place[m], c) for m, c in entry.items() if over.characteristic == 0 or c != 0) for entry in row)
+        for row in by_monomial
+    )
+    return Equation(over, tuple(exponents), terms)
+
+
+def nonzero_eps(eps: Any, over: Field) -> Any:
+    """eps as an element of the field. Raises InputError where it is 0, BadPrime where only the prime makes it so."""
+    element = over.convert(eps)
+    if element == 0:
+        if isinstance(eps, int | str | Fraction | fmpz | fmpq) and rational(eps) != 0:
+            raise BadPrime(
+                f"the prime {over.characteristic} divides the numerator of eps = {eps}: take another prime",
+                over.characteristic,
+            )
+        raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+    return element
+
+
+def why_no_map(map_: ImplicitMap) -> str:
+    """Empty, or what is wrong with a map that somebody has written down, found at random points modulo primes.
+
+    It must have values, and where an inverse map is given too, lead back from them. A point says so by chance with
+    probability below 2^-40 for equations of any size that can be read, and these are three points.
+    """
+    rng = random.Random(f"map {seed_for(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
+    for _ in range(3):
+        over = random_prime_field(rng)
+        x = tuple(over.random(rng) for _ in range(map_.dim))
+        try:
+            found = map_.at(over.random(rng), over)
+            image = found.step(x)
+            back = x if map_.backward is None else found.inverse.step(image)
+        except BadPrime:
+            continue
+        except SingularStep:
+            return "found a map that has no value at random points: the new point is not determined"
+        if back != x:
+            return "found a map that does not lead back from the images of random points, expected the inverse map"
+    return ""

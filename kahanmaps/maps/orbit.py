@@ -1,0 +1,220 @@
+"""One door to all orbits: of any map, in any arithmetic, by the fastest way that gives what is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from math import gcd
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.errors import InputError
+from kahanmaps.family.associated import FamilyMember
+from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.maps.accuracy import NotAccurate, bits_for
+from kahanmaps.maps.arithmetic import Arithmetic
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.jump import special_start
+from kahanmaps.maps.kahan import Kahan, as_map
+from kahanmaps.maps.methods import JUMP_FROM, choose_method, why_no_reduction
+from kahanmaps.maps.orbits import (
+    DEFAULT_MAX_DIGITS,
+    Iterates,
+    Orbit,
+    OrbitEnd,
+    OrbitPoint,
+    require_short,
+    require_steps,
+)
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+_TOO_FAR = 10**13  # years
+_FEW_STEPS = 3  # for which looking for a structure does not pay
+_LONG_INPUT = 4000  # bits of start and eps, from which on setting up a normal form pays later
+_LARGE_DIMENSION = 16
+_BITS_AT_LEAST = 4096  # where no precision is enough
+
+
+def orbit(
+    given: QuadraticSystem | BirationalMap,
+    start: Sequence[Any],
+    eps: Any = None,
+    *,
+    steps: int | None = None,
+    at: Sequence[int] | None = None,
+    arithmetic: str | Arithmetic = "exact",
+    method: str | None = None,
+    backward: bool = False,
+    every: int = 1,
+    max_digits: int | None = None,
+    hamiltonian: CubicHamiltonian | None = None,
+    member: FamilyMember | None = None,
+    structure: Structure | NoStructure | None = None,
+    kernel: str | None = None,
+    accuracy: int = 15,
+    progress: Callable[[str], None] | None = None,
+) -> Walk:
+    """The orbit of a start, or some of its iterates: iterate over it once, then look at `end`.
+
+    Args:
+        given: the map; a quadratic system stands for its Kahan map.
+        start: exact numbers.
+        eps: an exact number, for Kahan maps half the time step; none for a map without it.
+        steps: how many steps to take, or
+        at: which iterates alone are wanted.
+        arithmetic: "exact", "float", "mod:P", "ball:BITS" or "ball:auto".
+        method: "generic", "normal-form" or "jump"; chosen by itself unless given.
+        backward: step by the inverse map.
+        every: float orbits deliver only multiples of it; `wanted` tells for all.
+        max_digits: the digit budget in exact arithmetic (200,000 unless given).
+        hamiltonian, member: what is known of a quadratic system, so that its normal form need not be searched.
+        structure: the normal form itself, or why there is none; looked for where it pays unless given.
+        kernel: "numpy" or "numba", for floats.
+        accuracy: decimal digits, for "ball:auto".
+        progress: is told of trials.
+
+    Returns:
+        The points as they come, exact, enclosed or rounded as the arithmetic is; `method` says how and why.
+
+    Raises:
+        InputError: for wrong values, and for what the map, the method and the arithmetic do not allow together.
+
+    >>> riccati = QuadraticSystem.from_text(["x"], ["x^2"])
+    >>> [point.text for point in orbit(riccati, ["1/5"], "1/2", steps=3)]
+    [['1/5'], ['1/4'], ['1/3'], ['1/2']]
+    >>> [point.text for point in orbit(riccati, ["1/5"], "1/2", steps=3, arithmetic="mod:7")]
+    [['3'], ['2'], ['5'], ['4']]
+    """
+    if (steps is None) == (at is None):
+        raise InputError("expected a number of steps, or at: the steps that are wanted; one of the two")
+    if isinstance(arithmetic, str):
+        arithmetic = Arithmetic.parse(arithmetic)
+    map_ = as_map(given)
+    if eps is None and map_.has_eps:
+        raise InputError("found no eps, expected an exact number: the map depends on it")
+    exact_eps = fmpq(1) if eps is None else rational(eps)
+    far = max(at, default=0) if at is not None else (steps or 0)
+    require_steps(far)
+    if arithmetic.kind == "exact":
+        require_short(exact_eps, [rational(entry) for entry in start], max_digits)
+    if structure is None:
+        structure = _structure(map_, start, exact_eps, far, method, arithmetic, hamiltonian, member)
+    chosen = choose_method(method, arithmetic.kind, structure, at)
+    if chosen.name != "jump" and far > _TOO_FAR:
+        raise InputError(
+            f"step {far} is too far to be reached one step after the other (more than {_TOO_FAR:.0e}), "
+            f"and there is no other way here: {chosen.reason}"
+        )
+    used = structure if chosen.name != "generic" and isinstance(structure, Structure) else None
+    interval = every if at is None else max(1, gcd(*at))
+
+    def made(numbers: Arithmetic) -> Any:
+        if numbers.kind == "float":
+            from kahanmaps.maps.fast import FloatOrbit
+
+            form = None if used is None else used.form
+            return FloatOrbit(map_, exact_eps, start, far, backward=backward, form=form, kernel=kernel, every=interval)
+        over, budget = map_.at(exact_eps, numbers.field), max_digits or DEFAULT_MAX_DIGITS
+        if chosen.name == "jump" and used is not None:
+            return Iterates(over, start, at or [], structure=used, backward=backward, max_digits=budget)
+        normal = used if chosen.name == "normal-form" else None
+        return Orbit(over, start, far, backward=backward, max_digits=budget, structure=normal)
+
+    remark = ""
+    if arithmetic == Arithmetic("ball"):
+        try:
+            bits = bits_for(lambda bits: made(Arithmetic("ball", bits)), accuracy, progress)
+        except NotAccurate as error:
+            bits, remark = _BITS_AT_LEAST, str(error)
+        arithmetic = Arithmetic("ball", bits)
+    return Walk(made(arithmetic), arithmetic, chosen.name, chosen.text, None if at is None else set(at), every, remark)
+
+
+class Walk:
+    """What `orbit` returns. `arithmetic` is the one used, `method` its name and `why` the reason; `orbit` does it."""
+
+    def __init__(
+        self, orbit: Any, arithmetic: Arithmetic, method: str, why: str, at: set[int] | None, every: int, remark: str
+    ) -> None:
+        self.orbit = orbit
+        self.arithmetic = arithmetic
+        self.method = method
+        self.why = why
+        self._at, self._every, self._remark = at, every, remark
+
+    def wanted(self, step: int) -> bool:
+        """Whether this step is one that was asked for: others may come as well."""
+        return step in self._at if self._at is not None else step % self._every == 0
+
+    def interrupt(self) -> None:
+        """Ask a running orbit to end after the step in flight (safe to call from a signal handler)."""
+        self.orbit.interrupt()
+
+    @property
+    def end(self) -> OrbitEnd:
+        """How it ended, once all points have come."""
+        end: OrbitEnd | None = self.orbit.end
+        if end is None:
+            raise AssertionError("an orbit has not ended, or without saying how")
+        return OrbitEnd("precision", end.steps, self._remark) if self._remark and end.is_whole else end
+
+    def __iter__(self) -> Iterator[OrbitPoint]:
+        if self.arithmetic.kind != "float":
+            yield from self.orbit
+            return
+        from kahanmaps.maps.fast import FLOATS
+
+        for step, x in self.orbit:
+            yield OrbitPoint(step, FLOATS, tuple(x.tolist()))
+
+
+def _structure(
+    map_: BirationalMap,
+    start: Sequence[Any],
+    eps: fmpq,
+    steps: int,
+    method: str | None,
+    arithmetic: Arithmetic,
+    hamiltonian: CubicHamiltonian | None,
+    member: FamilyMember | None,
+) -> Structure | NoStructure:
+    """The normal form, where it may be of use."""
+    if method == "generic":
+        return NoStructure("not looked for")
+    if not isinstance(map_, Kahan) or map_.system.symbols:
+        return NoStructure(f"it is an {map_.title}" if map_.title[0] in "aeiou" else f"it is a {map_.title}")
+    if method is None and (reason := _why_not_to_look(map_, start, eps, steps, arithmetic, member)):
+        return NoStructure(reason)
+    structure = structure_of(map_.system, hamiltonian, member)
+    if isinstance(structure, NoStructure):
+        return structure
+    if arithmetic.kind == "float" and structure.T is not None and method is None:
+        return NoStructure("in machine numbers only J = [[0, I], [-I, 0]] has one")
+    reason = ""
+    if arithmetic.kind == "ball":
+        reason = special_start(structure, eps, start)
+    if arithmetic.kind == "mod":
+        reason = why_no_reduction(structure, GF(arithmetic.number), eps)
+    return NoStructure(reason) if reason else structure
+
+
+def _why_not_to_look(
+    map_: BirationalMap,
+    start: Sequence[Any],
+    eps: fmpq,
+    steps: int,
+    arithmetic: Arithmetic,
+    member: FamilyMember | None,
+) -> str:
+    """Empty, or why looking for a structure would cost more than it can save."""
+    few = JUMP_FROM["mod"] - 1 if arithmetic.kind == "mod" else _FEW_STEPS
+    numbers = [eps, *(rational(entry) for entry in start)]
+    if max(max(abs(x.p).bit_length(), x.q.bit_length()) for x in numbers) > _LONG_INPUT:
+        few = max(few, 24)
+    if steps <= few:
+        return "not looked for, for so few steps"
+    if member is None and map_.dim > _LARGE_DIMENSION:
+        return f"not looked for in dimension {map_.dim}"
+    return ""

@@ -1,0 +1,100 @@
+"""Polarised maps of polynomial vector fields of any degree d, on d - 1 copies of the phase space.
+
+For x' = f(x) let F be the symmetric d-linear form, in (x, 1), with F(x, ..., x) = f(x). The method
+
+    (x_{k+d-1} - x_k) / ((d - 1) h) = F(x_k, x_{k+1}, ..., x_{k+d-1}),      h = 2 eps,
+
+is linear in the last point and in the first: a birational map of (x_k, ..., x_{k+d-2}). For d = 2 it is Kahan's.
+Source: cmoq-2015.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations
+from math import factorial
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import names_of, ring
+from kahanmaps.errors import InputError
+from kahanmaps.maps.implicit import ImplicitMap
+
+TITLE = "polarised map"
+MAX_DEGREE = 6
+
+
+def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
+    """The polarised map of x' = f(x), f of degree at most `degree`, with the time step 2 eps.
+
+    Args:
+        rhs: the n components of f, polynomials over Q in the n variables, then eps.
+        degree: d, from 2 to 6; a field of a lower degree has a map for each d.
+
+    Returns:
+        The map, exact, and its inverse. Its variables are those of f, at the points x_k, ..., x_{k+d-2}: x, x_1, x_2...
+
+    Raises:
+        InputError: where a degree exceeds d, or d is out of range.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> cubic = polarised_map([parse_polynomial("x^3", ["x", "eps"])])
+    >>> cubic.variables, cubic.at("1/4").step(["1/2", "1/3"])
+    (('x', 'x_1'), (1/3, 3/5))
+    """
+    if not 2 <= degree <= MAX_DEGREE:
+        raise InputError(f"found the degree {degree}, expected 2 to {MAX_DEGREE}")
+    names, n = names_of(rhs[0])[:-1], len(rhs)
+    found = max((sum(m[:n]) for f in rhs for m in f.monoms()), default=0)
+    if found > degree:
+        raise InputError(f"found right-hand sides of degree {found}, expected at most {degree}")
+    copies = degree - 1
+    variables = (*names, *(f"{name}_{k}" for k in range(1, copies) for name in names))
+    context = ring((*variables, "eps"))
+    known = [context.gens()[k * n : (k + 1) * n] for k in range(copies)]
+    step = 2 * copies * context.gens()[-1]
+    last = [_linear_in_one_point(f, known, step, degree) for f in rhs]
+
+    def unit(column: int, other: Any) -> tuple[fmpq_mpoly, ...]:
+        """The row that says that a coordinate of the image is `other`."""
+        return (*(context.constant(int(j == column)) for j in range(copies * n)), -other)
+
+    # (x_k, ..., x_{k+d-2}) -> (x_{k+1}, ..., x_{k+d-1}), and for the inverse (x_{k-1}, ..., x_{k+d-3}) with -h.
+    zero = [context.constant(0)] * ((copies - 1) * n)
+    forward = [unit(k * n + i, known[k + 1][i]) for k in range(copies - 1) for i in range(n)]
+    backward = [unit((k + 1) * n + i, known[k][i]) for k in range(copies - 1) for i in range(n)]
+    for i, (matrix, right) in enumerate(last):
+        unknown = [context.constant(int(i == j)) for j in range(n)]
+        ahead = [one - entry for one, entry in zip(unknown, matrix, strict=True)]
+        behind = [one + entry for one, entry in zip(unknown, matrix, strict=True)]
+        forward.append((*zero, *ahead, -known[0][i] - right))
+        backward.append((*behind, *zero, -known[-1][i] + right))
+    return ImplicitMap(variables, tuple(forward), TITLE, has_time_step=True, backward=tuple(backward))
+
+
+def _linear_in_one_point(
+    f: fmpq_mpoly, known: Sequence[Sequence[fmpq_mpoly]], step: fmpq_mpoly, degree: int
+) -> tuple[list[fmpq_mpoly], fmpq_mpoly]:
+    """`step` F(x_1, ..., x_{d-1}, y) as a linear function of y: its coefficients, and what is free of y."""
+    n, copies = len(known[0]), len(known)
+    one = step * 0 + 1
+    linear, free = [step * 0 for _ in range(n)], step * 0
+    for monomial, coefficient in f.terms():
+        factors: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
+        factors += [None] * (degree - len(factors))
+        share = step * (coefficient / fmpq(factorial(degree))) * _power_of_eps(step, int(monomial[n]))
+        for places in permutations(factors):
+            product = share
+            for point, j in zip(known, places[:copies], strict=True):
+                product = product * (one if j is None else point[j])
+            j = places[-1]
+            if j is None:
+                free = free + product
+            else:
+                linear[j] = linear[j] + product
+    return linear, free
+
+
+def _power_of_eps(like: fmpq_mpoly, exponent: int) -> fmpq_mpoly:
+    return like.context().gens()[-1] ** exponent
