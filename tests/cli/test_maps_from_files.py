@@ -1,0 +1,60 @@
+"""Maps that are not Kahan's on the command line: what takes them, and what says that it does not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from schema_helpers import mistakes
+
+from kahanmaps.documents.files import read_system
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
+NAMES = [path.stem for path in EXAMPLES]
+HEAD = 'variables = ["x", "y"]\n'
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=NAMES)
+@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007", "float", "ball:auto"])
+def test_the_orbit_command_takes_every_map_in_every_arithmetic(kahanmaps, path, arithmetic):
+    file = read_system(path)
+    start = ",".join(["1/2", "1/3", "2/5", "1/7"][: file.dim])
+    eps = " --eps 1/10" if file.map.has_eps else ""
+    out = kahanmaps(f"orbit {path} --start {start}{eps} --steps 3 --arithmetic {arithmetic} --format jsonl -q").out
+    header, *points, end = map(json.loads, out.splitlines())
+    assert [mistakes("orbit", line) for line in (header, *points, end)] == [[]] * 6
+    assert (header["time_step"] is None) == (not file.map.has_time_step)
+    assert ("equations" in header) == (file.kind != "system" or file.name == "duffing")
+    assert end["status"] == "completed"
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=NAMES)
+def test_degrees_and_checks_print_records_of_their_schemas(kahanmaps, path):
+    assert mistakes("degrees", json.loads(kahanmaps(f"degrees {path} --terms 3 --json -q").out)) == []
+    assert mistakes("check", json.loads(kahanmaps(f"check-measure {path} --json -q").out)) == []
+    assert mistakes("singularities", json.loads(kahanmaps(f"singularities {path} --eps 1/3 --json -q").out)) == []
+
+
+def test_a_map_with_eps_needs_it_and_one_without_does_not(kahanmaps):
+    def status(name, eps=""):
+        return kahanmaps(f"orbit {EXAMPLES[NAMES.index(name)]} --start 1/2,1/3 --steps 1 {eps} -q").status
+
+    assert [status("mcmillan"), status("symplectic-euler"), status("symplectic-euler", "--eps 1/9")] == [0, 2, 0]
+
+
+def test_backward_steps_need_an_inverse(kahanmaps, tmp_path):
+    path = tmp_path / "henon.toml"
+    path.write_text(HEAD + '[map]\nimage = ["y", "x + y^2"]')
+    found = kahanmaps(f"orbit {path} --start 1,2 --steps 1 --backward")
+    assert found.status == 2
+    assert "the inverse of this map is not known" in found.err
+
+
+@pytest.mark.parametrize(
+    "command", ["analyze", "find-integrals", "heights --eps 1/10", "ensemble --eps 1 --random 2 --steps 1"]
+)
+def test_other_commands_say_that_they_are_for_quadratic_systems(kahanmaps, command):
+    found = kahanmaps(f"{command} {EXAMPLES[NAMES.index('mcmillan')]}")
+    assert found.status == 2
+    assert "mcmillan is of kind [map], expected a quadratic system of its own" in " ".join(found.err.split())

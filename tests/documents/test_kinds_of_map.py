@@ -1,0 +1,153 @@
+"""Maps that are not Kahan's, from files: read, refused with all mistakes, and put to the test by the commands."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.checks.commute import check_commute
+from kahanmaps.checks.conserve import check_integrals
+from kahanmaps.checks.preserve import check_measure, check_poisson
+from kahanmaps.checks.settings import NO_TIME_STEP, Settings
+from kahanmaps.documents.files import parse_system, read_system
+from kahanmaps.documents.symbols import with_symbols
+from kahanmaps.errors import InputError, SystemFileError
+from kahanmaps.laboratory.degrees import degree_growth
+from kahanmaps.laboratory.singularities import singularities, symbolic_denominator
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
+NAMES = [path.stem for path in EXAMPLES]
+HEAD = 'variables = ["x", "y"]\n'
+
+
+def example(name):
+    return read_system(EXAMPLES[NAMES.index(name)])
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=NAMES)
+def test_a_file_of_any_kind_reads_back_equal(path):
+    file = read_system(path)
+    again = parse_system(file.to_toml(), file.name)
+    assert again == file
+    assert json.loads(json.dumps(file.document)) == again.document
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=NAMES)
+def test_what_the_example_says_that_it_preserves_is_proved(path):
+    file = read_system(path)
+    if file.integrals:
+        assert str(check_integrals(file).verdict) == "proved"
+    assert str(check_measure(file).verdict) == "proved"
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=NAMES)
+def test_another_claim_of_the_example_is_refuted(path):  # so the checks can fail
+    file = read_system(path)
+    first = file.variables[0]
+    wrong = parse_rational_function(f"{first}^2 + 1", [*file.variables, "eps"])
+    assert str(check_integrals(file, extra={"wrong": wrong}).verdict) == "refuted"
+    assert str(check_measure(file, extra=wrong).verdict) == "refuted"
+
+
+def test_maps_of_different_kinds_commute_or_not():
+    # The Kahan map of x' = x^2 is x/(1 - 2 eps x); of x' = 3 x^2 at a third of eps it is the same.
+    one = parse_system('variables = ["x"]\n[map]\nimage = ["x/(1 - 2*eps*x)"]')
+    other = parse_system('variables = ["x"]\n[system]\nrhs = ["x^2 + eps^2*x^2"]')
+    third = parse_system('variables = ["x"]\n[bilinear]\nequations = ["X - x = eps*(x + X)"]')
+    assert str(check_commute(one, other).verdict) == "proved"
+    assert str(check_commute(one, third).verdict) == "refuted"
+    settings = Settings(eps=fmpq(1, 5))
+    assert str(check_commute(one, one, settings, fmpq(1, 3)).verdict) == "proved"
+    report = check_commute(third, one, settings, fmpq(1, 3))
+    assert str(report.verdict) == "refuted"
+    assert "the map of g is taken at eps2 = 1/3" in report.notes[0]
+
+
+def test_degrees_and_singularities_of_a_qrt_map_are_those_of_an_elliptic_fibration():
+    # Quadratic growth; x^2 y^2 - x^2 - y^2 + x y is a pencil of biquadratic curves. 2 n^2 + 1: Bellon 1999.
+    map_ = example("mcmillan").map
+    assert degree_growth(map_, max_terms=6).degrees == (1, 3, 9, 19, 33, 51, 73)
+    run = singularities(map_, "1/3")
+    assert {(h.polynomial, h.confined_at) for h in run.hypersurfaces} == {("y - 1", 3), ("y + 1", 3)}
+    assert symbolic_denominator(map_) == [("y - 1", 1), ("y + 1", 1)]
+
+
+def test_a_change_of_time_changes_no_degree():
+    top = parse_system('variables = ["x", "y", "z"]\n[system]\nrhs = ["y*z", "-2*z*x", "x*y"]')
+    assert degree_growth(example("rescaled-top").map, max_terms=5).degrees == (1, 3, 9, 19, 33, 51)
+    assert degree_growth(top.system, max_terms=5).degrees == (1, 3, 9, 19, 33, 51)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "rescaled-top"])
+def test_what_is_for_quadratic_systems_says_which_kind_of_map_it_found(name):
+    file = example(name)
+    for ask in (lambda: file.system, lambda: with_symbols(file), lambda: with_symbols(file, list(file.parameters))):
+        with pytest.raises(InputError, match="expected a quadratic system of its own"):
+            ask()
+    with pytest.raises(InputError, match=f"{file.name} is of kind .{file.kind}.: Pi"):
+        check_poisson(file)
+
+
+def test_a_system_with_eps_in_it_is_no_quadratic_system_of_its_own():
+    with pytest.raises(InputError, match="rescaled-top has eps in its coefficients"):
+        _ = example("rescaled-top").system
+
+
+def test_a_record_of_a_map_without_time_step_does_not_speak_of_one():
+    assert check_measure(example("symplectic-euler")).context["convention"] == NO_TIME_STEP
+    assert check_measure(example("duffing")).context["convention"] != NO_TIME_STEP
+
+
+def test_the_new_point_may_have_any_names():
+    plain = 'variables = ["x"]\n[bilinear]\nequations = ["X - x = 2*eps*x*X"]'
+    named = 'variables = ["x"]\n[bilinear]\nnew = ["b"]\nequations = ["b - x = 2*eps*x*b"]'
+    assert parse_system(plain, "same").map.subject == parse_system(named, "same").map.subject
+
+
+WRONG = [
+    ('[bilinear]\nequations = ["X = x"]', "bilinear.equations", "found 1 equation, expected 2"),
+    ('[bilinear]\nequations = ["X = x", "Y + y"]', "bilinear.equations[2]", "expected LEFT = RIGHT"),
+    ('[bilinear]\nequations = ["X = x", "Y = y = 1"]', "bilinear.equations[2]", "expected LEFT = RIGHT"),
+    ('[bilinear]\nequations = ["X = x^2", "Y = y"]', "bilinear.equations[1]", "degree 2, expected at most 1"),
+    ('[bilinear]\nequations = ["X = x", "Y = X*Y"]', "bilinear", "found the term -X*Y"),
+    ('[bilinear]\nequations = ["X = x", "X = y"]', "bilinear", "no value at random points"),
+    ('[bilinear]\nequations = ["X = x", "Z = y"]', "bilinear.equations[2]", "unknown name 'Z'"),
+    ('[bilinear]\nnew = ["a", "x"]\nequations = ["a = x", "x = y"]', "bilinear.new", "x"),
+    ('[bilinear]\nnew = ["a"]\nequations = ["a = x", "b = y"]', "bilinear.new", "found 1 name, expected 2"),
+    ('[bilinear]\nnew = ["a", "2"]\nequations = ["a = x", "b = y"]', "bilinear.new", "2"),
+    ("[bilinear]", "bilinear.equations", "missing"),
+    ('[map]\nimage = ["x"]', "map.image", "found 1 function, expected 2"),
+    ('[map]\nimage = ["x", "1/0"]', "map.image[2]", "division"),
+    ('[map]\nimage = ["x", "y"]\ninverse = ["x", "-y"]', "map", "does not lead back"),
+    ('[map]\nimage = ["x", "y + x^2"]\ninverse = ["x", "y - x^3"]', "map", "does not lead back"),
+    ('[map]\ninverse = ["x", "y"]', "map.image", "missing"),
+    ('[map]\nimage = "x"', "map.image", "expected a list of rational functions"),
+    ('[map]\nimage = ["x", "y"]\nback = ["x", "y"]', "map.back", "unknown key"),
+    ('[system]\nrhs = ["x", "y^3"]', "system.rhs[2]", "degree 3, expected at most 2"),
+    ('[system]\nrhs = ["x", "y^4"]\ndiscretization = "polarised"', "system.rhs[2]", "degree 4, expected at most 3"),
+    (
+        '[system]\nrhs = ["x", "y"]\ndiscretization = "euler"',
+        "system.discretization",
+        'expected "kahan" or "polarised"',
+    ),
+    ('[system]\nrhs = ["x", "y"]\ndegree = 3', "system.degree", "expected none"),
+    ('[system]\nrhs = ["x", "y"]\ndiscretization = "polarised"\ndegree = 9', "system.degree", "from 2 to 6"),
+    ('[system]\nrhs = ["x", "y"]\ndiscretization = "polarised"\ndegree = "3"', "system.degree", "from 2 to 6"),
+    ('[system]\nrhs = ["x", "y"]\n[map]\nimage = ["x", "y"]', "file", "found [system], [map]"),
+]
+
+
+@pytest.mark.parametrize(("text", "key", "words"), WRONG, ids=range(len(WRONG)))
+def test_a_mistake_is_told_with_its_key(text, key, words):
+    with pytest.raises(SystemFileError) as caught:
+        parse_system(HEAD + text)
+    assert [what for where, what in caught.value.mistakes if where == key and words in what], caught.value.mistakes
+
+
+def test_the_polarised_map_of_a_system_of_two_names_that_clash_is_refused():
+    with pytest.raises(SystemFileError, match="x_1"):
+        parse_system('variables = ["x", "x_1"]\n[system]\nrhs = ["x^3", "1"]\ndiscretization = "polarised"')

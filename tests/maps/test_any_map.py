@@ -1,0 +1,335 @@
+"""One map, many evaluators: each kind of map in every arithmetic is what the generic step over its field says.
+
+The generic step solves M(x) x~ = r(x) as it stands; it is compared with independent formulas where there are some.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flint import fmpq
+from helpers import points, rationals
+from hypothesis import assume, given, settings
+
+from kahanmaps.algebra.duals import DualField
+from kahanmaps.algebra.fields import GF, QQ, RR
+from kahanmaps.algebra.matrices import det
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.documents.files import parse_system, read_system
+from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.maps.arithmetic import Arithmetic
+from kahanmaps.maps.bilinear import bilinear_map
+from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit
+from kahanmaps.maps.implicit import ImplicitMap
+from kahanmaps.maps.kahan import Kahan, KahanMap
+from kahanmaps.maps.modular import ModularEnsemble
+from kahanmaps.maps.orbit import orbit
+from kahanmaps.maps.orbits import Orbit
+from kahanmaps.maps.polarised import polarised_map
+from kahanmaps.maps.projective import homogeneous_map
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "maps"
+LOTKA_VOLTERRA = QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"])
+
+
+def cubic(*rhs, degree=3):
+    names = ["x", "y", "z"][: len(rhs)]
+    return polarised_map([parse_polynomial(text, [*names, "eps"]) for text in rhs], degree)
+
+
+MAPS = {
+    "kahan": Kahan(LOTKA_VOLTERRA),
+    "adjusted": read_system(EXAMPLES / "rescaled-top.toml").map,
+    "bilinear": read_system(EXAMPLES / "symplectic-euler.toml").map,
+    "polarised": read_system(EXAMPLES / "duffing.toml").map,
+    "explicit": read_system(EXAMPLES / "mcmillan.toml").map,
+    "quartic": cubic("y^4 - x", "x*y + eps^2", degree=4),
+    "henon": parse_system('variables = ["x", "y"]\n[map]\nimage = ["y", "x + eps*y^2"]').map,
+}
+WITH_INVERSE = [name for name in MAPS if name != "henon"]
+LINEAR = [name for name in MAPS if MAPS[name].at(1).equation.degree == 1]
+P = 1009
+every_map = pytest.mark.parametrize("name", MAPS)
+
+
+def start_of(map_):
+    return [fmpq(k + 2, 2 * k + 3) for k in range(map_.dim)]
+
+
+def generic_orbit(over, start, steps):
+    found = [over.point(start)]
+    for _ in range(steps):
+        found.append(over.generic_step(found[-1]))
+    return found
+
+
+# Over the rationals.
+
+
+@every_map
+def test_integers_over_one_denominator_step_as_rationals_do(name):
+    over = MAPS[name].at("1/10")
+
+    @settings(max_examples=20)
+    @given(points(over.dim))
+    def compare(x):
+        try:
+            image = over.generic_step(x)
+        except SingularStep:
+            with pytest.raises(SingularStep):
+                over.step(x)
+            return
+        assert over.step(x) == image
+        assert over.determinant(x) == det(over.denominator_matrix(x))
+
+    compare()
+
+
+@every_map
+def test_the_equation_is_that_of_the_matrices(name):
+    over = MAPS[name].at("2/7")
+    x, n = tuple(start_of(MAPS[name])), MAPS[name].dim
+    rows = over.equation.rows(over.equation.monomials([*x, QQ.one]), QQ.zero)
+    assert [row[:n] for row in rows] == over.denominator_matrix(x).tolist()
+    assert [-row[n] for row in rows] == over.right_side(x).entries()
+    assert [[evaluate(e, QQ, [*x, fmpq(2, 7)]) for e in row] for row in MAPS[name].matrix] == [row[:n] for row in rows]
+
+
+@pytest.mark.parametrize("name", WITH_INVERSE)
+def test_the_inverse_leads_back_and_forth(name):
+    over = MAPS[name].at("1/10")
+
+    @settings(max_examples=20)
+    @given(points(over.dim))
+    def compare(x):
+        try:
+            image, before = over.step(x), over.inverse_step(x)
+            assert over.inverse_step(image) == x
+            assert over.step(before) == x
+        except SingularStep:
+            assume(False)
+
+    compare()
+
+
+def test_a_map_of_which_no_inverse_is_known_says_so():
+    with pytest.raises(InputError, match="the inverse of this map is not known"):
+        _ = MAPS["henon"].at(1).inverse
+
+
+@every_map
+def test_the_jacobi_matrix_is_that_of_dual_numbers(name):
+    map_ = MAPS[name]
+    x, n = start_of(map_), map_.dim
+    found = map_.at("1/10").jacobian(x)
+    for k in range(n):
+        duals = DualField(QQ)
+        moved = tuple(duals.dual(entry, fmpq(int(i == k))) for i, entry in enumerate(x))
+        image = map_.at("1/10", duals).generic_step(moved)
+        assert [entry.slope for entry in image] == [found[i, k] for i in range(n)]
+
+
+# Other fields.
+
+
+@every_map
+@pytest.mark.parametrize("prime", [P, 2**61 - 1, 2**127 - 1])
+def test_residues_of_an_orbit_are_the_orbit_of_residues(name, prime):
+    map_ = MAPS[name]
+    over, field = map_.at("1/10"), GF(prime)
+    exact = generic_orbit(over, start_of(map_), 3)
+    assert [tuple(map(field.convert, x)) for x in exact] == generic_orbit(map_.at("1/10", field), exact[0], 3)
+
+
+@every_map
+@pytest.mark.parametrize("kernel", ["numpy", "numba"])
+@pytest.mark.parametrize("prime", [P, 2**61 - 1])
+def test_arrays_of_residues_step_as_one_residue_does(name, kernel, prime):
+    map_ = MAPS[name]
+    starts = [[(7 * i + 3 * k + 1) % prime for k in range(map_.dim)] for i in range(20)]
+    if kernel == "numba" and name not in LINEAR:
+        with pytest.raises(InputError, match="the kernel numba is for equations that are linear"):
+            ModularEnsemble(map_, "1/10", starts, prime, kernel=kernel)
+        return
+    ensemble = ModularEnsemble(map_, "1/10", starts, prime, kernel=kernel)
+    ensemble.advance(4)
+    for start, x, count in zip(starts, ensemble.x.tolist(), ensemble.step_counts.tolist(), strict=True):
+        one = Orbit(map_.at("1/10", GF(prime)), start, 4)
+        *_, last = one
+        assert (one.end.steps, [int(e) for e in last.x]) == (count, x)
+
+
+@every_map
+def test_balls_hold_the_exact_orbit(name):
+    map_ = MAPS[name]
+    exact = generic_orbit(map_.at("1/10"), start_of(map_), 4)
+    for x, balls in zip(exact, Orbit(map_.at("1/10", RR(200)), start_of(map_), 4), strict=True):
+        assert all(ball.contains(RR(200).convert(entry)) or ball.overlaps(RR(200).convert(entry))
+                   for ball, entry in zip(balls.x, x, strict=True))  # fmt: skip
+        assert all(ball.rad() < 1e-40 for ball in balls.x)
+
+
+# Machine numbers.
+
+
+@every_map
+@pytest.mark.parametrize("backward", [False, True])
+def test_machine_numbers_follow_the_exact_orbit(name, backward):
+    map_ = MAPS[name]
+    if backward and name not in WITH_INVERSE:
+        pytest.skip("no inverse")
+    over = map_.at("1/10")
+    exact = generic_orbit(over.inverse if backward else over, start_of(map_), 5)
+    for kernel in ("numpy", "numba"):
+        found = [x for _, x in FloatOrbit(map_, "1/10", start_of(map_), 5, kernel=kernel, backward=backward)]
+        expected = [[float(int(e.p) / int(e.q)) for e in x] for x in exact]
+        assert np.allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+@every_map
+def test_kernels_for_machine_numbers_agree_to_the_last_bit(name):
+    map_ = MAPS[name]
+    starts = np.array([[0.3 + 0.01 * i + 0.1 * k for k in range(map_.dim)] for i in range(100)])
+    found = []
+    for kernel, count in (("numpy", 100), ("numba", 100), ("numpy", 1), ("numba", 1)):
+        ensemble = FloatEnsemble(map_, "1/10", starts[:count], kernel=kernel, threads=1)
+        ensemble.advance(5)
+        found.append(ensemble.x[:1])
+    assert all(np.array_equal(found[0], other, equal_nan=True) for other in found[1:])
+
+
+def test_a_denominator_that_almost_vanishes_is_told_at_any_scale_of_the_coefficients():
+    for scale in ("1", "10^20"):
+        text = f'variables = ["x", "y"]\n[map]\nimage = ["{scale}/({scale}*(x - 1))", "y"]'
+        one = FloatOrbit(parse_system(text).map, 1, [1 + fmpq(1, 2**45), 0], 1)
+        list(one)
+        assert (one.near_singular, one.near_singular_at) == (1, 0)
+
+
+# Projective space.
+
+
+@every_map
+def test_forms_without_common_factor_have_the_image_for_their_values(name):
+    over = MAPS[name].at("1/10")
+    forms, _ = homogeneous_map(over)
+    x = start_of(MAPS[name])
+    *above, below = [evaluate(form, QQ, [*x, QQ.one]) for form in forms]
+    assert tuple(entry / below for entry in above) == over.generic_step(tuple(x))
+
+
+# The same map, written in two ways.
+
+
+@given(points(2), rationals().filter(bool))
+def test_kahan_maps_are_bilinear_maps_and_polarised_maps_of_degree_two(x, eps):
+    texts = ["X - x - eps*(x + X - x*Y - X*y)", "Y - y - eps*(x*Y + X*y - y - Y)"]
+    names = ["x", "y", "X", "Y", "eps"]
+    written = bilinear_map(["x", "y"], [parse_polynomial(text, names) for text in texts])
+    others = [written, cubic("x*(1 - y)", "y*(x - 1)", degree=2)]
+    one = KahanMap(LOTKA_VOLTERRA, eps)
+    for other in others:
+        over = other.at(eps)
+        assert over.denominator_matrix(x) == one.denominator_matrix(x)
+        assert over.right_side(x) == one.right_side(x)
+        assert over.inverse.denominator_matrix(x) == one.inverse.denominator_matrix(x)
+        assert over.numerator_matrix(x, x) == one.numerator_matrix(x, x)
+
+
+def test_another_sign_in_an_equation_is_another_map():  # the comparison above can fail
+    text = "X - x + eps*(x + X - x*Y - X*y)"
+    names = ["x", "y", "X", "Y", "eps"]
+    other = bilinear_map(["x", "y"], [parse_polynomial(text, names), parse_polynomial("Y - y", names)])
+    assert other.at(1).denominator_matrix([1, 2]) != KahanMap(LOTKA_VOLTERRA, 1).denominator_matrix([1, 2])
+
+
+@given(points(1), rationals().filter(bool))
+def test_the_kahan_map_of_a_riccati_equation_by_its_formula(x, eps):
+    formula = explicit_map(["x"], [parse_rational_function("x/(1 - 4*eps*x)", ["x", "eps"])]).at(eps)
+    kahan = KahanMap(QuadraticSystem.from_text(["x"], ["2*x^2"]), eps)
+    assume(1 - 4 * eps * x[0] != 0)
+    assert formula.step(x) == kahan.step(x)
+    assert formula.inverse.step(kahan.step(x)) == x  # a quotient of affine functions has a known inverse
+
+
+@given(points(2), rationals().filter(bool))
+def test_a_polarised_map_solves_its_defining_equation(x, eps):
+    # x' = x^3 + x^2 + eps: (x'' - x)/(4 eps) = x x' x'' + (x x' + x' x'' + x'' x)/3 + eps.
+    over = cubic("x^3 + x^2 + eps").at(eps)
+    assume(over.determinant(x) != 0)
+    a, b = x
+    again, c = over.step(x)
+    assert again == b
+    assert (c - a) / (4 * eps) == a * b * c + (a * b + b * c + c * a) / 3 + eps
+
+
+def test_adjusted_coefficients_are_those_at_eps():
+    system = QuadraticSystem((parse_polynomial("x^2 + eps^2*x", ["x", "eps"]),), ("eps",))
+    assert Kahan(system).at("1/2").step(["1/3"]) == KahanMap(system.at([fmpq(1, 2)]), "1/2").step(["1/3"])
+    assert Kahan(system).at("1/2").inverse_step(Kahan(system).at("1/2").step(["1/3"])) == (fmpq(1, 3),)
+
+
+# The door.
+
+
+@every_map
+@pytest.mark.parametrize("text", ["exact", "mod:1009", "ball:200", "ball:auto", "float"])
+def test_the_door_gives_the_orbit_in_every_arithmetic(name, text):
+    map_ = MAPS[name]
+    walk = orbit(map_, start_of(map_), "1/10" if map_.has_eps else None, steps=3, arithmetic=text)
+    found = list(walk)
+    assert (walk.end.status, [point.step for point in found]) == ("completed", [0, 1, 2, 3])
+    exact = generic_orbit(map_.at("1/10"), start_of(map_), 3)[-1]
+    if text == "exact":
+        assert found[-1].x == exact
+    elif text.startswith("mod"):
+        assert found[-1].x == tuple(GF(1009).convert(e) for e in exact)
+    else:
+        numbers = [float(e) if text == "float" else float(e.mid()) for e in found[-1].x]
+        assert np.allclose(numbers, [int(e.p) / int(e.q) for e in exact], rtol=1e-9)
+
+
+def test_a_map_that_depends_on_eps_needs_one():
+    with pytest.raises(InputError, match="found no eps"):
+        orbit(MAPS["bilinear"], [1, 2], steps=1)
+
+
+def test_steps_or_iterates_are_asked_for_and_not_both():
+    for wrong in ({}, {"steps": 1, "at": [1]}):
+        with pytest.raises(InputError, match="one of the two"):
+            orbit(LOTKA_VOLTERRA, [1, 2], "1/10", **wrong)
+
+
+@pytest.mark.parametrize("text", ["", "exactly", "mod", "mod:", "mod:0", "mod:-3", "ball:x", "float:2", "mod:١"])
+def test_other_words_are_no_arithmetic(text):
+    with pytest.raises(InputError, match="expected exact, float, mod:P"):
+        Arithmetic.parse(text)
+
+
+# What is refused.
+
+
+def test_a_map_whose_parts_do_not_fit_is_refused():
+    one = parse_polynomial("1", ["x", "eps"])
+    with pytest.raises(InputError, match="expected 1 rows of 2 polynomials in x, eps"):
+        ImplicitMap(("x",), ((one,),), "short")
+
+
+def test_eps_zero_is_refused_and_a_prime_that_makes_it_zero_is_bad():
+    with pytest.raises(InputError, match="found eps = 0"):
+        MAPS["bilinear"].at(0)
+    with pytest.raises(BadPrime):
+        MAPS["bilinear"].at(7, GF(7))
+
+
+def test_polarisation_is_for_small_degrees():
+    for degree in (1, 7):
+        with pytest.raises(InputError, match="expected 2 to 6"):
+            cubic("x", degree=degree)
+    with pytest.raises(InputError, match="found right-hand sides of degree 4, expected at most 3"):
+        cubic("x^4")
