@@ -175,11 +175,17 @@ class GenericNumpy:
         # Beyond some hundred terms even one lane is faster in arrays, which are then matrices.
         self.few = _FEW_GENERIC if len(equation.factors) + equation.rows**3 // 3 < 1000 else 0
         n = equation.rows
-        terms = np.zeros((n + len(equation.products), n * (n + 1)))
-        for entry in range(n * (n + 1)):
-            for t in range(equation.first[entry], equation.first[entry + 1]):
-                terms[equation.columns[t], entry] = equation.factors[t]
-        self._terms = terms.reshape(-1, n, n + 1, 1)  # by k, i, j
+        # By row and column, and then either one by one or, where there are many, in whole matrices.
+        self._places = [
+            (*divmod(entry, n + 1), int(equation.columns[t]), float(equation.factors[t]))
+            for entry in range(n * (n + 1))
+            for t in range(equation.first[entry], equation.first[entry + 1])
+        ]
+        self._terms: FloatArray | None = None
+        if 3 * len(self._places) > n * n * (n + 1):
+            self._terms = np.zeros((n + len(equation.products), n, n + 1, 1))
+            for i, j, k, factor in self._places:
+                self._terms[k, i, j] = factor
 
     def advance(
         self, lanes: Lanes, first: int, steps: int, every: int, sampled: int, record: FloatArray | None
@@ -203,9 +209,13 @@ class GenericNumpy:
         for a, b in equation.products:
             y.append(y[a] * y[b])
         full = np.repeat(equation.constants[:, :, None], x.shape[1], axis=2)
-        product = np.empty_like(full)
-        for terms, value in zip(self._terms, y, strict=True):
-            full += np.multiply(terms, value, out=product)
+        if self._terms is None:
+            for i, j, k, factor in self._places:
+                full[i, j] += factor * y[k]
+        else:
+            product = np.empty_like(full)
+            for terms, value in zip(self._terms, y, strict=True):
+                full += np.multiply(terms, value, out=product)
         matrix, right = full[:, :n], full[:, n].copy()
         # At least the row of the pivot, by which the single step judges: what may be near-singular is done again there.
         scale = np.fmax(np.fmax.reduce(np.abs(matrix).reshape(n * n, -1), axis=0), 1.0)

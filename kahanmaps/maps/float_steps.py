@@ -424,7 +424,8 @@ class PythonGeneric:
         factors: list[float] = equation.factors.tolist()
         constants: list[list[float]] = equation.constants.tolist()
         terms = [list(zip(columns[s:e], factors[s:e], strict=True)) for s, e in pairwise(first)]
-        self._entries = [[(constants[i][j], terms[i * (n + 1) + j]) for j in range(n + 1)] for i in range(n)]
+        rows = [[(constants[i][j], terms[i * (n + 1) + j]) for j in range(n + 1)] for i in range(n)]
+        self._entries = [(row[:n], *row[n]) for row in rows]
         self._products: list[list[int]] = equation.products.tolist()
 
     def step(self, x: list[float]) -> tuple[list[float], int, int]:
@@ -433,15 +434,19 @@ class PythonGeneric:
         for a, b in self._products:
             y.append(y[a] * y[b])
         matrix, right, sizes = [], [], []
-        for row in self._entries:
-            entries = []
+        for row, side, side_terms in self._entries:
+            entries, size = [], 1.0
             for total, terms in row:
                 for k, factor in terms:
                     total += factor * y[k]
                 entries.append(total)
-            right.append(entries.pop())
+                if abs(total) > size:
+                    size = abs(total)
+            for k, factor in side_terms:
+                side += factor * y[k]
             matrix.append(entries)
-            sizes.append(max(1.0, *map(abs, entries)))
+            right.append(side)
+            sizes.append(size)
         return _solved(matrix, right, sizes)
 
 
