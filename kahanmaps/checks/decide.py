@@ -16,11 +16,12 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 from flint import fmpq
 
@@ -28,8 +29,9 @@ from kahanmaps.algebra.bounds import BoundField, Size, bound_of
 from kahanmaps.algebra.chance import PRIME_BITS, random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, PrimeField
 from kahanmaps.checks.claims import Evidence, Verdict, Witness
-from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep
+from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep, counted
 
+METHOD = "random points over GF(p)"
 DEFAULT_ERROR_BITS = 100
 # Rosser and Schoenfeld: at least 3 N / (5 ln N) primes in (N, 2N] for N >= 21; here N = 2^62.
 _PRIMES_LOG2 = math.log2(0.6) + PRIME_BITS - math.log2(PRIME_BITS * math.log(2))
@@ -82,6 +84,37 @@ class Identity:
         except (SingularStep, SingularMatrix):
             return None
 
+    # What `decide` asks of a statement.
+
+    name = "identity"
+    patience = _MAX_POLES
+    conjugates = 1
+
+    @property
+    def where(self) -> str:
+        """For what it is stated, as a part of a sentence."""
+        return f", {self.scope or ('for every eps' if self.eps is None else f'for eps = {self.eps}')}"
+
+    def trials(self, seed: int) -> Iterator[Trial]:
+        """The identity at random points, each over GF(p) for another random p."""
+        rng = random.Random(f"identity {self.seed(seed)}")
+        while True:
+            field = random_prime_field(rng)
+            sides = None
+            with suppress(BadPrime):
+                point = tuple(field.random(rng) for _ in range(self.dim))
+                eps = _draw_eps(self, field, rng)
+                sides = self.at(field, point, eps)
+            if sides is None:
+                yield Trial()
+            else:
+                held = _equal(field, sides)
+                yield Trial(field.prime, None if held else _refuted(self, seed, field, point, eps, sides))
+
+    def data(self, undefined: int) -> dict[str, Any]:
+        """What evidence from random points says beside the bounds."""
+        return {"poles_met": undefined, "eps": "every" if self.eps is None else str(self.eps)}
+
 
 @dataclass(frozen=True)
 class Decision:
@@ -92,68 +125,90 @@ class Decision:
     witness: Witness | None = None
 
 
-def decide(identity: Identity, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
-    """Decide an identity at random points over GF(p): supported with error below 2^-error_bits, or refuted."""
-    rng = random.Random(f"identity {identity.seed(seed)}")
-    equation, pole_degree = identity.bound
-    per_trial = log2_error(equation, pole_degree)
-    is_bounded = not math.isinf(per_trial)
+@dataclass(frozen=True)
+class Trial:
+    """A statement at one random point modulo `prime`; None: it has no value there. `decision` is there if it is one."""
+
+    prime: int | None = None
+    decision: Decision | None = None
+
+
+class Statement(Protocol):
+    """What can be decided at random points: identities, and the claims of the paper on objects of their own.
+
+    `bound` is as that of an identity, `conjugates` as for `log2_error`; `patience` is the number of points without a
+    value after which there is no hope, and `trials` ends where no further point is to be had.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def where(self) -> str: ...
+
+    @property
+    def bound(self) -> tuple[Size, int]: ...
+
+    @property
+    def conjugates(self) -> int: ...
+
+    @property
+    def patience(self) -> int: ...
+
+    def trials(self, seed: int) -> Iterator[Trial]: ...
+
+    def data(self, undefined: int) -> dict[str, Any]: ...
+
+
+def decide(statement: Statement, seed: int, error_bits: int = DEFAULT_ERROR_BITS) -> Decision:
+    """Decide a statement at random points over GF(p): supported with error below 2^-error_bits, or refuted."""
+    equation, pole_degree = statement.bound
+    per_trial = log2_error(equation, pole_degree, statement.conjugates)
+    is_bounded = not math.isinf(equation.bits)
     if is_bounded and per_trial >= -1:
         text = f"the degree bound {equation.degree} is too large for primes of 63 bits to decide anything"
-        evidence = Evidence("random points over GF(p)", text, {"degree_bound": equation.degree})
-        return Decision(Verdict.UNDECIDED, evidence)
-    trials = max(1, math.ceil(error_bits / -per_trial)) if is_bounded else 1
-    poles = 0
-    primes = []
-    for _ in range(trials):
-        while True:
-            if poles > _MAX_POLES:
-                return Decision(
-                    Verdict.UNDECIDED,
-                    Evidence(
-                        "random points over GF(p)",
-                        f"the identity is not defined at any of {poles} random points over GF(p): "
-                        "a denominator seems to vanish identically",
-                        {"poles_met": poles},
-                    ),
-                )
-            field = random_prime_field(rng)
-            try:
-                point = tuple(field.random(rng) for _ in range(identity.dim))
-                eps = _draw_eps(identity, field, rng)
-                sides = identity.at(field, point, eps)
-            except BadPrime:
-                poles += 1
-                continue
-            if sides is not None:
+        return _undecided(text, points=0, degree_bound=equation.degree)
+    needed = max(1, math.ceil(error_bits / -per_trial)) if is_bounded else 1
+    undefined = 0
+    primes: list[int] = []
+    for trial in statement.trials(seed):
+        if trial.decision is not None:
+            return trial.decision
+        if trial.prime is not None:
+            primes.append(trial.prime)
+            if len(primes) == needed:
                 break
-            poles += 1
-        if not _equal(field, sides):
-            return _refuted(identity, seed, field, point, eps, sides)
-        primes.append(field.prime)
+            continue
+        undefined += 1
+        if undefined > statement.patience:
+            text = f"the {statement.name} is not defined at any of {undefined} random points over GF(p)"
+            return _undecided(f"{text}: a denominator seems to vanish identically", poles_met=undefined)
+    else:
+        return _undecided("no prime was found at which chi splits into distinct factors", points=0)
     if not is_bounded:
-        text = "held at a random point, which says nothing: the two sides have no values over bounds, hence no bound"
-        return Decision(Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
-    bound = per_trial * trials
-    scope = identity.scope or ("for every eps" if identity.eps is None else f"for eps = {identity.eps}")
+        return _undecided("held at a random point, which says nothing: the two sides have no values over bounds")
+    bound = math.floor(-per_trial * needed)
     return Decision(
         Verdict.SUPPORTED,
         Evidence(
-            "random points over GF(p)",
-            f"held at {trials} random point{'s' * (trials > 1)} over GF(p), p random of 63 bits, {scope}; "
-            f"false with probability below 2^{math.floor(-bound) * -1}",
+            METHOD,
+            f"held at {counted(needed, 'random point')} over GF(p), p random of 63 bits{statement.where}; "
+            f"false with probability below 2^-{bound}",
             {
-                "points": trials,
-                "error_bound": f"2^{-math.floor(-bound)}",
+                "points": needed,
+                "error_bound": f"2^-{bound}",
                 "degree_bound": equation.degree,
                 "coefficient_bits_bound": math.ceil(equation.bits),
                 "pole_degree_bound": pole_degree,
-                "poles_met": poles,
                 "primes": [str(prime) for prime in primes],
-                "eps": "every" if identity.eps is None else str(identity.eps),
+                **statement.data(undefined),
             },
         ),
     )
+
+
+def _undecided(text: str, **data: Any) -> Decision:
+    return Decision(Verdict.UNDECIDED, Evidence(METHOD, text, data))
 
 
 def log2_error(equation: Size, poles: int, conjugates: int = 1) -> float:

@@ -5,16 +5,16 @@ What is common to a given member and to the member in general; `verify.py` has t
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from itertools import count
+from typing import Any, cast
 
 from kahanmaps.algebra.bounds import BoundField, Size, bound_of
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.checks.claims import Evidence, Finding, Verdict, Witness
-from kahanmaps.checks.decide import log2_error
+from kahanmaps.checks.decide import Decision, Trial, decide
 from kahanmaps.checks.judge import Contradiction
 from kahanmaps.checks.settings import Settings
 from kahanmaps.errors import InputError
@@ -127,18 +127,16 @@ class Examiner(ABC):
             return self._finding(claim, Verdict.UNDECIDED, Evidence("outside the hypotheses", reason))
         if claim.kind is not Kind.EQUAL:
             return self._examine_existence(claim)
-        needs, equation, poles = self._size(claim)
-        roots = "roots" in needs
-        decision = self._at_points(claim, roots, equation, poles)
+        statement = ClaimAtPoints(self, claim)
+        decision = decide(statement, self.settings.seed, self.settings.error_bits)
+        found = self._finding(claim, decision.verdict, decision.evidence, witness=decision.witness)
         if claim.misprint and decision.verdict is Verdict.SUPPORTED:
             silent = Evidence("special member", f"the misprint does not show for this member: {self.what_is_special()}")
-            return replace(
-                decision, verdict=Verdict.UNDECIDED, evidence=silent, also=(decision.evidence,), applies=False
-            )
+            return replace(found, verdict=Verdict.UNDECIDED, evidence=silent, also=(found.evidence,), applies=False)
         if claim.misprint or decision.verdict is Verdict.REFUTED:
-            return decision
+            return found
         try:
-            proof = self.proof(claim, needs, equation, poles)
+            proof = self.proof(claim, statement.needs, *statement.bound)
             also = tuple(self.also(claim))
         except Contradiction as error:
             text = f"{error}, although it {decision.evidence.summary}: the exact computation decides"
@@ -148,59 +146,7 @@ class Examiner(ABC):
                 return self._finding(claim, Verdict.PROVED, proof, (decision.evidence, *also))
             if decision.evidence.data.get("points") == 0:  # no prime, or none large enough, for a point
                 return self._finding(claim, Verdict.PROVED, proof, also)
-        return decision.with_also(*also)
-
-    def _at_points(self, claim: Claim, roots: bool, equation: Size, poles: int) -> Finding:
-        per_trial = log2_error(equation, poles, self.conjugates(roots))
-        if per_trial >= -1:
-            text = f"the degree bound {equation.degree} is too large for primes of 63 bits to decide anything"
-            evidence = Evidence("random points over GF(p)", text, {"points": 0})
-            return self._finding(claim, Verdict.UNDECIDED, evidence)
-        trials = max(1, math.ceil(self.settings.error_bits / -per_trial))
-        primes: list[int] = []
-        undefined = number = 0
-        while len(primes) < trials:
-            objects = self.point(roots, number)
-            number += 1
-            if objects is None:
-                text = "no prime was found at which chi splits into distinct factors"
-                return self._finding(
-                    claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text, {"points": 0})
-                )
-            try:
-                outcome = evaluate(claim, objects)
-            except UNDEFINED:
-                undefined += 1
-                if undefined > _POLES:
-                    text = f"the claim is not defined at any of {undefined} random points over GF(p)"
-                    return self._finding(claim, Verdict.UNDECIDED, Evidence("random points over GF(p)", text))
-                continue
-            if not outcome.holds:
-                return self._refuted(claim, roots, outcome)
-            if not outcome.pairs:
-                text = "it does not apply to this member: there is nothing to compare"
-                return self._finding(claim, Verdict.UNDECIDED, Evidence("outside the hypotheses", text))
-            primes.append(objects.K.characteristic)
-        bound = math.floor(-per_trial * trials)
-        assumed = ""
-        if roots and self.conjugates(True) > 1:
-            assumed = " at which chi splits (of which at least half as many are assumed as Chebotarev's density gives)"
-        evidence = Evidence(
-            "random points over GF(p)",
-            f"held at {trials} random point{'s' * (trials > 1)} over GF(p), p random of 63 bits{assumed}; "
-            f"false with probability below 2^-{bound}",
-            {
-                "points": trials,
-                "error_bound": f"2^-{bound}",
-                "degree_bound": equation.degree,
-                "coefficient_bits_bound": math.ceil(equation.bits),
-                "pole_degree_bound": poles,
-                "splitting_field_degree_bound": self.conjugates(roots),
-                "undefined_at": undefined,
-                "primes": [str(prime) for prime in primes],
-            },
-        )
-        return self._finding(claim, Verdict.SUPPORTED, evidence)
+        return found.with_also(*also)
 
     def _examine_existence(self, claim: Claim) -> Finding:
         """Claims that something differs somewhere, or has a certain rank: one point that shows it is a proof."""
@@ -241,31 +187,6 @@ class Examiner(ABC):
             evidence = Evidence("special member", special, {"points": tried})
             return replace(self._finding(claim, Verdict.UNDECIDED, evidence), applies=False)
         evidence = Evidence("random points", f"{text} at each of {tried} random points", {"points": tried})
-        return self._finding(claim, Verdict.REFUTED, evidence, witness=witness_of(outcome))
-
-    def _size(self, claim: Claim) -> tuple[set[str], Size, int]:
-        """What a claim uses, a bound for the equation it amounts to, and the degree of all its denominators."""
-        bounds = self.bounds()
-        equation, poles = bound_of(cast(BoundField, bounds.K), claim.function(bounds))
-        return bounds.used, equation, poles
-
-    def _refuted(self, claim: Claim, roots: bool, outcome: Outcome) -> Finding:
-        for number in range(12):
-            objects = self.exact_point(roots, number)
-            if objects is None:
-                break
-            try:
-                exact = evaluate(claim, objects)
-            except (*UNDEFINED, LookupError):
-                continue
-            if not exact.holds:
-                text = "fails at a rational point, exactly"
-                evidence = Evidence("exact rational point", text)
-                return self._finding(claim, Verdict.REFUTED, evidence, witness=witness_of(exact))
-        text = f"fails at a point over {outcome.objects.K.name}, where all denominators are units, so it fails over Q"
-        if roots:
-            text = f"fails at a point over {outcome.objects.K.name}, where chi splits"
-        evidence = Evidence("point over GF(p)", text)
         return self._finding(claim, Verdict.REFUTED, evidence, witness=witness_of(outcome))
 
     def controls(self, claim: Claim) -> list[Finding]:
@@ -343,6 +264,68 @@ class Examiner(ABC):
         if claim.label:
             source += f" [{claim.label}]"
         return Finding(title, verdict, evidence, also, witness, claim.formula, source, bool(claim.misprint), place)
+
+
+class ClaimAtPoints:
+    """A claim as `decide` takes it: at the points of an examiner."""
+
+    name = "claim"
+    patience = _POLES
+
+    def __init__(self, examiner: Examiner, claim: Claim) -> None:
+        self._examiner, self._claim = examiner, claim
+        bounds = examiner.bounds()
+        self.bound = bound_of(cast(BoundField, bounds.K), claim.function(bounds))
+        self.needs = bounds.used
+        self._roots = "roots" in self.needs
+        self.conjugates = examiner.conjugates(self._roots)
+
+    @property
+    def where(self) -> str:
+        """What is assumed of the primes."""
+        if self.conjugates == 1:
+            return ""
+        return " at which chi splits (of which at least half as many are assumed as Chebotarev's density gives)"
+
+    def trials(self, seed: int) -> Iterator[Trial]:
+        """The claim at one random point after the other."""
+        for number in count():
+            objects = self._examiner.point(self._roots, number)
+            if objects is None:
+                return
+            try:
+                outcome = evaluate(self._claim, objects)
+            except UNDEFINED:
+                yield Trial()
+                continue
+            if not outcome.holds:
+                yield Trial(decision=self._refutation(outcome))
+            elif not outcome.pairs:
+                text = "it does not apply to this member: there is nothing to compare"
+                yield Trial(decision=Decision(Verdict.UNDECIDED, Evidence("outside the hypotheses", text)))
+            else:
+                yield Trial(objects.K.characteristic)
+
+    def data(self, undefined: int) -> dict[str, Any]:
+        """What evidence says beside the bounds."""
+        return {"splitting_field_degree_bound": self.conjugates, "undefined_at": undefined}
+
+    def _refutation(self, outcome: Outcome) -> Decision:
+        for number in range(12):
+            objects = self._examiner.exact_point(self._roots, number)
+            if objects is None:
+                break
+            try:
+                exact = evaluate(self._claim, objects)
+            except (*UNDEFINED, LookupError):
+                continue
+            if not exact.holds:
+                evidence = Evidence("exact rational point", "fails at a rational point, exactly")
+                return Decision(Verdict.REFUTED, evidence, witness_of(exact))
+        text = f"fails at a point over {outcome.objects.K.name}, where all denominators are units, so it fails over Q"
+        if self._roots:
+            text = f"fails at a point over {outcome.objects.K.name}, where chi splits"
+        return Decision(Verdict.REFUTED, Evidence("point over GF(p)", text), witness_of(outcome))
 
 
 def _last_word(found: Sequence[Finding], without: Sequence[str]) -> Finding:

@@ -13,7 +13,7 @@ from paper.members import member
 from kahanmaps.checks.settings import Settings
 from kahanmaps.paper import realise
 from kahanmaps.paper.controls import broken
-from kahanmaps.paper.examiner import VerifyOptions
+from kahanmaps.paper.examiner import ClaimAtPoints, VerifyOptions
 from kahanmaps.paper.registry import Kind, claims
 from kahanmaps.paper.verify import _MemberExaminer
 
@@ -108,7 +108,8 @@ def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, 
     examined = _MemberExaminer(found, Settings(), VerifyOptions())
     bounds = broken(control, realise.bound_objects(found, None))
     monkeypatch.setattr(examined, "bounds", lambda: bounds)
-    needs, equation, poles = examined._size(claim)
+    statement = ClaimAtPoints(examined, claim)
+    needs, (equation, poles) = statement.needs, statement.bound
     functions = realise.member_functions(found, sorted(needs - {"roots"}), None, 10**9)
     sizes = difference_sizes(claim, broken(control, functions))
     for above, below in sizes:
