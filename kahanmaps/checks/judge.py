@@ -8,8 +8,8 @@ bound states; where both sides can be multiplied out, what comes out decides.
 from __future__ import annotations
 
 from kahanmaps.checks.claims import Evidence, Finding, Verdict, Witness
-from kahanmaps.checks.decide import Identity, decide, fails_over_Q
-from kahanmaps.checks.expand import NotEqual, expansion
+from kahanmaps.checks.decide import Decision, Identity, decide, fails_over_Q
+from kahanmaps.checks.expand import METHOD, NotEqual, expansion
 from kahanmaps.checks.settings import OrbitRun, Settings, along
 
 
@@ -45,18 +45,11 @@ def judge(
         verdict, evidence, witness = Verdict.PROVED, proof, None
         if decision.verdict is Verdict.SUPPORTED:
             also.append(decision.evidence)
-    elif decision.verdict is Verdict.SUPPORTED and not control:
-        try:
-            expanded = expansion(identity)
-        except NotEqual as error:
-            refutation = fails_over_Q(identity, settings.seed)
-            verdict, evidence = Verdict.REFUTED, Evidence("expansion", str(error))
-            if refutation is not None:
-                evidence, witness = refutation.evidence, refutation.witness
-        else:
-            if expanded is not None:
-                verdict, evidence = Verdict.PROVED, expanded
-                also.append(decision.evidence)
+    elif not control:
+        settled = settle(identity, decision, settings.seed)
+        verdict, evidence, witness = settled.verdict, settled.evidence, settled.witness
+        if verdict is Verdict.PROVED:
+            also.append(decision.evidence)
     if orbit is not None:
         experience, failure = along(identity, orbit)
         also.append(experience)
@@ -65,3 +58,14 @@ def judge(
                 raise Contradiction(f"{claim}: {evidence.summary}, but it {experience.summary} {failure}")
             verdict, evidence, witness = Verdict.REFUTED, experience, failure
     return Finding(claim, verdict, evidence, tuple(also), witness, formula, source, control)
+
+
+def settle(identity: Identity, decision: Decision, seed: int, budget: int | None = None) -> Decision:
+    """The decision at random points or, where these support a claim and both sides can be multiplied out, that."""
+    if decision.verdict is not Verdict.SUPPORTED:
+        return decision
+    try:
+        expanded = expansion(identity, budget)
+    except NotEqual as error:
+        return fails_over_Q(identity, seed) or Decision(Verdict.REFUTED, Evidence(METHOD, str(error)))
+    return decision if expanded is None else Decision(Verdict.PROVED, expanded)

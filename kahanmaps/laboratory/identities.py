@@ -13,7 +13,8 @@ from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides, decide
-from kahanmaps.checks.expand import MAX_DIMENSION, METHOD, NotEqual, expansion
+from kahanmaps.checks.expand import MAX_DIMENSION
+from kahanmaps.checks.judge import settle
 from kahanmaps.invariants.integrals import integral_condition
 from kahanmaps.invariants.measures import density_condition
 from kahanmaps.maps.kahan import KahanMapOver
@@ -82,13 +83,8 @@ def density_verdict(
 def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verdict, Evidence]:
     """The verdict on an identity, by random points and, if `expands`, by expansion."""
     decision = decide(identity, seed)
-    if decision.verdict is Verdict.SUPPORTED and expands:
-        try:
-            if expansion(identity, _BUDGET) is not None:
-                return Verdict.PROVED, Evidence(METHOD, f"both sides are the same rational function, {identity.scope}")
-        except NotEqual:
-            return Verdict.REFUTED, Evidence(METHOD, f"the two sides are different functions, {identity.scope}")
-    return decision.verdict, decision.evidence
+    found = settle(identity, decision, seed, _BUDGET) if expands else decision
+    return found.verdict, found.evidence
 
 
 def _identity(

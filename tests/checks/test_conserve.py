@@ -64,7 +64,7 @@ SINGULAR = hamiltonian_of("x y z w", "x^2*w - y^3 + z*x + w", [[0, 1, 0, 0], [-1
 def claims_are_decided_at_points_alone():
     """Proof by expansion, which makes many a supported claim a proved one, has its own tests in test_expand.py."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judge, "expansion", lambda identity: None)
+        patch.setattr(judge, "expansion", lambda *_: None)
         yield
 
 

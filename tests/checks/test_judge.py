@@ -56,12 +56,12 @@ def blind(monkeypatch):
     """Random points that let everything pass."""
     held = Decision(SUPPORTED, Evidence("random points over GF(p)", "held"))
     monkeypatch.setattr(judge_module, "decide", lambda *arguments: held)
-    monkeypatch.setattr(judge_module, "expansion", lambda identity: None)
+    monkeypatch.setattr(judge_module, "expansion", lambda *_: None)
 
 
 @pytest.fixture
 def at_points_only(monkeypatch):
-    monkeypatch.setattr(judge_module, "expansion", lambda identity: None)
+    monkeypatch.setattr(judge_module, "expansion", lambda *_: None)
 
 
 def test_a_proof_decides_and_the_points_stand_beside_it():
@@ -98,7 +98,7 @@ def test_a_proved_claim_that_fails_on_the_orbit_is_a_contradiction(blind):
 
 def test_a_claim_proved_by_expansion_that_fails_on_the_orbit_is_a_contradiction(blind, monkeypatch):
     expanded = Evidence("expansion", "both sides are the same")
-    monkeypatch.setattr(judge_module, "expansion", lambda identity: expanded)
+    monkeypatch.setattr(judge_module, "expansion", lambda *_: expanded)
     assert judge("c", TRUE, Settings(), None, orbit(1, 2)).evidence == expanded
     with pytest.raises(Contradiction, match="both sides are the same, but it fails at step 0"):
         judge("c", FALSE, Settings(), None, orbit(1, 2))
@@ -162,5 +162,5 @@ def test_a_finding_carries_formula_source_and_whether_it_is_a_control():
     ("identity", "control", "verdict"), [(FALSE, False, REFUTED), (NOWHERE, False, UNDECIDED), (TRUE, True, SUPPORTED)]
 )
 def test_what_fails_or_is_nowhere_defined_is_not_expanded_and_no_control_is(identity, control, verdict, monkeypatch):
-    monkeypatch.setattr(judge_module, "expansion", lambda identity: pytest.fail("it was expanded"))
+    monkeypatch.setattr(judge_module, "expansion", lambda *_: pytest.fail("it was expanded"))
     assert judge("c", identity, Settings(), control=control).verdict is verdict

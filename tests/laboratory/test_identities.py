@@ -40,7 +40,7 @@ def blind(monkeypatch):
 def test_an_expansion_refutes_what_random_points_let_pass(blind, is_density, eps):
     verdict, evidence = VERDICTS[is_density](ROTATION, function("x^2 - y^2 + eps"), eps)
     assert verdict is Verdict.REFUTED
-    assert evidence.method == "expansion"
+    assert evidence.method == "exact rational point"  # which the expansion asks for
 
 
 def test_the_proof_for_every_eps_is_for_eps_and_not_for_a_coordinate():
