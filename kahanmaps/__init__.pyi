@@ -85,6 +85,7 @@ from kahanmaps.laboratory.symmetries import linear_symmetries as linear_symmetri
 from kahanmaps.languages.convert import convert as convert
 from kahanmaps.maps.arithmetic import Arithmetic as Arithmetic
 from kahanmaps.maps.bilinear import bilinear_map as bilinear_map
+from kahanmaps.maps.composed import composed_map as composed_map
 from kahanmaps.maps.explicit import explicit_map as explicit_map
 from kahanmaps.maps.fast import FloatOrbit as FloatOrbit
 from kahanmaps.maps.fast import to_floats as to_floats

@@ -1,4 +1,4 @@
-"""Many orbits modulo a prime p < 2^61 at once, as arrays, and long single ones.
+"""Many orbits modulo a prime p < 2^61 at once, as arrays.
 
 Stepping takes no inverse. Where chi splits into linear factors modulo p, every plane of the normal form goes by itself
 in homogeneous coordinates (maps/planar_block.py). Any other map goes as (X : Z), x = X/Z: its equation (M | -r) is a
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
@@ -20,13 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import GF, PrimeField
-from kahanmaps.errors import BadPrime, InputError, counted
+from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.float_blocks import require_same_system
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.orbits import require_steps
-from kahanmaps.maps.planar_block import Triple
 from kahanmaps.maps.splitting import Splitting
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -38,7 +36,6 @@ BITS = 61
 KERNELS = ("numpy", "numba")
 _SMALL = 1 << 31
 _LANES = 8192  # so many numbers of an array at a time stay in the cache
-_WORTH_COMPILING = 20_000  # steps of one orbit
 
 
 def _sum(arrays: Iterable[Any]) -> Any:
@@ -476,74 +473,3 @@ class _General:
         if len(lanes):
             rows = column + np.argmax(M[column:, column, lanes] != 0, axis=0)
             M[rows, :, lanes], M[column, :, lanes] = M[column, :, lanes].T.copy().T, M[rows, :, lanes].copy()
-
-
-# One orbit.
-
-
-@dataclass(frozen=True)
-class ModularOrbit:
-    """The last point `x` of an orbit modulo p, after `steps` steps; `status` is "completed" or "singular"."""
-
-    x: tuple[int, ...]
-    steps: int
-    status: str
-    message: str
-    kernel: str
-
-
-def modular_orbit(
-    form: NormalForm, eps: Any, start: Sequence[Any], prime: int, steps: int, *, kernel: str | None = None
-) -> ModularOrbit:
-    """The point `steps` steps on, one orbit of a member modulo any prime; the time step is 2 eps.
-
-    `kernel` is "python" (any prime, any chi) or "numba" (p < 2^61 odd, and chi splits); None: numba for many steps.
-    Raises BadPrime where the normal form has no reduction modulo p, InputError for a wrong start or kernel.
-
-    >>> from kahanmaps.family.draw import draw_with_eigenvalues
-    >>> from kahanmaps.family.planar import normal_form
-    >>> form = normal_form(draw_with_eigenvalues([1, -2], seed=7))
-    >>> modular_orbit(form, "1/10", ["1/2", "-1/3", 0, 1], 10007, 1000).message
-    '1000 steps'
-    """
-    require_steps(steps)
-    field = GF(prime)
-    splitting = Splitting(form, field, eps)
-    triples = splitting.triples([field.convert(value) for value in start])
-    possible = 2 < prime < 1 << BITS and all(plane.degree == 1 for plane in splitting.planes)
-    if kernel not in (None, "python", "numba"):
-        raise InputError(f"found the kernel {kernel!r}, expected python or numba")
-    if kernel == "numba" and not (possible and find_spec("numba") is not None):
-        raise InputError("the kernel numba needs numba, an odd p < 2^61 and a chi that splits modulo p: take python")
-    if kernel is None:
-        kernel = "numba" if possible and steps >= _WORTH_COMPILING and find_spec("numba") is not None else "python"
-    if kernel == "numba":
-        walker = _Planes(splitting, Arithmetic(prime), "numba")
-        x = np.array([[int(field.convert(value))] for value in start], dtype=np.uint64)
-        state, singular_at = walker.enter(x), np.full(1, -1, dtype=np.int64)
-        walker.walk(state, steps, 0, singular_at)
-        at, point = int(singular_at[0]), tuple(int(e) for e in walker.leave(state)[:, 0])
-    else:
-        at, triples = _walk_in_python(splitting, triples, steps)
-        point = tuple(int(entry) for entry in splitting.point(triples)) if prime > 2 else _modulo_2(start, field)
-    if at < 0:
-        return ModularOrbit(point, steps, "completed", counted(steps, "step"), kernel)
-    message = f"det(I - eps f'(x)) = 0 at step {at}: the map has no value there"
-    return ModularOrbit(point, at, "singular", message, kernel)
-
-
-def _walk_in_python(splitting: Splitting, triples: list[Triple], steps: int) -> tuple[int, list[Triple]]:
-    """The index of the last point where it has no image, else -1, and the last point."""
-    steppers = [plane.block.image for plane in splitting.planes]
-    for step in range(steps):
-        images = [image(triple) for image, triple in zip(steppers, triples, strict=True)]
-        for _, _, W in images:
-            if W == 0:
-                return step, triples
-        triples = images
-    return -1, triples
-
-
-def _modulo_2(start: Sequence[Any], field: PrimeField) -> tuple[int, ...]:
-    """Modulo 2 the map of a member that has a normal form there is the identity."""
-    return tuple(int(field.convert(value)) for value in start)

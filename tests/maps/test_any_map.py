@@ -22,6 +22,7 @@ from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.maps.arithmetic import Arithmetic
 from kahanmaps.maps.bilinear import bilinear_map
+from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit
 from kahanmaps.maps.implicit import ImplicitMap
@@ -51,6 +52,7 @@ MAPS = {
     "quartic": cubic("y^4 - x", "x*y + eps^2", degree=4),
     "henon": parse_system('variables = ["x", "y"]\n[map]\nimage = ["y", "x + eps*y^2"]').map,
 }
+MAPS["composed"] = composed_map(MAPS["bilinear"], (MAPS["explicit"], -1))
 WITH_INVERSE = [name for name in MAPS if name != "henon"]
 LINEAR = [name for name in MAPS if MAPS[name].at(1).equation.degree == 1]
 P = 1009
@@ -272,6 +274,39 @@ def test_adjusted_coefficients_are_those_at_eps():
     system = QuadraticSystem((parse_polynomial("x^2 + eps^2*x", ["x", "eps"]),), ("eps",))
     assert Kahan(system).at("1/2").step(["1/3"]) == KahanMap(system.at([fmpq(1, 2)]), "1/2").step(["1/3"])
     assert Kahan(system).at("1/2").inverse_step(Kahan(system).at("1/2").step(["1/3"])) == (fmpq(1, 3),)
+
+
+@given(points(2), rationals().filter(bool))
+def test_a_composition_takes_one_step_after_the_other(x, eps):
+    one, other = MAPS["kahan"], MAPS["bilinear"]
+    word = composed_map(one, (other, 2), (one, -1)).at(eps)
+    try:
+        expected = one.at(eps).inverse.step(other.at(eps).step(other.at(eps).step(one.at(eps).step(x))))
+    except SingularStep:
+        assume(False)
+    assume(word.determinant(x) != 0)
+    assert word.step(x) == expected
+    assert composed_map(other, one).subject != composed_map(one, other).subject
+
+
+def test_a_map_and_its_inverse_compose_to_the_identity():
+    for name in WITH_INVERSE:
+        if name != "quartic":
+            map_ = MAPS[name]
+            assert composed_map(map_, (map_, -1)).at(1).step(start_of(map_)) == tuple(start_of(map_))
+
+
+def test_what_cannot_be_composed_is_refused():
+    with pytest.raises(InputError, match="found no map to compose"):
+        composed_map((MAPS["kahan"], 0))
+    with pytest.raises(InputError, match="found maps of the dimensions 2, 3"):
+        composed_map(MAPS["kahan"], MAPS["adjusted"])
+    with pytest.raises(InputError, match="the inverse of this map is not known"):
+        composed_map((MAPS["henon"], -1))
+    with pytest.raises(InputError, match="too large to be multiplied out"):
+        composed_map((MAPS["quartic"], 5))
+    with pytest.raises(InputError, match="the inverse of this map is not known"):
+        _ = composed_map((MAPS["henon"], 2)).at(1).inverse
 
 
 # The door.

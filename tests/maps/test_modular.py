@@ -18,7 +18,7 @@ from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.modular import Arithmetic, ModularEnsemble, modular_orbit
+from kahanmaps.maps.modular import Arithmetic, ModularEnsemble
 from kahanmaps.maps.modular_numba import kernels
 from kahanmaps.maps.orbits import Orbit
 from kahanmaps.maps.periods import orbit_period
@@ -283,55 +283,29 @@ def test_compiled_products_are_exact_too_numba(prime):
 # One orbit.
 
 
-@pytest.mark.parametrize("kernel", ["python", "numba"])
-@pytest.mark.parametrize("prime", [101, 2**31 - 1, MERSENNE])
-def test_a_single_orbit_ends_at_the_point_of_the_exact_orbit(kernel, prime):
-    form, system = FORMS["1,-2,3"], MEMBERS["1,-2,3"].chosen.system
-    for start in random_starts(random.Random(prime), prime, 6, 8):
-        found = modular_orbit(form, "1/10", start, prime, 40, kernel=kernel)
-        point, index, singular = exact(system, "1/10", start, prime, 40)
-        assert (list(found.x), found.steps, found.status == "singular") == (point, index, singular)
-        assert found.kernel == kernel
-
-
-@pytest.mark.parametrize("prime", [31, 2**89 - 1])
-def test_a_single_orbit_needs_no_split_chi_and_no_small_prime(prime):
-    form, system = FORMS["t^2 + 1"], MEMBERS["t^2 + 1"].chosen.system
-    for start in random_starts(random.Random(prime), prime, 4, 8):
-        found = modular_orbit(form, "1/10", start, prime, 20)
-        point, index, singular = exact(system, "1/10", start, prime, 20)
-        assert (list(found.x), found.steps, found.status == "singular") == (point, index, singular)
-        assert found.kernel == "python"
-        if singular:
-            assert found.message == f"det(I - eps f'(x)) = 0 at step {index}: the map has no value there"
-
-
-def test_what_a_single_orbit_cannot_have_is_refused():
-    with pytest.raises(InputError, match="python or numba"):
-        modular_orbit(FORMS["1,-2"], 1, [1, 2, 3, 4], 101, 5, kernel="numpy")
-    with pytest.raises(InputError, match="splits"):
-        modular_orbit(FORMS["t^2 + 1"], 1, [1, 2, 3, 4], 31, 5, kernel="numba")
-    with pytest.raises(InputError, match="steps"):
-        modular_orbit(FORMS["1,-2"], 1, [1, 2, 3, 4], 101, -5)
+def last_of(system, start, prime, steps, form):
+    """The last point of one orbit, in compiled code."""
+    ensemble = ModularEnsemble(system, "1/10", [start], prime, form=form, kernel="numba")
+    ensemble.advance(steps)
+    assert ensemble.status == ["completed"]
+    return ensemble.x[0].tolist()
 
 
 def test_a_million_steps_with_numba_end_where_two_halves_end_numba():
-    form, start = FORMS["1,-2"], ["1/2", "-1/3", 0, 1]
-    whole = modular_orbit(form, "1/10", start, MERSENNE, 10**6)
-    assert (whole.kernel, whole.status) == ("numba", "completed")
-    half = modular_orbit(form, "1/10", start, MERSENNE, 5 * 10**5)
-    assert modular_orbit(form, "1/10", half.x, MERSENNE, 5 * 10**5).x == whole.x
+    form, system, start = FORMS["1,-2"], MEMBERS["1,-2"].chosen.system, ["1/2", "-1/3", 0, 1]
+    half = last_of(system, start, MERSENNE, 5 * 10**5, form)
+    assert last_of(system, half, MERSENNE, 5 * 10**5, form) == last_of(system, start, MERSENNE, 10**6, form)
 
 
 def test_a_period_found_without_walking_is_walked_numba():
-    form, prime, rng, walked = FORMS["1,-2"], 2003, random.Random(6), 0
+    form, system, prime = FORMS["1,-2"], MEMBERS["1,-2"].chosen.system, 2003
+    rng, walked = random.Random(6), 0
     for start in random_starts(rng, prime, 4, 40):
         found = orbit_period(form, "1/10", start, prime)
         if found.meets_pole is not False or found.period is None:
             continue
-        orbit = modular_orbit(form, "1/10", start, prime, found.period, kernel="numba")
-        assert (list(orbit.x), orbit.status) == (start, "completed")
+        assert last_of(system, start, prime, found.period, form) == start
         for divisor in {p for p in (2, 3, 5, 7) if found.period % p == 0}:
-            assert list(modular_orbit(form, "1/10", start, prime, found.period // divisor).x) != start
+            assert last_of(system, start, prime, found.period // divisor, form) != start
         walked += 1
     assert walked > 2

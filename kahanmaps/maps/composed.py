@@ -1,0 +1,66 @@
+"""Compositions of maps and of their inverses, multiplied out: given by rational functions then, as others are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.errors import InputError
+from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
+
+_BUDGET = 20_000_000  # products of terms
+
+
+def composed_map(*maps: tuple[BirationalMap, int] | BirationalMap) -> ImplicitMap:
+    """The map that takes one step of each map after the other, all with the same eps.
+
+    Args:
+        maps: in the order in which they are applied; with a power, (map, power), which may be negative.
+
+    Returns:
+        The map, exact; its inverse is known if all the maps have one.
+
+    Raises:
+        InputError: for maps of different dimensions, for a negative power of a map without inverse, and where the
+            formulas grow too large.
+
+    >>> from kahanmaps.maps.kahan import Kahan
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> f, g = (Kahan(QuadraticSystem.from_text(["x"], [rhs])) for rhs in ("x^2", "x"))
+    >>> conjugate = composed_map(g, f, (g, -1)).at("1/2")
+    >>> conjugate.step(["1/9"]), g.at("1/2").inverse.step(f.at("1/2").step(g.at("1/2").step(["1/9"])))
+    ((1/6,), (1/6,))
+    """
+    steps = [
+        (one, 1 if power > 0 else -1)
+        for one, power in (given if isinstance(given, tuple) else (given, 1) for given in maps)
+        for _ in range(abs(power))
+    ]
+    if not steps:
+        raise InputError("found no map to compose, expected at least one")
+    variables = steps[0][0].variables
+    if any(one.dim != len(variables) for one, _ in steps):
+        raise InputError(f"found maps of the dimensions {', '.join(str(one.dim) for one, _ in steps)}, expected one")
+    image = _formulas(variables, steps)
+    try:
+        inverse = _formulas(variables, [(one, -sign) for one, sign in reversed(steps)])
+    except InputError:
+        inverse = None
+    return explicit_map(variables, image, inverse)
+
+
+def _formulas(variables: Sequence[str], steps: Sequence[tuple[BirationalMap, int]]) -> list[RationalFunction]:
+    """The coordinates of the image of (x_1, ..., x_n) as functions of them and eps, in lowest terms."""
+    field = FunctionField([*variables, "eps"], _BUDGET, reduces=True)
+    *x, eps = field.variables
+    point: tuple[Any, ...] = tuple(x)
+    try:
+        for one, sign in steps:
+            over = one.at(eps, field)
+            point = (over if sign > 0 else over.inverse).step(point)
+    except BudgetExceeded as error:
+        raise InputError("found a composition with formulas too large to be multiplied out") from error
+    return [RationalFunction(entry.above, entry.below) for entry in point]
