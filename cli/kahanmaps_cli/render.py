@@ -55,15 +55,14 @@ def exit_status(report: Report) -> int:
 
 def headline(report: Report) -> str:
     """The first line: what was checked, of which systems, for which eps."""
+    from kahanmaps.checks.settings import eps_words
+
     context = report.context
     names = context["system"] + (f", {context['other']}" if "other" in context else "")
-    if context["eps"] == "every":
-        eps = "every eps (the time step is 2 eps)"
-    else:
-        eps = f"eps = {context['eps']} (time step 2 eps = {context['time_step']})"
+    eps = eps_words(context)
     if "eps2" in context:
         eps += f", second map at eps2 = {context['eps2']}"
-    return f"{report.check}: {names}, {eps}"
+    return f"{report.check}: {names}{eps}"
 
 
 def _verdict_text(finding: Finding) -> str:

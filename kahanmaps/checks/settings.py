@@ -25,6 +25,7 @@ from kahanmaps.version import __version__
 MAX_STEPS = 10_000  # of the exact orbit, all of whose points are kept
 CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
 NO_TIME_STEP = "eps stands in the map as its file says; there is no time step"
+NO_EPS = "the map does not depend on eps"
 
 
 def _silent(_: str) -> None:
@@ -68,12 +69,13 @@ class Settings:
 
     def context(self, files: Sequence[SystemFile], **more: Any) -> dict[str, Any]:
         """What is needed to redo the check, as plain data: the systems themselves among it."""
+        time_step = "every" if self.eps is None else format_number(2 * self.eps)
         return {
             "version": __version__,
             "system": files[0].name,
             **({"other": files[1].name} if len(files) > 1 else {}),
             "eps": "every" if self.eps is None else format_number(self.eps),
-            "time_step": "every" if self.eps is None else format_number(2 * self.eps),
+            "time_step": time_step if files[0].map.has_time_step else None,
             "convention": convention(files[0].map),
             "arithmetic": "exact",
             "seed": self.seed,
@@ -86,7 +88,23 @@ class Settings:
 
 def convention(map_: BirationalMap) -> str:
     """What eps is, in a sentence that every record carries."""
+    if not map_.has_eps:
+        return NO_EPS
     return CONVENTION if map_.has_time_step else NO_TIME_STEP
+
+
+def eps_words(context: Mapping[str, Any]) -> str:
+    """For which eps a record speaks, with the time step where there is one, to follow the name of the map.
+
+    >>> eps_words({"eps": "1/10", "time_step": "1/5", "convention": CONVENTION})
+    ', eps = 1/10 (time step 2 eps = 1/5)'
+    """
+    if context["convention"] == NO_EPS:
+        return ""
+    has_step = context["time_step"] is not None
+    if context["eps"] == "every":
+        return f", every eps{' (the time step is 2 eps)' if has_step else ''}"
+    return f", eps = {context['eps']}" + (f" (time step 2 eps = {context['time_step']})" if has_step else "")
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
+from kahanmaps.checks.settings import eps_words
 from kahanmaps.display import markup
 from kahanmaps.displayed import html_form
 from kahanmaps.errors import counted
@@ -98,10 +99,10 @@ def eps_sentence(report: Report) -> str:
     context = report.context
     if "eps" not in context:
         return ""
-    if context["eps"] == "every":
-        return markup.eps_words()
     second = f", second map at eps2 = {markup.shortened(context['eps2'])}" if "eps2" in context else ""
-    return markup.eps_words(context["eps"], context["time_step"]) + second
+    step = context["time_step"] and markup.shortened(context["time_step"])
+    words = eps_words({**context, "eps": markup.shortened(context["eps"]), "time_step": step})
+    return words.removeprefix(", ") + second
 
 
 def ending_sentence(report: Report) -> str:

@@ -12,7 +12,7 @@ from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
-from kahanmaps.checks.settings import NO_TIME_STEP, Settings
+from kahanmaps.checks.settings import CONVENTION, NO_EPS, NO_TIME_STEP, Settings, eps_words
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError, SystemFileError
@@ -99,7 +99,14 @@ def test_a_system_with_eps_in_it_is_no_quadratic_system_of_its_own():
 
 def test_a_record_of_a_map_without_time_step_does_not_speak_of_one():
     assert check_measure(example("symplectic-euler")).context["convention"] == NO_TIME_STEP
-    assert check_measure(example("duffing")).context["convention"] != NO_TIME_STEP
+    assert check_measure(example("duffing")).context["convention"] == CONVENTION
+    assert check_measure(example("mcmillan")).context["convention"] == NO_EPS
+    assert [check_measure(example(name)).context["time_step"] for name in NAMES] == ["every", None, "every", None]
+    named = check_measure(example("symplectic-euler"), Settings(eps=fmpq(1, 9))).context
+    assert [eps_words(context) for context in (named, check_measure(example("mcmillan")).context)] == [
+        ", eps = 1/9",
+        "",
+    ]
 
 
 def test_the_new_point_may_have_any_names():
