@@ -99,7 +99,7 @@ def eps_words(context: Mapping[str, Any]) -> str:
     >>> eps_words({"eps": "1/10", "time_step": "1/5", "convention": CONVENTION})
     ', eps = 1/10 (time step 2 eps = 1/5)'
     """
-    if context["convention"] == NO_EPS:
+    if context.get("convention") == NO_EPS:
         return ""
     has_step = context["time_step"] is not None
     if context["eps"] == "every":
