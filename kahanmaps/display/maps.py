@@ -5,9 +5,11 @@ from __future__ import annotations
 from flint import fmpq
 
 from kahanmaps.display import markup
-from kahanmaps.display.latex import latex_aligned, latex_name, latex_number
+from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_number
+from kahanmaps.display.systems import CHARACTERS, system_latex
 from kahanmaps.displayed import html_form, latex_form
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
+from kahanmaps.maps.kahan import Kahan, KahanMap
 from kahanmaps.maps.orbits import Orbit, OrbitPoint
 from kahanmaps.maps.periods import OrbitPeriod
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -38,6 +40,16 @@ def map_latex(kahan: KahanMap) -> str:
         )
     )
     return latex_aligned(rows, _EQUATIONS + 2)
+
+
+@latex_form.register
+def birational_latex(map_: BirationalMap) -> str:
+    """The equations between a point and its image; of a Kahan map the differential equation that it belongs to."""
+    if isinstance(map_, Kahan):
+        return system_latex(map_.system)
+    assert isinstance(map_, ImplicitMap)
+    shown = map_.equations[: _EQUATIONS + 1]
+    return latex_aligned([(latex_cut(equation, CHARACTERS), "0") for equation in shown], _EQUATIONS)
 
 
 def _image(name: str) -> str:

@@ -315,3 +315,14 @@ def test_a_store_shows_its_experiments_and_says_when_it_is_closed(tmp_path):
         assert "missing" in text_of(store)
         assert "1 ✓ proved" in text_of(store)
     assert "has been closed" in text_of(store)
+
+
+def test_maps_as_data_show_their_equations():
+    top = km.Kahan(km.QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"]))
+    assert top._repr_latex_() == top.system._repr_latex_()
+    lyness = km.explicit_map(["x"], [km.parse_rational_function("1/(eps + x)", ["x", "eps"])])
+    text = lyness._repr_latex_()
+    assert r"\varepsilon" in text
+    assert "&= 0" in text
+    many = [km.parse_rational_function(f"x{k}", [*(f"x{i}" for i in range(30)), "eps"]) for k in range(30)]
+    assert r"\vdots" in km.explicit_map([f"x{i}" for i in range(30)], many)._repr_latex_()
