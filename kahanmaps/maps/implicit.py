@@ -356,8 +356,10 @@ class ImplicitMap(BirationalMap):
         >>> ImplicitMap(("x",), ((1 - eps*x, -x),), "Riccati").equations
         (-x*x_new*eps - x + x_new,)
         """
-        n = len(self.variables)
-        context = ring((*self.variables, *(f"{name}_new" for name in self.variables), "eps"))
+        n, ending = len(self.variables), "_new"
+        while any(name + ending in self.variables for name in self.variables):
+            ending += "_"
+        context = ring((*self.variables, *(name + ending for name in self.variables), "eps"))
         old = [*context.gens()[:n], context.gens()[-1]]
         new = [*context.gens()[n : 2 * n], context.constant(1)]
         return tuple(

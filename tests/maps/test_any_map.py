@@ -358,6 +358,11 @@ def test_a_map_whose_parts_do_not_fit_is_refused():
         ImplicitMap(("x",), ((one,),), "short")
 
 
+def test_new_points_have_names_of_their_own():
+    map_ = explicit_map(["x", "x_new"], [parse_rational_function(t, ["x", "x_new", "eps"]) for t in ("x_new", "x")])
+    assert str(map_) == "-x_new + x_new_ = 0\n-x + x_new_new_ = 0"
+
+
 def test_eps_zero_is_refused_and_a_prime_that_makes_it_zero_is_bad():
     with pytest.raises(InputError, match="found eps = 0"):
         MAPS["bilinear"].at(0)
