@@ -59,6 +59,7 @@ class Identity:
     right_label: str = "right side"
     entries: tuple[str, ...] = ()  # names of the entries, where a witness should show only one that differs
     scope: str = ""  # for what it is stated, in words, where there is more to say than eps
+    no_value: str = "a denominator seems to vanish identically"  # where it is defined nowhere
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
     def seed(self, seed: int) -> int:
@@ -147,6 +148,9 @@ class Statement(Protocol):
     def where(self) -> str: ...
 
     @property
+    def no_value(self) -> str: ...
+
+    @property
     def bound(self) -> tuple[Size, int]: ...
 
     @property
@@ -182,7 +186,7 @@ def decide(statement: Statement, seed: int, error_bits: int = DEFAULT_ERROR_BITS
         undefined += 1
         if undefined > statement.patience:
             text = f"the {statement.name} is not defined at any of {undefined} random points over GF(p)"
-            return _undecided(f"{text}: a denominator seems to vanish identically", poles_met=undefined)
+            return _undecided(f"{text}: {statement.no_value}", poles_met=undefined)
     else:
         return _undecided("no prime was found at which chi splits into distinct factors", points=0)
     if not is_bounded:

@@ -8,12 +8,17 @@ from kahanmaps.display.mathml import formula, matrix
 from kahanmaps.display.systems import CHARACTERS, equations_html
 from kahanmaps.displayed import html_form
 from kahanmaps.documents.files import SystemFile
+from kahanmaps.maps.kahan import Kahan
 
 
 @html_form.register
 def file_html(file: SystemFile) -> str:
     """A system file: its equations, parameters and claims."""
-    rows = [("equations", equations_html(file.system))]
+    if isinstance(file.map, Kahan):
+        shown = equations_html(file.map.system)
+    else:
+        shown = "<br/>\n".join(markup.escape(markup.shortened(line, CHARACTERS)) for line in str(file.map).split("\n"))
+    rows = [("equations", shown)]
     if file.parameters:
         values = (f"{name} = {markup.shortened(format_number(v))}" for name, v in list(file.parameters.items())[:20])
         rows.append(("parameters", markup.escape(", ".join(values))))

@@ -43,6 +43,21 @@ _KEYS = {
 }
 
 
+def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> Kahan:
+    """The Kahan map of right-hand sides in the variables, then eps, which may not occur."""
+    if any("eps" not in polynomial.unused_gens() for polynomial in rhs):
+        return Kahan(QuadraticSystem(tuple(rhs), ("eps",)))
+    return Kahan(QuadraticSystem(tuple(substitute(polynomial, {"eps": fmpq(1)}) for polynomial in rhs)))
+
+
+# What makes a map of right-hand sides (polynomials in the variables, then eps) and their degree, and the degree: the
+# usual one and the largest.
+_DISCRETIZATIONS: dict[str, tuple[Callable[[Sequence[fmpq_mpoly], int], BirationalMap], int, int]] = {
+    "kahan": (_kahan, 2, 2),
+    "polarised": (polarised_map, 3, MAX_DEGREE),
+}
+
+
 class Contents(NamedTuple):
     """What a system file holds; the fields are those of `SystemFile`."""
 
@@ -120,6 +135,8 @@ class DocumentReader:
                 map_ = Kahan(hamiltonian.system)
             elif map_ is not None:
                 self.variables = map_.variables  # a polarised map has more of them
+                for clash in set(self.variables) & set(self.parameters):
+                    self._mistake(f"parameters.{clash}", "is a variable of the map as well, expected distinct names")
         integrals = self._read_integrals()
         density = self._read_density()
         self._read_catalog()
@@ -279,14 +296,14 @@ class DocumentReader:
 
     def _read_system(self, section: Mapping[str, Any]) -> BirationalMap | None:
         method = section.get("discretization", "kahan")
-        if method not in ("kahan", "polarised"):
-            self._mistake("system.discretization", f'found {_show(method)}, expected "kahan" or "polarised"')
+        if method not in _DISCRETIZATIONS:
+            words = ", ".join(f'"{name}"' for name in _DISCRETIZATIONS)
+            self._mistake("system.discretization", f"found {_show(method)}, expected one of {words}")
             return None
-        degree = section.get("degree", 2 if method == "kahan" else 3)
-        if method == "kahan" and "degree" in section:
-            self._mistake("system.degree", 'found a degree, expected none but for discretization = "polarised"')
-        elif type(degree) is not int or not 2 <= degree <= MAX_DEGREE:
-            self._mistake("system.degree", f"found {_show(degree)}, expected a number from 2 to {MAX_DEGREE}")
+        make, usual, largest = _DISCRETIZATIONS[method]
+        degree = section.get("degree", usual)
+        if type(degree) is not int or not 2 <= degree <= largest:
+            self._mistake("system.degree", f"found {_show(degree)}, expected a number from 2 to {largest}")
             return None
         given = self._required("system", section, "rhs")
         found = [
@@ -298,11 +315,7 @@ class DocumentReader:
         if rhs is None or len(known) != len(rhs) or self.variables is None or self.unsure:
             return None
         try:
-            if method == "polarised":
-                return polarised_map(known, degree)
-            if any("eps" not in polynomial.unused_gens() for polynomial in known):
-                return Kahan(QuadraticSystem(tuple(known), ("eps",)))
-            return Kahan(QuadraticSystem(tuple(substitute(p, {"eps": fmpq(1)}) for p in known)))
+            return make(known, degree)
         except InputError as error:
             self._mistake("system.rhs", str(error))
             return None
@@ -317,7 +330,8 @@ class DocumentReader:
             check_names(new)
             check_names((*self.variables, *new, *self.parameters, "eps"))
         except InputError as error:
-            self._mistake("bilinear.new", f"{error} (names of the coordinates of the new point)")
+            hint = "" if "new" in section else ': give new = ["..."], names for the coordinates of the new point'
+            self._mistake("bilinear.new", f"{error}{hint}")
             return None
         found = []
         for i, value in enumerate(given):

@@ -73,10 +73,10 @@ class SystemFile(Displayed):
             return self.map.system
         what = "has eps in its coefficients" if isinstance(self.map, Kahan) else f"is of kind [{self.kind}]"
         if self.kind == "system" and not isinstance(self.map, Kahan):
-            what = 'has discretization = "polarised"'
+            what = f"stands for a {self.map.title}"
         raise InputError(
             f"{self.name} {what}, expected a quadratic system of its own: other maps are for orbit, check-commute, "
-            "check-integrals, check-measure and degrees"
+            "check-integrals, check-measure, degrees and singularities"
         )
 
     def require_claim(self, what: str, function: RationalFunction) -> None:

@@ -330,7 +330,7 @@ class _Search:
                 return
             self._replaced += 1
             if best < 0 and self._replaced > _LINES:
-                raise Stopped("singular", f"iterate {n} exists nowhere: det(I - eps f'(x)) = 0 on the image before")
+                raise Stopped("singular", f"iterate {n} exists nowhere: {self._map.denominator_name} = 0 on the image")
             if self._replaced > _REPLACEMENTS:
                 raise Stopped("lines", f"random lines do not agree on the degree of iterate {n}: {found}")
             if best >= 0:

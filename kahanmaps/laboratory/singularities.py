@@ -160,7 +160,7 @@ def singularities(
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     limits = _range(map_.dim, steps, time.monotonic() + seconds)
     forms, common = homogeneous_map(map_.at(exact_eps))
-    degree = max(int(form.total_degree()) for form in forms)
+    degree = max(0, *(int(form.total_degree()) for form in forms))
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
     denominator = _affine(forms[-1] * common * (-1) ** map_.dim, map_)
     is_undefined = bool(forms[-1].is_zero())  # det(I - eps f'(x)) = 0 for all x
@@ -366,8 +366,10 @@ def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[
     return [(format_polynomial(factor), int(power)) for factor, power in kernel_minors(rows)[-1].factor()[1]]
 
 
-def default_eps(system: QuadraticSystem | BirationalMap, seed: int) -> tuple[fmpq, fmpq]:
-    """Two different rational numbers of small height, the same ones for the same system and seed."""
+def default_eps(system: QuadraticSystem | BirationalMap, seed: int) -> tuple[fmpq, ...]:
+    """Two rational numbers of small height, the same ones for the same map and seed; one for a map without eps."""
+    if not as_map(system).has_eps:
+        return (fmpq(1),)
     rng = random.Random(f"singularities eps {seed_for(seed, as_map(system).subject)}")
     first = fmpq(rng.randint(2, 9), 11)
     return first, fmpq(rng.randint(2, 11), 13)

@@ -379,7 +379,7 @@ class ImplicitMap(BirationalMap):
 
     def at(self, eps: Any, over: Field = QQ) -> EquationMap:
         """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where it has no reduction."""
-        element = nonzero_eps(eps, over)
+        element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         for known, at, found in self._last:
             if known is over and at is element:
                 return found
@@ -413,9 +413,10 @@ def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, eps: Any) -> 
     else:
         seen = dict.fromkeys(m for row in by_monomial for entry in row for m in entry)
         exponents = [(*m, degree - sum(m)) for m in seen]
+    droppable = over is QQ or over.characteristic > 0  # elsewhere a zero may be uncertain
     place = {exponent[:n]: k for k, exponent in enumerate(exponents)}
     terms = tuple(
-        tuple(tuple((place[m], c) for m, c in entry.items() if over.characteristic == 0 or c != 0) for entry in row)
+        tuple(tuple((place[m], c) for m, c in entry.items() if not droppable or c != 0) for entry in row)
         for row in by_monomial
     )
     return Equation(over, tuple(exponents), terms)
@@ -430,7 +431,7 @@ def nonzero_eps(eps: Any, over: Field) -> Any:
                 f"the prime {over.characteristic} divides the numerator of eps = {eps}: take another prime",
                 over.characteristic,
             )
-        raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+        raise InputError("found eps = 0, expected another number: at eps = 0 a map with a time step is the identity")
     return element
 
 

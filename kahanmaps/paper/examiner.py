@@ -270,6 +270,7 @@ class ClaimAtPoints:
     """A claim as `decide` takes it: at the points of an examiner."""
 
     name = "claim"
+    no_value = "a denominator seems to vanish identically"
     patience = _POLES
 
     def __init__(self, examiner: Examiner, claim: Claim) -> None:

@@ -17,7 +17,8 @@ from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.laboratory.degrees import degree_growth
-from kahanmaps.laboratory.singularities import singularities, symbolic_denominator
+from kahanmaps.laboratory.singularities import patterns, singularities, symbolic_denominator
+from kahanmaps.maps.orbit import orbit
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
 NAMES = [path.stem for path in EXAMPLES]
@@ -139,9 +140,9 @@ WRONG = [
     (
         '[system]\nrhs = ["x", "y"]\ndiscretization = "euler"',
         "system.discretization",
-        'expected "kahan" or "polarised"',
+        'expected one of "kahan", "polarised"',
     ),
-    ('[system]\nrhs = ["x", "y"]\ndegree = 3', "system.degree", "expected none"),
+    ('[system]\nrhs = ["x", "y"]\ndegree = 3', "system.degree", "from 2 to 2"),
     ('[system]\nrhs = ["x", "y"]\ndiscretization = "polarised"\ndegree = 9', "system.degree", "from 2 to 6"),
     ('[system]\nrhs = ["x", "y"]\ndiscretization = "polarised"\ndegree = "3"', "system.degree", "from 2 to 6"),
     ('[system]\nrhs = ["x", "y"]\n[map]\nimage = ["x", "y"]', "file", "found [system], [map]"),
@@ -158,3 +159,39 @@ def test_a_mistake_is_told_with_its_key(text, key, words):
 def test_the_polarised_map_of_a_system_of_two_names_that_clash_is_refused():
     with pytest.raises(SystemFileError, match="x_1"):
         parse_system('variables = ["x", "x_1"]\n[system]\nrhs = ["x^3", "1"]\ndiscretization = "polarised"')
+
+
+def test_a_parameter_that_a_polarised_map_calls_a_variable_is_refused():
+    text = 'variables = ["x"]\n[parameters]\nx_1 = "2"\n[system]\nrhs = ["x^3"]\ndiscretization = "polarised"'
+    with pytest.raises(SystemFileError, match=r"parameters\.x_1: is a variable of the map as well"):
+        parse_system(text)
+
+
+def test_capitals_that_are_taken_ask_for_other_names():
+    with pytest.raises(SystemFileError, match=r"give new = \["):
+        parse_system('variables = ["X"]\n[bilinear]\nequations = ["X = X"]')
+
+
+LOST = 'variables = ["x", "y"]\n[map]\nimage = ["x + y/eps", "y/(eps - 1) + x*y/(eps^2 - 1/4)"]'
+
+
+@pytest.mark.parametrize("arithmetic", ["exact", "float", "mod:10007"])
+def test_a_map_that_has_no_value_at_some_eps_ends_singular_there(arithmetic):
+    walk = orbit(parse_system(LOST).map, ["1/2", "1/3"], "1/2", steps=2, arithmetic=arithmetic)
+    assert len(list(walk)) == 1
+    assert walk.end.status == "singular"
+    assert singularities(parse_system(LOST).map, "1/2").map_degree == 0
+
+
+def test_an_image_of_lower_dimension_is_told_where_no_measure_makes_sense():
+    file = parse_system('variables = ["x", "y"]\n[map]\nimage = ["x*y", "x^2*y^2 + 1"]')
+    one = parse_rational_function("1", ["x", "y", "eps"])
+    [finding] = check_measure(file, extra=one).findings
+    assert str(finding.verdict) == "undecided"
+    assert "no inverse" in finding.evidence.summary
+    assert "the map is not dominant" in patterns(file.map, None).running
+
+
+def test_a_file_of_any_kind_shows_itself_in_a_notebook():
+    for name in NAMES:
+        assert example(name)._repr_html_()

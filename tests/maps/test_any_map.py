@@ -53,7 +53,16 @@ MAPS = {
     "henon": parse_system('variables = ["x", "y"]\n[map]\nimage = ["y", "x + eps*y^2"]').map,
 }
 MAPS["composed"] = composed_map(MAPS["bilinear"], (MAPS["explicit"], -1))
-WITH_INVERSE = [name for name in MAPS if name != "henon"]
+
+
+def has_inverse(map_):
+    try:
+        return map_.at(1).inverse is not None
+    except InputError:
+        return False
+
+
+WITH_INVERSE = [name for name, map_ in MAPS.items() if has_inverse(map_)]
 LINEAR = [name for name in MAPS if MAPS[name].at(1).equation.degree == 1]
 P = 1009
 every_map = pytest.mark.parametrize("name", MAPS)

@@ -115,6 +115,7 @@ def command(
 
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     require_eps(file, eps)
+    eps = eps if file.map.has_eps else None
     if options["accuracy"] is not None and options["arithmetic"] != ("ball", 0):
         raise click.UsageError("--accuracy is for --arithmetic ball:auto")
     if options["kernel"] is not None and options["arithmetic"][0] != "float":

@@ -125,7 +125,8 @@ def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[st
         factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
         tell(f"factors of {name}\t{cut(factors) or 'none'}")
     for run in runs:
-        tell(f"\n# eps = {format_number(run.eps)}: map of degree {run.map_degree}, {run.text}")
+        at = f"eps = {format_number(run.eps)}: " if file.map.has_eps else ""
+        tell(f"\n# {at}map of degree {run.map_degree}, {run.text}")
         tell(f"{name}\t{cut(run.denominator)}")
         for found in run.hypersurfaces:
             kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
