@@ -13,7 +13,7 @@ closer to infinity than 2^96 counts as a pole, and ends the orbit.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -56,17 +56,19 @@ class PlaneOrbit:
 class InvariantPlane:
     """One plane of the normal form: its root of chi, as a number and as text, and one orbit for each start.
 
-    `h` are the coefficients of the cubic in the coordinates (u, v), complex where the root is; `u_form` and `v_form`
-    are u and v as linear forms in x. `shape` says what h is: one of the constants of `symmetric_planes`.
+    `h` are the coefficients of the cubic in the coordinates (u, v), complex where the root is; `shape` says what h is:
+    one of the constants of `symmetric_planes`. `index` is the number of the plane in its splitting, `block` its map in
+    the coordinates (u, v), and `matrix` leads to them from those of the splitting.
     """
 
+    index: int
     root: complex
     root_text: str
     shape: str
     h: tuple[complex, complex, complex, complex]
-    u_form: Numbers
-    v_form: Numbers
-    orbits: tuple[PlaneOrbit, ...]
+    block: PlanarBlock
+    matrix: Matrix
+    orbits: tuple[PlaneOrbit, ...] = ()
 
     @property
     def is_real(self) -> bool:
@@ -134,18 +136,13 @@ def find_invariant_curves(
             orbits, pole = _orbits(frames, firsts, epsilon, steps, said, progress)
             runs.append(
                 [
-                    PlaneOrbit(u, v, _cubic(frame, first, epsilon) if frame.root.imag == 0 else None)
+                    PlaneOrbit(u, v, _cubic(frame, first, epsilon) if frame.is_real else None)
                     for frame, first, (u, v) in zip(frames, firsts, orbits, strict=True)
                 ]
             )
             originals.append(_in_variables(frames, orbits, splitting))
             poles.append(pole)
-        planes = tuple(
-            InvariantPlane(
-                frame.root, frame.root_text, frame.shape, frame.h, *_forms(frame, splitting), tuple(of_plane)
-            )
-            for frame, of_plane in zip(frames, zip(*runs, strict=True), strict=True)
-        )
+    planes = tuple(replace(frame, orbits=found) for frame, found in zip(frames, zip(*runs, strict=True), strict=True))
     return InvariantCurves(file.variables, epsilon, steps, planes, tuple(originals), tuple(poles), structure.text)
 
 
@@ -159,20 +156,7 @@ def _require_sizes(starts: Sequence[Sequence[Any]], steps: int) -> None:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Frame:
-    """A plane of the splitting, its map in the coordinates that are drawn, and the matrix that leads to them."""
-
-    index: int
-    root: complex
-    root_text: str
-    shape: str
-    block: PlanarBlock
-    h: tuple[complex, complex, complex, complex]
-    matrix: Matrix
-
-
-def _frames(splitting: Splitting) -> list[_Frame]:
+def _frames(splitting: Splitting) -> list[InvariantPlane]:
     """The planes, real ones by increasing root."""
     rational_roots = [-factor[0] / factor[1] for factor, _ in splitting.form.chi.factor()[1] if factor.degree() == 1]
     found = []
@@ -182,26 +166,23 @@ def _frames(splitting: Splitting) -> list[_Frame]:
             exact = [number for number in rational_roots if root.contains(arb(number))]
             text = format_number(exact[0]) if exact else f"{float(root.mid()):.5g}"
             shape, matrix = symmetric_coordinates(plane.block)
-            block = PlanarBlock(*(entry.mid() for entry in transformed(plane.block, matrix)))
         else:
             # A ball around 0 is the only way in which 0 comes as the real part of a root that is not rational.
             real = 0.0 if root.real.contains(arb(0)) else float(root.real.mid())
             text = f"{real:.5g} +- {float(root.imag.mid()):.5g}i" if real else f"+-{float(root.imag.mid()):.5g}i"
             shape, matrix = COMPLEX, ((acb(1), acb(0)), (acb(0), acb(1)))
-            block = PlanarBlock(
-                *(entry.mid() for entry in (plane.block.a, plane.block.b, plane.block.c, plane.block.d))
-            )
-        h = tuple(_machine(entry) for entry in (block.a, block.b, block.c, block.d))
+        coefficients = [entry.mid() for entry in transformed(plane.block, matrix)]
+        h = tuple(map(_machine, coefficients))
         if not np.isfinite(h).all():
             raise InputError(
                 "the normal form leaves the range of machine numbers: its coefficients are too large to draw"
             )
-        found.append(_Frame(index, complex(_machine(root)), text, shape, block, h, matrix))
+        found.append(InvariantPlane(index, complex(_machine(root)), text, shape, h, PlanarBlock(*coefficients), matrix))
     return sorted(found, key=lambda frame: (frame.root.imag != 0, frame.root.real, frame.root.imag))
 
 
 def _orbits(
-    frames: Sequence[_Frame],
+    frames: Sequence[InvariantPlane],
     firsts: Sequence[Triple],
     eps: fmpq,
     steps: int,
@@ -245,7 +226,7 @@ def _orbit(
     return us, vs
 
 
-def _cubic(frame: _Frame, first: Triple, eps: fmpq) -> PlaneCubic:
+def _cubic(frame: InvariantPlane, first: Triple, eps: fmpq) -> PlaneCubic:
     """The curve through the start, its level given as a fraction of numbers of moderate size."""
     U, V, W = first
     step = 2 * arb(eps)
@@ -266,17 +247,9 @@ def _cubic(frame: _Frame, first: Triple, eps: fmpq) -> PlaneCubic:
     return cubic
 
 
-def _forms(frame: _Frame, splitting: Splitting) -> tuple[Numbers, Numbers]:
-    """u and v as linear forms in the variables."""
-    columns = []
-    for k in range(splitting.dim):
-        unit = [arb(int(i == k)) for i in range(splitting.dim)]
-        columns.append(_turned(frame.matrix, splitting.triples(unit)[frame.index]))
-    step = 2 * splitting.eps
-    return np.array([_machine(U / step) for U, _, _ in columns]), np.array([_machine(V / step) for _, V, _ in columns])
-
-
-def _in_variables(frames: Sequence[_Frame], orbits: Sequence[tuple[Numbers, Numbers]], splitting: Splitting) -> Numbers:
+def _in_variables(
+    frames: Sequence[InvariantPlane], orbits: Sequence[tuple[Numbers, Numbers]], splitting: Splitting
+) -> Numbers:
     """The orbit in the variables of the system, a row for each step."""
     total = np.zeros((len(orbits[0][0]), splitting.dim))
     for frame, (u, v) in zip(frames, orbits, strict=True):

@@ -119,14 +119,6 @@ def rounded(point):
     return [int(entry.p) / int(entry.q) for entry in point]
 
 
-@pytest.mark.parametrize("name", MEMBERS)
-def test_the_coordinates_are_the_forms_at_the_points(curves, name):
-    found = curves(name)
-    for plane in found.planes:
-        assert found.originals[0][:5] @ plane.u_form == pytest.approx(plane.orbits[0].u[:5], rel=1e-9)
-        assert found.originals[0][:5] @ plane.v_form == pytest.approx(plane.orbits[0].v[:5], rel=1e-9)
-
-
 def test_the_curve_is_the_conserved_quantity_of_the_catalogue(curves):
     # paper_m2 claims I1 and I2 = h_i/(1 + eps^2 D_i): at the start they are the levels, up to 1/chi'(root) = -1, 1
     file, found = load("paper_m2"), curves("m = 2")
