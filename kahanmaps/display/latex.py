@@ -78,7 +78,7 @@ def latex_polynomial(polynomial: fmpq_mpoly) -> str:
     ordered = [latex_name(names[k]) for k in order]
     text = ""
     for monomial, coefficient in reading_order(polynomial):
-        term = _term(abs(coefficient), [monomial[k] for k in order], ordered)
+        term = " ".join(factors_of(abs(coefficient), [monomial[k] for k in order], ordered, _power, latex_number))
         if coefficient < 0:
             text += f" - {term}" if text else f"-{term}"
         else:
@@ -96,13 +96,18 @@ def latex_rational_function(function: RationalFunction) -> str:
     >>> print(latex_rational_function(parse_rational_function("(x/2 + 1)/(1 - eps^2*x)", ["x", "eps"])))
     \frac{x + 2}{2 - 2 \varepsilon^2 x}
     """
+    above, below = map(latex_polynomial, above_and_below(function))
+    return above if function.is_polynomial else rf"\frac{{{above}}}{{{below}}}"
+
+
+def above_and_below(function: RationalFunction) -> tuple[fmpq_mpoly, fmpq_mpoly]:
+    """Numerator and denominator as they are written: without fractions, the first term of the denominator positive."""
     if function.is_polynomial:  # the denominator is 1 then
-        return latex_polynomial(function.numerator)
+        return function.numerator, function.denominator
     factor = fmpq(common_denominator(function.numerator))
     if reading_order(function.denominator)[0][1] < 0:
         factor = -factor
-    above, below = function.numerator * factor, function.denominator * factor
-    return rf"\frac{{{latex_polynomial(above)}}}{{{latex_polynomial(below)}}}"
+    return function.numerator * factor, function.denominator * factor
 
 
 def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
@@ -132,11 +137,6 @@ def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:
         rows.append(rf"&\ \vdots\ \text{{({len(equations)} equations)}}")
     inside = r" \\ ".join(rows)
     return rf"$\displaystyle \begin{{aligned}} {inside} \end{{aligned}}$"
-
-
-def _term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:
-    """One term with a positive coefficient; a coefficient 1 is left out before factors."""
-    return " ".join(factors_of(coefficient, exponents, names, _power, latex_number))
 
 
 def _power(name: str, exponent: int) -> str:

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
+from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.reading import factors_of, first_terms, reading_order
 from kahanmaps.algebra.text import format_number
-from kahanmaps.display.latex import GREEK_NAMES
+from kahanmaps.display.latex import GREEK_NAMES, above_and_below
 from kahanmaps.display.markup import escape
 from kahanmaps.errors import InputError, counted
 
@@ -75,7 +75,7 @@ def mathml_rational_function(function: RationalFunction) -> str:
     >>> mathml_rational_function(parse_rational_function("x/y^2", ["x", "y"]))
     '<mfrac><mrow><mi>x</mi></mrow><mrow><msup><mi>y</mi><mn>2</mn></msup></mrow></mfrac>'
     """
-    above, below = _above_and_below(function)
+    above, below = above_and_below(function)
     if below.is_one():
         return mathml_polynomial(above)
     return f"<mfrac>{mathml_polynomial(above)}{mathml_polynomial(below)}</mfrac>"
@@ -144,7 +144,7 @@ def _sum(polynomial: fmpq_mpoly, characters: int | None = None) -> list[str]:
 
 
 def _quotient(function: RationalFunction, characters: int | None) -> list[str]:
-    above, below = _above_and_below(function)
+    above, below = above_and_below(function)
     if below.is_one():
         return _sum(above, characters)
     fits = characters is None or all(len(first_terms(part, characters)) == len(part) for part in (above, below))
@@ -168,16 +168,6 @@ def _plain(polynomial: fmpq_mpoly) -> str:
     return " ".join(text for _, text in _pieces(polynomial))
 
 
-def _above_and_below(function: RationalFunction) -> tuple[fmpq_mpoly, fmpq_mpoly]:
-    """Numerator and denominator with integer coefficients, the first term of the denominator positive."""
-    if function.is_polynomial:  # the denominator is 1 then
-        return function.numerator, function.denominator
-    factor = fmpq(common_denominator(function.numerator))
-    if reading_order(function.denominator)[0][1] < 0:
-        factor = -factor
-    return function.numerator * factor, function.denominator * factor
-
-
 def _pieces(polynomial: fmpq_mpoly) -> list[tuple[str, str]]:
     """Each term with its sign: as MathML, and as plain text."""
     names = names_of(polynomial)
@@ -191,20 +181,11 @@ def _pieces(polynomial: fmpq_mpoly) -> list[tuple[str, str]]:
         form = "infix" if found else "prefix"
         mark = f'<mo form="{form}">{sign}</mo>' if sign else ""
         text = {"−": "- ", "+": "+ ", "": ""}[sign] if found else "-" * bool(sign)
-        found.append((mark + _term(size, exponents, ordered), text + _plain_term(size, exponents, plain)))
+        marked = factors_of(size, exponents, ordered, "<msup>{}<mn>{}</mn></msup>".format, mathml_number)
+        found.append(
+            (
+                mark + _TIMES.join(marked),
+                text + "*".join(factors_of(size, exponents, plain, "{}^{}".format, format_number)),
+            )
+        )
     return found or [("<mn>0</mn>", "0")]
-
-
-def _term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:
-    """One term with a positive coefficient; a coefficient 1 is left out before factors."""
-    return _TIMES.join(factors_of(coefficient, exponents, names, _power, mathml_number))
-
-
-def _power(name: str, exponent: int) -> str:
-    return f"<msup>{name}<mn>{exponent}</mn></msup>"
-
-
-def _plain_term(coefficient: fmpq, exponents: Sequence[int], names: Sequence[str]) -> str:
-    return "*".join(
-        factors_of(coefficient, exponents, names, lambda name, exponent: f"{name}^{exponent}", format_number)
-    )

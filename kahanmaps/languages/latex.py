@@ -5,10 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from flint import fmpq
-
-from kahanmaps.algebra.polynomials import RationalFunction, common_denominator
-from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.display.latex import above_and_below, latex_name, latex_polynomial, latex_rational_function
 from kahanmaps.languages.formulas import Formulas
 from kahanmaps.languages.writer import header
 
@@ -110,10 +108,7 @@ def _quotient(left: str, function: RationalFunction) -> list[tuple[str, str]]:
     whole = latex_rational_function(function)
     if len(whole) <= 2 * _LINE or function.is_polynomial:
         return [(left, whole)]
-    factor = fmpq(common_denominator(function.numerator))
-    if latex_polynomial(function.denominator).startswith("-"):
-        factor = -factor
-    above, below = latex_polynomial(function.numerator * factor), latex_polynomial(function.denominator * factor)
+    above, below = map(latex_polynomial, above_and_below(function))
     P, Q = f"P_{{{left}}}", f"Q_{{{left}}}"
     return [(left, rf"\frac{{{P}}}{{{Q}}}"), (P, above), (Q, below)]
 
