@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
+from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.float_ensemble import FloatEnsemble
-from kahanmaps.maps.float_numbers import FloatArray, to_float, to_floats
+from kahanmaps.maps.float_numbers import FloatArray, to_floats
 from kahanmaps.maps.orbits import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -109,19 +110,11 @@ def euler_orbits(system: QuadraticSystem, eps: Any, starts: FloatArray, steps: i
     >>> euler_orbits(QuadraticSystem.from_text(["x"], ["x"]), "1/2", np.array([[1.0]]), 2).points[:, 0, 0].tolist()
     [1.0, 2.0, 4.0]
     """
-    require_steps(steps)
-    require_points(steps + 1, *starts.shape)
-    field_of = VectorField(system)
-    step = 2 * to_float(rational(eps))
-    points = np.empty((steps + 1, *starts.shape))
-    points[0] = starts
-    with np.errstate(all="ignore"):
-        for k in range(steps):
-            points[k + 1] = points[k] + step * field_of(points[k])
-            points[k + 1][~np.isfinite(points[k + 1]).all(axis=1)] = np.nan
-    gone = int(np.isnan(points[-1]).any(axis=1).sum())
-    ended = {"left the range of machine floats": gone} if gone else {}
-    return Trajectories(system.variables, points, np.arange(steps + 1), ended)
+    context = ring((*system.variables, "eps"))
+    *x, symbol = context.gens()
+    rhs = (f.compose(*x, ctx=context) for f in system.rhs)
+    image = [RationalFunction(y + 2 * symbol * f, context.constant(1)) for y, f in zip(x, rhs, strict=True)]
+    return walked(FloatEnsemble(explicit_map(system.variables, image), eps, starts, kernel="numpy"), steps)
 
 
 class VectorField:
