@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from flint import fmpq, fmpq_mpoly
@@ -26,31 +25,9 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian
 _LONGEST = 30
 
 
-class WatchedFunction(Protocol):
-    """A function of a point with eps inserted; `label` is its name in a picture."""
-
-    @property
-    def name(self) -> str:
-        """What the user calls it."""
-        ...
-
-    @property
-    def label(self) -> str:
-        """What a picture calls it."""
-        ...
-
-    def at(self, start: Sequence[fmpq]) -> fmpq | None:
-        """The exact value at a rational point, None where it has none."""
-        ...
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """The values at points (count, dim) in doubles, NaN where there is none."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class Expression:
-    """A rational function of the variables and eps."""
+    """A rational function of the variables and eps, with eps inserted; `name` is what the user calls it."""
 
     name: str
     function: RationalFunction
@@ -58,13 +35,16 @@ class Expression:
 
     @property
     def label(self) -> str:
+        """What a picture calls it."""
         return label_of(self.name) if is_name(self.name) else plain(self.name)
 
     def at(self, start: Sequence[fmpq]) -> fmpq | None:
+        """The exact value at a rational point, None where it has none."""
         value: fmpq | None = self.function.value(QQ, [*start, self.eps])
         return value
 
     def __call__(self, points: FloatArray) -> FloatArray:
+        """The values at points (count, dim) in doubles, NaN where there is none."""
         return PointFunction(self.name, self.function, to_float(self.eps))(points)
 
 
@@ -80,8 +60,9 @@ class OfTheImage:
         hamiltonian = function.hamiltonian
         self._hamiltonian = hamiltonian
         if isinstance(function, ModifiedHamiltonian):
-            self._H = _in_doubles(hamiltonian, hamiltonian.H)
-            self._gradient = [_in_doubles(hamiltonian, slope) for slope in hamiltonian.gradient]
+            self._H, *self._gradient = (
+                PointFunction("", _as_function(hamiltonian, f)) for f in (hamiltonian.H, *hamiltonian.gradient)
+            )
         else:
             matrix = hamiltonian.J * function.matrix
             self._matrix = to_floats(matrix.entries()).reshape(hamiltonian.dim, hamiltonian.dim)
@@ -113,6 +94,9 @@ class OfTheImage:
         found[~np.isfinite(found)] = np.nan
         values[good] = found
         return values
+
+
+WatchedFunction = Expression | OfTheImage
 
 
 def functions_of(file: SystemFile, eps: fmpq) -> dict[str, WatchedFunction]:
@@ -183,7 +167,3 @@ def asked_functions(file: SystemFile, eps: fmpq, requests: Sequence[tuple[str, s
 
 def _as_function(hamiltonian: CubicHamiltonian, polynomial: fmpq_mpoly) -> RationalFunction:
     return parse_rational_function(format_polynomial(polynomial), (*hamiltonian.variables, "eps"))
-
-
-def _in_doubles(hamiltonian: CubicHamiltonian, polynomial: fmpq_mpoly) -> PointFunction:
-    return PointFunction("", _as_function(hamiltonian, polynomial))

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import Any
+from types import SimpleNamespace
 
 import numpy as np
 from flint import fmpq, fmpq_mpoly
 
-from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.numerals import is_name
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.text import parse_rational_function
@@ -22,19 +21,8 @@ from kahanmaps.plots.figures import label_of, plain
 _SHORT = 60  # characters of a formula that fits along an axis
 
 
-class _Arrays:
-    """Arrays of doubles, as far as evaluating a polynomial needs a field."""
-
-    zero = 0.0
-    one = 1.0
-
-    @staticmethod
-    def convert(value: Any) -> float:
-        return to_float(rational(value))
-
-    @staticmethod
-    def working() -> AbstractContextManager[None]:
-        return nullcontext()
+# Arrays of doubles, as far as evaluating a polynomial needs a field.
+_ARRAYS = SimpleNamespace(zero=0.0, one=1.0, convert=to_float, working=nullcontext)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +85,7 @@ class PointFunction:
 
     def _value(self, polynomial: fmpq_mpoly, points: FloatArray) -> FloatArray:
         coordinates = [*np.moveaxis(points, -1, 0), self.eps]
-        value = np.asarray(evaluate(polynomial, _Arrays, coordinates), dtype=np.float64)
+        value = np.asarray(evaluate(polynomial, _ARRAYS, coordinates), dtype=np.float64)
         filled: FloatArray = np.array(np.broadcast_to(value, points.shape[:-1]))
         filled[np.isnan(points).any(axis=-1)] = np.nan  # constants too: where there is no point there is no value
         return filled

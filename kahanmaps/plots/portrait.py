@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,21 +15,11 @@ from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.trajectories import Trajectories
 from kahanmaps.plots.windows import Window, outside, window_of
 
+if TYPE_CHECKING:
+    from kahanmaps.plots.drift_functions import WatchedFunction
+
 STEP = "step"
 ORBIT = "orbit"
-
-
-class Colouring(Protocol):
-    """A function that colours points: a PointFunction, or one of `drift_functions`."""
-
-    @property
-    def label(self) -> str:
-        """What the picture calls it."""
-        ...
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        """The values at points (count, dim), NaN where there is none."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +47,7 @@ def portrait_of(
     found: Trajectories,
     axes: Sequence[PointFunction | str],
     *,
-    colour: Colouring | str = ORBIT,
+    colour: PointFunction | WatchedFunction | str = ORBIT,
     window: Window | None = None,
     euler: Trajectories | None = None,
 ) -> Portrait:

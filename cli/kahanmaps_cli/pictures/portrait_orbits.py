@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from kahanmaps.plots.density import Density
     from kahanmaps.plots.drift_functions import WatchedFunction
     from kahanmaps.plots.point_functions import PointFunction
-    from kahanmaps.plots.portrait import Colouring
     from kahanmaps.plots.trajectories import Trajectories
     from kahanmaps.plots.windows import Window
     from kahanmaps_cli.pictures.stored import Stored
@@ -106,7 +105,7 @@ class Orbits:
         parameters = {} if self.file is None else self.file.parameters
         return point_function(text.strip(), self.variables, self.eps, parameters, named)
 
-    def colouring(self, text: str) -> Colouring:
+    def colouring(self, text: str) -> PointFunction | WatchedFunction:
         """The same, and integrals that theorems give, in which the image of the point occurs."""
         known = self._known().get(text.strip())
         return self.function(text) if known is None else known
