@@ -121,10 +121,8 @@ class PlaneCubic:
         a, b, c, d = self.h
         p, q, r = self.D
         disc = b * b * c * c - 4 * (a * c**3 + b**3 * d) + 18 * a * b * c * d - 27 * a * a * d * d
-        # h_u, h_v, D_u, D_v as lists of coefficients
-        T: Any = _padded(np.polymul([3 * a, 2 * b, c], [q, 2 * r]), 3) - _padded(
-            np.polymul([b, 2 * c, 3 * d], [2 * p, q]), 3
-        )
+        # h_u D_v - h_v D_u, each a list of coefficients
+        T = np.convolve([3 * a, 2 * b, c], [q, 2 * r]) - np.convolve([b, 2 * c, 3 * d], [2 * p, q])
         cube = 8 * self.eps**3
         rest = 27 * (self.below * self.below - cube * cube * disc * self.above * self.above)
         changes: list[float] = []
@@ -194,26 +192,10 @@ def _zeros(form: Floats) -> list[float]:
         return []
     # Turned by an angle that no nice form is zero at, so that no root is at infinity.
     turn = 0.7390851
+    u, v = np.poly1d([np.cos(turn), -np.sin(turn)]), np.poly1d([np.sin(turn), np.cos(turn)])
     degree = len(form) - 1
-    turned = np.zeros(degree + 1)
-    for k, entry in enumerate(form / largest):
-        turned += entry * np.polymul(
-            _power(np.array([np.cos(turn), -np.sin(turn)]), degree - k),
-            _power(np.array([np.sin(turn), np.cos(turn)]), k),
-        )
-    roots = np.roots(turned)
+    turned = sum((u ** (degree - k) * v**k * entry for k, entry in enumerate(form / largest)), np.poly1d([0.0]))
+    roots = turned.roots
     real = roots[np.abs(roots.imag) < 1e-7 * (1 + np.abs(roots))].real
     # u = cos(turn) u' - sin(turn) v', v = sin(turn) u' + cos(turn) v': a root u'/v' has the direction atan2(1, root).
     return [float((np.arctan2(1.0, root) + turn) % np.pi) for root in real]
-
-
-def _power(form: Floats, exponent: int) -> Floats:
-    total = np.array([1.0])
-    for _ in range(exponent):
-        total = np.polymul(total, form)
-    return _padded(total, exponent * (len(form) - 1))
-
-
-def _padded(form: Any, degree: int) -> Floats:
-    """The form with the leading zeros that polymul drops."""
-    return np.concatenate([np.zeros(degree + 1 - len(form)), form])

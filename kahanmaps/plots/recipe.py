@@ -92,23 +92,11 @@ def _png_texts(content: bytes) -> Iterator[tuple[str, str]]:
 
 def _pdf_text(content: bytes, key: str) -> str | None:
     """A string of the Info dictionary: (...) in Latin-1 with escapes, UTF-16 after a byte order mark."""
-    start = re.search(rb"/" + key.encode() + rb"\s*\(", content)
-    if start is None:
+    found = re.search(rb"/" + key.encode() + rb"\s*\(((?:\\.|[^\\)])*)\)", content, re.DOTALL)
+    if found is None:
         return None
-    held = bytearray()
-    depth, at = 1, start.end()
-    while at < len(content):
-        byte = content[at : at + 1]
-        if byte == b"\\":
-            at += 1
-            byte = {b"n": b"\n", b"r": b"\r", b"t": b"\t"}.get(content[at : at + 1], content[at : at + 1])
-        elif byte in (b"(", b")"):
-            depth += 1 if byte == b"(" else -1
-            if depth == 0:
-                break
-        held += byte
-        at += 1
-    text = bytes(held)
+    letters = {b"n": b"\n", b"r": b"\r", b"t": b"\t"}
+    text = re.sub(rb"\\(.)", lambda escaped: letters.get(escaped[1], escaped[1]), found[1], flags=re.DOTALL)
     return text[2:].decode("utf-16-be") if text.startswith(b"\xfe\xff") else text.decode("latin-1")
 
 
