@@ -11,7 +11,7 @@ from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import equations_html
 from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
-from kahanmaps.reports.page import CHARACTERS, Origin, Section, page, statements, text, wide
+from kahanmaps.reports.page import CHARACTERS, Section, page, statements, text, wide
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.reports.portraits import invariant_curves_figure, portrait_figure
 from kahanmaps.reports.statement_formulas import formulas_of
@@ -22,12 +22,13 @@ if TYPE_CHECKING:
 
     from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.analysis import Analysis
+    from kahanmaps.plots.recipe import Recipe
     from kahanmaps.plots.style import Style
 
 _EQUATIONS = 40
 
 
-def analysis_page(found: Analysis, title: str, origin: Origin, pictures: Pictures) -> str:
+def analysis_page(found: Analysis, title: str, recipe: Recipe, pictures: Pictures) -> str:
     """The page about what `analyze` found."""
     lead = f"{text(found.file.name)}, dimension {found.dim}, {text(eps_sentence(found.eps))}"
     if found.symbols:
@@ -40,9 +41,8 @@ def analysis_page(found: Analysis, title: str, origin: Origin, pictures: Picture
         *_catalogue(found.file),
         *(_statements(found, name, pictures) for name, _ in found.sections),
         Section("orbits", "Orbits", orbits(found.file, found.eps, pictures)),
-        Section("pictures", "Pictures", f"<p>{text(pictures.note)}</p>" if pictures.note else ""),
     ]
-    return page(title, lead, sections, origin)
+    return page(title, lead, sections, pictures, recipe, found.seed)
 
 
 def _verdict(found: Analysis) -> Section:

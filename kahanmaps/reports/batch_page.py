@@ -9,7 +9,7 @@ from kahanmaps.display import markup
 from kahanmaps.display.experiments import status_table, table_html
 from kahanmaps.errors import counted
 from kahanmaps.experiments.summary import summarise
-from kahanmaps.reports.page import Origin, Section, page, text, wide
+from kahanmaps.reports.page import Section, page, text, wide
 from kahanmaps.reports.pictures import Pictures
 
 if TYPE_CHECKING:
@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 
     from kahanmaps.experiments.store import Store
     from kahanmaps.experiments.summary import Summary
+    from kahanmaps.plots.recipe import Recipe
     from kahanmaps.plots.style import Style
 
 _ROWS = 400
 
 
 def batch_page(
-    store: Store, title: str, origin: Origin, pictures: Pictures, by: Sequence[str], values: Sequence[str]
+    store: Store, title: str, recipe: Recipe, pictures: Pictures, by: Sequence[str], values: Sequence[str]
 ) -> str:
     """The page about all experiments of a database; `by` and `values` are those of `summarise`.
 
@@ -39,39 +40,30 @@ def batch_page(
     done = sum(sum(one.outcomes.values()) for one in status)
     every = sum(one.tasks for one in status)
     lead = f"{counted(len(status), 'experiment')}, {done} of {every} tasks done"
+    ends = "What became of the tasks,"
+    counts = _figure("counts", ends, summary, (), "The tables have the numbers", pictures) if summary.groups else ""
+    spread = f"Distribution of {', '.join(values)}"
+    about = "The table above has the quantiles"
     sections = [
-        Section("status", "How far it has come", f"{wide(status_table(status))}\n{_counts_figure(summary, pictures)}"),
+        Section("status", "How far it has come", f"{wide(status_table(status))}\n{counts}"),
         Section("summary", "Summary", tables if done else "<p>There are no results yet.</p>"),
-        Section("distributions", "Distributions", _distributions(summary, values, pictures)),
+        Section(
+            "distributions",
+            "Distributions",
+            _figure("distributions-figure", spread, summary, values, about, pictures) if values else "",
+        ),
         Section("experiments", "The experiments", definitions),
-        Section("pictures", "Pictures", f"<p>{text(pictures.note)}</p>" if pictures.note else ""),
     ]
-    return page(title, lead, sections, origin)
+    return page(title, lead, sections, pictures, recipe)
 
 
-def _counts_figure(summary: Summary, pictures: Pictures) -> str:
-    """What became of the tasks of each group."""
-    if not summary.groups:
-        return ""
-
-    def drawing(style: Style) -> Figure:
-        from kahanmaps.plots.batch import draw_batch
-
-        return draw_batch(summary, (), style)
-
-    caption = f"What became of the tasks, by {', '.join(summary.by)}."
-    return pictures.draw("counts", caption, f"{caption} The tables have the numbers.", drawing)
-
-
-def _distributions(summary: Summary, values: Sequence[str], pictures: Pictures) -> str:
-    """The distribution of the numbers that were asked for, in each group."""
-    if not values:
-        return ""
+def _figure(name: str, what: str, summary: Summary, values: Sequence[str], tables: str, pictures: Pictures) -> str:
+    """The groups of a summary: what became of their tasks, or the distributions of `values`."""
 
     def drawing(style: Style) -> Figure:
         from kahanmaps.plots.batch import draw_batch
 
         return draw_batch(summary, values, style)
 
-    caption = f"Distribution of {', '.join(values)} by {', '.join(summary.by)}."
-    return pictures.draw("distributions-figure", caption, f"{caption} The table above has the quantiles.", drawing)
+    caption = f"{what} by {', '.join(summary.by)}."
+    return pictures.draw(name, caption, f"{caption} {tables}.", drawing)

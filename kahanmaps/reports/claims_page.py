@@ -19,7 +19,7 @@ from kahanmaps.display.checks import (
     verdict_html,
 )
 from kahanmaps.reports.analysis_page import system_html
-from kahanmaps.reports.page import ROOM, Origin, Section, page, text, wide
+from kahanmaps.reports.page import ROOM, Section, page, text, wide
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.reports.portraits import invariant_curves_figure, portrait_figure
 from kahanmaps.sources import source
@@ -27,6 +27,7 @@ from kahanmaps.sources import source
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Finding, Report
     from kahanmaps.documents.files import SystemFile
+    from kahanmaps.plots.recipe import Recipe
 
 _PAPER = "petrera-suris-2016"
 _EXPLAINED = (
@@ -39,7 +40,7 @@ _EXPLAINED = (
 def claims_page(
     reports: Sequence[Report],
     title: str,
-    origin: Origin,
+    recipe: Recipe,
     pictures: Pictures,
     file: SystemFile | None = None,
     left_out: Sequence[str] = (),
@@ -66,9 +67,8 @@ def claims_page(
         ),
         Section("notes", "Notes", markup.listed(notes) if notes else ""),
         Section("sources", "Source", f"<p>{text(source(_PAPER))}</p>" if reports[0].check == "verify" else ""),
-        Section("pictures", "Pictures", f"<p>{text(pictures.note)}</p>" if pictures.note else ""),
     ]
-    return page(title, lead, sections, origin)
+    return page(title, lead, sections, pictures, recipe, reports[0].context.get("seed"))
 
 
 def _groups(reports: Sequence[Report]) -> list[tuple[str, str, list[Finding]]]:

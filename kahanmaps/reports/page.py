@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from kahanmaps.display import markup
 from kahanmaps.display.checks import Room
 from kahanmaps.plots.recipe import Recipe
+from kahanmaps.reports.pictures import Pictures
 from kahanmaps.reports.stylesheet import STYLESHEET
 
 CHARACTERS = 6_000  # of one formula, about; and of one line of text
@@ -27,17 +28,15 @@ class Section:
     html: str
 
 
-@dataclass(frozen=True)
-class Origin:
-    """How a page was made: the command and the system in `recipe`, and the seed (None where nothing is drawn)."""
+def page(
+    title: str, lead: str, sections: Sequence[Section], pictures: Pictures, recipe: Recipe, seed: int | None = None
+) -> str:
+    """The whole page. `title` is text, `lead` is HTML; sections that are empty are left out.
 
-    recipe: Recipe
-    seed: int | None = None
-
-
-def page(title: str, lead: str, sections: Sequence[Section], origin: Origin) -> str:
-    """The whole page. `title` is text, `lead` is HTML; sections that are empty are left out."""
-    present = [section for section in (*sections, _remake(origin)) if section.html]
+    `recipe` and `seed` (None where nothing is drawn at random) say how it was made.
+    """
+    note = Section("pictures", "Pictures", f"<p>{text(pictures.note)}</p>" if pictures.note else "")
+    present = [section for section in (*sections, note, _remake(recipe, seed)) if section.html]
     links = "".join(f'<li><a href="#{one.id}">{markup.escape(one.title)}</a></li>' for one in present)
     body = "\n".join(map(_section_html, present))
     name = markup.escape(title)
@@ -46,7 +45,7 @@ def page(title: str, lead: str, sections: Sequence[Section], origin: Origin) -> 
 <head>
 <meta charset="utf-8"/>
 <meta name="viewport" content="width=device-width, initial-scale=1"/>
-<meta name="generator" content="kahanmaps {origin.recipe.version}"/>
+<meta name="generator" content="kahanmaps {recipe.version}"/>
 <link rel="icon" href="data:,"/>
 <title>{name}</title>
 <style>{STYLESHEET}</style>
@@ -88,13 +87,12 @@ def statements(lines: Sequence[tuple[str, str]]) -> str:
     return "\n".join(['<ul class="statements">', *rows, "</ul>"])
 
 
-def _remake(origin: Origin) -> Section:
-    recipe = origin.recipe
+def _remake(recipe: Recipe, seed: int | None) -> Section:
     rows = [("version", f"kahanmaps {markup.escape(recipe.version)}")]
     if recipe.command:
         rows.insert(0, ("command", f"<code>{text(recipe.command)}</code>"))
-    if origin.seed is not None:
-        rows.append(("seed", str(origin.seed)))
+    if seed is not None:
+        rows.append(("seed", str(seed)))
     inside = wide(markup.definitions(rows))
     if recipe.system:
         shown = markup.escape(markup.shortened(recipe.system, _LONGEST_SYSTEM))

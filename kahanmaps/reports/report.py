@@ -15,7 +15,6 @@ from kahanmaps.plots.recipe import Recipe
 from kahanmaps.reports.analysis_page import analysis_page
 from kahanmaps.reports.batch_page import batch_page
 from kahanmaps.reports.claims_page import claims_page
-from kahanmaps.reports.page import Origin
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.whole_files import write_whole
 
@@ -60,18 +59,17 @@ def report_html(
     drawn = Pictures(pictures)
     title = (title or "").strip()
     if isinstance(found, Analysis):
-        origin = Origin(Recipe(command, found.file.to_toml()), found.seed)
-        return analysis_page(found, title or _title(found.file), origin, drawn)
+        return analysis_page(found, title or _title(found.file), Recipe(command, found.file.to_toml()), drawn)
     if isinstance(found, Store):
-        return batch_page(found, title or "A batch", Origin(Recipe(command)), drawn, by, values)
+        return batch_page(found, title or "A batch", Recipe(command), drawn, by, values)
     reports = [found] if isinstance(found, Report) else list(found)
     if not reports or not all(isinstance(report, Report) for report in reports):
         kinds = ", ".join(sorted({type(report).__name__ for report in reports})) or "nothing"
         raise InputError(f"found {kinds}, expected an Analysis, a Report, several of them, or a Store")
-    origin = Origin(Recipe(command, "" if file is None else file.to_toml()), reports[0].context.get("seed"))
+    recipe = Recipe(command, "" if file is None else file.to_toml())
     name = str(reports[0].context.get("system", "")) if file is None else _title(file)
     return claims_page(
-        reports, title or f"{_WHAT.get(reports[0].check, 'Checks')}: {name}", origin, drawn, file, left_out
+        reports, title or f"{_WHAT.get(reports[0].check, 'Checks')}: {name}", recipe, drawn, file, left_out
     )
 
 
