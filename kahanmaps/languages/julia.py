@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flint import fmpq
-
 from kahanmaps.languages.language import Language, listed
 from kahanmaps.languages.names import Naming, words
 
@@ -15,10 +13,6 @@ _RESERVED = words(
     "while I im pi NaN Inf nothing missing exact collect hcat det transpose sum LinearAlgebra Rational BigInt",
     "Integer Union Base Core Main",
 )
-
-
-def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    return ", ".join(["point", *["eps"] * eps, *symbols])
 
 
 def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
@@ -34,10 +28,6 @@ def _matrix(rows: Sequence[Sequence[str]]) -> str:
     return "hcat(" + ",\n        ".join(columns) + ")"
 
 
-def _number(value: fmpq) -> str:
-    return str(value).replace("/", "//")
-
-
 _EXACT = """\
 using LinearAlgebra
 
@@ -49,10 +39,9 @@ JULIA = Language(
     title="Julia",
     naming=Naming(lambda name: name in _RESERVED),
     comment=lambda line: f"# {line}".rstrip(),
-    number=_number,
+    fraction="{}//{}",
     vector=lambda entries: f"[{listed(entries, '        ')}]",
     matrix=_matrix,
-    arguments=_arguments,
     unpack=_unpack,
     function="function <name>(<arguments>)\n    <unpack>return <body>\nend",
     recipes={

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
+from kahanmaps.algebra.reading import factors_of
 from kahanmaps.languages.names import Naming
 
 LINE = 100  # characters of a line of an expression, after which it is broken
@@ -23,29 +24,45 @@ _TERMS_TOGETHER = 100  # a sum of more terms is bracketed in parts: parsers recu
 class Language:
     """How a language writes what the Kahan map needs.
 
-    `comment` turns a line of text into a comment, `number` writes an exact number, `vector` and `matrix` write entries
-    that are texts. `arguments` and `unpack` take the variables (none where the point is used as a whole), whether eps
-    is an argument, and the symbols: the one writes the list of arguments of a definition, the other what makes the
-    variables out of them. `function` is the template of a function whose value is a formula, with <name>, <arguments>,
-    <unpack> and <body>. `recipes` are templates of the functions that are the same for all systems up to the dimension
-    <n>, the further arguments <more> of a call, and the names of functions, <vector_field> and so on. `naming` says
-    which names may be used; `head` is what the file loads first, with <functions>; `usage` is a call of the map.
+    `comment` turns a line of text into a comment, `integer` writes one and `fraction` two of them, `vector` and
+    `matrix` write entries that are texts. The arguments of a definition are the point, eps and the symbols: `point`
+    takes the names of the variables (none where the point is used as a whole), `argument` and `symbol` one name.
+    `unpack` takes the variables, whether eps is an argument, and the symbols: it writes what makes the variables out of
+    the arguments. `function` is the template of a function whose value is a formula, with <name>, <arguments>, <unpack>
+    and <body>. `recipes` are templates of the functions that are the same for all systems up to the dimension <n>, the
+    further arguments <more> of a call, and the names of functions, <vector_field> and so on. `definition` is what
+    stands around both, with <name>, <arguments> and <body>, whose lines begin as the first one. `naming` says which
+    names may be used; `head` is what the file loads first, with <functions>; `usage` is a call of the map.
     """
 
     key: str
     title: str
     naming: Naming
     comment: Callable[[str], str]
-    number: Callable[[fmpq], str]
     vector: Callable[[Sequence[str]], str]
     matrix: Callable[[Sequence[Sequence[str]]], str]
-    arguments: Callable[[Sequence[str], bool, Sequence[str]], str]
     unpack: Callable[[Sequence[str], bool, Sequence[str]], str]
     function: str
     recipes: Mapping[str, str]
     usage: str
+    point: Callable[[Sequence[str]], str] = lambda variables: "point"
+    argument: str = "{}"
+    symbol: str = "{}"
+    definition: str = "<body>"
+    integer: Callable[[fmpz], str] = str
+    fraction: str = "{}/{}"
     power: str = "^"
     head: str = ""
+
+    def number(self, value: fmpq) -> str:
+        """An exact number."""
+        above = self.integer(value.p)
+        return above if value.q == 1 else self.fraction.format(above, self.integer(value.q))
+
+    def arguments(self, variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
+        """The list of arguments of a definition."""
+        first = [self.point(variables), *[self.argument.format("eps")] * eps]
+        return ", ".join([*first, *map(self.symbol.format, symbols)])
 
     def polynomial(self, polynomial: fmpq_mpoly, safe: Mapping[str, str]) -> str:
         """A polynomial as an expression, exactly; blanks only around + and - between terms.
@@ -55,9 +72,8 @@ class Language:
         names = [safe[name] for name in names_of(polynomial)]
         terms: list[str] = []
         for monomial, coefficient in polynomial.terms():
-            minus = coefficient < 0
-            term = self._term(-coefficient if minus else coefficient, monomial, names)
-            terms.append((" - " if minus else " + ") + term)
+            factors = factors_of(abs(coefficient), monomial, names, self._power, self.number)
+            terms.append((" - " if coefficient < 0 else " + ") + "*".join(factors))
         if not terms:
             return self.number(fmpq(0))
         if len(terms) > _TERMS_TOGETHER:
@@ -76,24 +92,8 @@ class Language:
         """A matrix of numbers."""
         return self.matrix([[self.number(entry) for entry in row] for row in matrix.tolist()])
 
-    def _term(self, coefficient: fmpq, monomial: Sequence[int], names: Sequence[str]) -> str:
-        factors = [
-            name if exponent == 1 else f"{name}{self.power}{exponent}"
-            for name, exponent in zip(names, monomial, strict=True)
-            if exponent
-        ]
-        if not factors or coefficient != 1:
-            factors.insert(0, self.number(coefficient))
-        return "*".join(factors)
-
-
-def plain_number(value: fmpq) -> str:
-    """p or p/q, where that is an exact number.
-
-    >>> plain_number(fmpq(-1, 3))
-    '-1/3'
-    """
-    return str(value)
+    def _power(self, name: str, exponent: int) -> str:
+        return f"{name}{self.power}{exponent}"
 
 
 def python_integer(value: fmpz) -> str:

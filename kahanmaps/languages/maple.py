@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kahanmaps.languages.language import Language, listed, plain_number
+from kahanmaps.languages.language import Language, listed
 from kahanmaps.languages.names import Naming, words
 
 _RESERVED = words(
@@ -18,10 +18,6 @@ _RESERVED = words(
 )
 
 
-def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    return ", ".join(["point", *["eps"] * eps, *symbols])
-
-
 def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
     names = ", ".join(variables)
     return f"local {names};\n  {names} := op(convert(point, list));\n  "
@@ -30,7 +26,7 @@ def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
 # A symbol times a Matrix may stay a product: hence ScalarMultiply. Where a singular matrix leaves equations that can be
 # solved, LinearSolve gives a family of solutions: hence the determinant.
 _REFUSE = """\
-  if LinearAlgebra:-Determinant(M) = 0 then error "det(I - eps f'(x)) = 0: the Kahan map has no value here" end if;
+if LinearAlgebra:-Determinant(M) = 0 then error "det(I - eps f'(x)) = 0: the Kahan map has no value here" end if;
 """
 
 MAPLE = Language(
@@ -38,51 +34,40 @@ MAPLE = Language(
     title="Maple",
     naming=Naming(lambda name: name in _RESERVED),
     comment=lambda line: "# " + line.replace("\\", "/") if line else "#",  # a final \ would continue the comment
-    number=plain_number,
     vector=lambda entries: f"Vector([{listed(entries, '   ')}])",
     matrix=lambda rows: "Matrix([" + ",\n   ".join(f"[{listed(row, '     ')}]" for row in rows) + "])",
-    arguments=_arguments,
     unpack=_unpack,
-    function="<name> := proc(<arguments>)\n  <unpack><body>;\nend proc:",
+    definition="<name> := proc(<arguments>)\n  <body>;\nend proc:",
+    function="<unpack><body>",
     recipes={
         "kahan_map": f"""\
-<kahan_map> := proc(<arguments>)
-  local M;
-  M := LinearAlgebra:-IdentityMatrix(<n>)
-    - LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(point<more>), eps);
+local M;
+M := LinearAlgebra:-IdentityMatrix(<n>)
+  - LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(point<more>), eps);
 {_REFUSE}\
-  Vector(convert(point, list))
-    + LinearAlgebra:-ScalarMultiply(LinearAlgebra:-LinearSolve(M, <vector_field>(point<more>)), 2*eps);
-end proc:""",
-        "kahan_inverse": "<kahan_inverse> := proc(<arguments>)\n  <kahan_map>(point, -eps<more>);\nend proc:",
+Vector(convert(point, list))
+  + LinearAlgebra:-ScalarMultiply(LinearAlgebra:-LinearSolve(M, <vector_field>(point<more>)), 2*eps)""",
+        "kahan_inverse": "<kahan_map>(point, -eps<more>)",
         "kahan_jacobian": """\
-<kahan_jacobian> := proc(<arguments>)
-  local M, image;
-  image := <kahan_map>(point, eps<more>);
-  M := LinearAlgebra:-IdentityMatrix(<n>)
-    - LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(point<more>), eps);
-  LinearAlgebra:-LinearSolve(M,
-    LinearAlgebra:-IdentityMatrix(<n>)
-    + LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(image<more>), eps));
-end proc:""",
+local M, image;
+image := <kahan_map>(point, eps<more>);
+M := LinearAlgebra:-IdentityMatrix(<n>)
+  - LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(point<more>), eps);
+LinearAlgebra:-LinearSolve(M,
+  LinearAlgebra:-IdentityMatrix(<n>)
+  + LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(image<more>), eps))""",
         "modified_hamiltonian": """\
-<modified_hamiltonian> := proc(<arguments>)
-  local image;
-  image := <kahan_map>(point, eps<more>);
-  <hamiltonian>(point<more>) + (LinearAlgebra:-Transpose(<hamiltonian_gradient>(point<more>))
-    . (image - Vector(convert(point, list))))/3;
-end proc:""",
+local image;
+image := <kahan_map>(point, eps<more>);
+<hamiltonian>(point<more>) + (LinearAlgebra:-Transpose(<hamiltonian_gradient>(point<more>))
+  . (image - Vector(convert(point, list))))/3""",
         "form": """\
-<name> := proc(<arguments>)
-  local M;
-  M := <matrix>;
-  (LinearAlgebra:-Transpose(Vector(convert(point, list))) . M . <kahan_map>(point, eps<more>))/eps;
-end proc:""",
+local M;
+M := <matrix>;
+(LinearAlgebra:-Transpose(Vector(convert(point, list))) . M . <kahan_map>(point, eps<more>))/eps""",
         "determinant": """\
-<density> := proc(<arguments>)
-  LinearAlgebra:-Determinant(LinearAlgebra:-IdentityMatrix(<n>)
-    - LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(point<more>), eps));
-end proc:""",
+LinearAlgebra:-Determinant(LinearAlgebra:-IdentityMatrix(<n>)
+  - LinearAlgebra:-ScalarMultiply(<vector_field_jacobian>(point<more>), eps))""",
     },
     usage="<kahan_map>([<values>], 1/10<more>);",
 )

@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from kahanmaps.languages.language import Language, listed, plain_number
+from kahanmaps.languages.language import Language, listed
 from kahanmaps.languages.names import Naming
 
 
-def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    first = "{" + ", ".join(f"{name}_" for name in point) + "}" if point else "point_List"
-    return ", ".join([first, *["eps_"] * eps, *[f"{name}_" for name in symbols]])
+def _pattern(point: Sequence[str]) -> str:
+    return "{" + ", ".join(f"{name}_" for name in point) + "}" if point else "point_List"
 
 
 def _comment(line: str) -> str:
@@ -25,10 +24,11 @@ MATHEMATICA = Language(
     # Every name of the system itself starts with a capital letter.
     naming=Naming(lambda name: name[0].isupper(), "v", False, re.compile(r"[A-Za-z][A-Za-z0-9]*")),
     comment=_comment,
-    number=plain_number,
     vector=lambda entries: f"{{{listed(entries, '   ')}}}",
     matrix=lambda rows: "{" + ",\n   ".join(f"{{{listed(row, '     ')}}}" for row in rows) + "}",
-    arguments=_arguments,
+    point=_pattern,
+    argument="{}_",
+    symbol="{}_",
     unpack=lambda variables, eps, symbols: "",
     function="<name>[<arguments>] :=\n  <body>;",
     recipes={

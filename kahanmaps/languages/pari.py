@@ -5,17 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from kahanmaps.languages.language import Language, listed, plain_number
+from kahanmaps.languages.language import Language, listed
 from kahanmaps.languages.names import Naming
 
 # GP has more than a thousand functions whose names are words, and more with each version; none is one letter with
 # digits, and an underscore is only in those of its debugger.
 _FREE = re.compile(r"[A-HJ-NP-Za-z][0-9]*|(?!dbg_)[A-Za-z][A-Za-z0-9]*_[A-Za-z0-9_]*")
-
-
-def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    # An argument that is not given is 0 in GP: a symbol stands for itself instead.
-    return ", ".join(["point", *["eps"] * eps, *[f"{name} = '{name}" for name in symbols]])
 
 
 def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
@@ -33,37 +28,25 @@ PARI = Language(
     title="PARI/GP",
     naming=Naming(lambda name: _FREE.fullmatch(name) is None),
     comment=lambda line: rf"\\ {line}".rstrip(),
-    number=plain_number,
     vector=lambda entries: f"[{listed(entries, '   ')}]~",
     matrix=_matrix,
-    arguments=_arguments,
+    symbol="{0} = '{0}",  # an argument that is not given is 0 in GP: a symbol stands for itself instead
     unpack=_unpack,
-    function="{<name>(<arguments>) =\n  <unpack><body>\n}",
+    definition="{<name>(<arguments>) =\n  <body>\n}",
+    function="<unpack><body>",
     recipes={
         "kahan_map": """\
-{<kahan_map>(<arguments>) =
-  Col(point) + 2*eps*matsolve(matid(<n>) - eps*<vector_field_jacobian>(point<more>), <vector_field>(point<more>))
-}""",
-        "kahan_inverse": "{<kahan_inverse>(<arguments>) =\n  <kahan_map>(point, -eps<more>)\n}",
+Col(point) + 2*eps*matsolve(matid(<n>) - eps*<vector_field_jacobian>(point<more>), <vector_field>(point<more>))""",
+        "kahan_inverse": "<kahan_map>(point, -eps<more>)",
         "kahan_jacobian": """\
-{<kahan_jacobian>(<arguments>) =
-  my(image = <kahan_map>(point, eps<more>));
-  matsolve(matid(<n>) - eps*<vector_field_jacobian>(point<more>),
-           matid(<n>) + eps*<vector_field_jacobian>(image<more>))
-}""",
+my(image = <kahan_map>(point, eps<more>));
+matsolve(matid(<n>) - eps*<vector_field_jacobian>(point<more>),
+         matid(<n>) + eps*<vector_field_jacobian>(image<more>))""",
         "modified_hamiltonian": """\
-{<modified_hamiltonian>(<arguments>) =
-  my(image = <kahan_map>(point, eps<more>));
-  <hamiltonian>(point<more>) + <hamiltonian_gradient>(point<more>)~*(image - Col(point))/3
-}""",
-        "form": """\
-{<name>(<arguments>) =
-  Col(point)~*<matrix>*<kahan_map>(point, eps<more>)/eps
-}""",
-        "determinant": """\
-{<density>(<arguments>) =
-  matdet(matid(<n>) - eps*<vector_field_jacobian>(point<more>))
-}""",
+my(image = <kahan_map>(point, eps<more>));
+<hamiltonian>(point<more>) + <hamiltonian_gradient>(point<more>)~*(image - Col(point))/3""",
+        "form": "Col(point)~*<matrix>*<kahan_map>(point, eps<more>)/eps",
+        "determinant": "matdet(matid(<n>) - eps*<vector_field_jacobian>(point<more>))",
     },
     usage="<kahan_map>([<values>]~, 1/10<more>)",
 )

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flint import fmpq
-
 from kahanmaps.languages.language import Language, listed, python_integer
 from kahanmaps.languages.names import PYTHON_KEYWORDS, Naming, words
 
@@ -15,17 +13,8 @@ _RESERVED = PYTHON_KEYWORDS | words(
 )
 
 
-def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    return ", ".join(["point", *["eps"] * eps, *[f'{name}=SR.var("{name}")' for name in symbols]])
-
-
 def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
     return f"{', '.join(variables)}{',' * (len(variables) == 1)} = vector(point)\n    "
-
-
-def _number(value: fmpq) -> str:
-    above = python_integer(value.p)
-    return above if value.q == 1 else f"{above}/{python_integer(value.q)}"
 
 
 # Where a singular matrix leaves equations that can be solved, solve_right gives one solution: hence is_singular.
@@ -34,36 +23,31 @@ SAGE = Language(
     title="SageMath",
     naming=Naming(lambda name: name in _RESERVED),
     comment=lambda line: f"# {line}".rstrip(),
-    number=_number,
+    integer=python_integer,
     vector=lambda entries: f"vector([{listed(entries, '        ')}])",
     matrix=lambda rows: "matrix([" + ",\n        ".join(f"[{listed(row, '         ')}]" for row in rows) + "])",
-    arguments=_arguments,
+    symbol='{0}=SR.var("{0}")',
     unpack=_unpack,
-    function="def <name>(<arguments>):\n    <unpack>return <body>",
+    definition="def <name>(<arguments>):\n    <body>",
+    function="<unpack>return <body>",
     recipes={
         "kahan_map": """\
-def <kahan_map>(<arguments>):
-    M = identity_matrix(<n>) - eps*<vector_field_jacobian>(point<more>)
-    if M.is_singular():
-        raise ZeroDivisionError("det(I - eps f'(x)) = 0: the Kahan map has no value here")
-    return vector(point) + 2*eps*M.solve_right(<vector_field>(point<more>))""",
-        "kahan_inverse": "def <kahan_inverse>(<arguments>):\n    return <kahan_map>(point, -eps<more>)",
+M = identity_matrix(<n>) - eps*<vector_field_jacobian>(point<more>)
+if M.is_singular():
+    raise ZeroDivisionError("det(I - eps f'(x)) = 0: the Kahan map has no value here")
+return vector(point) + 2*eps*M.solve_right(<vector_field>(point<more>))""",
+        "kahan_inverse": "return <kahan_map>(point, -eps<more>)",
         "kahan_jacobian": """\
-def <kahan_jacobian>(<arguments>):
-    image = <kahan_map>(point, eps<more>)
-    M = identity_matrix(<n>) - eps*<vector_field_jacobian>(point<more>)
-    return M.solve_right(identity_matrix(<n>) + eps*<vector_field_jacobian>(image<more>))""",
+image = <kahan_map>(point, eps<more>)
+M = identity_matrix(<n>) - eps*<vector_field_jacobian>(point<more>)
+return M.solve_right(identity_matrix(<n>) + eps*<vector_field_jacobian>(image<more>))""",
         "modified_hamiltonian": """\
-def <modified_hamiltonian>(<arguments>):
-    step = <kahan_map>(point, eps<more>) - vector(point)
-    return <hamiltonian>(point<more>) + <hamiltonian_gradient>(point<more>)*step/3""",
+step = <kahan_map>(point, eps<more>) - vector(point)
+return <hamiltonian>(point<more>) + <hamiltonian_gradient>(point<more>)*step/3""",
         "form": """\
-def <name>(<arguments>):
-    M = <matrix>
-    return vector(point)*(M*<kahan_map>(point, eps<more>))/eps""",
-        "determinant": """\
-def <density>(<arguments>):
-    return (identity_matrix(<n>) - eps*<vector_field_jacobian>(point<more>)).det()""",
+M = <matrix>
+return vector(point)*(M*<kahan_map>(point, eps<more>))/eps""",
+        "determinant": "return (identity_matrix(<n>) - eps*<vector_field_jacobian>(point<more>)).det()",
     },
     usage="<kahan_map>([<values>], 1/10<more>)",
 )

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flint import fmpq
-
 from kahanmaps.languages.language import Language, listed, python_integer
 from kahanmaps.languages.names import PYTHON_KEYWORDS, Naming, words
 
@@ -17,20 +15,10 @@ _RESERVED = PYTHON_KEYWORDS | words(
 )
 
 
-def _arguments(point: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    return ", ".join(["point", *["eps"] * eps, *[f'{name}=Symbol("{name}")' for name in symbols]])
-
-
 def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
     lines = [f"[{', '.join(variables)}] = Matrix(list(point))"] if variables else []
     lines += [f"{name} = sympify({name})" for name in (*["eps"] * eps, *symbols)]
     return "".join(f"{line}\n    " for line in lines)
-
-
-def _number(value: fmpq) -> str:
-    if value.q == 1:
-        return python_integer(value.p)
-    return f"Rational({python_integer(value.p)}, {python_integer(value.q)})"
 
 
 SYMPY = Language(
@@ -38,34 +26,30 @@ SYMPY = Language(
     title="SymPy",
     naming=Naming(lambda name: name in _RESERVED),
     comment=lambda line: f"# {line}".rstrip(),
-    number=_number,
+    integer=python_integer,
+    fraction="Rational({}, {})",
     vector=lambda entries: f"Matrix([{listed(entries, '        ')}])",
     matrix=lambda rows: "Matrix([" + ",\n        ".join(f"[{listed(row, '         ')}]" for row in rows) + "])",
-    arguments=_arguments,
+    symbol='{0}=Symbol("{0}")',
     unpack=_unpack,
-    function="def <name>(<arguments>):\n    <unpack>return <body>",
+    definition="def <name>(<arguments>):\n    <body>",
+    function="<unpack>return <body>",
     recipes={
         "kahan_map": """\
-def <kahan_map>(<arguments>):
-    <unpack_eps>M = eye(<n>) - eps*<vector_field_jacobian>(point<more>)
-    return Matrix(list(point)) + 2*eps*M.LUsolve(<vector_field>(point<more>))""",
-        "kahan_inverse": "def <kahan_inverse>(<arguments>):\n    return <kahan_map>(point, -sympify(eps)<more>)",
+<unpack_eps>M = eye(<n>) - eps*<vector_field_jacobian>(point<more>)
+return Matrix(list(point)) + 2*eps*M.LUsolve(<vector_field>(point<more>))""",
+        "kahan_inverse": "return <kahan_map>(point, -sympify(eps)<more>)",
         "kahan_jacobian": """\
-def <kahan_jacobian>(<arguments>):
-    <unpack_eps>image = <kahan_map>(point, eps<more>)
-    M = eye(<n>) - eps*<vector_field_jacobian>(point<more>)
-    return M.LUsolve(eye(<n>) + eps*<vector_field_jacobian>(image<more>))""",
+<unpack_eps>image = <kahan_map>(point, eps<more>)
+M = eye(<n>) - eps*<vector_field_jacobian>(point<more>)
+return M.LUsolve(eye(<n>) + eps*<vector_field_jacobian>(image<more>))""",
         "modified_hamiltonian": """\
-def <modified_hamiltonian>(<arguments>):
-    step = <kahan_map>(point, eps<more>) - Matrix(list(point))
-    return <hamiltonian>(point<more>) + <hamiltonian_gradient>(point<more>).dot(step)/3""",
+step = <kahan_map>(point, eps<more>) - Matrix(list(point))
+return <hamiltonian>(point<more>) + <hamiltonian_gradient>(point<more>).dot(step)/3""",
         "form": """\
-def <name>(<arguments>):
-    <unpack_eps>M = <matrix>
-    return Matrix(list(point)).dot(M*<kahan_map>(point, eps<more>))/eps""",
-        "determinant": """\
-def <density>(<arguments>):
-    <unpack_eps>return (eye(<n>) - eps*<vector_field_jacobian>(point<more>)).det()""",
+<unpack_eps>M = <matrix>
+return Matrix(list(point)).dot(M*<kahan_map>(point, eps<more>))/eps""",
+        "determinant": "<unpack_eps>return (eye(<n>) - eps*<vector_field_jacobian>(point<more>)).det()",
     },
     usage="<kahan_map>([<values>], Rational(1, 10)<more>)",
     power="**",

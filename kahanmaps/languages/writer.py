@@ -15,7 +15,15 @@ from kahanmaps.languages.language import Language, broken, fill, listed
 from kahanmaps.sources import SOURCES
 from kahanmaps.version import __version__
 
-PARTS = ("system", "map", "inverse", "jacobian", "map-formulas", "integrals", "density")
+# Parts that are one function of every system.
+_FIXED = {
+    "system": "vector_field",
+    "map": "kahan_map",
+    "inverse": "kahan_inverse",
+    "jacobian": "kahan_jacobian",
+    "map-formulas": "kahan_map_formula",
+}
+PARTS = (*_FIXED, "integrals", "density")
 
 _INDENT = "        "
 # What a function calls, directly.
@@ -138,16 +146,8 @@ class _Writer:
 
     def _part(self, part: str) -> None:
         formulas = self.formulas
-        if part == "system":
-            self._fixed("vector_field")
-        elif part == "map":
-            self._fixed("kahan_map")
-        elif part == "inverse":
-            self._fixed("kahan_inverse")
-        elif part == "jacobian":
-            self._fixed("kahan_jacobian")
-        elif part == "map-formulas":
-            self._fixed("kahan_map_formula")
+        if part in _FIXED:
+            self._fixed(_FIXED[part])
         elif part == "density":
             self._fixed("determinant" if formulas.density is None else "density")
         elif part == "integrals":
@@ -158,8 +158,7 @@ class _Writer:
                 self._needed("form")
                 form = "J" if k == 0 else "J A^T" if k == 1 else f"J (A^T)^{k}"
                 words = f"An integral of the map, by a theorem: x^T M x~/eps with M = {form}"
-                more = {"name": self.forms[name], "matrix": self.language.constant_matrix(matrix)}
-                self._recipe("form", self.forms[name], words, more)
+                self._recipe("form", self.forms[name], words, {"matrix": self.language.constant_matrix(matrix)})
             if formulas.H is not None and not formulas.forms:
                 self._fixed("modified_hamiltonian")
 
@@ -212,21 +211,25 @@ class _Writer:
             "unpack": self.language.unpack(variables, eps, self.symbols),
             "body": body,
         }
-        self._add(name, words, fill(self.language.function, values))
+        self._add(words, self.language.function, values)
 
     def _recipe(self, key: str, name: str, words: str, more: dict[str, str]) -> None:
         values = {
             **self.functions,
+            "name": name,
             "n": str(self.formulas.dim),
             "more": self._more(),
             "arguments": self.language.arguments([], True, self.symbols),
             "unpack_eps": self.language.unpack([], True, []),
             **more,
         }
-        self._add(name, words, fill(self.language.recipes[key], values))
+        first = self.language.definition.partition("<body>")[0]
+        indent = first[first.rfind("\n") + 1 :]
+        self._add(words, self.language.recipes[key].replace("\n", f"\n{indent}"), values)
 
-    def _add(self, name: str, words: str, text: str) -> None:
-        self.written[name] = f"{self.language.comment(words)}\n{text}"
+    def _add(self, words: str, template: str, values: dict[str, str]) -> None:
+        text = fill(self.language.definition, {**values, "body": fill(template, values)})
+        self.written[values["name"]] = f"{self.language.comment(words)}\n{text}"
 
     def _more(self) -> str:
         return "".join(f", {name}" for name in self.symbols)
