@@ -80,12 +80,9 @@ def style_from(options: dict[str, Any]) -> Style:
     """The style that the options ask for."""
     from kahanmaps.plots.style import Style
 
-    given: dict[str, Any] = {}
+    given = {name: options[name] for name in ("font_size", "dpi") if options[name] is not None}
     if options["size"] is not None:
         given["width"], given["height"] = options["size"]
-    for name in ("font_size", "dpi"):
-        if options[name] is not None:
-            given[name] = options[name]
     return Style(**given)
 
 

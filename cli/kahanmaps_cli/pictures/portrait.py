@@ -245,7 +245,7 @@ def _density(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Fig
         points, starts = (np.stack([axis(x) for axis in axes], axis=-1) for x in (pilot, orbits.starts))
         window = window_of(points, starts)
     style = style_from(options)
-    found = orbits.counted(axes, window, cells_for(style), progress)
+    found = orbits.count(axes, window, cells_for(style), progress)
     orbits.note_outside(found.outside, found.points)
     note = f"{found.outside} points outside" if found.outside and options["window"] is None else ""
     return draw_density(found, style, equal=options["equal"], note=note)

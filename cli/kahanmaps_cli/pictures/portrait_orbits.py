@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
@@ -192,10 +192,10 @@ class Orbits:
         assert self.file is not None
         found = euler_orbits(self.file.system, -self.eps if self.backward else self.eps, self.starts, self.steps)
         for reason, count in found.ended.items():
-            self.notes.append(f"explicit Euler: {_counted(count, 'orbit')} {reason}")
+            self.notes.append(f"explicit Euler: {counted(count, 'orbit')} {reason}")
         return found
 
-    def counted(self, axes: Sequence[PointFunction], window: Window, shape: tuple[int, int], progress: Told) -> Density:
+    def count(self, axes: Sequence[PointFunction], window: Window, shape: tuple[int, int], progress: Told) -> Density:
         """The points of all orbits counted in cells."""
         from kahanmaps.plots.density import density_of
         from kahanmaps.plots.trajectories import ended_early, portions_of
@@ -207,17 +207,17 @@ class Orbits:
             progress(f"{points:.3g} of {total:.3g} points, {rate:.2g} a second")
 
         if self.stored is not None:
-            total = self.stored.points.shape[0] * self.stored.points.shape[1]
-            with interruptible(self.interrupt):
-                found = density_of(self._while_wanted(portions_of(self.stored.points)), axes, window, shape, told)
-            self.walked = len(self.stored.points) - 1
-            return found
-        total = self.ensemble.n * (self.steps + 1)
+            portions, total = portions_of(self.stored.points), self.stored.points.shape[0] * self.stored.points.shape[1]
+        else:
+            portions, total = self.ensemble.records(self.steps, 1), self.ensemble.n * (self.steps + 1)
         with interruptible(self.interrupt):
-            found = density_of(self._while_wanted(self.ensemble.records(self.steps, 1)), axes, window, shape, told)
-        self.ended = ended_early(self.ensemble)
-        self.walked = self.ensemble.step
-        self.interrupted = self.walked < self.steps
+            found = density_of(self._while_wanted(portions), axes, window, shape, told)
+        if self.stored is not None:
+            self.walked = len(self.stored.points) - 1
+        else:
+            self.ended = ended_early(self.ensemble)
+            self.walked = self.ensemble.step
+            self.interrupted = self.walked < self.steps
         return found
 
     def _while_wanted(self, portions: Iterator[FloatArray]) -> Iterator[FloatArray]:
@@ -233,19 +233,15 @@ class Orbits:
 
     def told(self) -> Iterator[str]:
         """What is drawn, and what became of it."""
-        orbits = _counted(len(self.starts), "orbit")
+        orbits = counted(len(self.starts), "orbit")
         eps = "" if self.eps is None else f", eps = {self.eps} (time step 2 eps = {2 * self.eps})"
         if self.stored is not None:
-            yield f"{self.name}: {orbits} of {_counted(len(self.stored.points), 'point')}{eps}"
+            yield f"{self.name}: {orbits} of {counted(len(self.stored.points), 'point')}{eps}"
         else:
             backward = ", backward" if self.backward else ""
             chosen = " from chosen starts" if self.chosen else ""
-            yield f"{self.name}: {orbits}{chosen}, {_counted(self.walked or 0, 'step')}{backward}{eps}"
+            yield f"{self.name}: {orbits}{chosen}, {counted(self.walked or 0, 'step')}{backward}{eps}"
         for reason, count in self.ended.items():
             yield f"{count} of {orbits} ended early: {reason}"
         if self.interrupted:
             yield f"interrupted after step {self.walked}"
-
-
-def _counted(number: int, word: str) -> str:
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"

@@ -111,18 +111,15 @@ def _from_npz(path: str) -> Stored:
     if x.ndim != 2:
         raise InputError(f"{path}: found an array of shape {x.shape}, expected (points, dim)")
     if x.dtype.kind == "S":
-        rows = [[cell.decode() for cell in row] for row in x.tolist()]
-        return _stored(path, [int(step) for step in steps], rows, header, end)
-    points = np.asarray(x, dtype=np.float64)
-    numbers = [int(step) for step in steps]
-    return Stored(_names(header, points.shape[1]), points[:, None], _steps(numbers), header, end)
+        x = [[_number(cell.decode()) for cell in row] for row in x.tolist()]
+    return _stored(steps, x, header, end)
 
 
 def _from_jsonl(path: str) -> Stored:
     header: dict[str, Any] = {}
     end: dict[str, Any] = {}
     steps: list[int] = []
-    rows: list[list[str]] = []
+    rows: list[list[float]] = []
     for line in _lines(path):
         record = json.loads(line)
         if record["record"] == "header":
@@ -131,8 +128,8 @@ def _from_jsonl(path: str) -> Stored:
             end = record
         else:
             steps.append(int(record["step"]))
-            rows.append([str(entry) for entry in record["x"]])
-    return _stored(path, steps, rows, header, end)
+            rows.append([_number(str(entry)) for entry in record["x"]])
+    return _stored(steps, rows, header, end)
 
 
 def _from_csv(path: str) -> Stored:
@@ -147,7 +144,8 @@ def _from_csv(path: str) -> Stored:
     width = len(header["variables"])
     cells = list(csv.reader(table))[1:]
     end = told[-1] if len(told) > 1 else {}
-    return _stored(path, [int(row[0]) for row in cells], [row[1 : 1 + width] for row in cells], header, end)
+    rows = [[_number(cell) for cell in row[1 : 1 + width]] for row in cells]
+    return _stored([row[0] for row in cells], rows, header, end)
 
 
 def _lines(path: str) -> Iterator[str]:
@@ -159,12 +157,13 @@ def _lines(path: str) -> Iterator[str]:
                 yield line
 
 
-def _stored(path: str, steps: list[int], rows: list[list[str]], header: dict[str, Any], end: dict[str, Any]) -> Stored:
+def _stored(steps: Sequence[Any], x: Any, header: dict[str, Any], end: dict[str, Any]) -> Stored:
+    """An orbit; its steps become doubles, for those that were jumped to may be longer than machine integers."""
     import numpy as np
 
-    width = len(rows[0]) if rows else 0
-    points = np.array([[_number(cell) for cell in row] for row in rows], dtype=np.float64).reshape(len(rows), width)
-    return Stored(_names(header, width), points[:, None], _steps(steps), header, end)
+    width = len(x[0]) if len(x) else 0
+    points = np.array(x, dtype=np.float64).reshape(len(x), 1, width)
+    return Stored(_names(header, width), points, np.array([float(int(step)) for step in steps]), header, end)
 
 
 def _names(header: dict[str, Any], width: int) -> tuple[str, ...]:
@@ -175,13 +174,6 @@ def _names(header: dict[str, Any], width: int) -> tuple[str, ...]:
     if width and len(names) != width:
         raise ValueError(f"{len(names)} names for {width} columns")
     return names
-
-
-def _steps(steps: list[int]) -> Any:
-    """Doubles: steps that were jumped to may be longer than machine integers."""
-    import numpy as np
-
-    return np.array([float(step) for step in steps])
 
 
 def _number(text: str) -> float:
