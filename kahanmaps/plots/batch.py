@@ -15,7 +15,7 @@ from kahanmaps.experiments.columns import Column, Pairs
 from kahanmaps.experiments.export import plain as plain_text
 from kahanmaps.experiments.records import Outcome
 from kahanmaps.experiments.summary import VERDICTS, Group, Summary
-from kahanmaps.plots.figures import drawing, label_of, new_figure, plain, points
+from kahanmaps.plots.figures import beside, drawing, label_of, new_figure, plain, points
 from kahanmaps.plots.legends import legend_above
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOURS, MARKS, Style
 
@@ -213,15 +213,7 @@ def _draw_bars(axes: Axes, counts: Sequence[dict[str, int]], label: str, style: 
             axes.barh(range(len(counts)), widths, 0.62, left, label=kind, **look)
             left += widths
     for k, total in enumerate(left):
-        axes.annotate(
-            f"{int(total)}",
-            (total, k),
-            (3, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=style.smallest,
-            clip_on=False,
-        )
+        beside(axes, f"{int(total)}", (total, k), (3, 0), va="center", fontsize=style.smallest, clip_on=False)
     axes.set_xlim(0, 1.12 * max(float(left.max()), 1.0))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=6, integer=True))
     axes.set_xlabel(label)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kahanmaps.errors import InputError
-from kahanmaps.plots.figures import RASTERISE_ABOVE, drawing, label_of, new_figure
+from kahanmaps.plots.figures import RASTERISE_ABOVE, beside, drawing, label_of, new_figure
 from kahanmaps.plots.invariant_curves import InvariantCurves, InvariantPlane
 from kahanmaps.plots.plane_cubics import Floats, PlaneCubic
 from kahanmaps.plots.plane_views import Disc, Rectangle, clouds_of, view_of
@@ -99,8 +99,6 @@ class _Pen:
         self.scale, self.by_step, self.style = scale, by_step, style
 
     def orbit(self, axes: Axes, x: Floats, y: Floats, number: int, normals: Floats | None) -> None:
-        from matplotlib.patheffects import withStroke
-
         count = len(x)
         size = 11.0 if count <= 120 else 6.0 if count <= 500 else 2.0 if count <= 5_000 else 0.6
         how: dict[str, Any] = {"color": COLOURS[number], "marker": MARKS[number]}
@@ -115,18 +113,9 @@ class _Pen:
             across, up = np.abs(x[:k] - x[k]) / np.ptp(axes.get_xlim()), np.abs(y[:k] - y[k]) / np.ptp(axes.get_ylim())
             if np.any(np.hypot(across, up) < _CROWDED):
                 continue
-            axes.annotate(
-                str(k),
-                (x[k], y[k]),
-                xytext=tuple(8 * aside * _inwards(axes, x[k], y[k], aside)),
-                textcoords="offset points",
-                fontsize=self.style.smallest,
-                horizontalalignment="center",
-                verticalalignment="center",
-                annotation_clip=True,
-                path_effects=[withStroke(linewidth=1.5, foreground="white")],
-                zorder=4,
-            )
+            offset = tuple(8 * aside * _inwards(axes, x[k], y[k], aside))
+            how = {"fontsize": self.style.smallest, "ha": "center", "va": "center", "annotation_clip": True}
+            beside(axes, str(k), (x[k], y[k]), offset, 1.5, zorder=4, **how)
 
     def add_bar(self, figure: Figure, pole: int | None) -> None:
         from matplotlib.cm import ScalarMappable

@@ -14,7 +14,7 @@ import numpy as np
 from flint import arb
 
 from kahanmaps.errors import InputError
-from kahanmaps.plots.figures import drawing, label_of, new_figure, plain, wrapped
+from kahanmaps.plots.figures import beside, drawing, label_of, new_figure, plain, wrapped
 from kahanmaps.plots.plane_cubics import Floats
 from kahanmaps.plots.squares import Lattice, Squares
 from kahanmaps.plots.style import COLOURS, Style
@@ -146,8 +146,8 @@ def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floa
     if len(one) == 2:  # the name of the last corner is there as well
         corner = (one[-1, -1] - window[:, 0]) / lengths
         inwards, down = -np.sign(corner - 0.5)
-        beside = [corner + np.array([0.2 * k * inwards, -0.1 * down]) for k in range(4)]
-        inside = np.concatenate([inside, np.array(beside)])
+        name = [corner + np.array([0.2 * k * inwards, -0.1 * down]) for k in range(4)]
+        inside = np.concatenate([inside, np.array(name)])
     places = [(x, y) for x in (0.04, 0.64) for y in (0.04, 0.64)]
     x, y = max(places, key=lambda place: np.hypot(*(inside - np.array(place) - 0.16).T).min())
     inset = axes.inset_axes((x, y, 0.32, 0.32), zorder=7)
@@ -157,18 +157,9 @@ def _magnify(axes: Axes, one: Floats, other: Floats, every: Floats, window: Floa
     inset.set_ylim(ends[:, 1].mean() - half[1], ends[:, 1].mean() + half[1])
     inset.set_xticks([])
     inset.set_yticks([])
-    from matplotlib.patheffects import withStroke
-
-    how: dict[str, Any] = {"fontsize": style.smallest, "path_effects": [withStroke(linewidth=1.5, foreground="white")]}
-    inset.text(
-        0.04,
-        0.96,
-        rf"$\times {_in_two_digits(lengths[0] * 0.32 / (2 * half[0]))}$",
-        va="top",
-        transform=inset.transAxes,
-        zorder=8,
-        **how,
-    )
+    factor = rf"$\times {_in_two_digits(lengths[0] * 0.32 / (2 * half[0]))}$"
+    how: dict[str, Any] = {"xycoords": "axes fraction", "fontsize": style.smallest}
+    beside(inset, factor, (0.04, 0.96), (0, 0), 1.5, va="top", zorder=8, **how)
     _draw_lattices(inset, one[-2:, -2:], other[-2:, -2:])
     inset.plot(*ends.T, color=_GAP, linestyle=":", linewidth=0.9, zorder=2)
 
@@ -201,8 +192,6 @@ def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, 
     """
     if not np.isfinite(point).all():
         return
-    from matplotlib.patheffects import withStroke
-
     limits = np.array([axes.get_xlim(), axes.get_ylim()])
     low, length = limits[:, 0], limits[:, 1] - limits[:, 0]
     away = (point - middle) / length
@@ -220,16 +209,7 @@ def _label(axes: Axes, point: Floats, text: str, middle: Floats, letter: float, 
         aligned = "center" if abs(away[0]) < 0.4 else "left" if away[0] > 0 else "right"
         offset = 7 * away[0], 7 * away[1]
     raised = "center" if abs(away[1]) < 0.4 and maps < 2 else "bottom" if away[1] >= 0 else "top"
-    axes.annotate(
-        text,
-        (float(x), float(y)),
-        xytext=offset,
-        textcoords="offset points",
-        horizontalalignment=aligned,
-        verticalalignment=raised,
-        path_effects=[withStroke(linewidth=2, foreground="white")],
-        zorder=5,
-    )
+    beside(axes, text, (float(x), float(y)), offset, 2, ha=aligned, va=raised, zorder=5)
 
 
 def _arrow(axes: Axes, start: Floats, end: Floats, colour: str, width: float) -> None:

@@ -128,6 +128,15 @@ def points(axes: Axes, *coordinates: Any, of: int | None = None, **how: Any) -> 
     )[0]
 
 
+def beside(axes: Axes, text: str, at: Any, offset: tuple[float, float], halo: float = 0.0, **how: Any) -> None:
+    """A text beside a point, `offset` points away from it, with `halo` points of white around its letters."""
+    if halo:
+        from matplotlib.patheffects import withStroke
+
+        how["path_effects"] = [withStroke(linewidth=halo, foreground="white")]
+    axes.annotate(text, at, xytext=offset, textcoords="offset points", **how)
+
+
 def dot_size(count: int) -> float:
     """The diameter of dots, in points, where there are `count` of them."""
     return 2.4 if count <= 500 else 1.4 if count <= 5_000 else 0.7 if count <= 50_000 else 0.35

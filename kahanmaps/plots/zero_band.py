@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from kahanmaps.plots.figures import beside
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -36,14 +38,6 @@ def log_scale_with_zero(axes: Axes, least: float, largest: float, has_zeros: boo
     # Ticks of powers stop above the band, where the scale means nothing.
     axes.yaxis.set_major_locator(FixedLocator([10.0**k for k in powers[::every]]))
     axes.yaxis.set_minor_locator(NullLocator())
-    axes.annotate(
-        "0",
-        (0, zero),
-        xycoords=("axes fraction", "data"),
-        xytext=(-3, 0),
-        textcoords="offset points",
-        ha="right",
-        va="center",
-        fontsize="small",
-    )
+    where = ("axes fraction", "data")
+    beside(axes, "0", (0, zero), (-3, 0), xycoords=where, ha="right", va="center", fontsize="small")
     return zero
