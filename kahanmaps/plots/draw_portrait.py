@@ -172,13 +172,10 @@ def _draw_coloured(axes: Any, shown: FloatArray, values: FloatArray, lines: bool
     if shown.shape[2] == 3:
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-        collection: Any = Line3DCollection(pairs[there], **how)
-        collection.set_array(colours[there])
-        axes.add_collection3d(collection, autolim=False)
-        return collection
-    collection = LineCollection(list(pairs[there]), zorder=2, **how)
+        collection: Any = axes.add_collection3d(Line3DCollection(pairs[there], **how), autolim=False)
+    else:
+        collection = axes.add_collection(LineCollection(list(pairs[there]), zorder=2, **how), autolim=False)
     collection.set_array(colours[there])
-    axes.add_collection(collection, autolim=False)
     return collection
 
 
@@ -226,16 +223,12 @@ def _make_room(axes: Any, window: Window | None) -> None:
 
     With a window the box has the proportions of its sides.
     """
+    from matplotlib.ticker import MaxNLocator
+
     axes.set_box_aspect(None if window is None else [high - low for low, high in window], zoom=0.84)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.pane.set_facecolor("white")
         axis.pane.set_edgecolor("#BBBBBB")
-        axis.set_major_locator(_few_ticks())
+        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10], prune="both"))
     axes.tick_params(pad=0)
     axes.xaxis.labelpad = axes.yaxis.labelpad = axes.zaxis.labelpad = 0
-
-
-def _few_ticks() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(4, steps=[1, 2, 5, 10], prune="both")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -205,18 +205,11 @@ class _Bins:
         missing = ~np.isfinite(errors)
         self._undefined += int(missing.sum())
         errors = np.where(missing, -1.0, errors)
-        for k, low, high in self._pieces(first, len(errors)):
-            best = low + int(errors[low:high].argmax())
-            if errors[best] > self._largest[k]:
-                self._largest[k], self._where[k] = errors[best], first + best
-
-    def _pieces(self, first: int, count: int) -> Iterator[tuple[int, int, int]]:
-        """The bins that these steps meet, each with the range of their indices in it."""
-        last = first + count - 1
-        k = int(np.searchsorted(self._edges, first, side="left")) - 1
-        while k < len(self._largest) and self._edges[k] < last:
-            yield k, max(int(self._edges[k]) + 1 - first, 0), min(int(self._edges[k + 1]) - first + 1, count)
-            k += 1
+        bins = np.searchsorted(self._edges, np.arange(first, first + len(errors))) - 1
+        for part in np.split(np.arange(len(errors)), np.flatnonzero(np.diff(bins)) + 1):
+            best = part[errors[part].argmax()]
+            if errors[best] > self._largest[bins[best]]:
+                self._largest[bins[best]], self._where[bins[best]] = errors[best], first + best
 
     def curve(self, method: str, function: str) -> DriftCurve:
         """What was found, bins without a value left out."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -194,10 +195,7 @@ def _degree_label(name: str, growth: DegreeGrowth) -> str:
 
 def _as_formula(text: str) -> str:
     """2*n^2 + 1 for matplotlib."""
-    pieces = text.replace("*", "").split("^")
-    return pieces[0] + "".join(
-        "^{" + piece.split(" ")[0] + "}" + "".join(f" {rest}" for rest in piece.split(" ")[1:]) for piece in pieces[1:]
-    )
+    return re.sub(r"\^([^ ^]*)", r"^{\1}", text.replace("*", ""))
 
 
 def _draw_heights_of(axes: Axes, curves: Sequence[HeightCurve], k: int, from_one: bool) -> None:

@@ -60,13 +60,9 @@ class Squares:
     @property
     def compared(self) -> list[tuple[Point, Point]]:
         """The pairs of points that the two orders lead to, where both are there."""
-        found = []
-        for i in range(1, self.steps + 1):
-            for j in range(1, self.steps + 1):
-                one, other = self.g_after_f[i][j], self.f_after_g[i][j]
-                if one is not None and other is not None:
-                    found.append((one, other))
-        return found
+        rows = zip(self.g_after_f[1:], self.f_after_g[1:], strict=True)
+        pairs = (pair for row, other in rows for pair in zip(row[1:], other[1:], strict=True))
+        return [(one, other) for one, other in pairs if one is not None and other is not None]
 
     @property
     def closes(self) -> bool | None:
