@@ -15,11 +15,9 @@ _RESERVED = words(
 )
 
 
-def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    names = ", ".join(variables) if len(variables) > 1 else "".join(f"({name},)" for name in variables)
-    lines = [f"{names} = exact.(point)"] if variables else []
-    lines += [f"{name} = exact({name})" for name in (*["eps"] * eps, *symbols)]
-    return "".join(f"{line}\n    " for line in lines)
+def _take(variables: Sequence[str]) -> str:
+    names = ", ".join(variables) if len(variables) > 1 else f"({variables[0]},)"
+    return f"{names} = exact.(point)"
 
 
 def _matrix(rows: Sequence[Sequence[str]]) -> str:
@@ -42,35 +40,27 @@ JULIA = Language(
     fraction="{}//{}",
     vector=lambda entries: f"[{listed(entries, '        ')}]",
     matrix=_matrix,
-    unpack=_unpack,
-    function="function <name>(<arguments>)\n    <unpack>return <body>\nend",
+    take=_take,
+    convert="{0} = exact({0})",
+    definition="function <name>(<arguments>)\n    <body>\nend",
+    function="<unpack>return <body>",
     recipes={
         "kahan_map": """\
-function <kahan_map>(<arguments>)
-    <unpack_eps>M = I - eps*<vector_field_jacobian>(point<more>)
-    return collect(exact.(point)) + 2*eps*(M \\ <vector_field>(point<more>))
-end""",
+<unpack_eps>M = I - eps*<vector_field_jacobian>(point<more>)
+return collect(exact.(point)) + 2*eps*(M \\ <vector_field>(point<more>))""",
         "kahan_inverse": "<kahan_inverse>(<arguments>) = <kahan_map>(point, -eps<more>)",
         "kahan_jacobian": """\
-function <kahan_jacobian>(<arguments>)
-    <unpack_eps>image = <kahan_map>(point, eps<more>)
-    M = I - eps*<vector_field_jacobian>(point<more>)
-    return M \\ (I + eps*<vector_field_jacobian>(image<more>))
-end""",
+<unpack_eps>image = <kahan_map>(point, eps<more>)
+M = I - eps*<vector_field_jacobian>(point<more>)
+return M \\ (I + eps*<vector_field_jacobian>(image<more>))""",
         "modified_hamiltonian": """\
-function <modified_hamiltonian>(<arguments>)
-    step = <kahan_map>(point, eps<more>) - collect(exact.(point))
-    return <hamiltonian>(point<more>) + sum(<hamiltonian_gradient>(point<more>) .* step)*1//3
-end""",
+step = <kahan_map>(point, eps<more>) - collect(exact.(point))
+return <hamiltonian>(point<more>) + sum(<hamiltonian_gradient>(point<more>) .* step)*1//3""",
         "form": """\
-function <name>(<arguments>)
-    <unpack_eps>M = <matrix>
-    return sum(collect(exact.(point)) .* (M*<kahan_map>(point, eps<more>)))/eps
-end""",
+<unpack_eps>M = <matrix>
+return sum(collect(exact.(point)) .* (M*<kahan_map>(point, eps<more>)))/eps""",
         "determinant": """\
-function <density>(<arguments>)
-    <unpack_eps>return det(I - eps*<vector_field_jacobian>(point<more>))
-end""",
+<unpack_eps>return det(I - eps*<vector_field_jacobian>(point<more>))""",
     },
     usage="<kahan_map>([<values>], 1//10<more>)",
     head=_EXACT,

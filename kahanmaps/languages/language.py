@@ -26,13 +26,13 @@ class Language:
 
     `comment` turns a line of text into a comment, `integer` writes one and `fraction` two of them, `vector` and
     `matrix` write entries that are texts. The arguments of a definition are the point, eps and the symbols: `point`
-    takes the names of the variables (none where the point is used as a whole), `argument` and `symbol` one name.
-    `unpack` takes the variables, whether eps is an argument, and the symbols: it writes what makes the variables out of
-    the arguments. `function` is the template of a function whose value is a formula, with <name>, <arguments>, <unpack>
-    and <body>. `recipes` are templates of the functions that are the same for all systems up to the dimension <n>, the
-    further arguments <more> of a call, and the names of functions, <vector_field> and so on. `definition` is what
-    stands around both, with <name>, <arguments> and <body>, whose lines begin as the first one. `naming` says which
-    names may be used; `head` is what the file loads first, with <functions>; `usage` is a call of the map.
+    takes the names of the variables (none where the point is used as a whole), `argument` and `symbol` one name. `take`
+    writes what makes the variables out of the point, `convert` what makes an exact number of an argument ("": nothing).
+    `definition` is the template of a function, with <name>, <arguments> and <body>, and `function` that of the body
+    where its value is a formula, with <unpack> and <body>. `recipes` are the bodies of the functions that are the same
+    for all systems up to the dimension <n>, the further arguments <more> of a call, and the names of functions,
+    <vector_field> and so on; one with <arguments> is the whole definition. `naming` says which names may be used;
+    `head` is what the file loads first, with <functions>; `usage` is a call of the map.
     """
 
     key: str
@@ -41,14 +41,15 @@ class Language:
     comment: Callable[[str], str]
     vector: Callable[[Sequence[str]], str]
     matrix: Callable[[Sequence[Sequence[str]]], str]
-    unpack: Callable[[Sequence[str], bool, Sequence[str]], str]
+    take: Callable[[Sequence[str]], str]
+    definition: str
     function: str
     recipes: Mapping[str, str]
     usage: str
     point: Callable[[Sequence[str]], str] = lambda variables: "point"
     argument: str = "{}"
     symbol: str = "{}"
-    definition: str = "<body>"
+    convert: str = ""
     integer: Callable[[fmpz], str] = str
     fraction: str = "{}/{}"
     power: str = "^"
@@ -63,6 +64,17 @@ class Language:
         """The list of arguments of a definition."""
         first = [self.point(variables), *[self.argument.format("eps")] * eps]
         return ", ".join([*first, *map(self.symbol.format, symbols)])
+
+    def unpack(self, variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
+        """What makes the variables and exact numbers out of the arguments, before the rest of a body."""
+        lines = [self.take(variables)] if variables else []
+        lines += [self.convert.format(name) for name in (*["eps"] * eps, *symbols)]
+        return "".join(f"{line}\n{self.indent}" for line in lines if line)
+
+    @property
+    def indent(self) -> str:
+        """What the lines of a body begin with."""
+        return self.definition.partition("<body>")[0].rpartition("\n")[2]
 
     def polynomial(self, polynomial: fmpq_mpoly, safe: Mapping[str, str]) -> str:
         """A polynomial as an expression, exactly; blanks only around + and - between terms.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from kahanmaps.languages.language import Language, listed
 from kahanmaps.languages.names import Naming, words
 
@@ -16,11 +14,6 @@ _RESERVED = words(
     # Names that stand for a procedure inside itself, and those of the environment.
     "args nargs procname thisproc thismodule Normalizer Testzero Order Rounding UseHardwareFloats printlevel",
 )
-
-
-def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    names = ", ".join(variables)
-    return f"local {names};\n  {names} := op(convert(point, list));\n  "
 
 
 # A symbol times a Matrix may stay a product: hence ScalarMultiply. Where a singular matrix leaves equations that can be
@@ -36,7 +29,7 @@ MAPLE = Language(
     comment=lambda line: "# " + line.replace("\\", "/") if line else "#",  # a final \ would continue the comment
     vector=lambda entries: f"Vector([{listed(entries, '   ')}])",
     matrix=lambda rows: "Matrix([" + ",\n   ".join(f"[{listed(row, '     ')}]" for row in rows) + "])",
-    unpack=_unpack,
+    take=lambda variables: "local {0};\n  {0} := op(convert(point, list));".format(", ".join(variables)),
     definition="<name> := proc(<arguments>)\n  <body>;\nend proc:",
     function="<unpack><body>",
     recipes={

@@ -29,8 +29,9 @@ MATHEMATICA = Language(
     point=_pattern,
     argument="{}_",
     symbol="{}_",
-    unpack=lambda variables, eps, symbols: "",
-    function="<name>[<arguments>] :=\n  <body>;",
+    take=lambda variables: "",
+    definition="<name>[<arguments>] :=\n  <body>;",
+    function="<body>",
     recipes={
         "kahan_map": """\
 <kahan_map>[<arguments>] := Module[{m},

@@ -13,10 +13,6 @@ from kahanmaps.languages.names import Naming
 _FREE = re.compile(r"[A-HJ-NP-Za-z][0-9]*|(?!dbg_)[A-Za-z][A-Za-z0-9]*_[A-Za-z0-9_]*")
 
 
-def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    return f"my({', '.join(f'{name} = point[{k}]' for k, name in enumerate(variables, 1))});\n  "
-
-
 def _matrix(rows: Sequence[Sequence[str]]) -> str:
     if len(rows) == 1:
         return f"Mat({rows[0][0]})"
@@ -31,7 +27,7 @@ PARI = Language(
     vector=lambda entries: f"[{listed(entries, '   ')}]~",
     matrix=_matrix,
     symbol="{0} = '{0}",  # an argument that is not given is 0 in GP: a symbol stands for itself instead
-    unpack=_unpack,
+    take=lambda variables: f"my({', '.join(f'{name} = point[{k}]' for k, name in enumerate(variables, 1))});",
     definition="{<name>(<arguments>) =\n  <body>\n}",
     function="<unpack><body>",
     recipes={

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from kahanmaps.languages.language import Language, listed, python_integer
 from kahanmaps.languages.names import PYTHON_KEYWORDS, Naming, words
 
@@ -11,10 +9,6 @@ _RESERVED = PYTHON_KEYWORDS | words(
     "I e i pi oo infinity NaN QQ ZZ RR CC SR beta gamma zeta psi matrix vector identity_matrix Integer",
     "ZeroDivisionError",
 )
-
-
-def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    return f"{', '.join(variables)}{',' * (len(variables) == 1)} = vector(point)\n    "
 
 
 # Where a singular matrix leaves equations that can be solved, solve_right gives one solution: hence is_singular.
@@ -27,7 +21,7 @@ SAGE = Language(
     vector=lambda entries: f"vector([{listed(entries, '        ')}])",
     matrix=lambda rows: "matrix([" + ",\n        ".join(f"[{listed(row, '         ')}]" for row in rows) + "])",
     symbol='{0}=SR.var("{0}")',
-    unpack=_unpack,
+    take=lambda variables: f"{', '.join(variables)}{',' * (len(variables) == 1)} = vector(point)",
     definition="def <name>(<arguments>):\n    <body>",
     function="<unpack>return <body>",
     recipes={

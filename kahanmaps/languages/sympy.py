@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from kahanmaps.languages.language import Language, listed, python_integer
 from kahanmaps.languages.names import PYTHON_KEYWORDS, Naming, words
 
@@ -13,12 +11,6 @@ _RESERVED = PYTHON_KEYWORDS | words(
     "LC LM LT jn Ne Or QQ RR Si ZZ And Not Xor Chi Max Min Mod Poly abs sin cos tan cot exp log det",
     "Matrix Rational Symbol eye sympify map list",
 )
-
-
-def _unpack(variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-    lines = [f"[{', '.join(variables)}] = Matrix(list(point))"] if variables else []
-    lines += [f"{name} = sympify({name})" for name in (*["eps"] * eps, *symbols)]
-    return "".join(f"{line}\n    " for line in lines)
 
 
 SYMPY = Language(
@@ -31,7 +23,8 @@ SYMPY = Language(
     vector=lambda entries: f"Matrix([{listed(entries, '        ')}])",
     matrix=lambda rows: "Matrix([" + ",\n        ".join(f"[{listed(row, '         ')}]" for row in rows) + "])",
     symbol='{0}=Symbol("{0}")',
-    unpack=_unpack,
+    take=lambda variables: f"[{', '.join(variables)}] = Matrix(list(point))",
+    convert="{0} = sympify({0})",
     definition="def <name>(<arguments>):\n    <body>",
     function="<unpack>return <body>",
     recipes={

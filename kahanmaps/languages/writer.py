@@ -223,12 +223,13 @@ class _Writer:
             "unpack_eps": self.language.unpack([], True, []),
             **more,
         }
-        first = self.language.definition.partition("<body>")[0]
-        indent = first[first.rfind("\n") + 1 :]
-        self._add(words, self.language.recipes[key].replace("\n", f"\n{indent}"), values)
+        self._add(words, self.language.recipes[key], values)
 
     def _add(self, words: str, template: str, values: dict[str, str]) -> None:
-        text = fill(self.language.definition, {**values, "body": fill(template, values)})
+        if "<arguments>" not in template:
+            body = fill(template.replace("\n", f"\n{self.language.indent}"), values)
+            template, values = self.language.definition, {**values, "body": body}
+        text = fill(template, values)
         self.written[values["name"]] = f"{self.language.comment(words)}\n{text}"
 
     def _more(self) -> str:
