@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from flint import acb, arb, fmpq
+from flint import acb, acb_mat, arb, fmpq
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import RR, rational
@@ -28,7 +28,7 @@ from kahanmaps.family.structure import NoStructure, structure_of
 from kahanmaps.maps.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.splitting import Splitting
 from kahanmaps.plots.plane_cubics import PlaneCubic
-from kahanmaps.plots.symmetric_planes import COMPLEX, Matrix, inverse, symmetric_coordinates, transformed
+from kahanmaps.plots.symmetric_planes import COMPLEX, Matrix, symmetric_coordinates, transformed
 
 MAX_POINTS = 1_000_000
 MAX_STARTS = 7  # as many colours as there are
@@ -170,7 +170,7 @@ def _frames(splitting: Splitting) -> list[InvariantPlane]:
             # A ball around 0 is the only way in which 0 comes as the real part of a root that is not rational.
             real = 0.0 if root.real.contains(arb(0)) else float(root.real.mid())
             text = f"{real:.5g} +- {float(root.imag.mid()):.5g}i" if real else f"+-{float(root.imag.mid()):.5g}i"
-            shape, matrix = COMPLEX, ((acb(1), acb(0)), (acb(0), acb(1)))
+            shape, matrix = COMPLEX, acb_mat([[1, 0], [0, 1]])
         coefficients = [entry.mid() for entry in transformed(plane.block, matrix)]
         h = tuple(map(_machine, coefficients))
         if not np.isfinite(h).all():
@@ -253,7 +253,7 @@ def _in_variables(
     """The orbit in the variables of the system, a row for each step."""
     total = np.zeros((len(orbits[0][0]), splitting.dim))
     for frame, (u, v) in zip(frames, orbits, strict=True):
-        (f, g), (k, l) = ([complex(_machine(entry)) for entry in row] for row in inverse(frame.matrix))
+        f, g, k, l = (complex(_machine(entry)) for entry in frame.matrix.inv().entries())
         old = [f * u + g * v, k * u + l * v]
         columns = np.array([[float(entry) for entry in row] for row in splitting.matrix(frame.index)])
         parts = [old[0].real, old[0].imag, old[1].real, old[1].imag] if frame.root.imag else [old[0].real, old[1].real]
@@ -262,7 +262,7 @@ def _in_variables(
 
 
 def _turned(matrix: Matrix, triple: Triple) -> Triple:
-    (f, g), (k, l) = matrix
+    f, g, k, l = matrix.entries()
     U, V, W = triple
     return f * U + g * V, k * U + l * V, W
 

@@ -7,13 +7,11 @@ three real lines at angles of 60 degrees, or kappa (u^3 + 3 u v^2), with one; ka
 
 from __future__ import annotations
 
-from typing import Any
-
-from flint import arb
+from flint import acb_mat, arb, arb_mat
 
 from kahanmaps.maps.planar_block import PlanarBlock
 
-Matrix = tuple[tuple[Any, Any], tuple[Any, Any]]  # of balls, complex ones in a complex plane
+Matrix = arb_mat | acb_mat  # complex in a complex plane
 
 COMPLEX = "complex"
 THREE_LINES, ONE_LINE, REPEATED, ZERO = "kappa (u^3 - 3 u v^2)", "kappa (u^3 + 3 u v^2)", "a repeated factor", "0"
@@ -29,7 +27,7 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
     >>> shape, [round(float(entry), 3) + 0 for entry in transformed(block, matrix)]
     ('kappa (u^3 - 3 u v^2)', [0.31, 0.0, -0.931, 0.0])
     """
-    one: Matrix = ((arb(1), arb(0)), (arb(0), arb(1)))
+    one = arb_mat([[1, 0], [0, 1]])
     if all(coefficient.contains(arb(0)) for coefficient in (block.a, block.b, block.c, block.d)):
         return ZERO, one
     if block.discriminant.contains(arb(0)):
@@ -41,7 +39,7 @@ def symmetric_coordinates(block: PlanarBlock) -> tuple[str, Matrix]:
 
 def transformed(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]:
     """The coefficients of the cubic in new coordinates, the matrix (of determinant 1) times the old ones."""
-    (f, g), (k, l) = matrix
+    f, g, k, l = matrix.entries()
     # u = l u' - g v', v = -k u' + f v'
     a, b, c, d = block.a, block.b, block.c, block.d
     slope_u, slope_v = 3 * a * l * l - 2 * b * l * k + c * k * k, b * l * l - 2 * c * l * k + 3 * d * k * k
@@ -49,23 +47,17 @@ def transformed(block: PlanarBlock, matrix: Matrix) -> tuple[arb, arb, arb, arb]
     return block.h(l, -k), -g * slope_u + f * slope_v, l * other_u - k * other_v, block.h(-g, f)
 
 
-def inverse(matrix: Matrix) -> Matrix:
-    """The inverse of a matrix of determinant 1."""
-    (f, g), (k, l) = matrix
-    return (l, -g), (-k, f)
-
-
 def _three_lines(block: PlanarBlock) -> Matrix:
     """D is negative definite: it is made -(u^2 + v^2) times a number, and the plane is turned."""
     p, q, r = (-entry for entry in block.D)
     size = (p * r - q * q / 4).sqrt()
     stretch = (p / size).sqrt()
-    upright: Matrix = ((stretch, stretch * q / (2 * p)), (arb(0), 1 / stretch))
+    upright = arb_mat([[stretch, stretch * q / (2 * p)], [0, 1 / stretch]])
     # Now h is the real part of (a - i b/3) (u + i v)^3.
     a, b, _, _ = transformed(block, upright)
     # atan2 of a ball across its cut would be all of -pi ... pi, so it is turned away from there.
     angle = (arb.atan2(-b / 3, -a) + arb.pi() if a < 0 else arb.atan2(b / 3, a)) / 3
-    return _product(((angle.cos(), angle.sin()), (-angle.sin(), angle.cos())), upright)
+    return arb_mat([[angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]]) * upright
 
 
 def _one_line(block: PlanarBlock) -> Matrix:
@@ -83,9 +75,8 @@ def _one_line(block: PlanarBlock) -> Matrix:
     if left < 0:
         scale = -scale
     half = arb(1) / arb(2).sqrt()
-    first = (L[0] * scale, L[1] * scale)
-    second = (M[0] * scale * ratio, M[1] * scale * ratio)
-    return _product(((half, half), (-half, half)), (first, second))
+    forms = arb_mat([[entry * scale for entry in L], [entry * scale * ratio for entry in M]])
+    return arb_mat([[half, half], [-half, half]]) * forms
 
 
 def _cubes(block: PlanarBlock, L: tuple[arb, arb], M: tuple[arb, arb]) -> tuple[arb, arb]:
@@ -97,9 +88,3 @@ def _cubes(block: PlanarBlock, L: tuple[arb, arb], M: tuple[arb, arb]) -> tuple[
 def _cube_root(number: arb) -> arb:
     root = abs(number).root(3)
     return root if number > 0 else -root
-
-
-def _product(left: Matrix, right: Matrix) -> Matrix:
-    (a, b), (c, d) = left
-    (e, f), (g, h) = right
-    return (a * e + b * g, a * f + b * h), (c * e + d * g, c * f + d * h)
