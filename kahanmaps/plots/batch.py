@@ -15,8 +15,7 @@ from kahanmaps.experiments.columns import Column, Pairs
 from kahanmaps.experiments.export import plain as plain_text
 from kahanmaps.experiments.records import Outcome
 from kahanmaps.experiments.summary import VERDICTS, Group, Summary
-from kahanmaps.plots.figures import beside, drawing, label_of, new_figure, plain, points
-from kahanmaps.plots.legends import legend_above
+from kahanmaps.plots.figures import beside, drawing, label_of, legend_above, new_figure, plain, points
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOURS, MARKS, Style
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ import numpy as np
 
 from kahanmaps.errors import InputError
 from kahanmaps.plots.drift import METHODS, DriftCurve, DriftSurvey
-from kahanmaps.plots.figures import drawing, new_figure, wrapped
-from kahanmaps.plots.legends import label_number, legend_above, legend_height
+from kahanmaps.plots.figures import drawing, label_number, legend_above, legend_height, new_figure, wrapped
 from kahanmaps.plots.style import COLOURS, LINES, Style
 from kahanmaps.plots.zero_band import log_scale_with_zero
 

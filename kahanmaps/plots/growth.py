@@ -13,9 +13,8 @@ from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.degrees import DegreeGrowth
 from kahanmaps.laboratory.height_survey import HeightSurvey
 from kahanmaps.laboratory.recurrences import GrowthClass
-from kahanmaps.plots.figures import drawing, new_figure, plain
+from kahanmaps.plots.figures import drawing, label_number, legend_above, legend_height, new_figure, plain
 from kahanmaps.plots.height_curves import HeightCurve, fit_of, height_curves
-from kahanmaps.plots.legends import label_number, legend_above, legend_height
 from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
 from kahanmaps.plots.zero_band import log_scale_with_zero
 
