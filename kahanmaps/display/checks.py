@@ -63,13 +63,8 @@ def evidence_rows(finding: Finding, room: Room = NOTEBOOK) -> list[tuple[str, st
         rows.append(("also", f"… and {len(finding.also) - room.entries} more"))
     if finding.witness is not None:
         rows.append(("witness", _witness(finding.witness, room)))
-    if finding.place.get("misprint"):
-        rows.append(("misprint", _text(str(finding.place["misprint"]), room.text)))
-    if finding.place.get("broken"):
-        rows.append(("broken", _text(str(finding.place["broken"]), room.text)))
-    if finding.source:
-        rows.append(("source", _text(finding.source, room.text)))
-    return rows
+    last = {**{word: finding.place.get(word) for word in ("misprint", "broken")}, "source": finding.source}
+    return rows + [(word, _text(str(what), room.text)) for word, what in last.items() if what]
 
 
 def because(evidence: Evidence, room: Room = NOTEBOOK) -> str:

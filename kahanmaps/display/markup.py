@@ -97,15 +97,14 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "")
     return "\n".join([f"<table>{above}{names}<tbody>", *lines, "</tbody></table>"])
 
 
-def definitions(rows: Iterable[tuple[str, str]], caption: str = "") -> str:
+def definitions(rows: Iterable[tuple[str, str]]) -> str:
     """A table of two columns: a word, which is text, and what it stands for, which is HTML already."""
-    above = f"<caption>{escape(caption)}</caption>" if caption else ""
     lines = [
         f'<tr><th scope="row" style="text-align: left; vertical-align: top">{escape(word)}</th>'
         f"<td {_LEFT}>{what}</td></tr>"
         for word, what in rows
     ]
-    return "\n".join([f"<table>{above}<tbody>", *lines, "</tbody></table>"])
+    return "\n".join(["<table><tbody>", *lines, "</tbody></table>"])
 
 
 def details(summary: str, inside: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from kahanmaps.algebra.numerals import is_name
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.languages.formulas import Formulas, check_parts
+from kahanmaps.languages.formulas import Formulas
 from kahanmaps.languages.julia import JULIA
 from kahanmaps.languages.language import Language
 from kahanmaps.languages.latex import write_latex
@@ -71,8 +71,7 @@ def convert(
 def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
     """The parts in the order of `PARTS`. Raises InputError for one that is unknown or cannot be written."""
     if what is None:
-        known = [("integrals", formulas.knows_integrals), ("density", formulas.knows_density)]
-        return ["system", "map", *[part for part, is_known in known if is_known]]
+        return ["system", "map", *(part for part in ("integrals", "density") if part not in formulas.missing)]
     if isinstance(what, str):
         raise InputError(f"found the text {what[:40]!r}, expected a list of parts such as ['system', 'map']")
     asked = list(what)
@@ -81,5 +80,7 @@ def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
             raise InputError(f"found the part {str(part)[:40]!r}, expected one of {', '.join(PARTS)}")
     if not asked:
         raise InputError(f"found no part, expected some of {', '.join(PARTS)}")
-    check_parts(asked, formulas)
+    for part in formulas.missing:
+        if part in asked:
+            raise InputError(formulas.missing[part])
     return [part for part in PARTS if part in asked]

@@ -92,15 +92,23 @@ class Formulas:
         J = member.chosen.hamiltonian.J
         return {f"H{k}": J * (member.A**k).transpose() for k in range(member.m)}
 
-    @property
-    def knows_integrals(self) -> bool:
-        """Whether an integral is claimed by the file or given by a theorem."""
-        return bool(self.integrals) or self.H is not None
-
-    @property
-    def knows_density(self) -> bool:
-        """Whether a density is claimed by the file or given by a theorem: det(I - eps f'(x)) for Hamiltonian f."""
-        return self.density is not None or self.H is not None
+    @cached_property
+    def missing(self) -> dict[str, str]:
+        """Of integrals and density what is neither claimed by the file nor given by a theorem, with what to do."""
+        if self.H is not None:  # then there is the modified H, and det(I - eps f'(x))
+            return {}
+        found = {}
+        if not self.integrals:
+            found["integrals"] = (
+                f"found no integral of {self.file.name}, expected a section [integrals] in its file: "
+                "'kahanmaps find-integrals SYSTEM --toml' looks for some and prints one"
+            )
+        if self.density is None:
+            found["density"] = (
+                f"found no density of {self.file.name}, expected a section [density] in its file: "
+                "'kahanmaps find-density SYSTEM --toml' looks for one and prints it"
+            )
+        return found
 
     def closed_form(self) -> list[RationalFunction]:
         """The components of the Kahan map as rational functions of the names and eps, in lowest terms, exact.
@@ -154,18 +162,3 @@ def _too_large(found: str) -> InputError:
         f"the closed form of the map is too large: found {found}; "
         "ask for 'map' instead, which solves the linear equations for x~ and works in every dimension"
     )
-
-
-def check_parts(parts: Sequence[str], formulas: Formulas) -> None:
-    """Raise InputError where integrals or a density are asked for and none is known."""
-    name = formulas.file.name
-    if "integrals" in parts and not formulas.knows_integrals:
-        raise InputError(
-            f"found no integral of {name}, expected a section [integrals] in its file: "
-            "'kahanmaps find-integrals SYSTEM --toml' looks for some and prints one"
-        )
-    if "density" in parts and not formulas.knows_density:
-        raise InputError(
-            f"found no density of {name}, expected a section [density] in its file: "
-            "'kahanmaps find-density SYSTEM --toml' looks for one and prints it"
-        )

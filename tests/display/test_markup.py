@@ -30,7 +30,7 @@ def test_escaped_text_is_shown_as_it_is():
     "html",
     [
         markup.table([EVIL], [["<b>1</b>"]], EVIL),
-        markup.definitions([(EVIL, "1")], EVIL),
+        markup.definitions([(EVIL, "1")]),
         markup.details(EVIL, "<p>1</p>"),
         markup.titled(EVIL, "<p>1</p>", EVIL),
         markup.verdict(EVIL),
