@@ -1,7 +1,7 @@
 """Pictures, from values that were computed before: results in, figures out.
 
 style             sizes in centimetres, fonts, colours that the colour-blind and a grey printer tell apart
-figures           an empty figure in a style, its labels and legend; a figure as a file (PDF, SVG, PNG) or as SVG inside a page
+figures           an empty figure in a style, its texts and legend; as a file (PDF, SVG, PNG) or as SVG inside a page
 recipe            how a picture was made: written into its file, read from it
 terminal          a figure as characters, for a terminal
 zero_band         a logarithmic axis on which an exact zero has a place
