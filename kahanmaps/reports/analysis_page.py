@@ -11,6 +11,7 @@ from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import equations_html
 from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
+from kahanmaps.plots.growth import draw_degrees, draw_heights
 from kahanmaps.reports.page import CHARACTERS, Section, page, statements, text, wide
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.reports.portraits import invariant_curves_figure, portrait_figure
@@ -18,12 +19,9 @@ from kahanmaps.reports.statement_formulas import formulas_of
 from kahanmaps.sources import source
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.analysis import Analysis
     from kahanmaps.plots.recipe import Recipe
-    from kahanmaps.plots.style import Style
 
 _EQUATIONS = 40
 
@@ -114,11 +112,6 @@ def _degrees(found: Analysis, pictures: Pictures) -> list[str]:
     if growth is None:
         return []
 
-    def drawing(style: Style) -> Figure:
-        from kahanmaps.plots.growth import draw_degrees
-
-        return draw_degrees({found.file.name: growth}, style)
-
     first = ", ".join(map(str, growth.degrees[:8]))
     alt = f"Degrees of the iterates against their number, from {first}: {growth.growth_text}"
     caption = (
@@ -126,7 +119,7 @@ def _degrees(found: Analysis, pictures: Pictures) -> list[str]:
     )
     rows = [(str(n), str(d)) for n, d in enumerate(growth.degrees)]
     return [
-        pictures.draw("degrees", caption, alt, drawing),
+        pictures.draw("degrees", caption, alt, lambda style: draw_degrees({found.file.name: growth}, style)),
         markup.details("Degrees as a table", wide(markup.table(["n", "degree of the n-th iterate"], rows))),
     ]
 
@@ -136,13 +129,9 @@ def _heights(found: Analysis, pictures: Pictures) -> list[str]:
     if survey is None or not survey.orbits:
         return []
 
-    def drawing(style: Style) -> Figure:
-        from kahanmaps.plots.growth import draw_heights
-
-        return draw_heights(survey, style)
-
     alt = f"Heights of exact orbits in bits against the step: {survey.text}"
+    caption = "Heights of exact orbits, and the growth that was fitted."
     return [
-        pictures.draw("heights", "Heights of exact orbits, and the growth that was fitted.", alt, drawing),
+        pictures.draw("heights", caption, alt, lambda style: draw_heights(survey, style)),
         markup.details("Orbits whose heights were measured", wide(heights_html(survey))),
     ]

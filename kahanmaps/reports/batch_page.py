@@ -9,16 +9,14 @@ from kahanmaps.display import markup
 from kahanmaps.display.experiments import status_table, table_html
 from kahanmaps.errors import counted
 from kahanmaps.experiments.summary import summarise
+from kahanmaps.plots.batch import draw_batch
 from kahanmaps.reports.page import Section, page, text, wide
 from kahanmaps.reports.pictures import Pictures
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from kahanmaps.experiments.store import Store
     from kahanmaps.experiments.summary import Summary
     from kahanmaps.plots.recipe import Recipe
-    from kahanmaps.plots.style import Style
 
 _ROWS = 400
 
@@ -60,10 +58,5 @@ def batch_page(
 def _figure(name: str, what: str, summary: Summary, values: Sequence[str], tables: str, pictures: Pictures) -> str:
     """The groups of a summary: what became of their tasks, or the distributions of `values`."""
 
-    def drawing(style: Style) -> Figure:
-        from kahanmaps.plots.batch import draw_batch
-
-        return draw_batch(summary, values, style)
-
     caption = f"{what} by {', '.join(summary.by)}."
-    return pictures.draw(name, caption, f"{caption} {tables}.", drawing)
+    return pictures.draw(name, caption, f"{caption} {tables}.", lambda style: draw_batch(summary, values, style))

@@ -11,13 +11,20 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.errors import counted
+from kahanmaps.plots.automatic_starts import automatic_starts
+from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
+from kahanmaps.plots.draw_portrait import draw_portrait
+from kahanmaps.plots.invariant_curves import find_invariant_curves
+from kahanmaps.plots.point_functions import point_function
+from kahanmaps.plots.portrait import portrait_of
+from kahanmaps.plots.style import Style
+from kahanmaps.plots.trajectories import ensemble_for, walked
 from kahanmaps.reports.pictures import Pictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.plots.style import Style
 
 _EPS = fmpq(1, 20)  # where a page is for every eps
 _STEPS = 600
@@ -32,12 +39,6 @@ def portrait_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
     axes = file.variables[:2] if file.system.dim > 1 else ("step", file.variables[0])
 
     def drawing(style: Style) -> Figure:
-        from kahanmaps.plots.automatic_starts import automatic_starts
-        from kahanmaps.plots.draw_portrait import draw_portrait
-        from kahanmaps.plots.point_functions import point_function
-        from kahanmaps.plots.portrait import portrait_of
-        from kahanmaps.plots.trajectories import ensemble_for, walked
-
         starts = automatic_starts(file.system, at)
         found = walked(ensemble_for(file.system, at, starts, _STEPS), _STEPS)
         functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
@@ -62,9 +63,6 @@ def invariant_curves_figure(file: SystemFile, eps: Any, pictures: Pictures) -> s
     remarks: list[str] = []
 
     def drawing(style: Style) -> Figure:
-        from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
-        from kahanmaps.plots.invariant_curves import find_invariant_curves
-
         starts = list(islice(random_starts(file.system.dim, 0), _ORBITS))
         found = find_invariant_curves(file, starts, at, _CURVE_STEPS)
         remarks.extend(
