@@ -172,15 +172,13 @@ def _origin(function: WatchedFunction, start: Sequence[fmpq]) -> tuple[float, fl
 def _orbit(
     system: QuadraticSystem, eps: fmpq, start: Sequence[fmpq], steps: int, method: str, form: NormalForm | None
 ) -> Any:
-    if method == "generic":
-        return FloatOrbit(system, eps, start, steps)
-    if method == "normal-form":
-        if form is None:
-            raise InputError("the method normal-form needs a normal form, and there is none")
-        return FloatOrbit(system, eps, start, steps, form=form)
     if method not in METHODS:
         raise InputError(f"found the method {str(method)[:40]!r}, expected one of {', '.join(METHODS)}")
-    return ClassicalOrbit(system, eps, start, steps, method)
+    if method not in ("generic", "normal-form"):
+        return ClassicalOrbit(system, eps, start, steps, method)
+    if method == "normal-form" and form is None:
+        raise InputError("the method normal-form needs a normal form, and there is none")
+    return FloatOrbit(system, eps, start, steps, form=form if method == "normal-form" else None)
 
 
 def _edges(steps: int, linear: bool) -> NDArray[np.int64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,6 @@ from kahanmaps.algebra.text import format_polynomial, parse_rational_function
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
-from kahanmaps.invariants.phase_functions import PhaseFunction
 from kahanmaps.maps.float_ensemble import FloatEnsemble
 from kahanmaps.maps.float_numbers import FloatArray, to_float, to_floats
 from kahanmaps.plots.figures import label_of, plain
@@ -51,21 +50,20 @@ class Expression:
 class OfTheImage:
     """An integral in which the image of the point under the Kahan map occurs: modified H, or one of the commutant."""
 
-    def __init__(self, function: PhaseFunction, eps: fmpq, label: str) -> None:
-        if not isinstance(function, ModifiedHamiltonian | CommutantIntegral):
-            raise InputError(f"found {function.name}, expected the modified H or an integral of the commutant")
-        self.name = function.name
-        self.label = label
+    def __init__(self, function: ModifiedHamiltonian | CommutantIntegral, eps: fmpq, label: str) -> None:
+        self.name, self.label = function.name, label
         self._function, self._eps = function, eps
         hamiltonian = function.hamiltonian
-        self._hamiltonian = hamiltonian
+        self._values: Callable[[FloatArray, FloatArray], FloatArray]  # at points and their images
         if isinstance(function, ModifiedHamiltonian):
-            self._H, *self._gradient = (
-                PointFunction("", _as_function(hamiltonian, f)) for f in (hamiltonian.H, *hamiltonian.gradient)
+            polynomials = (hamiltonian.H, *hamiltonian.gradient)
+            H, *gradient = (PointFunction("", _as_function(hamiltonian, polynomial)) for polynomial in polynomials)
+            self._values = lambda x, image: (
+                H(x) + ((image - x) * np.stack([slope(x) for slope in gradient], axis=1)).sum(axis=1) / 3.0
             )
         else:
-            matrix = hamiltonian.J * function.matrix
-            self._matrix = to_floats(matrix.entries()).reshape(hamiltonian.dim, hamiltonian.dim)
+            matrix = to_floats((hamiltonian.J * function.matrix).entries()).reshape(hamiltonian.dim, hamiltonian.dim)
+            self._values = lambda x, image: ((x @ matrix) * image).sum(axis=1) / to_float(eps)
 
     def at(self, start: Sequence[fmpq]) -> fmpq | None:
         """The exact value, None where the Kahan map has none."""
@@ -82,15 +80,11 @@ class OfTheImage:
         if not good.any():
             return values
         x = points[good]
-        ensemble = FloatEnsemble(self._hamiltonian.system, self._eps, x, kernel="numpy")
+        ensemble = FloatEnsemble(self._function.hamiltonian.system, self._eps, x, kernel="numpy")
         ensemble.advance(1)
         image = np.where((ensemble.failed_at >= 0)[:, None], np.nan, ensemble.x)
         with np.errstate(all="ignore"):
-            if isinstance(self._function, ModifiedHamiltonian):
-                slopes = np.stack([slope(x) for slope in self._gradient], axis=1)
-                found = self._H(x) + ((image - x) * slopes).sum(axis=1) / 3.0
-            else:
-                found = ((x @ self._matrix) * image).sum(axis=1) / to_float(self._eps)
+            found = self._values(x, image)
         found[~np.isfinite(found)] = np.nan
         values[good] = found
         return values

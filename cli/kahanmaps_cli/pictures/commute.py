@@ -12,8 +12,6 @@ from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_optio
 from kahanmaps_cli.pictures.variables import two_variables
 from kahanmaps_cli.progress import Progress, say
 
-HOLDS, UNDECIDED = 0, 3
-
 
 @click.command("commute", cls=PictureCommand)
 @click.argument("system", required=False)
@@ -78,4 +76,4 @@ def command(system: str | None, other: str | None, **options: Any) -> int:
             if square.stopped:
                 say(f"  points are missing: {square.stopped}")
     deliver(figure, options, file if second is None else None)
-    return UNDECIDED if any(square.stopped for square in found) else HOLDS
+    return 3 if any(square.stopped for square in found) else 0

@@ -15,8 +15,6 @@ from kahanmaps_cli.progress import Progress, say
 if TYPE_CHECKING:
     from kahanmaps.plots.invariant_curves import InvariantCurves
 
-HOLDS, UNDECIDED = 0, 3
-
 
 @click.command("invariant-curves", cls=PictureCommand)
 @system_options
@@ -73,7 +71,7 @@ def command(**options: Any) -> int:
     if not options["quiet"]:
         _tell(found, options["projective"])
     deliver(figure, options, file)
-    return HOLDS if all(pole is None for pole in found.poles) else UNDECIDED
+    return 0 if all(pole is None for pole in found.poles) else 3
 
 
 def _short(text: str) -> str:
