@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from flint import fmpq
-
 from kahanmaps.display import markup
 from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_number
 from kahanmaps.display.systems import CHARACTERS, system_latex
@@ -60,21 +58,19 @@ def _polarised(system: QuadraticSystem, k: int) -> str:
     """The right-hand side Q(x, x~) + B (x + x~)/2 + c of one component."""
     names = [(latex_name(name), _image(name)) for name in system.variables]
     polynomial = system.rhs[k]
-    terms: list[tuple[fmpq, str]] = []
+    text = ""
     for at in range(min(len(polynomial), _TERMS)):
         value = polynomial.coefficient(at)
         where = [j for j, exponent in enumerate(polynomial.monomial(at)) for _ in range(int(exponent))]
         if len(where) == 2 and where[0] == where[1]:
-            terms.append((value, " ".join(names[where[0]])))
+            factors = " ".join(names[where[0]])
         elif len(where) == 2:
             (x, x_image), (y, y_image) = (names[j] for j in where)
-            terms.append((value / 2, rf"({x} {y_image} + {x_image} {y})"))
+            value, factors = value / 2, rf"({x} {y_image} + {x_image} {y})"
         elif where:
-            terms.append((value / 2, rf"({' + '.join(names[where[0]])})"))
+            value, factors = value / 2, rf"({' + '.join(names[where[0]])})"
         else:
-            terms.append((value, ""))
-    text = ""
-    for value, factors in terms:
+            factors = ""
         number = latex_number(abs(value)) if abs(value) != 1 or not factors else ""
         number = number if len(number) < 200 else r"\text{(a long number)}"
         sign = "-" if value < 0 else "+" if text else ""

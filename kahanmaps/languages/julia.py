@@ -36,7 +36,6 @@ JULIA = Language(
     key="julia",
     title="Julia",
     naming=Naming(lambda name: name in _RESERVED),
-    comment=lambda line: f"# {line}".rstrip(),
     fraction="{}//{}",
     vector=lambda entries: f"[{listed(entries, '        ')}]",
     matrix=_matrix,

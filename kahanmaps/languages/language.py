@@ -38,7 +38,6 @@ class Language:
     key: str
     title: str
     naming: Naming
-    comment: Callable[[str], str]
     vector: Callable[[Sequence[str]], str]
     matrix: Callable[[Sequence[Sequence[str]]], str]
     take: Callable[[Sequence[str]], str]
@@ -50,6 +49,7 @@ class Language:
     argument: str = "{}"
     symbol: str = "{}"
     convert: str = ""
+    comment: Callable[[str], str] = lambda line: f"# {line}".rstrip()
     integer: Callable[[fmpz], str] = str
     fraction: str = "{}/{}"
     power: str = "^"

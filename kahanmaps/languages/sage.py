@@ -16,7 +16,6 @@ SAGE = Language(
     key="sage",
     title="SageMath",
     naming=Naming(lambda name: name in _RESERVED),
-    comment=lambda line: f"# {line}".rstrip(),
     integer=python_integer,
     vector=lambda entries: f"vector([{listed(entries, '        ')}])",
     matrix=lambda rows: "matrix([" + ",\n        ".join(f"[{listed(row, '         ')}]" for row in rows) + "])",

@@ -17,7 +17,6 @@ SYMPY = Language(
     key="sympy",
     title="SymPy",
     naming=Naming(lambda name: name in _RESERVED),
-    comment=lambda line: f"# {line}".rstrip(),
     integer=python_integer,
     fraction="Rational({}, {})",
     vector=lambda entries: f"Matrix([{listed(entries, '        ')}])",

@@ -68,9 +68,7 @@ class Squares:
     def closes(self) -> bool | None:
         """Whether the two orders lead to the same points, by ==; None where there is nothing to compare."""
         pairs = self.compared
-        if any(one != other for one, other in pairs):
-            return False
-        return True if pairs else None
+        return all(one == other for one, other in pairs) if pairs else None
 
     @property
     def gap(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain, count
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -108,9 +109,5 @@ def _from_record(path: str, growths: dict[str, DegreeGrowth]) -> None:
 
 def _add(growths: dict[str, DegreeGrowth], name: str, found: DegreeGrowth) -> None:
     """Two systems may have one name: the second is called name (2)."""
-    free = name
-    k = 1
-    while free in growths:
-        k += 1
-        free = f"{name} ({k})"
-    growths[free] = found
+    names = chain([name], (f"{name} ({k})" for k in count(2)))
+    growths[next(free for free in names if free not in growths)] = found
