@@ -1,8 +1,7 @@
 """Systems and their Kahan maps as files for other programs.
 
 formulas      what there is to write: right-hand sides, integrals, a density, the closed form of the map
-names         names that are reserved in a language, replaced
-language      a language as a table; the tables are in julia, maple, mathematica, pari, sage and sympy
+language      a language as a table, with its names; the tables are in julia, maple, mathematica, pari, sage and sympy
 writer        the file, from formulas and a table
 latex         the document in LaTeX
 convert       all of it as one function

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kahanmaps.languages.language import Language, listed
-from kahanmaps.languages.names import Naming, words
+from kahanmaps.languages.language import Language, Naming, listed, words
 
 _RESERVED = words(
     "abstract baremodule begin break catch const continue do else elseif end export false finally for function",

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from kahanmaps.languages.language import Language, listed
-from kahanmaps.languages.names import Naming, words
+from kahanmaps.languages.language import Language, Naming, listed, words
 
 _RESERVED = words(
     "D I O Pi Psi Zeta Beta GAMMA gamma Catalan infinity undefined true false FAIL Digits NULL",

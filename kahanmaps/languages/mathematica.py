@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from kahanmaps.languages.language import Language, listed
-from kahanmaps.languages.names import Naming
+from kahanmaps.languages.language import Language, Naming, listed
 
 
 def _pattern(point: Sequence[str]) -> str:

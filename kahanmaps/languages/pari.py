@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from kahanmaps.languages.language import Language, listed
-from kahanmaps.languages.names import Naming
+from kahanmaps.languages.language import Language, Naming, listed
 
 # GP has more than a thousand functions whose names are words, and more with each version; none is one letter with
 # digits, and an underscore is only in those of its debugger.

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from kahanmaps.languages.language import Language, listed, python_integer
-from kahanmaps.languages.names import PYTHON_KEYWORDS, Naming, words
+from kahanmaps.languages.language import PYTHON_KEYWORDS, Language, Naming, listed, python_integer, words
 
 _RESERVED = PYTHON_KEYWORDS | words(
     "I e i pi oo infinity NaN QQ ZZ RR CC SR beta gamma zeta psi matrix vector identity_matrix Integer",

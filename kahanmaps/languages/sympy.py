@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from kahanmaps.languages.language import Language, listed, python_integer
-from kahanmaps.languages.names import PYTHON_KEYWORDS, Naming, words
+from kahanmaps.languages.language import PYTHON_KEYWORDS, Language, Naming, listed, python_integer, words
 
 # Names that sympify reads as something else than a symbol, and those that the file imports.
 _RESERVED = PYTHON_KEYWORDS | words(

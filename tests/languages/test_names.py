@@ -10,9 +10,9 @@ from language_helpers import HAS_GP, gp_prints
 import kahanmaps as km
 from kahanmaps.languages.convert import LANGUAGES, convert
 from kahanmaps.languages.julia import JULIA
+from kahanmaps.languages.language import PYTHON_KEYWORDS
 from kahanmaps.languages.maple import MAPLE
 from kahanmaps.languages.mathematica import MATHEMATICA
-from kahanmaps.languages.names import PYTHON_KEYWORDS
 from kahanmaps.languages.pari import PARI
 from kahanmaps.languages.sage import SAGE
 from kahanmaps.languages.sympy import SYMPY
