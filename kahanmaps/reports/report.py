@@ -68,12 +68,8 @@ def report_html(
         raise InputError(f"found {kinds}, expected an Analysis, a Report, several of them, or a Store")
     recipe = Recipe(command, "" if file is None else file.to_toml())
     name = str(reports[0].context.get("system", "")) if file is None else _title(file)
-    return claims_page(
-        reports, title or f"{_WHAT.get(reports[0].check, 'Checks')}: {name}", recipe, drawn, file, left_out
-    )
-
-
-_WHAT = {"verify": "The paper, statement by statement"}
+    what = "The paper, statement by statement" if reports[0].check == "verify" else "Checks"
+    return claims_page(reports, title or f"{what}: {name}", recipe, drawn, file, left_out)
 
 
 def write_report(path: str | Path, found: Any, **options: Any) -> None:

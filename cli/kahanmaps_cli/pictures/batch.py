@@ -50,7 +50,6 @@ def command(database: str | None, db: str | None, **options: Any) -> int:
 
     Exit status: 0 done, 2 wrong use, or there is no task to draw.
     """
-    from kahanmaps.errors import InputError
     from kahanmaps.experiments.store import Store
 
     require_output(options)
@@ -66,12 +65,8 @@ def command(database: str | None, db: str | None, **options: Any) -> int:
     if options["x"] is not None and (options["values"] or len(by) > 1):
         raise click.UsageError("found --x with --value or several names in --by, expected at most one name in --by")
     with Store.open(path, readonly=True) as store, Progress(options["quiet"]) as progress:
-        rows = _Counted(store.rows(list(options["only"]) or None, missing=True), progress)
+        rows = _told(store.rows(list(options["only"]) or None, missing=True), path, progress)
         figure, talk = _pairs(rows, by, options) if options["x"] is not None else _groups(rows, by, options)
-    if not rows.count:
-        raise InputError(f"found no task in {path}, expected at least one to draw")
-    if figure is None:
-        raise AssertionError("tasks, and no picture of them")
     deliver(figure, options)
     if not options["quiet"]:
         for sentence in talk:
@@ -79,15 +74,13 @@ def command(database: str | None, db: str | None, **options: Any) -> int:
     return 0
 
 
-def _groups(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tuple[Figure | None, list[str]]:
+def _groups(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tuple[Figure, list[str]]:
     from kahanmaps.errors import counted
     from kahanmaps.experiments.summary import summarise
     from kahanmaps.plots.batch import draw_batch, groups_beyond
 
     values = list(dict.fromkeys(options["values"]))
     summary = summarise(rows, by or ["experiment"], values)
-    if not summary.groups:
-        return None, []
     missing = sum(group.missing for group in summary.groups)
     talk = [f"{missing} tasks have no result yet"] if missing and values else []
     for name in values:
@@ -96,13 +89,11 @@ def _groups(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tupl
     return draw_batch(summary, values, style_from(options), scale=options["scale"]), talk
 
 
-def _pairs(rows: _Counted, by: list[str], options: dict[str, Any]) -> tuple[Figure | None, list[str]]:
+def _pairs(rows: Iterable[Row], by: list[str], options: dict[str, Any]) -> tuple[Figure, list[str]]:
     from kahanmaps.experiments.columns import value_pairs
     from kahanmaps.plots.batch import clipped, draw_pairs
 
     pairs = value_pairs(rows, options["x"], options["y"], by[0] if by else None)
-    if not rows.count:
-        return None, []
     talk = []
     if pairs.missing:
         talk.append(f"{pairs.missing} tasks have no result yet")
@@ -113,16 +104,14 @@ def _pairs(rows: _Counted, by: list[str], options: dict[str, Any]) -> tuple[Figu
     return draw_pairs(pairs, style_from(options), scale=options["scale"]), talk
 
 
-class _Counted:
-    """Rows as they come, counted, with a word of progress now and then."""
+def _told(rows: Iterable[Row], path: str, progress: Progress) -> Iterator[Row]:
+    """Rows as they come, with a word of progress now and then. Raises InputError where there is none."""
+    from kahanmaps.errors import InputError
 
-    def __init__(self, rows: Iterable[Row], progress: Progress) -> None:
-        self._rows, self._progress = rows, progress
-        self.count = 0
-
-    def __iter__(self) -> Iterator[Row]:
-        for row in self._rows:
-            self.count += 1
-            if self.count % _TOLD == 0:
-                self._progress(f"{self.count} tasks read")
-            yield row
+    count = 0
+    for count, row in enumerate(rows, 1):
+        if count % _TOLD == 0:
+            progress(f"{count} tasks read")
+        yield row
+    if not count:
+        raise InputError(f"found no task in {path}, expected at least one to draw")
