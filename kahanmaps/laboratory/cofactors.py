@@ -173,12 +173,13 @@ def cofactor_space(sample: Sample, product: CofactorProduct, degree: int) -> Dar
     The sample must have more points than there are monomials.
     """
     dim, prime = sample.map.dim, sample.map.prime
-    support = exponents_up_to(dim, degree)
     rows = []
-    for (x, image), (above, below) in zip(sample.pairs[: len(support) + _SPARE], sample.values(product), strict=False):
-        here, there = monomial_values(support, x, prime), monomial_values(support, image, prime)
+    for (x, image), (above, below) in zip(
+        sample.pairs[: points_needed(dim, degree)], sample.values(product), strict=False
+    ):
+        here, there = (monomial_values(point, degree, prime) for point in (x, image))
         rows.append([(below * b - above * a) % prime for a, b in zip(here, there, strict=True)])
-    return DarbouxSpace.spanned_by(dim, degree, null_space(rows, len(support), prime), prime)
+    return DarbouxSpace.spanned_by(dim, degree, null_space(rows, len(rows[0]), prime), prime)
 
 
 def points_needed(dim: int, degree: int) -> int:

@@ -32,6 +32,7 @@ from kahanmaps.laboratory.modular_points import (
     echelon,
     exponents_up_to,
     gradient_values,
+    integers,
     monomial_values,
     null_space,
     rank,
@@ -145,27 +146,24 @@ def _complement(inner: Vectors, outer: Vectors, prime: int) -> Vectors:
     if not outer:
         return []
     stacked = [*inner, *outer]
-    columns = nmod_mat(len(stacked), len(stacked[0]), [c for row in stacked for c in row], prime).transpose()
-    reduced, found = columns.rref()
-    pivots, column = [], 0
-    for row in range(found):
-        while not int(reduced[row, column]):
-            column += 1
-        pivots.append(column)
+    pivots = _pivots(echelon(list(zip(*stacked, strict=True)), prime))
     return [stacked[k] for k in pivots if k >= len(inner)]
+
+
+def _pivots(basis: Vectors) -> list[int]:
+    """Where the vectors of an echelon basis have their first entries."""
+    return [next(k for k, entry in enumerate(row) if entry) for row in basis]
 
 
 def _values(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[nmod_mat, nmod_mat]:
     """The values of the polynomials at random points and at their images: one row a point."""
-    support, prime = exponents_up_to(map_.dim, degree), map_.prime
-    pairs = list(map_.pairs(count))
-    matrix = nmod_mat(len(basis), len(support), [c for row in basis for c in row], prime).transpose()
-
-    def at(side: int) -> nmod_mat:
-        entries = [value for pair in pairs for value in monomial_values(support, pair[side], prime)]
-        return nmod_mat(count, len(support), entries, prime) * matrix
-
-    return at(0), at(1)
+    prime = map_.prime
+    matrix = nmod_mat(basis, prime).transpose()
+    here, there = (
+        nmod_mat([monomial_values(point, degree, prime) for point in points], prime) * matrix
+        for points in zip(*map_.pairs(count), strict=True)
+    )
+    return here, there
 
 
 def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
@@ -182,13 +180,11 @@ def _antisymmetric(map_: ModularMap, basis: Vectors, degree: int) -> list[nmod_m
     places = [(a, b) for a in range(size) for b in range(a + 1, size)]
     here, there = _values(map_, basis, degree, len(places) + _SPARE)
     rows = []
-    for i in range(here.nrows()):
-        x = [int(here[i, a]) for a in range(size)]
-        y = [int(there[i, a]) for a in range(size)]
+    for x, y in zip(integers(here), integers(there), strict=True):
         rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in places])
     solutions = []
     for vector in null_space(rows, len(places), prime):
-        matrix = nmod_mat(size, size, [0] * (size * size), prime)
+        matrix = nmod_mat(size, size, prime)
         for (a, b), entry in zip(places, vector, strict=True):
             matrix[a, b] = entry
             matrix[b, a] = -entry
@@ -213,9 +209,8 @@ def _separate(solutions: list[nmod_mat], fresh: Vectors, explained: Vectors, pri
 
 def _restricted(solutions: list[nmod_mat], basis: Vectors, prime: int) -> list[nmod_mat]:
     """The fresh-fresh parts A = sum A'_ij b_i b_j^T as matrices A' in terms of a basis in echelon form."""
-    pivots = [next(j for j, entry in enumerate(row) if entry) for row in basis]
-    n = len(pivots)
-    return [nmod_mat(n, n, [int(A[i, j]) for i in pivots for j in pivots], prime) for A in solutions]
+    pivots = _pivots(basis)
+    return [nmod_mat([[int(A[i, j]) for j in pivots] for i in pivots], prime) for A in solutions]
 
 
 def _some_combinations(forms: list[nmod_mat], prime: int) -> list[nmod_mat]:
@@ -223,13 +218,11 @@ def _some_combinations(forms: list[nmod_mat], prime: int) -> list[nmod_mat]:
     if len(forms) <= _ENOUGH:
         return forms
     rng = random.Random(prime)
-    found = []
-    for _ in range(_ENOUGH):
-        total = forms[0] * rng.randrange(prime)
-        for form in forms[1:]:
-            total = total + form * rng.randrange(prime)
-        found.append(total)
-    return found
+    return [_combination([rng.randrange(prime) for _ in forms], forms) for _ in range(_ENOUGH)]
+
+
+def _combination(weights: Sequence[int], forms: Sequence[nmod_mat]) -> nmod_mat:
+    return sum((form * weight for weight, form in zip(weights, forms, strict=True) if weight), forms[0] * 0)
 
 
 def _blocks(solutions: list[nmod_mat], coordinates: Vectors, prime: int) -> list[Vectors]:
@@ -302,12 +295,8 @@ def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[
     lead = next((s for s in range(count) if products[s, s]), None)
     if lead is None:
         return []
-    total = nmod_mat(size, size, [0] * (size * size), prime)
-    for t in range(count):
-        weight = products[min(lead, t), max(lead, t)]
-        if weight:
-            total = total + solutions[t] * weight
-    coordinates = echelon([[int(total[a, b]) for a in range(size)] for b in range(size)], prime)
+    total = _combination([products[min(lead, t), max(lead, t)] for t in range(count)], solutions)
+    coordinates = echelon(integers(total), prime)
     return [echelon(combine(coordinates, fresh, prime), prime)] if len(coordinates) == 2 else []
 
 
@@ -316,7 +305,7 @@ def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: i
     if size == k:
         return block
     # Combinations of the A whose fresh-fresh part lives on the block: their columns are combinations of it.
-    pivots = [next(j for j, entry in enumerate(row) if entry) for row in block]
+    pivots = _pivots(block)
     others = [i for i in range(k) if i not in pivots]
     conditions = []
     for b in range(k):
@@ -332,10 +321,7 @@ def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: i
     n = len(block)
     system = []
     for weights in combinations:
-        A = nmod_mat(size, size, [0] * (size * size), prime)
-        for weight, solution in zip(weights, solutions, strict=True):
-            if weight:
-                A = A + solution * weight
+        A = _combination(weights, solutions)
         for p in pivots:
             # A = sum a_pq (p + w_p)(q + w_q)^T: the part of row p outside the fresh ones is sum_q a_pq w_q
             system.append([int(A[p, q]) for q in pivots] + [int(A[p, t]) for t in range(k, size)])
@@ -350,8 +336,7 @@ def gradient_rank(map_: ModularMap, spaces: Sequence[DarbouxSpace]) -> int:
     prime, x = map_.prime, map_.random_point()
     rows = []
     for space in spaces:
-        support = exponents_up_to(space.dim, space.degree)
-        values = [gradient_values(vector, support, x, prime) for vector in space.basis]
+        values = [gradient_values(vector, x, space.degree, prime) for vector in space.basis]
         q, dq = values[0]
         for p, dp in values[1:]:
             rows.append([(q * a - p * b) % prime for a, b in zip(dp, dq, strict=True)])

@@ -27,7 +27,6 @@ from kahanmaps.laboratory.modular_points import (
     Point,
     combine,
     echelon,
-    exponents_up_to,
     gradient_values,
     monomial_values,
     null_space,
@@ -112,13 +111,12 @@ def relations_on_orbit(map_: ModularMap, degree: int, start: Point | None = None
 
     Raises NoPoint where orbits meet the singular set.
     """
-    support = exponents_up_to(map_.dim, degree)
-    count = len(support) + _SPARE
+    unknowns = comb(map_.dim + degree, degree)
+    count = unknowns + _SPARE
     points = map_.orbit(count, start)
     period = len(points) if len(points) < count else None
-    rows = [monomial_values(support, x, map_.prime) for x in points]
-    vectors = null_space(rows, len(support), map_.prime)
-    normals = _normals(map_, vectors, support, points[-1])
+    vectors = null_space([monomial_values(x, degree, map_.prime) for x in points], unknowns, map_.prime)
+    normals = _normals(map_, vectors, degree, points[-1])
     return OrbitRelations(degree, vectors, normals, rank(normals, map_.prime), period, points[0], points[-1])
 
 
@@ -284,12 +282,10 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
     )
 
 
-def _normals(
-    map_: ModularMap, vectors: list[list[int]], support: tuple[tuple[int, ...], ...], point: Point
-) -> list[list[int]]:
+def _normals(map_: ModularMap, vectors: list[list[int]], degree: int, point: Point) -> list[list[int]]:
     """The gradients at the point, of random combinations where there are many vectors."""
     prime, rng = map_.prime, random.Random(map_.prime)
     if len(vectors) > map_.dim + 2:
         weights = [[rng.randrange(prime) for _ in vectors] for _ in range(map_.dim + 2)]
         vectors = combine(weights, vectors, prime)
-    return [gradient_values(vector, support, point, prime)[1] for vector in vectors]
+    return [gradient_values(vector, point, degree, prime)[1] for vector in vectors]

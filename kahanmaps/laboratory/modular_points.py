@@ -103,92 +103,63 @@ def exponents_up_to(dim: int, degree: int) -> tuple[tuple[int, ...], ...]:
 
 
 @cache
-def _recipe(support: tuple[tuple[int, ...], ...]) -> tuple[list[tuple[int, int]], list[int]]:
-    """How to compute monomials one product each: (index of an earlier one, variable), and where `support` is found."""
-    index: dict[tuple[int, ...], int] = {}
-    steps: list[tuple[int, int]] = []
-
-    def place(exponent: tuple[int, ...]) -> int:
-        found = index.get(exponent)
-        if found is None:
-            last = max((k for k, e in enumerate(exponent) if e), default=-1)
-            if last >= 0:
-                parent = place((*exponent[:last], exponent[last] - 1, *exponent[last + 1 :]))
-                steps.append((parent, last))
-            else:
-                steps.append((-1, -1))
-            found = index[exponent] = len(steps) - 1
-        return found
-
-    return steps, [place(exponent) for exponent in support]
+def _slopes(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
+    """For each monomial (variable, exponent, place of the monomial with one factor less), of all its variables."""
+    support = exponents_up_to(dim, degree)
+    places = {exponent: k for k, exponent in enumerate(support)}
+    return [
+        [(k, e, places[(*exponent[:k], e - 1, *exponent[k + 1 :])]) for k, e in enumerate(exponent) if e]
+        for exponent in support
+    ]
 
 
-def monomial_values(support: tuple[tuple[int, ...], ...], point: Point, prime: int) -> list[int]:
-    """The values of monomials at a point modulo a prime."""
-    steps, places = _recipe(support)
-    table: list[int] = []
-    for parent, variable in steps:
-        table.append(table[parent] * point[variable] % prime if parent >= 0 else 1)
-    return [table[place] for place in places]
+def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
+    """The values of all monomials of degree at most `degree` at a point modulo a prime, one product each."""
+    table = [1]
+    for slopes in _slopes(len(point), degree)[1:]:
+        variable, _, place = slopes[-1]
+        table.append(table[place] * point[variable] % prime)
+    return table
+
+
+def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int) -> tuple[int, list[int]]:
+    """The value and the gradient at a point of the polynomial of degree at most `degree` with these coefficients."""
+    value, gradient = 0, [0] * len(point)
+    powers = monomial_values(point, degree, prime)
+    for coefficient, slopes, power in zip(vector, _slopes(len(point), degree), powers, strict=True):
+        if coefficient:
+            value += coefficient * power
+            for variable, exponent, place in slopes:
+                gradient[variable] = (gradient[variable] + coefficient * exponent * powers[place]) % prime
+    return value % prime, gradient
+
+
+def integers(matrix: nmod_mat) -> list[list[int]]:
+    """The rows of a matrix modulo a prime as residues."""
+    return [[int(entry) for entry in row] for row in matrix.tolist()]
 
 
 def null_space(rows: Sequence[Sequence[int]], columns: int, prime: int) -> list[list[int]]:
     """The canonical basis (reduced echelon form) of the vectors that all rows annihilate, modulo a prime."""
     if not rows:
         return [[int(i == j) for j in range(columns)] for i in range(columns)]
-    matrix = nmod_mat(len(rows), columns, [entry for row in rows for entry in row], prime)
-    basis, nullity = matrix.nullspace()
-    if nullity == 0:
-        return []
-    vectors = [[int(basis[i, j]) for i in range(columns)] for j in range(nullity)]
-    return echelon(vectors, prime)
+    basis, nullity = nmod_mat(rows, prime).nullspace()
+    return echelon(integers(basis.transpose())[:nullity], prime)
 
 
 def echelon(vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
     """The reduced echelon basis of the span of vectors modulo a prime."""
     if not vectors:
         return []
-    columns = len(vectors[0])
-    matrix, rank = nmod_mat(len(vectors), columns, [entry for row in vectors for entry in row], prime).rref()
-    return [[int(matrix[i, j]) for j in range(columns)] for i in range(rank)]
+    matrix, rank = nmod_mat(vectors, prime).rref()
+    return integers(matrix)[:rank]
 
 
 def combine(weights: Sequence[Sequence[int]], vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
     """The combinations sum_k w_k v_k of vectors modulo a prime, one for each row w of weights."""
-    if not weights or not vectors:
-        return []
-    left = nmod_mat(len(weights), len(vectors), [entry for row in weights for entry in row], prime)
-    right = nmod_mat(len(vectors), len(vectors[0]), [entry for row in vectors for entry in row], prime)
-    product = left * right
-    return [[int(product[i, j]) for j in range(len(vectors[0]))] for i in range(len(weights))]
+    return integers(nmod_mat(weights, prime) * nmod_mat(vectors, prime)) if weights and vectors else []
 
 
 def rank(vectors: Sequence[Sequence[int]], prime: int) -> int:
     """The rank of vectors modulo a prime."""
-    if not vectors or not vectors[0]:
-        return 0
-    entries = [entry for row in vectors for entry in row]
-    return int(nmod_mat(len(vectors), len(vectors[0]), entries, prime).rank())
-
-
-def gradient_values(
-    vector: Sequence[int], support: tuple[tuple[int, ...], ...], point: Point, prime: int
-) -> tuple[int, list[int]]:
-    """The value and the gradient at a point of the polynomial with these coefficients."""
-    value, slopes = 0, [0] * len(point)
-    powers = monomial_values(support, point, prime)
-    inverses = [pow(x, -1, prime) if x else None for x in point]
-    for coefficient, exponent, power in zip(vector, support, powers, strict=True):
-        if not coefficient:
-            continue
-        value += coefficient * power
-        for k, e in enumerate(exponent):
-            if e:
-                inverse = inverses[k]
-                if inverse is None:  # random points have no zero; orbits on coordinate planes do
-                    lowered = (*exponent[:k], e - 1, *exponent[k + 1 :])
-                    slope = monomial_values((lowered,), point, prime)[0]
-                else:
-                    slope = power * inverse
-                slopes[k] = (slopes[k] + coefficient * e * slope) % prime
-    return value % prime, slopes
+    return int(nmod_mat(vectors, prime).rank()) if vectors else 0

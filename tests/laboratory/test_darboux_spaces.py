@@ -28,7 +28,7 @@ def first_map(file, eps=None):
 
 
 def values(space, x, prime):
-    powers = monomial_values(exponents_up_to(space.dim, space.degree), x, prime)
+    powers = monomial_values(x, space.degree, prime)
     return [sum(c * m for c, m in zip(vector, powers, strict=True)) % prime for vector in space.basis]
 
 
