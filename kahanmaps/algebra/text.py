@@ -179,8 +179,8 @@ def format_polynomial(polynomial: fmpq_mpoly) -> str:
     return "".join(pieces) or "0"
 
 
-def format_univariate(polynomial: fmpq_poly) -> str:
-    """A polynomial in t as people write it.
+def format_univariate(polynomial: fmpq_poly, name: str = "t") -> str:
+    """A polynomial in one variable as people write it.
 
     >>> format_univariate(fmpq_poly([-2, 0, 1]))
     't^2 - 2'
@@ -191,7 +191,7 @@ def format_univariate(polynomial: fmpq_poly) -> str:
         if coefficient == 0:
             continue
         size, sign = abs(coefficient), "-" if coefficient < 0 else "+"
-        letter = "" if power == 0 else "t" if power == 1 else f"t^{power}"
+        letter = "" if power == 0 else name if power == 1 else f"{name}^{power}"
         number = "" if size == 1 and letter else format_number(size) + ("*" if letter else "")
         text += f" {sign} {number}{letter}" if text else f"{'-' if sign == '-' else ''}{number}{letter}"
     return text or "0"

@@ -17,6 +17,7 @@ from flint import fmpq, nmod_poly
 from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.matrices import nullspace
+from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.critical import critical_points, pole_points
 from kahanmaps.laboratory.jets import NotGeneric, PrecisionTooLow, Step, image_of, walk
@@ -39,6 +40,7 @@ CONFINED = "confined"
 NOT_CONFINED = "not confined"
 NOT_CONTRACTED = "not contracted"
 UNDECIDED = "undecided"
+NO_POINT = "no point was followed"
 NO_TIME = "no two points could be followed in time"
 
 
@@ -66,10 +68,10 @@ class Hypersurface:
     contracted_at: int | None
     confined_at: int | None
     steps: tuple[Step, ...]
-    primes: tuple[int, ...]
-    note: str
-    followed: int
-    settled_at: int | None
+    primes: tuple[int, ...] = ()
+    note: str = ""
+    followed: int = 0
+    settled_at: int | None = None
 
 
 @dataclass(frozen=True)
@@ -99,11 +101,14 @@ class _Fate:
     """What became of one point: see Hypersurface."""
 
     status: str
-    contracted_at: int | None
-    confined_at: int | None
-    steps: tuple[Step, ...]
-    followed: int
-    settled_at: int | None
+    contracted_at: int | None = None
+    confined_at: int | None = None
+    steps: tuple[Step, ...] = ()
+    followed: int = 0
+    settled_at: int | None = None
+
+
+_UNKNOWN = _Fate(UNDECIDED)
 
 
 def fate_of(
@@ -126,7 +131,7 @@ def fate_of(
 
     def told(fate: _Fate, note: str = "") -> Hypersurface:
         degree = int(factor.total_degree())
-        return replace(_seen(text, degree, is_pole, multiplicity, fate, tuple(primes)), note=note)
+        return Hypersurface(text, degree, is_pole, multiplicity, primes=tuple(primes), note=note, **vars(fate))
 
     for _ in range(_TRIES):
         if len(fates) == _POINTS or limits.is_over:
@@ -145,18 +150,18 @@ def fate_of(
         except NotGeneric:
             continue
         except PrecisionTooLow:
-            return told(_unknown(), NO_TIME if limits.is_over else "the series lost all their terms")
+            return told(_UNKNOWN, NO_TIME if limits.is_over else "the series lost all their terms")
     if len(fates) < _POINTS:
-        return told(_unknown(), NO_TIME)
+        return told(_UNKNOWN, NO_TIME)
     one, other = ((fate.status, fate.contracted_at, fate.confined_at) for fate in fates)
     if one != other:
-        return told(_unknown(fates[0].steps), "two points tell different things")
+        return told(_Fate(UNDECIDED, steps=fates[0].steps), "two points tell different things")
     return told(fates[0])
 
 
 def untold(reason: str) -> Hypersurface:
     """Contracted hypersurfaces of which nothing is known, and why."""
-    return replace(_seen("?", 0, False, None, _unknown(), ()), note=reason)
+    return Hypersurface("?", 0, False, None, note=reason, **vars(_UNKNOWN))
 
 
 def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
@@ -179,14 +184,14 @@ def fates_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: 
             point = [rng.randrange(field.prime) for _ in range(map_.dim)] + [0]
             tangents = _tangents(point, [0] * map_.dim + [1], field)
             event = _first_event(equation, point, field, rng, limits)
-            fate = (
-                _unknown() if tangents is None else _fate_at(equation, point, tangents, field, rng, limits, event=event)
-            )
+            fate = _UNKNOWN
+            if tangents is not None:
+                fate = _fate_at(equation, point, tangents, field, rng, limits, event=event)
         except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
-            fate = _unknown()
-        found.append(_seen("Z", 1, False, None, fate, (field.prime,)))
+            fate = _UNKNOWN
+        found.append(Hypersurface("Z", 1, False, None, primes=(field.prime,), **vars(fate)))
         break
     return found
 
@@ -223,33 +228,14 @@ def _at_random(
             except NotGeneric:
                 continue
             except PrecisionTooLow:
-                fate = _unknown()
+                fate = _UNKNOWN
             key = (critical.multiplicity, fate.status, fate.contracted_at, fate.confined_at)
-            one = _seen("?", seen[critical.multiplicity], poles, critical.multiplicity, fate, (field.prime,))
+            one = Hypersurface("?", seen[key[0]], poles, key[0], primes=(field.prime,), **vars(fate))
             found[key] = _joined(found[key], one) if key in found else one
     for multiplicity in set(degrees) - {h.multiplicity for h in found.values()}:
-        nothing = _seen("?", degrees[multiplicity], poles, multiplicity, _unknown(), ())
-        found[(multiplicity,)] = replace(nothing, note="no point was followed")
+        untried = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT, **vars(_UNKNOWN))
+        found[(multiplicity,)] = untried
     return sorted(found.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
-
-
-def _seen(
-    text: str, degree: int, is_pole: bool, multiplicity: int | None, fate: _Fate, primes: tuple[int, ...]
-) -> Hypersurface:
-    return Hypersurface(
-        text,
-        degree,
-        is_pole,
-        multiplicity,
-        fate.status,
-        fate.contracted_at,
-        fate.confined_at,
-        fate.steps,
-        primes,
-        note="",
-        followed=fate.followed,
-        settled_at=fate.settled_at,
-    )
 
 
 def _joined(before: Hypersurface, new: Hypersurface) -> Hypersurface:
@@ -261,10 +247,6 @@ def _joined(before: Hypersurface, new: Hypersurface) -> Hypersurface:
         followed=min(before.followed, new.followed),
         settled_at=settled,
     )
-
-
-def _unknown(steps: tuple[Step, ...] = ()) -> _Fate:
-    return _Fate(UNDECIDED, None, None, steps, 0, None)
 
 
 def _told(ranks: Sequence[int], full: int) -> tuple[str, int | None, int | None]:
@@ -404,31 +386,18 @@ def _settled(orders: Sequence[int]) -> int | None:
 def _point_on(factor: Any, field: PrimeField, rng: random.Random) -> tuple[list[int], list[list[int]]] | None:
     """A random point of the hypersurface modulo p and a basis of its tangent space in projective space, or None."""
     p = field.prime
-    terms = [(tuple(int(e) for e in m), int(field.convert(c))) for m, c in factor.terms()]
     size = factor.context().nvars()
     a, b = ([rng.randrange(p) for _ in range(size)] for _ in range(2))
-    line = nmod_poly([], p)
-    for exponents, coefficient in terms:
-        term = nmod_poly([coefficient], p)
-        for x, v, exponent in zip(a, b, exponents, strict=True):
-            term = term * nmod_poly([x, v], p) ** exponent
-        line = line + term
+    line = evaluate(factor, field, [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)])
     if line.degree() < 1:
         return None
     roots = [-int(found[0]) for found, _ in line.factor()[1] if found.degree() == 1]
     if not roots:
         return None
     point = [(x + roots[0] * v) % p for x, v in zip(a, b, strict=True)]
-    gradient = []
-    for k in range(size):
-        total = 0
-        for exponents, coefficient in terms:
-            value = coefficient * exponents[k]
-            for j, exponent in enumerate(exponents):
-                value = value * pow(point[j], max(0, exponent - (j == k)), p) % p
-            total += value
-        gradient.append(total % p)
-    tangents = _tangents(point, gradient, field) if any(gradient) else None
+    at = [field.convert(x) for x in point]
+    slopes = [int(evaluate(slope, field, at)) for slope in gradient(factor)]
+    tangents = _tangents(point, slopes, field) if any(slopes) else None
     return None if tangents is None else (point, tangents)
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import flint
 from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz_mod_ctx, fmpz_mod_poly_ctx, fmpz_poly
 
-from kahanmaps.algebra.text import format_number, format_univariate
+from kahanmaps.algebra.text import format_univariate
 from kahanmaps.errors import InputError
 
 _PRIME = 2**521 - 1  # a Mersenne prime; coefficients of up to 520 bits are lifted
@@ -155,7 +155,7 @@ class Recurrence:
         for residue in range(period):
             first = next(n for n in count(self.preperiod) if n % period == residue)
             at = [first + period * k for k in range(size)]
-            forms.append(_polynomial_text(_interpolated(at, [values[n] for n in at])))
+            forms.append(format_univariate(_interpolated(at, [values[n] for n in at]), "n"))
         if len(set(forms)) == 1:
             return forms[0]
         return "; ".join(f"{form} for n = {residue} mod {period}" for residue, form in enumerate(forms))
@@ -293,19 +293,6 @@ def _interpolated(at: Sequence[int], values: Sequence[int]) -> fmpq_poly:
     size = len(at)
     powers = fmpq_mat(size, size, [fmpq(n) ** k for n in at for k in range(size)])
     return fmpq_poly(powers.solve(fmpq_mat(size, 1, [fmpq(value) for value in values])).entries())
-
-
-def _polynomial_text(polynomial: fmpq_poly) -> str:
-    terms = []
-    for k in range(polynomial.degree(), -1, -1):
-        c = polynomial[k]
-        if c != 0:
-            power = "" if k == 0 else "n" if k == 1 else f"n^{k}"
-            number = format_number(abs(c))
-            body = number if not power else power if number == "1" else f"{number}*{power}"
-            terms.append((" - " if c < 0 else " + ") + body)
-    text = "".join(terms)
-    return "-" + text[3:] if text.startswith(" - ") else text.removeprefix(" + ") or "0"
 
 
 def _signed(number: Any) -> str:
