@@ -93,6 +93,29 @@ def digits_of(polynomials: Iterable[fmpq_mpoly]) -> int:
     return int(longest.bit_length() * 0.30103) + 1
 
 
+def over_one_denominator(
+    functions: Sequence[RationalFunction], context: fmpq_mpoly_ctx, images: Sequence[fmpq_mpoly]
+) -> tuple[list[fmpq_mpoly], fmpq_mpoly]:
+    """Numerators over the least common denominator, and this, with `images` in the ring `context` for the variables.
+
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> over_one_denominator([RationalFunction(y, x), RationalFunction(x, x * y)], x.context(), [x, y])
+    ([y^2, x], x*y)
+    """
+
+    def moved(polynomial: fmpq_mpoly) -> fmpq_mpoly:
+        count = polynomial.context().nvars()
+        if count:
+            return polynomial.compose(*images[:count], ctx=context)
+        return context.constant(0 if polynomial.is_zero() else polynomial.leading_coefficient())
+
+    pairs = [(moved(function.numerator), moved(function.denominator)) for function in functions]
+    below = context.constant(1)
+    for _, denominator in pairs:
+        below = below * denominator / below.gcd(denominator)
+    return [above * (below / denominator) for above, denominator in pairs], below
+
+
 def primitive_part(polynomial: fmpq_mpoly) -> tuple[fmpq, fmpq_mpoly]:
     """The pair (c, P) with polynomial = c P, P of coprime integer coefficients, its leading one positive.
 

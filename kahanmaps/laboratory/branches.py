@@ -13,13 +13,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from flint import fmpq_mpoly
+from flint import fmpq
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.interpolation import reconstruct
-from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, ring, substitute
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.modular_points import ModularMap
 
@@ -106,27 +105,11 @@ def _roots(
         return None
     context = ring((*names, "T"))
     *gens, T = context.gens()
-
-    def lifted(polynomial: fmpq_mpoly) -> fmpq_mpoly:
-        if not names:
-            return context.constant(0 if polynomial.is_zero() else polynomial.leading_coefficient())
-        moved: fmpq_mpoly = polynomial.compose(*gens, ctx=context)
-        return moved
-
-    below = context.constant(1)
-    for function in answer.functions:
-        denominator = lifted(function.denominator)
-        below = below * denominator / below.gcd(denominator)
-    chi = below * T**count
-    for k, function in enumerate(answer.functions, 1):
-        chi = chi + lifted(function.numerator) * (below / lifted(function.denominator)) * T ** (count - k)
-    own = ring(tuple(names))
-    found = []
-    for factor, _ in chi.factor()[1]:
-        if max(int(exponents[-1]) for exponents in factor.monoms()) == 1:
-            slope: dict[Any, Any] = {}
-            rest: dict[Any, Any] = {}
-            for exponents, coefficient in factor.terms():
-                (slope if int(exponents[-1]) else rest)[exponents[:-1]] = coefficient
-            found.append(RationalFunction(own.from_dict(rest) * -1, own.from_dict(slope)))
-    return tuple(found)
+    above, below = over_one_denominator(answer.functions, context, gens)
+    chi = sum((P * T ** (count - k) for k, P in enumerate(above, 1)), below * T**count)
+    origin = {"T": fmpq(0)}
+    return tuple(
+        RationalFunction(-substitute(factor, origin), substitute(factor.derivative(len(gens)), origin))
+        for factor, _ in chi.factor()[1]
+        if factor.degrees()[-1] == 1
+    )

@@ -10,7 +10,7 @@ from typing import Any
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.interpolation import reconstruct
-from kahanmaps.algebra.polynomials import RationalFunction, primitive_part, ring
+from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, primitive_part, ring
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
@@ -110,26 +110,8 @@ def _polynomial(
     mine = {k: function for (i, k), function in coefficients.items() if i == row}
     pivot = _leading(space.basis[row])
     gens = context.gens()[n:]
-
-    def into(polynomial: fmpq_mpoly) -> fmpq_mpoly:
-        own = polynomial.context().nvars()
-        if own == 0:
-            lifted: fmpq_mpoly = context.constant(0 if polynomial.is_zero() else polynomial.leading_coefficient())
-        else:
-            lifted = polynomial.compose(*gens[:own], ctx=context)
-        return lifted
-
-    pairs = {k: (into(function.numerator), into(function.denominator)) for k, function in mine.items()}
-    below = context.constant(1)
-    for _, denominator in pairs.values():
-        below = below * denominator / below.gcd(denominator)
+    above, below = over_one_denominator(list(mine.values()), context, gens)
     total = context.constant(0)
-    for k, exponent in enumerate(monomials):
-        if k == pivot:
-            factor = below
-        elif k in pairs:
-            factor = pairs[k][0] * (below / pairs[k][1])
-        else:
-            continue
-        total = total + factor * context.from_dict({(*exponent, *([0] * len(gens))): 1})
+    for k, factor in (*zip(mine, above, strict=True), (pivot, below)):
+        total = total + factor * context.from_dict({(*monomials[k], *([0] * len(gens))): 1})
     return primitive_part(total)[1]
