@@ -32,7 +32,7 @@ from kahanmaps.laboratory.cofactors import (
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.identities import judged
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, exponents_up_to
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, product_of
 from kahanmaps.maps.kahan import KahanMapOver
 
 _MOST_TERMS = 2000  # of a polynomial: as many unknowns
@@ -173,34 +173,13 @@ def _is_spanned_by_products(known: dict[CofactorProduct, DarbouxSpace], product:
     """Whether products P Q of elements of other spaces, whose cofactors multiply to the given one, span its space."""
     space = known[product]
     by_powers = {one.powers: other for one, other in known.items() if one != product}
-    exponents = exponents_up_to(space.dim, space.degree)
-    places = {exponent: k for k, exponent in enumerate(exponents)}
     rows = []
     for powers, left in by_powers.items():
         rest = tuple(a - b for a, b in zip(product.powers, powers, strict=True))
         right = by_powers.get(rest)
         if right is not None and powers <= rest:
-            rows += [_times(P, Q, exponents, places, prime) for P in left.basis for Q in right.basis]
+            rows += [product_of(P, Q, space.dim, space.degree, prime) for P in left.basis for Q in right.basis]
     return len(echelon([row for row in rows if row is not None], prime)) == len(space.basis)
-
-
-def _times(
-    P: list[int],
-    Q: list[int],
-    exponents: Sequence[tuple[int, ...]],
-    places: dict[tuple[int, ...], int],
-    prime: int,
-) -> list[int] | None:
-    row = [0] * len(places)
-    for a, p in zip(exponents, P, strict=True):
-        if p:
-            for b, q in zip(exponents, Q, strict=True):
-                if q:
-                    place = places.get(tuple(i + j for i, j in zip(a, b, strict=True)))
-                    if place is None:
-                        return None  # of too high a degree
-                    row[place] = (row[place] + p * q) % prime
-    return row
 
 
 def _list(

@@ -35,6 +35,7 @@ from kahanmaps.laboratory.modular_points import (
     integers,
     monomial_values,
     null_space,
+    product_of,
     rank,
 )
 
@@ -74,19 +75,9 @@ class DarbouxSpace:
 
     def multiples(self, degree: int, prime: int) -> Vectors:
         """A basis of the products with all monomials, up to a degree."""
-        if degree < self.degree:
-            return []
-        places = {exponent: k for k, exponent in enumerate(exponents_up_to(self.dim, degree))}
-        own = exponents_up_to(self.dim, self.degree)
-        found = []
-        for factor in exponents_up_to(self.dim, degree - self.degree):
-            for vector in self.basis:
-                row = [0] * len(places)
-                for exponent, coefficient in zip(own, vector, strict=True):
-                    if coefficient:
-                        row[places[tuple(a + b for a, b in zip(factor, exponent, strict=True))]] = coefficient
-                found.append(row)
-        return echelon(found, prime)
+        factors = [[0] * k + [1] for k in range(len(exponents_up_to(self.dim, degree - self.degree)))]
+        rows = [product_of(P, vector, self.dim, degree, prime) for P in factors for vector in self.basis]
+        return echelon([row for row in rows if row is not None], prime)
 
 
 def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:

@@ -134,6 +134,25 @@ def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int
     return value % prime, gradient
 
 
+def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime: int) -> list[int] | None:
+    """The coefficients of a product of polynomials, up to the degree; None where its degree is higher.
+
+    The first ones suffice for a factor of a lower degree: the others are 0.
+    """
+    exponents = exponents_up_to(dim, degree)
+    places = {exponent: k for k, exponent in enumerate(exponents)}
+    row = [0] * len(exponents)
+    for a, p in zip(exponents, P, strict=False):
+        if p:
+            for b, q in zip(exponents, Q, strict=False):
+                if q:
+                    place = places.get(tuple(i + j for i, j in zip(a, b, strict=True)))
+                    if place is None:
+                        return None
+                    row[place] = (row[place] + p * q) % prime
+    return row
+
+
 def integers(matrix: nmod_mat) -> list[list[int]]:
     """The rows of a matrix modulo a prime as residues."""
     return [[int(entry) for entry in row] for row in matrix.tolist()]
