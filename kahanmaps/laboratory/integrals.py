@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
@@ -330,18 +331,14 @@ def _branches(
     laboratory: Laboratory, found: Found, cofactors: Sequence[Cofactor], reference: int, deadline: float
 ) -> tuple[dict[int, dict[Pattern, Branches]], str]:
     """What tells the spaces of each step apart that have zeros at the same places, and a reason where nothing does."""
-    seen: dict[tuple[int, tuple[int, ...]], Found | None] = {}
-    count = len(laboratory.symbols)
     names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
 
+    @cache
     def again(prime: int, values: tuple[int, ...]) -> Found | None:
-        if (prime, values) not in seen:
-            try:
-                map_ = laboratory.map_at(prime, values[:count], (*values, 1)[count])
-                seen[prime, values] = repeat(found, map_, cofactors, reference)
-            except (NoPoint, BadPrime):
-                seen[prime, values] = None
-        return seen[prime, values]
+        try:
+            return repeat(found, laboratory.map_for(prime, values), cofactors, reference)
+        except (NoPoint, BadPrime):
+            return None
 
     branches: dict[int, dict[Pattern, Branches]] = {}
     for number, group in enumerate(found.spaces):

@@ -15,7 +15,7 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.laboratory.affine_functions import affine_darboux
+from kahanmaps.laboratory.affine_functions import affine_cofactor, affine_darboux
 from kahanmaps.laboratory.closed_forms import ClosedForms, Spaces, closed_forms
 from kahanmaps.laboratory.cofactors import Cofactor, cofactor_of_affine, determinant_factors
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
@@ -60,6 +60,11 @@ class Laboratory:
             if eps == 0:
                 raise BadPrime(f"the prime {prime} divides the numerator of eps", prime)
         return ModularMap(self.system, prime, eps, values, self.seed)
+
+    def map_for(self, prime: int, values: Sequence[int]) -> ModularMap:
+        """The map for values of what formulas contain: of the symbols and, where it enters as one, of eps last."""
+        count = len(self.symbols)
+        return self.map_at(prime, values[:count], (*values, 1)[count])
 
     def other_maps(self, count: int) -> Iterator[ModularMap]:
         """So many maps modulo further primes, each at other random residues of the symbols and eps."""
@@ -113,27 +118,17 @@ class Laboratory:
         if not self.symbols:
             return True
         context = self.system.rhs[0].context()
-        gens = context.gens()[: self.system.dim]
-        l_ = function.compose(*gens, ctx=context)
-        slope = sum(
-            (l_.derivative(k) * polynomial for k, polynomial in enumerate(self.system.rhs)), context.constant(0)
-        )
-        return bool((slope % l_).is_zero())
+        moved = function.compose(*context.gens()[: self.system.dim], ctx=context)
+        return affine_cofactor(self.system, moved) is not None
 
     def formulas(self, model: Spaces, spaces_on: Callable[[ModularMap], Spaces | None], deadline: float) -> ClosedForms:
         """The polynomials that span spaces known modulo primes: `model` on the first map, `spaces_on(map)` on others.
 
         `spaces_on` returns None where the map is special. The search ends at `deadline`, a value of time.monotonic().
         """
-        count = len(self.symbols)
-
-        def spaces_at(prime: int, values: tuple[int, ...]) -> Spaces | None:
-            eps = values[count] if len(values) > count else 1
-            return spaces_on(self.map_at(prime, values[:count], eps))
-
         return closed_forms(
             model,
-            spaces_at,
+            lambda prime, values: spaces_on(self.map_for(prime, values)),
             self.system.variables,
             self.symbols,
             self.eps_enters,

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from math import comb
 from types import MappingProxyType
 
-from flint import fmpq
-
 from kahanmaps.algebra.residues import rational_reconstruction
 from kahanmaps.laboratory.branches import Branches, Pattern, pattern
 from kahanmaps.laboratory.cofactors import (
@@ -234,11 +232,5 @@ def _equal_entries(one: DarbouxSpace, model: DarbouxSpace, prime: int, reference
         for a, b in zip(mine, its, strict=True):
             if b and b != 1:
                 value = rational_reconstruction(b, reference)
-                if value is not None and _reduced(value, prime) == a:
-                    count += 1
+                count += value is not None and (value.p - a * value.q) % prime == 0
     return count
-
-
-def _reduced(value: fmpq, prime: int) -> int | None:
-    below = int(value.q) % prime
-    return int(value.p) * pow(below, -1, prime) % prime if below else None
