@@ -168,7 +168,4 @@ class Line:
         return None
 
     def _functional(self, x: list[nmod_poly]) -> nmod_poly:
-        total = nmod_poly([self._rng.randrange(self.prime)], self.prime)
-        for entry in x:
-            total = total + entry * nmod(self._rng.randrange(self.prime), self.prime)
-        return total
+        return nmod_poly([self._rng.randrange(self.prime)], self.prime) + self._mixture(x)

@@ -135,22 +135,8 @@ def cycle_census(
         rest = chart.count - graph.lost - graph.falling - int(lengths.sum())
         counts = _counted(lengths)
         far = _counted(lengths[~affine])
-        return Census(
-            *known,
-            True,
-            chart.count,
-            graph.lost,
-            graph.falling,
-            rest,
-            0,
-            0,
-            False,
-            counts,
-            far,
-            symmetric,
-            fixed,
-            *form,
-        )
+        seen = (*known, True, chart.count, graph.lost, graph.falling, rest, 0, 0, False)
+        return Census(*seen, counts, far, symmetric, fixed, *form)
     wanted = DEFAULT_SAMPLES if samples is None else samples
     starts = random_points(chart, wanted, seed_for(seed, system.rhs, exact_eps, prime))
     limit = 8 * hasse_weil(prime) if steps is None else steps
@@ -169,22 +155,8 @@ def cycle_census(
     counts = _counted(back[back > 0])
     lost, falling = int((gone == 0).sum()), int((gone > 0).sum())
     left = starts.shape[1] - lost - falling - sum(counts.values())
-    return Census(
-        *known,
-        False,
-        starts.shape[1],
-        lost,
-        falling,
-        0,
-        left,
-        taken,
-        taken < limit,
-        counts,
-        {},
-        None,
-        None,
-        *form,
-    )
+    seen = (*known, False, starts.shape[1], lost, falling, 0, left, taken, taken < limit)
+    return Census(*seen, counts, {}, None, None, *form)
 
 
 def default_eps(prime: int, count: int = 2) -> list[fmpq]:

@@ -71,14 +71,8 @@ def sparse_relations(
     >>> [one.text for one in sparse_relations(Laboratory(top).maps, 2, top.variables)]
     ['x1^2 + c1*x3^2 + c2 = 0', 'x2^2 + c3*x3^2 + c4 = 0']
     """
-    dim = maps[0].dim
-    support = sorted(exponents_up_to(dim, degree), key=lambda e: -sum(e))
-    places = {exponent: k for k, exponent in enumerate(exponents_up_to(dim, degree))}
-    order = [places[exponent] for exponent in support]
-    tables = []
-    for map_ in (maps[0], maps[0], maps[1]):
-        vectors = relations_on_orbit(map_, degree).vectors
-        tables.append(echelon([[vector[k] for k in order] for vector in vectors], map_.prime))
+    support = _falling(maps[0].dim, degree)
+    tables = [_relations(map_, degree) for map_ in (maps[0], maps[0], maps[1])]
     patterns = {tuple(tuple(bool(c) for c in row) for row in table) for table in tables}
     if len(patterns) != 1:
         return None
@@ -110,6 +104,18 @@ def sparse_relations(
     return tuple(found)
 
 
+def _falling(dim: int, degree: int) -> list[tuple[int, ...]]:
+    """The monomials of degree at most `degree`, those of the highest degree first."""
+    return sorted(exponents_up_to(dim, degree), key=lambda e: -sum(e))
+
+
+def _relations(map_: ModularMap, degree: int) -> list[list[int]]:
+    """The reduced echelon basis of the relations of a random orbit, on these monomials."""
+    places = {exponent: k for k, exponent in enumerate(exponents_up_to(map_.dim, degree))}
+    order = [places[exponent] for exponent in _falling(map_.dim, degree)]
+    return echelon([[v[k] for k in order] for v in relations_on_orbit(map_, degree).vectors], map_.prime)
+
+
 def _letter(choice: Sequence[str], variables: Sequence[str]) -> str:
     """The first letter that names like c1, c2, ... may begin with, none of them being a variable."""
     taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
@@ -120,11 +126,8 @@ def _implied(map_: ModularMap, degree: int, support: Sequence[tuple[int, ...]]) 
     """The leading monomials of the multiples of all relations of lower degree."""
     if degree == 1:
         return set()
-    below = sorted(exponents_up_to(map_.dim, degree - 1), key=lambda e: -sum(e))
-    places = {exponent: k for k, exponent in enumerate(exponents_up_to(map_.dim, degree - 1))}
-    vectors = relations_on_orbit(map_, degree - 1).vectors
-    table = echelon([[vector[places[e]] for e in below] for vector in vectors], map_.prime)
-    leads = [below[next(k for k, entry in enumerate(row) if entry)] for row in table]
+    below = _falling(map_.dim, degree - 1)
+    leads = [below[next(k for k, entry in enumerate(row) if entry)] for row in _relations(map_, degree - 1)]
     return {
         exponent
         for exponent in support
