@@ -79,6 +79,15 @@ def trace(matrix: Any) -> Any:
     return total
 
 
+def combination_of(weights: Sequence[Any], matrices: Sequence[Any]) -> Any:
+    """The sum of `weights[k]` `matrices[k]`, of which there is at least one."""
+    total = matrices[0] * weights[0]
+    for weight, matrix in zip(weights[1:], matrices[1:], strict=True):
+        if weight != 0:
+            total = total + matrix * weight
+    return total
+
+
 def primitive_integers(vector: tuple[fmpq, ...]) -> tuple[fmpz, ...]:
     """The coprime integers proportional to a rational vector, the first that is not zero positive."""
     below = fmpz(1)

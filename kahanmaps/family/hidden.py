@@ -17,12 +17,11 @@ import random
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank, trace
+from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers, rank, trace
 from kahanmaps.algebra.polynomials import gradient, linear_combinations, names_of, ring
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember, sign_polynomial
@@ -120,7 +119,7 @@ def structure_space(H: fmpq_mpoly, J: fmpq_mat | None = None) -> list[fmpq_mat]:
     conditions = [_integral(third * J) for third in third_derivatives(H)]
     # A few combinations of the conditions nearly always say as much as all of them.
     rng = random.Random(n)
-    few = [_combination(conditions, [rng.randint(-9, 9) for _ in conditions]) for _ in range(3)]
+    few = [combination_of([rng.randint(-9, 9) for _ in conditions], conditions) for _ in range(3)]
     for chosen in (few, conditions):
         found = _skew_solutions(chosen, n)
         if all(_is_symmetric(S * condition) for S in found for condition in conditions):
@@ -316,7 +315,7 @@ def _candidates(basis: Sequence[fmpq_mat]) -> Iterator[fmpq_mat]:
     rng = random.Random(len(basis))
     for count in itertools.count(2 * _DRAWS):
         bound = count // _DRAWS - 1
-        yield _combination(basis, [rng.randint(-bound, bound) for _ in basis])
+        yield combination_of([rng.randint(-bound, bound) for _ in basis], basis)
 
 
 def _factors_on(X: fmpq_mat, E: fmpq_mat) -> list[Factor]:
@@ -452,14 +451,6 @@ def _integral(matrix: fmpq_mat) -> fmpz_mat:
 
 def _is_symmetric(matrix: fmpz_mat) -> bool:
     return bool(matrix == matrix.transpose())
-
-
-def _combination(matrices: Sequence[Any], factors: Sequence[int]) -> Any:
-    total = matrices[0] * 0
-    for matrix, factor in zip(matrices, factors, strict=True):
-        if factor:
-            total = total + matrix * factor
-    return total
 
 
 def _identity(n: int) -> fmpq_mat:

@@ -24,7 +24,7 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz, fmpz_mat
 
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.matrices import primitive_integers
+from kahanmaps.algebra.matrices import combination_of, primitive_integers
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
@@ -330,7 +330,7 @@ def _coefficients(chi: fmpq_poly, S: fmpq_mat, tensors: list[fmpq_mat]) -> Quadr
     rows = S.transpose().tolist()
     module = [fmpq_mat(rows[:m]), fmpq_mat(rows[m:])]
     vectors = [fmpq_mat(n, 1, rows[0]), fmpq_mat(n, 1, rows[m])]
-    hessians = [_combination(tensors, rows[0]), _combination(tensors, rows[m])]
+    hessians = [combination_of(rows[0], tensors), combination_of(rows[m], tensors)]
     # The basis dual to 1, t, ..., t^(m-1) under l(a b).
     dual = [fmpq_poly([chi[j] for j in range(k + 1, m + 1)]) for k in range(m)]
 
@@ -345,15 +345,7 @@ def _along_columns(tensors: list[fmpq_mat], S: fmpq_mat) -> Iterator[fmpq_mat]:
     """The trilinear form in the coordinates z: one matrix for each column of S."""
     transposed = S.transpose()
     for column in transposed.tolist():
-        yield transposed * _combination(tensors, column) * S
-
-
-def _combination(matrices: list[fmpq_mat], factors: Sequence[fmpq]) -> fmpq_mat:
-    total = fmpq_mat(matrices[0].nrows(), matrices[0].ncols())
-    for matrix, factor in zip(matrices, factors, strict=True):
-        if factor != 0:
-            total = total + matrix * factor
-    return total
+        yield transposed * combination_of(column, tensors) * S
 
 
 def _krylov(t: fmpq_mat, vector: fmpq_mat) -> fmpq_mat:

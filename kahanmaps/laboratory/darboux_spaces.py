@@ -25,6 +25,7 @@ from dataclasses import dataclass
 
 from flint import nmod_mat
 
+from kahanmaps.algebra.matrices import combination_of
 from kahanmaps.laboratory.hirota_kimura import span_of_relations
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
@@ -209,11 +210,7 @@ def _some_combinations(forms: list[nmod_mat], prime: int) -> list[nmod_mat]:
     if len(forms) <= _ENOUGH:
         return forms
     rng = random.Random(prime)
-    return [_combination([rng.randrange(prime) for _ in forms], forms) for _ in range(_ENOUGH)]
-
-
-def _combination(weights: Sequence[int], forms: Sequence[nmod_mat]) -> nmod_mat:
-    return sum((form * weight for weight, form in zip(weights, forms, strict=True) if weight), forms[0] * 0)
+    return [combination_of([rng.randrange(prime) for _ in forms], forms) for _ in range(_ENOUGH)]
 
 
 def _blocks(solutions: list[nmod_mat], coordinates: Vectors, prime: int) -> list[Vectors]:
@@ -286,7 +283,7 @@ def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[
     lead = next((s for s in range(count) if products[s, s]), None)
     if lead is None:
         return []
-    total = _combination([products[min(lead, t), max(lead, t)] for t in range(count)], solutions)
+    total = combination_of([products[min(lead, t), max(lead, t)] for t in range(count)], solutions)
     coordinates = echelon(integers(total), prime)
     return [echelon(combine(coordinates, fresh, prime), prime)] if len(coordinates) == 2 else []
 
@@ -312,7 +309,7 @@ def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: i
     n = len(block)
     system = []
     for weights in combinations:
-        A = _combination(weights, solutions)
+        A = combination_of(weights, solutions)
         for p in pivots:
             # A = sum a_pq (p + w_p)(q + w_q)^T: the part of row p outside the fresh ones is sum_q a_pq w_q
             system.append([int(A[p, q]) for q in pivots] + [int(A[p, t]) for t in range(k, size)])

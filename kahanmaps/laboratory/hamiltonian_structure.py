@@ -15,11 +15,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz, nmod_mat
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ
-from kahanmaps.algebra.matrices import nullspace, primitive_integers
+from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.displayed import Displayed
@@ -138,7 +138,7 @@ def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.R
         by_y = quotient.rows(part) * quotient.section
         products = [K * by_y for K in forms]
         conditions = fmpq_mat([[P[i, j] - P[j, i] for P in products] for i, j in pairs])
-        forms = [_combination(vector, forms) for vector in nullspace(QQ, conditions)]
+        forms = [combination_of(vector, forms) for vector in nullspace(QQ, conditions)]
     if not forms:
         return ()
     echelon, _ = fmpq_mat([[K[i, j] for i, j in pairs] for K in forms]).rref()
@@ -149,14 +149,6 @@ def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.R
 def _skew(m: int, above: Mapping[tuple[int, int], int | fmpz]) -> fmpq_mat:
     """The skew matrix with these entries above the diagonal, and zeros."""
     return fmpq_mat(m, m, [above.get((a, b), 0) - above.get((b, a), 0) for a in range(m) for b in range(m)])
-
-
-def _combination(coefficients: Sequence[fmpq | int], forms: Sequence[fmpq_mat]) -> fmpq_mat:
-    total = forms[0] * coefficients[0]
-    for coefficient, form in zip(coefficients[1:], forms[1:], strict=True):
-        if coefficient != 0:
-            total = total + form * coefficient
-    return total
 
 
 def _hamiltonian(system: QuadraticSystem, quotient: QuotientForms, K: fmpq_mat) -> CubicHamiltonian:
@@ -202,18 +194,16 @@ def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[
     field = GF(random_prime(rng))
     modular = [field.convert_matrix(K) for K in forms]
     for _ in range(3):
-        generic = nmod_mat(m, m, field.characteristic)
-        for K in modular:
-            generic = generic + K * rng.randrange(field.characteristic)
+        generic = combination_of([rng.randrange(field.characteristic) for _ in modular], modular)
         if int(generic.det()):
             # Random small integers end it: the Pfaffian is a polynomial of degree m/2 that is not zero.
-            return next(K for K in (_combination(c, forms) for c in _small(len(forms), rng)) if K.det() != 0), True
+            return next(K for K in (combination_of(c, forms) for c in _small(len(forms), rng)) if K.det() != 0), True
     degrees = range(m // 2 + 1)
     if len(degrees) ** len(forms) > _GRID:
         return None, False
     # A polynomial of degree at most m/2 in each variable that vanishes on this grid is zero.
     for coefficients in product(degrees, repeat=len(forms)):
-        K = _combination(coefficients, forms)
+        K = combination_of(coefficients, forms)
         if K.det() != 0:
             return K, True
     return None, True
