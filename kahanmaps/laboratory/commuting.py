@@ -17,7 +17,7 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.matrices import primitive_integers
+from kahanmaps.algebra.matrices import combination_of, primitive_integers
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import Component, decoupling, normal_form, solve_system, without_contained
 from kahanmaps.algebra.text import format_number, format_polynomial
@@ -27,7 +27,7 @@ from kahanmaps.checks.settings import Settings
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.commuting_equations import commutator_equations
-from kahanmaps.laboratory.commuting_proofs import affine, is_affine, judge_family, judge_field
+from kahanmaps.laboratory.commuting_proofs import affine, judge_family, judge_field
 from kahanmaps.laboratory.commuting_space import (
     MAX_UNKNOWNS,
     SHAPES,
@@ -219,7 +219,7 @@ class _Search:
         size = self.space.dimension
         whole = Component(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
         # Where f is affine the space may be large, and often all of it commutes: a proof without equations.
-        if self.found.dimension is not None and is_affine(self.f) and affine(self.f, self.space.fields) is not None:
+        if self.found.dimension is not None and self.f.degree <= 1 and affine(self.f, self.space.fields) is not None:
             self._add_family(whole, judge_family(self.f, self.space, whole, self.settings))
         elif size > MAX_SPACE:
             self.found.undecided.append(
@@ -328,9 +328,7 @@ class _Search:
     def _field(self, weights: Sequence[fmpq], finding: Finding) -> CommutingField:
         matrix = None
         if self.space.matrices:
-            matrix = fmpq_mat(self.f.dim, self.f.dim)
-            for weight, B in zip(weights, self.space.matrices, strict=True):
-                matrix = matrix + B * weight
+            matrix = combination_of(weights, self.space.matrices)
         g = field_at(self.space, weights)
         names = [name for name, factor in (("0", 0), ("f", 1), ("-f", -1)) if g == self.f.scaled(factor)]
         return CommutingField(g, matrix, names[0] if names else "", finding)

@@ -63,9 +63,9 @@ def judge_family(f: QuadraticSystem, space: CommutingSpace, family: Component, s
 
 def affine(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | None:
     """The evidence by an affine map: f is affine, or there is one g and it is; None where that proves nothing."""
-    if is_affine(f):
+    if f.degree <= 1:
         name, pairs = "f", [(f, g) for g in fields]
-    elif len(fields) == 1 and is_affine(fields[0]):
+    elif len(fields) == 1 and fields[0].degree <= 1:
         name, pairs = "g", [(fields[0], f)]
     else:
         return None
@@ -82,11 +82,6 @@ def affine(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | 
     )
 
 
-def is_affine(system: QuadraticSystem) -> bool:
-    """Whether there are no quadratic terms."""
-    return all(form.rank() == 0 for form in system.Q)
-
-
 def _symmetric_at(a: QuadraticSystem, h: QuadraticSystem, count: int) -> bool:
     """Whether the affine Kahan map of `a` is a symmetry of h, at so many values of eps."""
     n, checked, k = a.dim, 0, 0
@@ -98,24 +93,15 @@ def _symmetric_at(a: QuadraticSystem, h: QuadraticSystem, count: int) -> bool:
             continue
         P = below.solve(identity + a.B * fmpq(1, k))
         q = below.solve(fmpq_mat(n, 1, list(a.c))) * fmpq(2, k)
-        if transported(h, P, q.entries()) != coefficients_of(h.transformed(P)):
+        if h.composed(P, q.entries()) != h.transformed(P):
             return False
         checked += 1
     return True
 
 
-def transported(h: QuadraticSystem, P: fmpq_mat, q: Sequence[fmpq]) -> list[list[fmpq]]:
-    """The coefficients of x -> h(P x + q).
-
-    >>> transported(QuadraticSystem.from_text(["x"], ["x^2"]), fmpq_mat([[2]]), [fmpq(1)])
-    [[4, 4, 1]]
-    """
-    return coefficients_of(h.composed(P, q))
-
-
 def _trivially(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
     for factor, why in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
-        if coefficients_of(g) == coefficients_of(f.scaled(factor)):
+        if g == f.scaled(factor):
             return Evidence(theorems.METHOD, why)
     return None
 

@@ -57,7 +57,7 @@ def conclude(found: Findings) -> Conclusion:
 
     if found.degrees is not None and found.degrees.ended == "singular" and len(found.degrees.degrees) == 1:
         return verdict("singular", f"The map is nowhere defined: {found.degrees.message}.")
-    if _is_affine(found):
+    if found.file.system.degree <= 1:
         closes = "" if period is None else f"; orbits close after {counted(period, 'step')} (measured)"
         return verdict("linear", f"The system is linear, and so is its Kahan map; {integrals}{closes}.")
     if said := contradictions(found):
@@ -100,10 +100,6 @@ def _count_text(found: Findings) -> str:
         return f"no integral{where} up to degree {search.profile.degree} (relations along orbits)"
     number = "no integral" if count == 0 else counted(count, "independent integral")
     return number + where if found.count_is_exact else f"at least {number}{where}"
-
-
-def _is_affine(found: Findings) -> bool:
-    return all(int(p.total_degree()) <= 1 for p in found.file.system.rhs)
 
 
 # -- the statements -------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-from flint import fmpq_mat
+from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.errors import InputError
@@ -44,19 +44,7 @@ def find_reversor(system: QuadraticSystem) -> fmpq_mat | None:
 
 def is_reversor(system: QuadraticSystem, matrix: fmpq_mat) -> bool:
     """Whether f(R x) = -R f(x) for this constant matrix R: then R Phi(., eps) = Phi(., -eps) R for every eps. Exact."""
-    local = system.over(QQ)
-    n = system.dim
-    if matrix * local.c != -local.c or matrix * local.B != -(local.B * matrix):
-        return False
-    for i in range(n):
-        pulled = matrix.transpose() * system.Q[i] * matrix
-        total = fmpq_mat(n, n)
-        for j in range(n):
-            if matrix[i, j] != 0:
-                total = total + system.Q[j] * matrix[i, j]
-        if pulled != -total:
-            return False
-    return True
+    return system.composed(matrix, [fmpq(0)] * system.dim) == system.transformed(-matrix)
 
 
 def require_reversor(system: QuadraticSystem, matrix: fmpq_mat) -> None:
@@ -64,7 +52,7 @@ def require_reversor(system: QuadraticSystem, matrix: fmpq_mat) -> None:
     n = system.dim
     if (matrix.nrows(), matrix.ncols()) != (n, n):
         raise InputError(f"found a {matrix.nrows()} x {matrix.ncols()} reversing matrix, expected {n} x {n}")
-    if matrix * matrix != fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)]):
+    if matrix * matrix != QQ.identity(n):
         raise InputError("found a reversing matrix R with R^2 other than I, expected an involution")
     if not is_reversor(system, matrix):
         raise InputError("found a matrix R with f(R x) other than -R f(x): it does not reverse the system")

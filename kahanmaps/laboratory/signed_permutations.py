@@ -41,7 +41,7 @@ class _Search:
         self.Q = [[[form[j, k] for k in range(n)] for j in range(n)] for form in f.Q]
         self.B: list[list[fmpq]] = f.B.tolist()
         # A translation changes the linear terms where there are quadratic ones, and never those of highest degree.
-        self.is_affine = all(form.rank() == 0 for form in f.Q)
+        self.is_affine = f.degree <= 1
 
     def walk(self, places: list[int], signs: list[int]) -> Iterator[fmpq_mat | None]:
         """All ways to go on; None where the time is over."""

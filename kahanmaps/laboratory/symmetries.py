@@ -18,7 +18,7 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.small_systems import solve_system
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
@@ -318,9 +318,5 @@ def _key(matrix: fmpq_mat) -> tuple[str, ...]:
 
 
 def _affine_text(variables: Sequence[str], S: fmpq_mat, r: Sequence[fmpq]) -> list[str]:
-    gens = ring(variables).gens()
-    zero = gens[0].context().constant(0)
-    return [
-        format_polynomial(sum((x * S[i, j] for j, x in enumerate(gens) if S[i, j] != 0), zero) + r[i])
-        for i in range(len(variables))
-    ]
+    images = linear_combinations(S, ring(variables).gens())
+    return [format_polynomial(image + shift) for image, shift in zip(images, r, strict=True)]

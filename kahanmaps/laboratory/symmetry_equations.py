@@ -12,10 +12,10 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
+from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import Component, solve_system
 from kahanmaps.laboratory.commuting_equations import coefficients_of
-from kahanmaps.laboratory.commuting_proofs import transported
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -26,7 +26,7 @@ def is_symmetry(system: QuadraticSystem, S: fmpq_mat, r: Sequence[fmpq], sign: i
     >>> is_symmetry(f, fmpq_mat([[1, 0], [0, -1]]), [fmpq(0)] * 2, -1)
     True
     """
-    return S.det() != 0 and transported(system, S, r) == coefficients_of(system.transformed(S).scaled(sign))
+    return S.det() != 0 and system.composed(S, r) == system.transformed(S).scaled(sign)
 
 
 def translation(f: QuadraticSystem, S: fmpq_mat, sign: int, deadline: float) -> tuple[fmpq, ...] | None:
@@ -105,11 +105,5 @@ def is_singular(part: Component, n: int) -> bool:
     >>> is_singular(Component((a, a, a, a)), 2), is_singular(Component((a, a, a, -a)), 2)
     (True, False)
     """
-    total = part.values[0].context().constant(0)
-    for order in itertools.permutations(range(n)):
-        swaps = sum(order[i] > order[j] for i in range(n) for j in range(i + 1, n))
-        product = part.values[0].context().constant(-1 if swaps % 2 else 1)
-        for i, j in enumerate(order):
-            product = product * part.values[i * n + j]
-        total = total + product
-    return bool(total.is_zero())
+    rows = [[*part.values[i * n : (i + 1) * n], None] for i in range(n)]
+    return bool(kernel_minors(rows)[-1].is_zero())
