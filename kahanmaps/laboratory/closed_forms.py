@@ -23,8 +23,7 @@ class ClosedForms:
     """The bases of spaces as polynomials in the variables, the symbols and eps; None and a reason if not found."""
 
     bases: list[list[fmpq_mpoly]] | None
-    reason: str
-    samples: int
+    reason: str = ""
 
 
 def closed_forms(
@@ -65,12 +64,10 @@ def closed_forms(
     names = (*symbols, "eps") if eps_enters == "symbol" else tuple(symbols)
     deadline = time.monotonic() + seconds
     functions: list[RationalFunction] = []
-    samples = 0
     if any(places):
         answer = reconstruct(box, names, seed=seed, deadline=deadline)
-        samples = answer.samples
         if answer.functions is None:
-            return ClosedForms(None, answer.reason, samples)
+            return ClosedForms(None, answer.reason)
         functions += answer.functions
     context = ring((*variables, *symbols, "eps"))
     bases = []
@@ -78,7 +75,7 @@ def closed_forms(
         coefficients = {cell: functions.pop(0) for cell in cells}
         basis = [_polynomial(space, i, coefficients, context, len(variables)) for i in range(len(space.basis))]
         bases.append([_weighted(P, len(variables)) for P in basis] if eps_enters == "by weight" else basis)
-    return ClosedForms(bases, "", samples)
+    return ClosedForms(bases)
 
 
 def _places(space: DarbouxSpace) -> list[tuple[int, int]]:

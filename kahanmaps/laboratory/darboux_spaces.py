@@ -96,41 +96,30 @@ def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
     return [members[key] for key in keys[:2]]
 
 
-@dataclass(frozen=True)
-class DegreeSearch:
-    """The new spaces of one degree; `unresolved` counts relations that no space accounts for (or that were not tried).
-
-    `reason` says why, where it is not zero.
-    """
-
-    spaces: list[DarbouxSpace]
-    unresolved: int
-    reason: str = ""
-
-
 def darboux_spaces(
     map_: ModularMap, degree: int, known: Sequence[DarbouxSpace] = (), seconds: float = 30.0
-) -> DegreeSearch:
-    """The spaces of degree `degree` that are not multiples of the `known` ones of lower degree."""
+) -> list[DarbouxSpace]:
+    """The spaces of degree `degree` that are not multiples of the `known` ones of lower degree.
+
+    Relations that no space accounts for have integrals for coefficients that are no P/Q of this degree. None are looked
+    for where relations span too many dimensions.
+    """
     prime = map_.prime
     deadline = time.monotonic() + seconds
-    span, _ = span_of_relations(map_, degree, seconds / 2)
+    span = span_of_relations(map_, degree, seconds / 2)
     explained = echelon([row for space in known for row in space.multiples(degree, prime)], prime)
     fresh = _complement(explained, span, prime)
     if not fresh:
-        return DegreeSearch([], 0)
-    size = len(fresh) + len(explained)
+        return []
     if not explained and _is_darboux(map_, fresh, degree):
-        return DegreeSearch([DarbouxSpace.spanned_by(map_.dim, degree, fresh, prime)], 0)
-    if size > LARGEST_SPAN or time.monotonic() > deadline:
-        return DegreeSearch([], len(fresh), f"the relations of degree {degree} span {size} dimensions, too many")
+        return [DarbouxSpace.spanned_by(map_.dim, degree, fresh, prime)]
+    if len(fresh) + len(explained) > LARGEST_SPAN or time.monotonic() > deadline:
+        return []
     solutions = _antisymmetric(map_, [*fresh, *explained], degree)
     bases = [basis for basis in _separate(solutions, fresh, explained, prime) if _is_darboux(map_, basis, degree)]
     if not bases and not explained:
         bases = [basis for basis in _of_rank_two(solutions, fresh, prime) if _is_darboux(map_, basis, degree)]
-    found = [DarbouxSpace.spanned_by(map_.dim, degree, basis, prime) for basis in bases]
-    missing = len(fresh) - sum(len(space.basis) for space in found)
-    return DegreeSearch(found, missing, "their coefficients are integrals without a form P/Q of this degree")
+    return [DarbouxSpace.spanned_by(map_.dim, degree, basis, prime) for basis in bases]
 
 
 def _complement(inner: Vectors, outer: Vectors, prime: int) -> Vectors:

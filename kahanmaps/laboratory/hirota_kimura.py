@@ -120,16 +120,15 @@ def relations_on_orbit(map_: ModularMap, degree: int, start: Point | None = None
     return OrbitRelations(degree, vectors, normals, rank(normals, map_.prime), period, points[0], points[-1])
 
 
-def span_of_relations(map_: ModularMap, degree: int, seconds: float = 30.0) -> tuple[list[list[int]], int]:
-    """(W, r): the reduced echelon basis W of the span of the relations of all orbits, and their number r for one."""
+def span_of_relations(map_: ModularMap, degree: int, seconds: float = 30.0) -> list[list[int]]:
+    """The reduced echelon basis of the span of the relations of all orbits."""
     deadline = time.monotonic() + seconds
-    first = relations_on_orbit(map_, degree)
-    found, still = first.vectors, 0
+    found, still = relations_on_orbit(map_, degree).vectors, 0
     while found and still < 2 and time.monotonic() < deadline:
         more = echelon([*found, *relations_on_orbit(map_, degree).vectors], map_.prime)
         still = still + 1 if len(more) == len(found) else 0
         found = more
-    return found, len(first.vectors)
+    return found
 
 
 def orbit_profile(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import comb
 from types import MappingProxyType
 
@@ -47,17 +47,20 @@ class Step:
 
 @dataclass(frozen=True)
 class Found:
-    """What a search found on one map: a list of spaces for each step, and how many independent integrals they give."""
+    """What a search found on one map: a list of spaces for each step."""
 
-    steps: list[Step]
-    spaces: list[list[DarbouxSpace]]
-    independent: int
-    unresolved: int
+    steps: list[Step] = field(default_factory=list)
+    spaces: list[list[DarbouxSpace]] = field(default_factory=list)
 
     @property
     def all_spaces(self) -> list[DarbouxSpace]:
         """The spaces of all steps."""
         return [space for spaces in self.spaces for space in spaces]
+
+    def add(self, step: Step, spaces: list[DarbouxSpace]) -> None:
+        """One more step."""
+        self.steps.append(step)
+        self.spaces.append(spaces)
 
 
 def affine_space(map_: ModularMap) -> DarbouxSpace | None:
@@ -82,20 +85,14 @@ def search(
 ) -> Found:
     """Spaces whose ratios are as many independent integrals as the profile shows, as far as they can be found."""
     deadline = time.monotonic() + seconds
-    steps: list[Step] = []
-    spaces: list[list[DarbouxSpace]] = []
-    wanted, unresolved = profile.codimension, 0
-
-    def known() -> list[DarbouxSpace]:
-        return [space for group in spaces for space in group]
+    found, wanted = Found(), profile.codimension
 
     def done() -> bool:
-        return gradient_rank(map_, known()) >= wanted or time.monotonic() > deadline
+        return gradient_rank(map_, found.all_spaces) >= wanted or time.monotonic() > deadline
 
     affine = affine_space(map_)
     if affine is not None:
-        steps.append(Step("affine", 1, None, AFFINE))
-        spaces.append([affine])
+        found.add(Step("affine", 1, None, AFFINE), [affine])
     later: list[int] = []
     for degree, nullity in enumerate(profile.nullities, 1):
         if not nullity:
@@ -108,33 +105,29 @@ def search(
         if done():
             break
         progress(f"closed forms from the relations of degree {degree}")
-        unresolved += _take_relations(map_, degree, steps, spaces, deadline)
+        _take_relations(map_, degree, found, deadline)
     if not done():
         top = _COFACTOR_DEGREE.get(map_.dim, 2)
         while comb(map_.dim + top, top) > _MOST_TERMS:
             top -= 1
         progress(f"polynomials of degree up to {top} with {comb(map_.dim + top, top)} terms and known cofactors")
-        for product, space in search_cofactors(map_, cofactors, known(), wanted, top, deadline - time.monotonic()):
-            steps.append(Step("cofactor", space.degree, product, f"common cofactor {product.text(cofactors)}"))
-            spaces.append([space])
+        left = deadline - time.monotonic()
+        for product, space in search_cofactors(map_, cofactors, found.all_spaces, wanted, top, left):
+            found.add(Step("cofactor", space.degree, product, f"common cofactor {product.text(cofactors)}"), [space])
     for degree in later:
         if done():
             break
         progress(f"closed forms from the relations of degree {degree}")
-        unresolved += _take_relations(map_, degree, steps, spaces, deadline)
-    return Found(steps, spaces, gradient_rank(map_, known()), unresolved)
+        _take_relations(map_, degree, found, deadline)
+    return found
 
 
-def _take_relations(
-    map_: ModularMap, degree: int, steps: list[Step], spaces: list[list[DarbouxSpace]], deadline: float
-) -> int:
-    known = [space for group in spaces for space in group]
-    found = darboux_spaces(map_, degree, known, max(1.0, deadline - time.monotonic()))
-    before = gradient_rank(map_, known)
-    if found.spaces and gradient_rank(map_, [*known, *found.spaces]) > before:
-        steps.append(Step("relations", degree, None, f"relations of degree {degree} along orbits"))
-        spaces.append(sorted(found.spaces, key=pattern))
-    return found.unresolved
+def _take_relations(map_: ModularMap, degree: int, found: Found, deadline: float) -> None:
+    known = found.all_spaces
+    spaces = darboux_spaces(map_, degree, known, max(1.0, deadline - time.monotonic()))
+    if spaces and gradient_rank(map_, [*known, *spaces]) > gradient_rank(map_, known):
+        step = Step("relations", degree, None, f"relations of degree {degree} along orbits")
+        found.add(step, sorted(spaces, key=pattern))
 
 
 def repeat(
@@ -149,11 +142,10 @@ def repeat(
     `reference` is the prime of `found`. Spaces of the same shape come in any order where there are no `branches` of
     their step, by which they are told apart.
     """
-    spaces: list[list[DarbouxSpace]] = []
+    again = Found()
     top = max((step.degree for step in found.steps if step.kind == "cofactor"), default=0)
     sample = Sample.of(map_, cofactors, points_needed(map_.dim, top)) if top else None
     for number, (step, model) in enumerate(zip(found.steps, found.spaces, strict=True)):
-        known = [space for group in spaces for space in group]
         if step.kind == "affine":
             affine = affine_space(map_)
             group = [affine] if affine is not None else []
@@ -161,12 +153,12 @@ def repeat(
             assert sample is not None
             group = [cofactor_space(sample, step.product, step.degree)]
         else:
-            group = darboux_spaces(map_, step.degree, known).spaces
+            group = darboux_spaces(map_, step.degree, again.all_spaces)
         ordered = _in_order(group, model, map_, reference, branches.get(number, {}))
         if ordered is None:
             return None
-        spaces.append(ordered)
-    return Found(found.steps, spaces, found.independent, found.unresolved)
+        again.add(step, ordered)
+    return again
 
 
 def classes(group: Sequence[DarbouxSpace]) -> dict[Pattern, list[DarbouxSpace]]:

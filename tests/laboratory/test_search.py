@@ -52,7 +52,8 @@ def test_affine_integrals(file, dimension):
 )
 def test_searches_can_be_repeated_on_another_map(name, kinds, independent):
     laboratory, known, found = searched(load(name))
-    assert ([step.kind for step in found.steps], found.independent) == (kinds, independent)
+    assert [step.kind for step in found.steps] == kinds
+    assert gradient_rank(laboratory.maps[0], found.all_spaces) == independent
     reference, second = laboratory.primes[0], laboratory.maps[1]
     again = repeat(found, second, known, reference)
     assert again is not None
@@ -79,7 +80,7 @@ def test_another_system_does_not_repeat_a_search():
 def test_random_systems_and_no_time_give_nothing():
     assert searched(random_system(3, 3))[2].steps == []
     found = searched(load("euler_top"), seconds=0.0)[2]
-    assert (found.steps, found.independent) == ([], 0)
+    assert found.steps == []
 
 
 def test_progress_is_told():
@@ -90,13 +91,12 @@ def test_progress_is_told():
 
 
 def calls_of_a_search(monkeypatch, nullities, wanted=1, by_relations=0, by_cofactors=0):
-    """The degrees whose relations are taken, the relations unresolved and what is told, with stand-ins for the work."""
+    """The degrees whose relations are taken and what is told, with stand-ins for the work."""
     taken, told, independent = [], [], [0]
 
     def relations(map_, degree, *_):
         taken.append(degree)
         independent[0] += by_relations
-        return 1
 
     def cofactors(*_):
         independent[0] += by_cofactors
@@ -106,26 +106,26 @@ def calls_of_a_search(monkeypatch, nullities, wanted=1, by_relations=0, by_cofac
     monkeypatch.setattr(module, "search_cofactors", cofactors)
     monkeypatch.setattr(module, "gradient_rank", lambda *_: independent[0])
     profile = SimpleNamespace(nullities=nullities, codimension=wanted)
-    found = search(Laboratory(load("lorenz")).maps[0], profile, [], 30.0, told.append)
-    return taken, found.unresolved, [text for text in told if "cofactors" in text]
+    search(Laboratory(load("lorenz")).maps[0], profile, [], 30.0, told.append)
+    return taken, [text for text in told if "cofactors" in text]
 
 
 def test_degrees_with_many_relations_come_after_the_cofactors_and_none_after_what_is_wanted(monkeypatch):
     terms = ["polynomials of degree up to 7 with 120 terms and known cofactors"]
     many = module.LARGEST_SPAN
-    assert calls_of_a_search(monkeypatch, (0, 3, 21, 20)) == ([2, 4, 3], 3, terms)
-    assert calls_of_a_search(monkeypatch, (1, many - 1, 1)) == ([1, 3, 2], 3, terms)
-    assert calls_of_a_search(monkeypatch, (1, many, 1)) == ([1], 1, terms)
-    assert calls_of_a_search(monkeypatch, (1, 1, 30), by_relations=1) == ([1], 1, [])
-    assert calls_of_a_search(monkeypatch, (1, 30, 30), by_cofactors=1) == ([1], 1, terms)
-    assert calls_of_a_search(monkeypatch, (30, 30), by_relations=1) == ([1], 1, terms)
-    assert calls_of_a_search(monkeypatch, (1, 30), wanted=0) == ([], 0, [])
+    assert calls_of_a_search(monkeypatch, (0, 3, 21, 20)) == ([2, 4, 3], terms)
+    assert calls_of_a_search(monkeypatch, (1, many - 1, 1)) == ([1, 3, 2], terms)
+    assert calls_of_a_search(monkeypatch, (1, many, 1)) == ([1], terms)
+    assert calls_of_a_search(monkeypatch, (1, 1, 30), by_relations=1) == ([1], [])
+    assert calls_of_a_search(monkeypatch, (1, 30, 30), by_cofactors=1) == ([1], terms)
+    assert calls_of_a_search(monkeypatch, (30, 30), by_relations=1) == ([1], terms)
+    assert calls_of_a_search(monkeypatch, (1, 30), wanted=0) == ([], [])
 
 
 @pytest.mark.parametrize(("most", "degree", "terms"), [(120, 7, 120), (119, 6, 84), (10, 2, 10), (9, 1, 4)])
 def test_cofactors_are_tried_up_to_so_many_terms(most, degree, terms, monkeypatch):
     monkeypatch.setattr(module, "_MOST_TERMS", most)
-    (told,) = calls_of_a_search(monkeypatch, ())[2]
+    (told,) = calls_of_a_search(monkeypatch, ())[1]
     assert told == f"polynomials of degree up to {degree} with {terms} terms and known cofactors"
 
 
@@ -154,7 +154,7 @@ def test_the_space_that_shares_numbers_is_taken_of_those_that_look_alike():
 def test_coefficients_are_interpolated():
     found = closed_forms(MODEL, pencil_at, ["x", "y"], ["a"], "symbol")
     assert [format_polynomial(P) for P in found.bases[0]] == ["x*a^2 + 3*eps - 1", "y^2"]
-    assert (found.reason, found.samples > 10) == ("", True)
+    assert found.reason == ""
 
 
 def test_special_values_are_passed_over():
@@ -189,4 +189,4 @@ def test_eps_by_weight_and_numbers():
 def test_without_coefficients_nothing_has_to_be_sampled():
     model = [DarbouxSpace(1, 1, [[1, 0], [0, 1]])]
     found = closed_forms(model, lambda prime, values: None, ["x"], ["a"], "symbol")
-    assert ([str(P) for P in found.bases[0]], found.samples) == (["1", "x"], 0)
+    assert [str(P) for P in found.bases[0]] == ["1", "x"]
