@@ -31,7 +31,7 @@ from kahanmaps.laboratory.cofactors import (
 )
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION, constant_structures
-from kahanmaps.laboratory.identities import density_verdict
+from kahanmaps.laboratory.identities import verdict_on
 from kahanmaps.laboratory.integrals import closing_note, toml_comment
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
@@ -254,7 +254,7 @@ def _formulas(
     for P in forms.bases[0]:
         one = P.context().constant(1)
         phi = RationalFunction(one, P) if inverse else RationalFunction(P, one)
-        verdict, evidence = density_verdict(laboratory.system, phi, laboratory.eps, laboratory.seed)
+        verdict, evidence = verdict_on(laboratory.system, phi, laboratory.eps, laboratory.seed, is_density=True)
         if verdict.holds:
             found.append(FoundDensity(phi, verdict, evidence))
     return found, f"a density of degree {degree} that was found modulo primes did not pass as an identity"

@@ -23,20 +23,25 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 _BUDGET = 60_000_000
 
 
-def integral_verdict(
-    system: QuadraticSystem, integral: RationalFunction, eps: fmpq | None, seed: int = 0
+def verdict_on(
+    system: QuadraticSystem, function: RationalFunction, eps: fmpq | None, seed: int = 0, *, is_density: bool
 ) -> tuple[Verdict, Evidence]:
-    """Whether I(x~) = I(x), for every value of the symbols of the system and, if `eps` is None, every eps.
+    """Whether I(x~) = I(x); of a density phi whether phi(x~) det(I - eps f'(x)) = phi(x) det(I + eps f'(x~)).
+
+    The second says that dx/phi is invariant. Both are for every value of the symbols of the system and, if `eps` is
+    None, every eps.
 
     Args:
         system: the system, some of its parameters symbols.
-        integral: an exact function of (variables, symbols, eps).
+        function: I or phi, an exact function of (variables, symbols, eps).
         eps: the paper's epsilon, an exact number (the time step is 2 eps), or None for every eps.
         seed: of the random points.
+        is_density: whether the function is a phi.
 
     Returns:
         The verdict with its evidence: proved by expansion, supported or refuted at random points modulo primes, or
-        undecided where the two sides have no values, as for a map that is singular everywhere.
+        undecided where the two sides have no values, as for a map that is singular everywhere; of a density also where
+        the map is not invertible.
 
     Source: celledoni-2019.
 
@@ -44,39 +49,15 @@ def integral_verdict(
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
     >>> for text in ("x^2 + y^2", "x^2 - y^2"):
-    ...     print(integral_verdict(rotation, parse_rational_function(text, ["x", "y", "eps"]), None)[0])
+    ...     function = parse_rational_function(text, ["x", "y", "eps"])
+    ...     print(verdict_on(rotation, function, None, is_density=False)[0])
     proved
     refuted
-    """
-    condition = integral_condition(integral, system.dim, eps)
-    identity = _identity(system, integral, eps, condition, of_density=False)
-    return judged(identity, seed, expands=system.dim <= MAX_DIMENSION)
-
-
-def density_verdict(
-    system: QuadraticSystem, density: RationalFunction, eps: fmpq | None, seed: int = 0
-) -> tuple[Verdict, Evidence]:
-    """Whether phi(x~) det(I - eps f'(x)) = phi(x) det(I + eps f'(x~)), that is, whether dx/phi is invariant.
-
-    Args:
-        system: the system, some of its parameters symbols.
-        density: phi, an exact function of (variables, symbols, eps).
-        eps: the paper's epsilon, an exact number (the time step is 2 eps), or None for every eps.
-        seed: of the random points.
-
-    Returns:
-        The verdict with its evidence, as `integral_verdict`; undecided as well where the map is not invertible.
-
-    Source: celledoni-2019.
-
-    >>> from kahanmaps.algebra.text import parse_rational_function
-    >>> from kahanmaps.systems.quadratic import QuadraticSystem
     >>> system = QuadraticSystem.from_text(["x"], ["x^2"])
-    >>> str(density_verdict(system, parse_rational_function("x^2", ["x", "eps"]), None)[0])
+    >>> str(verdict_on(system, parse_rational_function("x^2", ["x", "eps"]), None, is_density=True)[0])
     'proved'
     """
-    condition = density_condition(density, system.dim, eps)
-    identity = _identity(system, density, eps, condition, of_density=True)
+    identity = _identity(system, function, eps, is_density)
     return judged(identity, seed, expands=system.dim <= MAX_DIMENSION)
 
 
@@ -87,9 +68,7 @@ def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verd
     return found.verdict, found.evidence
 
 
-def _identity(
-    system: QuadraticSystem, function: RationalFunction, eps: fmpq | None, condition: str, *, of_density: bool
-) -> Identity:
+def _identity(system: QuadraticSystem, function: RationalFunction, eps: fmpq | None, is_density: bool) -> Identity:
     """P(x~) Q(x) = P(x) Q(x~) for P/Q, of a density times the determinants: in x, the symbols and eps."""
     n = system.dim
 
@@ -104,16 +83,17 @@ def _identity(
         if field.is_zero(Q) or field.is_zero(Q_there):
             return None
         left, right = P_there * Q, P * Q_there
-        if of_density:
+        if is_density:
             above, below = map_.inverse.determinant(image), map_.determinant(point)
             if field.is_zero(above):
                 return None  # the map is not invertible here, and 0 = 0 says nothing
             left, right = left * below, right * above
         return [left], [right]
 
+    condition = (density_condition if is_density else integral_condition)(function, n, eps)
     step = "for every eps" if eps is None else f"for eps = {eps}"
     symbols = f" and every {', '.join(system.symbols)}" if system.symbols else ""
     told = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
     scope = f"{step}{symbols}{told}"
-    subject = (system.symbols, system.rhs, function, of_density)
+    subject = (system.symbols, system.rhs, function, is_density)
     return Identity(n + len(system.symbols), sides, eps, scope=scope, subject=subject)

@@ -29,7 +29,7 @@ from kahanmaps.laboratory.branches import Branches, Pattern, tell_apart
 from kahanmaps.laboratory.cofactors import Cofactor
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.hirota_kimura import Profile, orbit_profile
-from kahanmaps.laboratory.identities import integral_verdict
+from kahanmaps.laboratory.identities import verdict_on
 from kahanmaps.laboratory.inherited import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
@@ -389,7 +389,9 @@ def _independent(
         if _is_affine_integral(laboratory.system, function):
             verdict, evidence = Verdict.PROVED, _AFFINE_EVIDENCE
         else:
-            verdict, evidence = integral_verdict(laboratory.system, function, laboratory.eps, laboratory.seed)
+            verdict, evidence = verdict_on(
+                laboratory.system, function, laboratory.eps, laboratory.seed, is_density=False
+            )
         if verdict.holds:
             rows.append(row)
             found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, verdict, evidence))

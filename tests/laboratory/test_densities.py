@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from itertools import islice
 from types import SimpleNamespace
 
@@ -21,10 +21,12 @@ from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.laboratory import densities as module
 from kahanmaps.laboratory.densities import _space, find_densities
-from kahanmaps.laboratory.identities import density_verdict
+from kahanmaps.laboratory.identities import verdict_on
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import rank
 from kahanmaps.maps.kahan import KahanMap
+
+density_verdict = partial(verdict_on, is_density=True)
 
 # lorenz and kirchhoff_generic: searched as far as dimension and time allow, nothing found
 WITHOUT = ("lorenz", "kirchhoff_generic")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 from flint import fmpq
 
@@ -15,12 +17,13 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory import identities
 from kahanmaps.laboratory.darboux import darboux_polynomials
 from kahanmaps.laboratory.densities import find_densities
-from kahanmaps.laboratory.identities import density_verdict, integral_verdict
+from kahanmaps.laboratory.identities import verdict_on
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 ROTATION = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
 LOTKA_VOLTERRA = QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"])
+integral_verdict, density_verdict = partial(verdict_on, is_density=False), partial(verdict_on, is_density=True)
 VERDICTS = {False: integral_verdict, True: density_verdict}
 
 

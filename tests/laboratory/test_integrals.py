@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import re
-from functools import cache
+from functools import cache, partial
 
 import pytest
 from flint import fmpq
@@ -19,10 +19,11 @@ from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.hirota_kimura import Profile
-from kahanmaps.laboratory.identities import integral_verdict
+from kahanmaps.laboratory.identities import verdict_on
 from kahanmaps.laboratory.integrals import IntegralSearch, _is_affine_integral, closing_note, find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 
+integral_verdict = partial(verdict_on, is_density=False)
 PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
 LONG = ("henon_heiles", "paper_m2")
 EPS = ["1/10", "-2/7", "3"]
