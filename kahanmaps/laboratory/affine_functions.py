@@ -140,21 +140,22 @@ def affine_darboux(system: QuadraticSystem, *, seed: int = 0) -> AffineDarbouxLi
     if m == 0:
         return AffineDarbouxList((), True, "")
     coordinates = [[fmpq(int(i == j)) for i in range(n)] for j in range(n)]
-    only = "only factors of the right-hand sides were tried"
+
+    def only_factors(reason: str) -> AffineDarbouxList:
+        why = f"{reason}: only factors of the right-hand sides were tried"
+        return AffineDarbouxList(_factors_that_are(system, coordinates), False, why)
+
     if m > MAX_EXTACTIC_DIMENSION:
-        found = _factors_that_are(system, coordinates)
-        return AffineDarbouxList(found, False, f"more than {MAX_EXTACTIC_DIMENSION} variables: {only}")
+        return only_factors(f"more than {MAX_EXTACTIC_DIMENSION} variables")
     if system.digits > LONG_COEFFICIENTS:
-        found = _factors_that_are(system, coordinates)
-        return AffineDarbouxList(found, False, f"coefficients of more than {LONG_COEFFICIENTS} digits: {only}")
+        return only_factors(f"coefficients of more than {LONG_COEFFICIENTS} digits")
     local = system.over(QQ)
     # A hyperplane parallel to the line is not met by it, so the line must not be known to who writes the system.
     rng = random.Random(f"affine {seed_for(seed, system.rhs)}")
     start, direction = ([fmpq(rng.randint(-_LINE, _LINE)) for _ in range(n)] for _ in range(2))
     along = _determinant_along(local, start, direction, quotient.free)
     if along.degree() < 0:
-        reason = f"the extactic determinant vanishes identically, there may be infinitely many: {only}"
-        return AffineDarbouxList(_factors_that_are(system, coordinates), False, reason)
+        return only_factors("the extactic determinant vanishes identically, there may be infinitely many")
     complete = True
     candidates = []
     for t in _rational_roots(along):

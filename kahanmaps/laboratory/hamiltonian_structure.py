@@ -24,8 +24,6 @@ from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.integrals import ModifiedHamiltonian
-from kahanmaps.invariants.measures import DeterminantDensity
 from kahanmaps.laboratory.affine_functions import QuotientForms, affine_integrals, quotient_by
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -51,16 +49,6 @@ class ConstantStructures(Displayed):
     casimirs: tuple[fmpq_mpoly, ...]
     reason: str
     proved: bool
-
-    @property
-    def integral(self) -> ModifiedHamiltonian | None:
-        """The integral of the Kahan map that follows by cmoq-2013."""
-        return None if self.hamiltonian is None else ModifiedHamiltonian(self.hamiltonian)
-
-    @property
-    def density(self) -> DeterminantDensity | None:
-        """The density of an invariant measure of the Kahan map that follows by cmoq-2013."""
-        return None if self.hamiltonian is None else DeterminantDensity(self.system)
 
 
 def constant_structures(system: QuadraticSystem, *, seed: int = 0) -> ConstantStructures:

@@ -11,6 +11,7 @@ import random
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 from flint import fmpq
@@ -144,7 +145,7 @@ def height_survey(
             if orbits and time.monotonic() > deadline:
                 return HeightSurvey(tuple(orbits), False)
             progress(f"heights: eps = {value}, orbit {k + 1} of {len(given)}")
-            for candidate in _candidates(draws) if start is None else (start,):
+            for candidate in islice(draws, _DRAWS) if start is None else (start,):
                 found = height_growth(
                     kahan_map, candidate, steps, structure=structure, max_digits=max_digits, deadline=deadline
                 )
@@ -164,8 +165,3 @@ def _generic_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:
     rng = random.Random(f"heights {seed}")
     while True:
         yield tuple(fmpq(rng.choice((-1, 1)) * rng.choice(_NUMERATORS), rng.choice(_DENOMINATORS)) for _ in range(dim))
-
-
-def _candidates(draws: Iterator[tuple[fmpq, ...]]) -> Iterator[tuple[fmpq, ...]]:
-    for _ in range(_DRAWS):
-        yield next(draws)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
 from typing import Any
 
 from flint import nmod, nmod_mat, nmod_poly
@@ -85,23 +84,6 @@ class Step:
     limit: tuple[int, ...] = field(repr=False)
 
 
-def follow(
-    equation: Equation,
-    point: Sequence[int],
-    direction: Sequence[int],
-    tangents: Sequence[Sequence[int]],
-    prime: int,
-    steps: int,
-    precision: int,
-) -> list[Step]:
-    """The steps of the curve point + t direction and of its neighbours point + d_i tangent_i + t direction; exact.
-
-    The equation of the map is one over GF(p), points and vectors are residues (X : Z).
-    Raises PrecisionTooLow and NotGeneric.
-    """
-    return list(islice(walk(equation, point, direction, tangents, prime, precision), steps))
-
-
 def walk(
     equation: Equation,
     point: Sequence[int],
@@ -110,7 +92,11 @@ def walk(
     prime: int,
     precision: int,
 ) -> Iterator[Step]:
-    """As `follow`, step after step without an end."""
+    """The steps of the curve point + t direction and of its neighbours point + d_i tangent_i + t direction; exact.
+
+    The equation of the map is one over GF(p), points and vectors are residues (X : Z). Step after step without an end;
+    raises PrecisionTooLow and NotGeneric.
+    """
     X = [
         Jet(
             nmod_poly([x, v], prime).truncate(precision),

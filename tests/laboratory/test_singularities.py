@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
+from itertools import islice
 
 import pytest
 from flint import fmpq, nmod_poly
@@ -19,9 +20,9 @@ from kahanmaps.laboratory.jets import (
     Jet,
     NotGeneric,
     PrecisionTooLow,
-    follow,
     image_of,
     valuation,
+    walk,
 )
 from kahanmaps.laboratory.singularities import _range, default_eps, singularities, symbolic_denominator
 from kahanmaps.maps.kahan import KahanMap
@@ -262,6 +263,10 @@ def test_poles_and_critical_points_on_a_line_are_neither_at_infinity_nor_of_the_
 
 
 # --- the series ------------------------------------------------------------------------------------------------------
+
+
+def follow(equation, point, direction, tangents, prime, steps, precision):
+    return list(islice(walk(equation, point, direction, tangents, prime, precision), steps))
 
 
 def test_a_generic_point_loses_no_rank_and_follows_the_map():
