@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.text import format_number
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.files import SystemFile
@@ -62,22 +63,17 @@ class Analysis(Findings, Displayed):
         from kahanmaps.version import __version__
 
         final = self.conclusion
-
-        def part(result: Any) -> Any:
-            return None if result is None else result.to_json()
-
+        runs = [attributes(run, "eps", "verdict", "followed", "text") for run in self.singularities]
         return {
             "command": "analyze",
             "version": __version__,
             "system": self.file.name,
-            "parameters": {name: format_number(value) for name, value in self.file.parameters.items()},
-            "symbols": list(self.symbols),
+            **attributes(self.file, "parameters"),
+            **attributes(self, "symbols"),
             "eps": "every" if self.eps is None else format_number(self.eps),
             "time_step": "every" if self.eps is None else format_number(2 * self.eps),
             "convention": CONVENTION,
-            "seed": self.seed,
-            "seconds": self.seconds,
-            "dim": self.dim,
+            **attributes(self, "seed", "seconds", "dim"),
             "verdict": {
                 "integrability": final.kind,
                 "integrals": final.integrals if self.integrals_were_counted else None,
@@ -86,21 +82,15 @@ class Analysis(Findings, Displayed):
                 "sentence": final.sentence,
             },
             "statements": [
-                {"section": title, "status": line.status, "text": line.text}
+                {"section": title, **attributes(line, "status", "text")}
                 for title, lines in self.sections
                 for line in lines
             ],
-            "integrals": part(self.integrals),
+            **attributes(self, "integrals"),
             "hirota_kimura": [relation.text for relation in self.relations],
-            "densities": part(self.densities),
-            "degrees": part(self.degrees),
-            "heights": part(self.heights),
-            "singularities": [
-                {"eps": format_number(run.eps), "verdict": run.verdict, "followed": run.followed, "text": run.text}
-                for run in self.singularities
-            ],
-            "symmetries": part(self.symmetries),
-            "commuting": part(self.commuting),
+            **attributes(self, "densities", "degrees", "heights"),
+            "singularities": runs,
+            **attributes(self, "symmetries", "commuting"),
             "family": self.structure.text if isinstance(self.structure, Structure) else None,
             "skipped": self.skipped,
             "document": dict(self.file.document),

@@ -18,9 +18,10 @@ from flint import fmpq, fmpq_mat
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import combination_of, primitive_integers
+from kahanmaps.algebra.plain import attributes, plain
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import Component, decoupling, normal_form, solve_system, without_contained
-from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Finding, Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
@@ -64,11 +65,9 @@ class CommutingField:
     def to_json(self) -> dict[str, Any]:
         """Plain data: rhs, B, trivial, verdict and evidence."""
         return {
-            "rhs": self.rhs,
-            "B": None if self.B is None else _rows(self.B),
+            **attributes(self, "rhs", "B"),
             "trivial": self.trivial or None,
-            "verdict": str(self.finding.verdict),
-            "evidence": self.finding.evidence.to_json(),
+            **attributes(self.finding, "verdict", "evidence"),
         }
 
 
@@ -84,10 +83,9 @@ class CommutingFamily:
         """Plain data: base, directions (rhs and B), verdict and evidence."""
         return {
             "parameters": len(self.directions),
-            "base": {"rhs": self.base.rhs, "B": self.base.to_json()["B"]},
-            "directions": [{"rhs": d.rhs, "B": d.to_json()["B"]} for d in self.directions],
-            "verdict": str(self.finding.verdict),
-            "evidence": self.finding.evidence.to_json(),
+            "base": attributes(self.base, "rhs", "B"),
+            "directions": [attributes(direction, "rhs", "B") for direction in self.directions],
+            **attributes(self.finding, "verdict", "evidence"),
         }
 
 
@@ -131,20 +129,12 @@ class CommutingSystems(Displayed):
     def to_json(self) -> dict[str, Any]:
         """Plain data, the shape that scripts rely on."""
         return {
-            "shape": self.shape,
+            **attributes(self, "shape"),
             "status": "complete" if self.complete else "undecided",
-            "verdict": str(self.verdict),
-            "bracket_space": {
-                "dimension": self.dimension,
-                "basis": [[format_polynomial(p) for p in g.rhs] for g in self.basis],
-            },
-            "solutions": [g.to_json() for g in self.solutions],
-            "families": [family.to_json() for family in self.families],
-            "every_g_commutes": self.every_g_commutes,
-            "irrational": self.irrational,
-            "discarded": self.discarded,
-            "order": self.order,
-            "undecided": self.undecided,
+            **attributes(self, "verdict"),
+            "bracket_space": {"dimension": self.dimension, "basis": plain([g.rhs for g in self.basis])},
+            **attributes(self, "solutions", "families", "every_g_commutes"),
+            **attributes(self, "irrational", "discarded", "order", "undecided"),
         }
 
 
@@ -340,7 +330,3 @@ class _Search:
 def _up_to_sign(weights: tuple[fmpq, ...]) -> tuple[Any, ...]:
     lead = next(w for w in weights if w != 0)
     return (*(abs(w) for w in weights), *(w * (1 if lead > 0 else -1) for w in weights), lead < 0)
-
-
-def _rows(matrix: fmpq_mat) -> list[list[str]]:
-    return [[format_number(entry) for entry in row] for row in matrix.tolist()]

@@ -15,8 +15,8 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate
-from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import Displayed, latex
@@ -52,12 +52,8 @@ class DarbouxPolynomials:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "cofactor": self.cofactor,
-            "polynomials": [format_polynomial(P) for P in self.polynomials],
-            "latex": [latex(P) for P in self.polynomials],
-            "verdict": str(self.verdict),
-        }
+        formulas = [latex(P) for P in self.polynomials]
+        return {**attributes(self, "cofactor", "polynomials"), "latex": formulas, **attributes(self, "verdict")}
 
 
 @dataclass
@@ -76,13 +72,7 @@ class DarbouxSearch(Displayed):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "degree": self.degree,
-            "cofactors": list(self.cofactors),
-            "spaces": [space.to_json() for space in self.spaces],
-            "reason": self.reason,
-            "primes": [str(prime) for prime in self.primes],
-        }
+        return attributes(self, "degree", "cofactors", "spaces", "reason", "primes")
 
 
 def darboux_polynomials(

@@ -27,11 +27,12 @@ from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.text import format_number
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.laboratory.curves import Line, Stopped
-from kahanmaps.laboratory.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence, rate_json
+from kahanmaps.laboratory.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence
 from kahanmaps.laboratory.singularities import MAX_STEPS, Patterns
 from kahanmaps.laboratory.singularities import patterns as patterns_of_map
 from kahanmaps.maps.implicit import BirationalMap
@@ -177,25 +178,15 @@ class DegreeGrowth(Displayed):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; primes are text, for they exceed what readers of JSON hold exactly."""
-        rate = self.dynamical_degree
+        lines = zip(self.primes, self.residues, strict=True)
+        names = ("growth", "growth_text", "dynamical_degree", "estimate", "looks_exponential", "recurrence")
         return {
-            "degrees": list(self.degrees),
+            **attributes(self, "degrees"),
             "eps": "generic" if self.eps is None else format_number(self.eps),
-            "ended": self.ended,
-            "message": self.message,
-            "seed": self.seed,
-            "lines": [
-                {"prime": str(p), "eps_residue": str(e)} for p, e in zip(self.primes, self.residues, strict=True)
-            ],
-            "growth": str(self.growth),
-            "growth_text": self.growth_text,
-            "dynamical_degree": None if rate is None else rate_json(rate),
-            "estimate": self.estimate,
-            "looks_exponential": self.looks_exponential,
-            "recurrence": None if self.recurrence is None else self.recurrence.to_json(),
-            "singularities": None if self.patterns is None else self.patterns.to_json(),
-            "unconfirmed": self.unconfirmed,
-            "notes": list(self.notes),
+            **attributes(self, "ended", "message", "seed"),
+            "lines": [{"prime": str(p), "eps_residue": str(e)} for p, e in lines],
+            **attributes(self, *names, singularities="patterns"),
+            **attributes(self, "unconfirmed", "notes"),
         }
 
 

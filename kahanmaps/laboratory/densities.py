@@ -15,6 +15,7 @@ from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
 
+from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, primitive_part
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
@@ -57,12 +58,7 @@ class FoundDensity:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "phi": self.text,
-            "latex": latex(self.function),
-            "verdict": str(self.verdict),
-            "evidence": self.evidence.to_json(),
-        }
+        return {"phi": self.text, "latex": latex(self.function), **attributes(self, "verdict", "evidence")}
 
 
 @dataclass(frozen=True)
@@ -91,14 +87,8 @@ class DensitySearch(Displayed):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "densities": [one.to_json() for one in self.densities],
-            "degree_tried": self.degree,
-            "period": self.period,
-            "note": self.note,
-            "reason": self.reason,
-            "primes": [str(prime) for prime in self.primes],
-        }
+        more = attributes(self, "period", "note", "reason", "primes")
+        return {**attributes(self, "densities", degree_tried="degree"), **more}
 
     def toml_section(self) -> str:
         """The first density as a section [density] of a system file, which `check-measure` accepts.

@@ -18,7 +18,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
-from kahanmaps.algebra.text import format_number
+from kahanmaps.algebra.plain import attributes
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
@@ -47,8 +47,7 @@ class SurveyedOrbit:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        numbers = [format_number(entry) for entry in self.start]
-        return {"eps": format_number(self.eps), "start": numbers, **self.growth.to_json()}
+        return {**attributes(self, "eps", "start"), **self.growth.to_json()}
 
 
 @dataclass(frozen=True)
@@ -96,13 +95,7 @@ class HeightSurvey(Displayed):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "kind": str(self.kind),
-            "kinds": [str(kind) for kind in self.kinds],
-            "text": self.text,
-            "whole": self.is_whole,
-            "orbits": [orbit.to_json() for orbit in self.orbits],
-        }
+        return attributes(self, "kind", "kinds", "text", whole="is_whole", orbits="orbits")
 
 
 def height_survey(

@@ -21,6 +21,7 @@ from typing import Any
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
@@ -96,14 +97,8 @@ class Profile:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "nullities": list(self.nullities),
-            "codimensions": list(self.codimensions),
-            "codimension": self.codimension,
-            "period": self.period,
-            "maps_agree": self.agree,
-            "complete": self.complete,
-        }
+        names = ("nullities", "codimensions", "codimension", "period")
+        return attributes(self, *names, maps_agree="agree", complete="complete")
 
 
 def relations_on_orbit(map_: ModularMap, degree: int, start: Point | None = None) -> OrbitRelations:
@@ -219,13 +214,9 @@ class Basis:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "functions": list(self.functions),
-            "dimension": self.dimension,
-            "integrals": [[not same for same in row] for row in self.constant],
-            "orbits_agree": self.agree,
-            "period": self.period,
-        }
+        integrals = [[not same for same in row] for row in self.constant]
+        more = attributes(self, orbits_agree="agree", period="period")
+        return {**attributes(self, "functions", "dimension"), "integrals": integrals, **more}
 
 
 def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpoly], names: Sequence[str]) -> Basis:

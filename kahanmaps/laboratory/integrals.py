@@ -19,6 +19,7 @@ from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate, ring
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
@@ -66,14 +67,12 @@ class FoundIntegral:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
+        degrees = [degree(self.function.numerator), degree(self.function.denominator)]
         return {
-            "name": self.name,
-            "integral": self.text,
+            **attributes(self, "name", integral="text"),
             "latex": latex(self.function),
-            "degrees": [degree(self.function.numerator), degree(self.function.denominator)],
-            "origin": self.origin,
-            "verdict": str(self.verdict),
-            "evidence": self.evidence.to_json(),
+            "degrees": degrees,
+            **attributes(self, "origin", "verdict", "evidence"),
         }
 
 
@@ -141,15 +140,11 @@ class IntegralSearch(Displayed):
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            "integrals": [one.to_json() for one in self.integrals],
+            **attributes(self, "integrals"),
             "found": len(self.integrals),
-            "codimension": self.codimension,
-            "codimension_is_exact": self.is_exact,
-            "by_theorems": self.by_theorems,
-            "relations": self.profile.to_json(),
-            "note": self.note,
-            "reason": self.reason,
-            "primes": [str(prime) for prime in self.primes],
+            **attributes(self, "codimension", codimension_is_exact="is_exact"),
+            **attributes(self, "by_theorems", relations="profile"),
+            **attributes(self, "note", "reason", "primes"),
         }
 
     def toml_section(self) -> str:

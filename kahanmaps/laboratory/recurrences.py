@@ -20,6 +20,7 @@ from typing import Any
 import flint
 from flint import arb, fmpq, fmpq_mat, fmpq_poly, fmpz_mod_ctx, fmpz_mod_poly_ctx, fmpz_poly
 
+from kahanmaps.algebra.plain import attributes, plain
 from kahanmaps.algebra.text import format_univariate
 from kahanmaps.errors import InputError
 
@@ -59,6 +60,12 @@ class GrowthRate:
         if self.minimal_polynomial.degree() == 1:
             return str(-self.minimal_polynomial[0])
         return f"{self.digits}, root of {format_univariate(fmpq_poly(self.minimal_polynomial))}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; coefficients are text, from x^0 up."""
+        coefficients = plain(self.minimal_polynomial.coeffs())
+        size = attributes(self, value="digits", enclosure="enclosure")
+        return {**size, "minimal_polynomial": coefficients, "multiplicity": self.multiplicity}
 
 
 @dataclass(frozen=True)
@@ -187,19 +194,11 @@ class Recurrence:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; coefficients are text, from x^0 up."""
-        rate = self.rate
         return {
-            "order": self.order,
-            "preperiod": self.preperiod,
-            "terms": self.terms,
-            "checked": self.checked,
-            "characteristic": [str(c) for c in self.characteristic.coeffs()],
+            **attributes(self, "order", "preperiod", "terms", "checked"),
+            "characteristic": plain(self.characteristic.coeffs()),
             "factors": [{"factor": str(factor), "multiplicity": k} for factor, k in self.factors],
-            "growth": str(self.growth),
-            "power": self.power,
-            "rate": None if rate is None else rate_json(rate),
-            "closed_form": self.closed_form,
-            "text": self.text,
+            **attributes(self, "growth", "power", "rate", "closed_form", "text"),
         }
 
     def _extended(self, length: int) -> list[int]:
@@ -245,16 +244,6 @@ def find_recurrence(values: Sequence[int]) -> Recurrence | None:
 def needed_checks(order: int) -> int:
     """The number of held-out terms without which a recurrence of this order is not accepted."""
     return max(2, -(-order // 3))
-
-
-def rate_json(rate: GrowthRate) -> dict[str, Any]:
-    """A growth rate as plain data."""
-    return {
-        "value": rate.digits,
-        "enclosure": rate.enclosure,
-        "minimal_polynomial": [str(c) for c in rate.minimal_polynomial.coeffs()],
-        "multiplicity": rate.multiplicity,
-    }
 
 
 @functools.cache

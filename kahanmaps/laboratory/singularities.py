@@ -23,6 +23,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_number, format_polynomial
@@ -244,13 +245,7 @@ class Patterns:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "lengths": list(self.lengths),
-            "searched": self.searched,
-            "some_confined": self.some_confined,
-            "running": self.running,
-            "text": self.text,
-        }
+        return attributes(self, "lengths", "searched", "some_confined", "running", "text")
 
 
 def patterns_of(runs: Sequence[SingularityRun]) -> Patterns:

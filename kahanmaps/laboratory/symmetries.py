@@ -18,9 +18,10 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers
+from kahanmaps.algebra.plain import attributes, plain
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.small_systems import solve_system
-from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.signed_permutations import MAX_DIMENSION as MAX_SIGNED
@@ -55,14 +56,8 @@ class Symmetry:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: S, r, what it is, the action as text."""
-        return {
-            "kind": "reversing symmetry" if self.reversing else "symmetry",
-            "S": [[format_number(e) for e in row] for row in self.S.tolist()],
-            "r": [format_number(e) for e in self.r],
-            "text": self.text,
-            "obvious": self.obvious,
-            "verdict": "proved",
-        }
+        kind = "reversing symmetry" if self.reversing else "symmetry"
+        return {"kind": kind, **attributes(self, "S", "r", "text", "obvious"), "verdict": "proved"}
 
 
 @dataclass(frozen=True)
@@ -89,13 +84,7 @@ class Infinitesimal:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: S, s, weight, the components as text."""
-        return {
-            "S": [[format_number(e) for e in row] for row in self.S.tolist()],
-            "s": [format_number(e) for e in self.s],
-            "rhs": self.rhs,
-            "weight": self.weight,
-            "verdict": "proved",
-        }
+        return {**attributes(self, "S", "s", "rhs", "weight"), "verdict": "proved"}
 
 
 @dataclass
@@ -134,22 +123,21 @@ class Symmetries(Displayed):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, the shape that scripts rely on."""
+        group = {
+            "of": "signed permutations",
+            "order": self.order,
+            "symmetries": sum(not t.reversing for t in self.signed),
+            "reversing_symmetries": sum(t.reversing for t in self.signed),
+            **attributes(self, "generators"),
+        }
+        listed = {"symmetries": self.symmetries[:MAX_LISTED], "reversing_symmetries": self.reversing[:MAX_LISTED]}
         return {
             "status": "complete" if self.complete else "undecided",
-            "infinitesimal": [x.to_json() for x in self.infinitesimal],
-            "scaling": None if self.scaling is None else self.scaling.to_json(),
-            "group": {
-                "of": "signed permutations",
-                "order": self.order,
-                "symmetries": sum(not t.reversing for t in self.signed),
-                "reversing_symmetries": sum(t.reversing for t in self.signed),
-                "generators": [t.to_json() for t in self.generators],
-            },
-            "listed": min(MAX_LISTED, len(self.symmetries)) + min(MAX_LISTED, len(self.reversing)),
-            "symmetries": [t.to_json() for t in self.symmetries[:MAX_LISTED]],
-            "reversing_symmetries": [t.to_json() for t in self.reversing[:MAX_LISTED]],
-            "searched": self.searched,
-            "undecided": self.undecided,
+            **attributes(self, "infinitesimal", "scaling"),
+            "group": group,
+            "listed": sum(map(len, listed.values())),
+            **plain(listed),
+            **attributes(self, "searched", "undecided"),
         }
 
 
