@@ -91,13 +91,6 @@ class QuotientForms:
         """The rows of a matrix that belong to the free coordinates."""
         return fmpq_mat([[matrix[i, j] for j in range(matrix.ncols())] for i in self.free])
 
-    @property
-    def coordinates(self) -> fmpq_mat:
-        """The matrix T of (y, z) = T x; its inverse begins with the columns of `section`."""
-        n = self.section.nrows()
-        units = [[fmpq(int(i == j)) for j in range(n)] for i in self.free]
-        return fmpq_mat([*units, *([fmpq(entry) for entry in vector] for vector in self.integrals)])
-
 
 def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
     """The linear forms of n variables modulo the independent forms `integrals`; the first coordinates that do.
@@ -112,8 +105,8 @@ def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
         if rank(QQ, fmpq_mat(more)) == len(more):
             rows = more
             free.append(j)
-    quotient = QuotientForms(tuple(integrals), tuple(free), fmpq_mat(n, len(free)))
-    inverse = quotient.coordinates.inv()
+    coordinates = fmpq_mat([*rows[len(integrals) :], *rows[: len(integrals)]])  # (y, z) as forms of x
+    inverse = coordinates.inv()
     section = fmpq_mat(n, len(free), [inverse[i, j] for i in range(n) for j in range(len(free))])
     return QuotientForms(tuple(integrals), tuple(free), section)
 

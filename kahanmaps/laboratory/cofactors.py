@@ -22,13 +22,7 @@ from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField,
 from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
-from kahanmaps.laboratory.modular_points import (
-    ModularMap,
-    Point,
-    exponents_up_to,
-    monomial_values,
-    null_space,
-)
+from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, monomial_values, null_space
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 _SPARE = 8

@@ -21,14 +21,7 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.laboratory.cofactors import (
-    Cofactor,
-    CofactorProduct,
-    Sample,
-    cofactor_space,
-    points_needed,
-    products,
-)
+from kahanmaps.laboratory.cofactors import Cofactor, CofactorProduct, Sample, cofactor_space, points_needed, products
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.identities import judged
 from kahanmaps.laboratory.laboratory import Laboratory

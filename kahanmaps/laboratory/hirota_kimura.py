@@ -42,19 +42,17 @@ _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 
 @dataclass(frozen=True)
 class OrbitRelations:
-    """The polynomials of degree at most `degree` that vanish along one orbit.
+    """The polynomials up to a degree that vanish along one orbit.
 
-    `vectors` is the reduced echelon basis on the monomials `exponents_up_to(dim, degree)`; `normals` span their
+    `vectors` is the reduced echelon basis on the monomials `exponents_up_to` that degree; `normals` span their
     gradients at the last point, `end`, and `codimension` is the rank of these; `period` is the number of points of an
     orbit that closed, else None.
     """
 
-    degree: int
     vectors: list[list[int]]
     normals: list[list[int]]
     codimension: int
     period: int | None
-    start: Point
     end: Point
 
 
@@ -101,18 +99,18 @@ class Profile:
         return attributes(self, *names, maps_agree="agree", complete="complete")
 
 
-def relations_on_orbit(map_: ModularMap, degree: int, start: Point | None = None) -> OrbitRelations:
-    """The polynomials of degree at most `degree` that vanish along an orbit (a random one) modulo a prime.
+def relations_on_orbit(map_: ModularMap, degree: int) -> OrbitRelations:
+    """The polynomials of degree at most `degree` that vanish along a random orbit modulo a prime.
 
     Raises NoPoint where orbits meet the singular set.
     """
     unknowns = comb(map_.dim + degree, degree)
     count = unknowns + _SPARE
-    points = map_.orbit(count, start)
+    points = map_.orbit(count)
     period = len(points) if len(points) < count else None
     vectors = null_space([monomial_values(x, degree, map_.prime) for x in points], unknowns, map_.prime)
     normals = _normals(map_, vectors, degree, points[-1])
-    return OrbitRelations(degree, vectors, normals, rank(normals, map_.prime), period, points[0], points[-1])
+    return OrbitRelations(vectors, normals, rank(normals, map_.prime), period, points[-1])
 
 
 def span_of_relations(map_: ModularMap, degree: int, seconds: float = 30.0) -> list[list[int]]:

@@ -16,6 +16,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 Point = tuple[int, ...]
 _TRIES = 60
+_NO_VALUE = "the map has no value at random points modulo a prime"
 
 
 class NoPoint(KahanmapsError):
@@ -67,33 +68,24 @@ class ModularMap:
             else:
                 missed += 1
                 if missed > _TRIES:
-                    raise NoPoint("the map has no value at random points modulo a prime")
+                    raise NoPoint(_NO_VALUE)
 
-    def orbit(self, count: int, start: Point | None = None) -> list[Point]:
+    def orbit(self, count: int) -> list[Point]:
         """Up to `count` points of an orbit; fewer where it is periodic: then all of its points.
 
         An orbit that meets the singular set is given up for another. Raises NoPoint where all do.
         """
         longest = 0
         for _ in range(_TRIES):
-            x = self.random_point() if start is None else start
-            found, first = [x], x
-            while len(found) < count:
-                image = self.step(x)
-                if image is None or image == first:
+            found = [self.random_point()]
+            while len(found) < count and (image := self.step(found[-1])) != found[0]:
+                if image is None:
                     break
                 found.append(image)
-                x = image
             else:
                 return found
-            if image is not None:
-                return found
             longest = max(longest, len(found))
-            if start is not None:
-                break
-        if longest == 1:
-            raise NoPoint("the map has no value at random points modulo a prime")
-        raise NoPoint("orbits modulo a prime meet the singular set")
+        raise NoPoint(_NO_VALUE if longest == 1 else "orbits modulo a prime meet the singular set")
 
 
 @cache
