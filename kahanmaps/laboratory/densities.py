@@ -139,54 +139,48 @@ def find_densities(
     if max_degree is not None and max_degree < 0:
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed)
-    deadline = time.monotonic() + seconds
-    dim = file.system.dim
-    top = max_degree if max_degree is not None else _MAX_DEGREE
-    top = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0)
-    tried, reason = -1, ""
+    densities, tried, reason, period = list[FoundDensity](), -1, laboratory.defect, None
+    if not reason:
+        period = _period(laboratory)
+        densities, tried, reason = _search(laboratory, max_degree, time.monotonic() + seconds, progress)
+    return DensitySearch(
+        file,
+        laboratory.symbols,
+        laboratory.eps,
+        tuple(densities),
+        tried,
+        "" if densities else reason,
+        laboratory.primes,
+        seed,
+        period,
+    )
 
-    def result(densities: Sequence[FoundDensity]) -> DensitySearch:
-        return DensitySearch(
-            file,
-            laboratory.symbols,
-            laboratory.eps,
-            tuple(densities),
-            tried,
-            "" if densities else reason,
-            laboratory.primes,
-            seed,
-            period,
-        )
 
-    period: int | None = None
-    if laboratory.defect:
-        reason = laboratory.defect
-        return result([])
-    period = _period(laboratory)
+def _search(
+    laboratory: Laboratory, max_degree: int | None, deadline: float, progress: Callable[[str], None]
+) -> tuple[list[FoundDensity], int, str]:
+    """Densities, the largest degree that was tried, and why there are none."""
+    dim = laboratory.system.dim
     theorem = _theorem(laboratory)
     if theorem is not None:
         of_theorem = _degree_in(theorem.function.numerator, dim)
         if max_degree is None or of_theorem <= max_degree:
-            tried = of_theorem
-            return result([theorem])
-    try:
-        for degree in range(top + 1):
-            if time.monotonic() > deadline:
-                reason = f"the time was over at degree {degree}"
-                return result([])
-            progress(f"densities of degree {degree}")
+            return [theorem], of_theorem, ""
+    top = max_degree if max_degree is not None else _MAX_DEGREE
+    top = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0)
+    for degree in range(top + 1):
+        if time.monotonic() > deadline:
+            return [], degree - 1, f"the time was over at degree {degree}"
+        progress(f"densities of degree {degree}")
+        try:
             for inverse in (False, True):
                 first, second = (_space(map_, degree, inverse) for map_ in laboratory.maps)
                 if first.basis and len(first.basis) == len(second.basis):
-                    tried = degree
                     found, reason = _formulas(laboratory, first, degree, inverse, deadline)
-                    return result(found)
-            tried = degree
-    except NoPoint as error:
-        reason = str(error)
-        return result([])
-    reason = f"no polynomial of degree at most {tried}, and no reciprocal of one, is a density"
-    return result([])
+                    return found, degree, reason
+        except NoPoint as error:
+            return [], degree - 1, str(error)
+    return [], top, f"no polynomial of degree at most {top}, and no reciprocal of one, is a density"
 
 
 def _theorem(laboratory: Laboratory) -> FoundDensity | None:

@@ -43,15 +43,7 @@ class Laboratory:
             raise InputError("found eps both as a number and as a symbol, expected one of the two")
         self.system = with_symbols(file, self.symbols)
         self.seed = seed_for(seed, self.symbols, self.system.rhs, self.eps)  # of all that is drawn for this system
-        rng = random.Random(f"laboratory {self.seed}")
-        self.maps: list[ModularMap] = []
-        while len(self.maps) < 2:
-            prime = random_prime(rng)
-            values = [rng.randrange(2, prime) for _ in self.symbols]
-            try:
-                self.maps.append(self.map_at(prime, values, rng.randrange(2, prime)))
-            except BadPrime:
-                continue
+        self.maps = list(self._drawn("laboratory", 2))
 
     def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:
         """The map modulo a prime; the residue `eps` counts only where eps is no given number. Raises BadPrime."""
@@ -68,7 +60,10 @@ class Laboratory:
 
     def other_maps(self, count: int) -> Iterator[ModularMap]:
         """So many maps modulo further primes, each at other random residues of the symbols and eps."""
-        rng = random.Random(f"other maps {self.seed}")
+        return self._drawn("other maps", count)
+
+    def _drawn(self, name: str, count: int) -> Iterator[ModularMap]:
+        rng = random.Random(f"{name} {self.seed}")
         while count > 0:
             prime = random_prime(rng)
             try:
