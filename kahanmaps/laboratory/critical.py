@@ -14,7 +14,6 @@ from typing import Any
 
 from flint import nmod_poly
 
-from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.laboratory.jets import Jet
 from kahanmaps.maps.implicit import Equation
@@ -33,7 +32,7 @@ class CriticalPoint:
 
 
 def critical_points(
-    equation: Equation, inverse: Equation, field: PrimeField, rng: random.Random
+    equation: Equation, inverse: Equation, rng: random.Random
 ) -> tuple[list[CriticalPoint], dict[int, int]]:
     """The critical points modulo p on a random line that are neither poles nor at infinity; exact.
 
@@ -41,8 +40,8 @@ def critical_points(
     points and, for each multiplicity, the number of zeros of E over the closure of GF(p): there may be zeros without
     points in GF(p).
     """
-    a, b, line = _random_line(equation, field, rng)
-    p = field.prime
+    a, b, line = _random_line(equation, rng)
+    p = equation.over.characteristic
     image = kernel_minors(equation.rows(equation.monomials(line), nmod_poly([], p)))
     common = nmod_poly([], p)
     for entry in image:
@@ -54,23 +53,20 @@ def critical_points(
     def E(X: Sequence[Any], zero: Any) -> Any:
         return _denominator(inverse, kernel_minors(equation.rows(equation.monomials(X), zero)), zero)
 
-    return _zeros(value, E, a, b, field, rng)
+    return _zeros(value, E, a, b, rng)
 
 
-def pole_points(
-    equation: Equation, field: PrimeField, rng: random.Random
-) -> tuple[list[CriticalPoint], dict[int, int]]:
+def pole_points(equation: Equation, rng: random.Random) -> tuple[list[CriticalPoint], dict[int, int]]:
     """The poles modulo p on a random line that are not at infinity, as `critical_points` gives critical points."""
-    a, b, line = _random_line(equation, field, rng)
-    value = _without(_denominator(equation, line, nmod_poly([], field.prime)), line[-1])
-    return _zeros(value, lambda X, zero: _denominator(equation, X, zero), a, b, field, rng)
+    a, b, line = _random_line(equation, rng)
+    value = _without(_denominator(equation, line, nmod_poly([], equation.over.characteristic)), line[-1])
+    return _zeros(value, lambda X, zero: _denominator(equation, X, zero), a, b, rng)
 
 
-def _random_line(
-    equation: Equation, field: PrimeField, rng: random.Random
-) -> tuple[list[int], list[int], list[nmod_poly]]:
-    a, b = ([rng.randrange(field.prime) for _ in range(equation.dim + 1)] for _ in range(2))
-    return a, b, [nmod_poly([x, v], field.prime) for x, v in zip(a, b, strict=True)]
+def _random_line(equation: Equation, rng: random.Random) -> tuple[list[int], list[int], list[nmod_poly]]:
+    p = equation.over.characteristic
+    a, b = ([rng.randrange(p) for _ in range(equation.dim + 1)] for _ in range(2))
+    return a, b, [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
 
 
 def _without(value: nmod_poly, *others: nmod_poly) -> nmod_poly:
@@ -86,20 +82,20 @@ def _zeros(
     function: Callable[[Sequence[Any], Any], Any],
     a: Sequence[int],
     b: Sequence[int],
-    field: PrimeField,
     rng: random.Random,
 ) -> tuple[list[CriticalPoint], dict[int, int]]:
     """The zeros in GF(p) of a function that has the given value on the line, and how many there are in all."""
     if value.degree() < 1:
         return [], {}
+    p = value.modulus()
     found, degrees = [], dict[int, int]()
     for factor, exponent in value.factor()[1]:
         power = int(exponent)
         degrees[power] = degrees.get(power, 0) + int(factor.degree())
         if factor.degree() == 1:
             s = -int(factor[0])
-            point = [(x + s * v) % field.prime for x, v in zip(a, b, strict=True)]
-            gradient = _gradient(function, point, power, field, rng)
+            point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
+            gradient = _gradient(function, point, power, p, rng)
             if any(gradient):
                 found.append(CriticalPoint(tuple(point), tuple(gradient), power))
     return found, degrees
@@ -109,11 +105,11 @@ def _gradient(
     function: Callable[[Sequence[Any], Any], Any],
     point: Sequence[int],
     power: int,
-    field: PrimeField,
+    p: int,
     rng: random.Random,
 ) -> list[int]:
     """The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is (t F_v + d F_w)^power G + ..."""
-    p, size, n = field.prime, len(point), power + 1
+    size, n = len(point), power + 1
     zero, one = nmod_poly([], p), nmod_poly([1], p)
     curve = [
         Jet(nmod_poly([x, rng.randrange(p)], p), [one if i == k else zero for i in range(size)], n)

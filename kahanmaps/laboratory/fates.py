@@ -145,7 +145,7 @@ def fate_of(
         if place is None or field.prime in primes:
             continue
         try:
-            fates.append(_fate_at(equation, *place, field, rng, limits, len(fates[0].steps) if fates else None))
+            fates.append(_fate_at(equation, *place, rng, limits, len(fates[0].steps) if fates else None))
             primes.append(field.prime)
         except NotGeneric:
             continue
@@ -183,10 +183,10 @@ def fates_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: 
             equation = map_.at(eps, field).equation
             point = [rng.randrange(field.prime) for _ in range(map_.dim)] + [0]
             tangents = _tangents(point, [0] * map_.dim + [1], field)
-            event = _first_event(equation, point, field, rng, limits)
+            event = _first_event(equation, point, rng, limits)
             fate = _UNKNOWN
             if tangents is not None:
-                fate = _fate_at(equation, point, tangents, field, rng, limits, event=event)
+                fate = _fate_at(equation, point, tangents, rng, limits, event=event)
         except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
@@ -212,19 +212,19 @@ def _at_random(
             equation, inverse = here.equation, here.inverse.equation
         except BadPrime:
             continue
-        points, seen = pole_points(equation, field, rng) if poles else critical_points(equation, inverse, field, rng)
+        points, seen = pole_points(equation, rng) if poles else critical_points(equation, inverse, rng)
         degrees |= seen
         whole = whole or sum(seen.values()) == len(points)
         for critical in points:
             tangents = _tangents(critical.point, critical.gradient, field)
             if tangents is None or limits.is_over:
                 continue
-            event = _first_event(equation, critical.point, field, rng, limits) if limits.briefly else None
+            event = _first_event(equation, critical.point, rng, limits) if limits.briefly else None
             seen_so[critical.multiplicity, event] = seen_so.get((critical.multiplicity, event), 0) + 1
             if event and seen_so[critical.multiplicity, event] > _SAME:
                 continue
             try:
-                fate = _fate_at(equation, critical.point, tangents, field, rng, limits, event=event)
+                fate = _fate_at(equation, critical.point, tangents, rng, limits, event=event)
             except NotGeneric:
                 continue
             except PrecisionTooLow:
@@ -262,7 +262,6 @@ def _fate_at(
     equation: Equation,
     point: Sequence[int],
     tangents: list[list[int]],
-    field: PrimeField,
     rng: random.Random,
     limits: Range,
     shown: int | None = None,
@@ -272,11 +271,11 @@ def _fate_at(
 
     In `shown` steps only where that is given, and in steps just beyond the first event where these tell enough.
     """
-    p, full = field.prime, len(tangents)
-    direction = [rng.randrange(p) for _ in point]
+    full = len(tangents)
+    direction = [rng.randrange(equation.over.characteristic) for _ in point]
 
     def followed(steps: int) -> tuple[Step, ...]:
-        run, is_whole = _walked(equation, point, direction, tangents, p, steps, limits.end)
+        run, is_whole = _walked(equation, point, direction, tangents, steps, limits.end)
         if not is_whole:
             raise PrecisionTooLow
         return tuple(run)
@@ -295,13 +294,13 @@ def _fate_at(
         # A hypersurface that comes back to one that is contracted shares the fate of that one from then on.
         return _Fate(status, down, up, run, len(run), again if again is not None else up or 0)
     reach = limits.reach if up is None else min(limits.reach, len(run) + _FREE_STEPS)
-    hit, reached = _next_hit(equation, run[-1].limit, p, len(run), reach, limits)
+    hit, reached = _next_hit(equation, run[-1].limit, len(run), reach, limits)
     if hit is None:
         return _Fate(status, down, up, run, reached, up or last)
     if up is not None:
         return _Fate(status, down, up, run, hit, hit)
     orders, _ = _walked(
-        equation, point, direction, [], p, min(limits.reach, max(limits.along, 2 * hit)), limits.end, most=_MOST_ALONG
+        equation, point, direction, [], min(limits.reach, max(limits.along, 2 * hit)), limits.end, most=_MOST_ALONG
     )
     # What a pattern without an end meets on its way may show in the order of the denominator only.
     known = [step.denominator for step in takewhile(lambda step: step.denominator is not None, orders)]
@@ -313,10 +312,10 @@ def _fate_at(
     return _Fate(status, down, up, run, len(orders), settled)
 
 
-def _first_event(equation: Equation, point: Sequence[int], field: PrimeField, rng: random.Random, limits: Range) -> int:
+def _first_event(equation: Equation, point: Sequence[int], rng: random.Random, limits: Range) -> int:
     """The first step that divides by a power of t, 0 where none of the first steps does."""
-    direction = [rng.randrange(field.prime) for _ in point]
-    run, _ = _walked(equation, point, direction, [], field.prime, limits.shown, limits.end, to_event=True)
+    direction = [rng.randrange(equation.over.characteristic) for _ in point]
+    run, _ = _walked(equation, point, direction, [], limits.shown, limits.end, to_event=True)
     return len(run) if run and run[-1].common else 0
 
 
@@ -325,7 +324,6 @@ def _walked(
     point: Sequence[int],
     direction: Sequence[int],
     tangents: Sequence[Sequence[int]],
-    prime: int,
     steps: int,
     end: float,
     to_event: bool = False,
@@ -339,7 +337,7 @@ def _walked(
     while True:
         run: list[Step] = []
         try:
-            for step in islice(walk(equation, point, direction, tangents, prime, precision), steps):
+            for step in islice(walk(equation, point, direction, tangents, precision), steps):
                 run.append(step)
                 if to_event and step.common:
                     return run, True
@@ -353,12 +351,12 @@ def _walked(
 
 
 def _next_hit(
-    equation: Equation, limit: Sequence[int], prime: int, steps: int, reach: int, limits: Range
+    equation: Equation, limit: Sequence[int], steps: int, reach: int, limits: Range
 ) -> tuple[int | None, int]:
     """The next step that a point of the image does not have, and the number of steps it was followed for."""
     at: Sequence[int] = limit
     for step in range(steps + 1, reach + 1):
-        image = image_of(equation, at, prime)
+        image = image_of(equation, at)
         if image is None:
             return step, step
         at = image

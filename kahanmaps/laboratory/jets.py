@@ -89,7 +89,6 @@ def walk(
     point: Sequence[int],
     direction: Sequence[int],
     tangents: Sequence[Sequence[int]],
-    prime: int,
     precision: int,
 ) -> Iterator[Step]:
     """The steps of the curve point + t direction and of its neighbours point + d_i tangent_i + t direction; exact.
@@ -97,6 +96,7 @@ def walk(
     The equation of the map is one over GF(p), points and vectors are residues (X : Z). Step after step without an end;
     raises PrecisionTooLow and NotGeneric.
     """
+    prime = equation.over.characteristic
     X = [
         Jet(
             nmod_poly([x, v], prime).truncate(precision),
@@ -122,12 +122,12 @@ def walk(
         yield Step(common, pole, denominator, _rank(X, prime), tuple(int(jet.value[0]) for jet in X))
 
 
-def image_of(equation: Equation, point: Sequence[int], prime: int) -> list[int] | None:
+def image_of(equation: Equation, point: Sequence[int]) -> list[int] | None:
     """The image of a point of projective space modulo p; None where all minors vanish: there only curves have one."""
-    size = len(point)
+    prime = equation.over.characteristic
     rows = equation.rows(equation.monomials([nmod(x, prime) for x in point]), nmod(0, prime))
-    kernel, nullity = nmod_mat(size - 1, size, [entry for row in rows for entry in row], prime).nullspace()
-    return [int(kernel[k, 0]) for k in range(size)] if nullity == 1 else None
+    kernel, nullity = nmod_mat(rows, prime).nullspace()
+    return [int(kernel[k, 0]) for k in range(len(point))] if nullity == 1 else None
 
 
 def _rank(X: Sequence[Jet], prime: int) -> int:
