@@ -182,13 +182,11 @@ class _Search:
         if all(p.is_zero() for p in f.rhs):
             self._add_zero(count)
             return
-        if count > MAX_UNKNOWNS or f.digits > LONG_COEFFICIENTS:
-            if count > MAX_UNKNOWNS:
-                found.undecided.append(f"g has {count} unknown coefficients, and at most {MAX_UNKNOWNS} are tried")
-            else:
-                found.undecided.append(
-                    f"other g are searched for coefficients of up to {LONG_COEFFICIENTS} digits only"
-                )
+        if count > MAX_UNKNOWNS:
+            found.undecided.append(f"g has {count} unknown coefficients, and at most {MAX_UNKNOWNS} are tried")
+        elif f.digits > LONG_COEFFICIENTS:
+            found.undecided.append(f"other g are searched for coefficients of up to {LONG_COEFFICIENTS} digits only")
+        if found.undecided:
             self.space = CommutingSpace((f,), (QQ.identity(f.dim),) * (found.shape == "linear"), 1)
         else:
             self.settings.progress("the fields g with [f, g] = 0")

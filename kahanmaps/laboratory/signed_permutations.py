@@ -6,6 +6,7 @@ numbers. Variables are placed one after the other, and a choice is dropped at th
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 
@@ -27,53 +28,39 @@ def signed_permutations(f: QuadraticSystem, sign: int, deadline: float) -> tuple
     [[[1, 0], [0, 1]], [[0, 1], [1, 0]]]
     """
     found: list[fmpq_mat] = []
-    for S in _Search(f, sign, deadline).walk([], []):
+    for S in _walk(f, sign, deadline):
         if S is None or len(found) >= MAX_FOUND:
             return found, False
         found.append(S)
     return found, True
 
 
-class _Search:
-    def __init__(self, f: QuadraticSystem, sign: int, deadline: float) -> None:
-        n = f.dim
-        self.n, self.sign, self.deadline = n, sign, deadline
-        self.Q = [[[form[j, k] for k in range(n)] for j in range(n)] for form in f.Q]
-        self.B: list[list[fmpq]] = f.B.tolist()
-        # A translation changes the linear terms where there are quadratic ones, and never those of highest degree.
-        self.is_affine = f.degree <= 1
+def _walk(f: QuadraticSystem, sign: int, deadline: float) -> Iterator[fmpq_mat | None]:
+    """All of them; None where the time is over."""
+    n = f.dim
+    # A translation changes the linear terms where there are quadratic ones, and never those of highest degree.
+    if f.degree <= 1:
+        table: dict[tuple[int, ...], fmpq] = {(i, j): f.B[i, j] for i in range(n) for j in range(n)}
+    else:
+        table = {(i, j, k): f.Q[i][j, k] for i in range(n) for j in range(n) for k in range(n)}
+    # The equations that contain a variable and no later one, each of them once.
+    equations = [[at for at in table if max(at) == last and at[1] <= at[-1]] for last in range(n)]
 
-    def walk(self, places: list[int], signs: list[int]) -> Iterator[fmpq_mat | None]:
-        """All ways to go on; None where the time is over."""
-        if time.monotonic() > self.deadline:
+    def fits(p: list[int], s: list[int]) -> bool:
+        return all(
+            table[tuple(p[k] for k in at)] * math.prod(s[k] for k in at) == table[at] * sign
+            for at in equations[len(p) - 1]
+        )
+
+    def further(p: list[int], s: list[int]) -> Iterator[fmpq_mat | None]:
+        if time.monotonic() > deadline:
             yield None
-            return
-        if len(places) == self.n:
-            S = fmpq_mat(self.n, self.n)
-            for i, (place, s) in enumerate(zip(places, signs, strict=True)):
-                S[place, i] = fmpq(s)
-            yield S
-            return
-        for place in range(self.n):
-            if place in places:
-                continue
-            for s in (1, -1):
-                p, t = [*places, place], [*signs, s]
-                if self._fits(p, t):
-                    yield from self.walk(p, t)
+        elif len(p) == n:
+            yield fmpq_mat([[s[i] if p[i] == row else 0 for i in range(n)] for row in range(n)])
+        else:
+            choices = (([*p, place], [*s, t]) for place in range(n) if place not in p for t in (1, -1))
+            for places, signs in choices:
+                if fits(places, signs):
+                    yield from further(places, signs)
 
-    def _fits(self, p: list[int], s: list[int]) -> bool:
-        """Whether the equations hold that contain the last variable and no later one."""
-        last = len(p) - 1
-        for i in range(last + 1):
-            for j in range(last + 1):
-                if self.is_affine:
-                    if last in (i, j) and self.B[p[i]][p[j]] * (s[i] * s[j]) != self.B[i][j] * self.sign:
-                        return False
-                    continue
-                for k in range(j, last + 1):
-                    if last in (i, j, k):
-                        image = self.Q[p[i]][p[j]][p[k]]
-                        if image * (s[i] * s[j] * s[k]) != self.Q[i][j][k] * self.sign:
-                            return False
-        return True
+    return further([], [])
