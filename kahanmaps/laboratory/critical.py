@@ -10,6 +10,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 from flint import nmod_poly
@@ -43,9 +44,7 @@ def critical_points(
     a, b, line = _random_line(equation, rng)
     p = equation.over.characteristic
     image = kernel_minors(equation.rows(equation.monomials(line), nmod_poly([], p)))
-    common = nmod_poly([], p)
-    for entry in image:
-        common = common.gcd(entry)
+    common = reduce(nmod_poly.gcd, image)
     if common.degree() > 0:
         image = [entry // common for entry in image]
     value = _without(_denominator(inverse, image, nmod_poly([], p)), image[-1] * common, line[-1])

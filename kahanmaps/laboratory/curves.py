@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import random
 import time
+from functools import reduce
 from typing import NoReturn
 
 from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
@@ -74,15 +75,10 @@ class Line:
         for entry in (*above, below):
             quotient, rest = divmod(entry, common)
             if not rest.is_zero():  # two mixtures with a factor that is not in all: once in about p
-                return self._divided([*above, below])
+                common = reduce(nmod_poly.gcd, above, below)
+                return [entry // common for entry in (*above, below)]
             curve.append(quotient)
         return curve
-
-    def _divided(self, entries: list[nmod_poly]) -> list[nmod_poly]:
-        common = nmod_poly([0], self.prime)
-        for entry in entries:
-            common = common.gcd(entry)
-        return [entry // common for entry in entries]
 
     def _times(self, left: nmod_poly, right: nmod_poly) -> nmod_poly:
         self._require_time()

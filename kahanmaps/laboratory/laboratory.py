@@ -7,8 +7,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from flint import fmpq_mpoly
-
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.residues import random_prime
@@ -101,20 +99,15 @@ class Laboratory:
 
     def cofactors(self) -> list[Cofactor]:
         """The cofactors that polynomials are tried with."""
+        context = self.system.rhs[0].context()
+        gens = context.gens()[: self.system.dim]
         affine = [
             cofactor_of_affine(one.function, self.system)
             for one in affine_darboux(self.file.system).functions
-            if self._stays_darboux(one.function)
+            # l is to divide l' with the symbols free, not only at the values that the file gives them
+            if affine_cofactor(self.system, one.function.compose(*gens, ctx=context)) is not None
         ]
         return [*affine, *determinant_factors(self.system)]
-
-    def _stays_darboux(self, function: fmpq_mpoly) -> bool:
-        """Whether l divides l' with the symbols free, not only at the values that the file gives them."""
-        if not self.symbols:
-            return True
-        context = self.system.rhs[0].context()
-        moved = function.compose(*context.gens()[: self.system.dim], ctx=context)
-        return affine_cofactor(self.system, moved) is not None
 
     def formulas(self, model: Spaces, spaces_on: Callable[[ModularMap], Spaces | None], deadline: float) -> ClosedForms:
         """The polynomials that span spaces known modulo primes: `model` on the first map, `spaces_on(map)` on others.

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from math import comb
 from types import MappingProxyType
 
@@ -93,19 +94,16 @@ def search(
     affine = affine_space(map_)
     if affine is not None:
         found.add(Step("affine", 1, None, AFFINE), [affine])
-    later: list[int] = []
-    for degree, nullity in enumerate(profile.nullities, 1):
-        if not nullity:
-            continue
-        if nullity >= LARGEST_SPAN:
-            break
-        if nullity > _FEW:
-            later.append(degree)
-            continue
-        if done():
-            break
-        progress(f"closed forms from the relations of degree {degree}")
-        _take_relations(map_, degree, found, deadline)
+
+    def take_relations(least: int, most: int) -> None:
+        sizes = takewhile(lambda size: size < LARGEST_SPAN, profile.nullities)
+        for degree in [degree for degree, size in enumerate(sizes, 1) if least <= size <= most]:
+            if done():
+                break
+            progress(f"closed forms from the relations of degree {degree}")
+            _take_relations(map_, degree, found, deadline)
+
+    take_relations(1, _FEW)
     if not done():
         top = _COFACTOR_DEGREE.get(map_.dim, 2)
         while comb(map_.dim + top, top) > _MOST_TERMS:
@@ -114,11 +112,7 @@ def search(
         left = deadline - time.monotonic()
         for product, space in search_cofactors(map_, cofactors, found.all_spaces, wanted, top, left):
             found.add(Step("cofactor", space.degree, product, f"common cofactor {product.text(cofactors)}"), [space])
-    for degree in later:
-        if done():
-            break
-        progress(f"closed forms from the relations of degree {degree}")
-        _take_relations(map_, degree, found, deadline)
+    take_relations(_FEW + 1, LARGEST_SPAN)
     return found
 
 
