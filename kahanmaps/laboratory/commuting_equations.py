@@ -9,13 +9,14 @@ b: [f_2, g] + [f, g_2] = 0.
 
 from __future__ import annotations
 
+import itertools
 import random
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.algebra.small_systems import independent
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -29,12 +30,8 @@ def coefficients_of(system: QuadraticSystem) -> list[list[fmpq]]:
     >>> coefficients_of(QuadraticSystem.from_text(["x", "y"], ["x*y", "x - 2"]))
     [[0, 1, 0, 0, 0, 0], [0, 0, 0, 1, 0, -2]]
     """
-    n = system.dim
-    rows = []
-    for i, form in enumerate(system.Q):
-        quadratic = [form[j, k] * (1 if j == k else 2) for j in range(n) for k in range(j, n)]
-        rows.append([*quadratic, *(system.B[i, j] for j in range(n)), system.c[i]])
-    return rows
+    support = [m for degree in (2, 1, 0) for m in monomials(system.dim, degree)]
+    return [[fmpq(component[m]) for m in support] for component in system.rhs]
 
 
 def system_of(variables: Sequence[str], rows: Sequence[Sequence[fmpq]]) -> QuadraticSystem:
@@ -43,12 +40,8 @@ def system_of(variables: Sequence[str], rows: Sequence[Sequence[fmpq]]) -> Quadr
     >>> print(system_of(["x"], [[fmpq(1), fmpq(0), fmpq(-3)]]))
     x' = x^2 - 3
     """
-    n, context = len(variables), ring(variables)
-    squares = [(*(int(i == j) + int(i == k) for i in range(n)),) for j, k in _pairs(n)]
-    support = [*squares, *(tuple(int(i == j) for i in range(n)) for j in range(n)), (0,) * n]
-    return QuadraticSystem(
-        tuple(context.from_dict({m: v for m, v in zip(support, row, strict=True) if v != 0}) for row in rows)
-    )
+    support = [m for degree in (2, 1, 0) for m in monomials(len(variables), degree)]
+    return QuadraticSystem(tuple(ring(variables).from_dict(dict(zip(support, row, strict=True))) for row in rows))
 
 
 def combination(systems: Sequence[QuadraticSystem], weights: Sequence[Any], zero: Any) -> list[list[Any]]:
@@ -107,7 +100,7 @@ class _Terms:
 
     def __init__(self, rows: Sequence[Sequence[Any]], n: int) -> None:
         self._n = n
-        pairs = list(_pairs(n))
+        pairs = list(itertools.combinations_with_replacement(range(n), 2))
         self._quadratic = [[(c, j, k) for c, (j, k) in zip(row, pairs, strict=False) if c != 0] for row in rows]
         self._linear = [[(c, j) for j, c in enumerate(row[len(pairs) : len(pairs) + n]) if c != 0] for row in rows]
         self._constant = [row[-1] for row in rows]
@@ -140,7 +133,3 @@ class _Terms:
             for c, j in terms:
                 if y[j] != 0:
                     value[i] = value[i] + c * y[j]
-
-
-def _pairs(n: int) -> Iterator[tuple[int, int]]:
-    return ((j, k) for j in range(n) for k in range(j, n))
