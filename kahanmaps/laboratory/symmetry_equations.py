@@ -5,7 +5,6 @@ f(S x + r) = sign S f(x) for all x; sign 1 for a symmetry, -1 for a reversing on
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
@@ -13,9 +12,8 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import coefficients_in, ring
 from kahanmaps.algebra.small_systems import Component, solve_system
-from kahanmaps.laboratory.commuting_equations import coefficients_of
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -74,28 +72,21 @@ def matrix_equations(f: QuadraticSystem, S: Sequence[Sequence[fmpq_mpoly]], sign
 
     >>> s = ring(["s"]).gens()[0]
     >>> matrix_equations(QuadraticSystem.from_text(["x"], ["x^2"]), [[s]], 1)
-    [s^2 - s, 0, 0, 2*s - 2]
+    [s^2 - s, 2*s - 2]
     """
-    n = f.dim
-    zero = S[0][0].context().constant(0)
-    table = coefficients_of(f)
-    equations = []
-    pairs = [(j, k) for j in range(n) for k in range(j, n)]
-    for i in range(n):
-        for place, (j, k) in enumerate(pairs):
-            total = zero
-            for a, b in itertools.product(range(n), repeat=2):
-                if f.Q[i][a, b] != 0:
-                    total = total + S[a][j] * S[b][k] * (f.Q[i][a, b] * (1 if j == k else 2))
-            equations.append(total - sum((S[i][a] * table[a][place] for a in range(n)), zero) * fmpq(sign))
-        for j in range(n):
-            total = sum((S[a][j] * f.B[i, a] for a in range(n)), zero)
-            equations.append(total - sum((S[i][a] * f.B[a, j] for a in range(n)), zero) * fmpq(sign))
-        equations.append(zero + f.c[i] - sum((S[i][a] * f.c[a] for a in range(n)), zero) * fmpq(sign))
-    slopes = [sum((2 * f.Q[i][i, j] for i in range(n)), fmpq(0)) for j in range(n)]
-    for j in range(n):
-        equations.append(sum((S[a][j] * slopes[a] for a in range(n)), zero) - slopes[j] * fmpq(sign))
-    return equations
+    n, entries = f.dim, [entry for row in S for entry in row]
+    joint = ring([f"x{j}" for j in range(n)] + [f"s{k}" for k in range(n * n)])
+    x, s = joint.gens()[:n], joint.gens()[n:]
+    images = [sum((s[i * n + j] * x[j] for j in range(n)), joint.constant(0)) for i in range(n)]
+    *at_x, divergence = (p.compose(*x, ctx=joint) * fmpq(sign) for p in (*f.rhs, f.divergence))
+    sides = [sum((s[i * n + a] * at_x[a] for a in range(n)), joint.constant(0)) for i in range(n)]
+    parts = [
+        p.compose(*images, ctx=joint) - side
+        for p, side in zip((*f.rhs, f.divergence), (*sides, divergence), strict=True)
+    ]
+    context = entries[0].context()
+    back = [context.constant(0)] * n + entries
+    return [c.compose(*back, ctx=context) for part in parts for c in coefficients_in(part, n)]
 
 
 def is_singular(part: Component, n: int) -> bool:
