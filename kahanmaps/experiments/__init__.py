@@ -1,8 +1,8 @@
 """Many experiments from one description: planned, run in child processes, stored, resumed.
 
-What is asked      spec.py (a spec in TOML) and what reads it: spec_document, shape, experiment, experiment_reader,
-                   experiment_systems; options.py (the vocabulary), grid.py (values and their combinations),
-                   recipes.py (how a task comes by its system), registry.py and tasks.py (what can be done)
+What is asked      spec.py (a spec in TOML), with shape and experiment_reader, experiment; options.py (the vocabulary),
+                   grid.py (values and their combinations), recipes.py (how a task comes by its system), registry.py
+                   and tasks.py (what can be done)
 What passes        records.py: tasks and their keys, limits, records
 Who does it        run.py (the loop), executor.py (what it drives); children.py and child.py here; cluster.py,
                    dask_client, job_groups, group_results and group.py (the command on a worker) elsewhere; versions.py

@@ -1,6 +1,7 @@
 """The shape of a spec, checked by pydantic: which keys there are and what kind of value each has.
 
-What the values mean depends on the task and is not checked here. Mistakes come as places, keys and sentences.
+What the values mean depends on the task and is not checked here. Whoever reads the meaning of a part asks the document
+for it, and tells it what is wrong.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from fractions import Fraction
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema
@@ -164,3 +166,37 @@ def _field(place: Place) -> tuple[type[BaseModel], str]:
 def key_of(place: Place) -> str:
     """A place as people write it, lists counted from 1: experiments.a.zip[1]."""
     return "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in place).removeprefix(".")
+
+
+class SpecDocument:
+    """A whole spec; paths of systems in it are relative to `folder`.
+
+    `mistakes` are pairs of key and sentence, those of the shape first. `documents` are of the systems found on the way.
+    """
+
+    def __init__(self, document: Mapping[str, Any], folder: Path) -> None:
+        self.document = document
+        self.folder = folder
+        self.mistakes: list[tuple[str, str]] = []
+        self.documents: dict[str, str] = {}
+        self._misshapen: list[Place] = []
+        for path, key, sentence in shape_mistakes(document):
+            self._misshapen.append(path)
+            self.mistake(key, sentence)
+
+    def mistake(self, key: str, sentence: str) -> None:
+        """Tell that something is wrong."""
+        # Keys and words come from the file: nothing in them may reach a terminal as an escape sequence.
+        printable = ["".join(c if c.isprintable() or c == "\n" else "_" for c in text) for text in (key, sentence)]
+        self.mistakes.append((printable[0].replace("\n", "_")[:120], printable[1]))
+
+    def sound(self, *path: str | int) -> Any:
+        """The value at a place, None where it is missing or has not the right shape."""
+        if any(bad == path[: len(bad)] for bad in self._misshapen):
+            return None
+        value: Any = self.document
+        for key in path:
+            if isinstance(value, dict) and key not in value:
+                return None
+            value = value[key]
+        return value

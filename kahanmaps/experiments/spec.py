@@ -19,8 +19,8 @@
 
 Reading it finds every mistake at once, each with its key; docs/batch.md has all keys.
 
-What one of the tables means is the matter of experiment_reader.py, what its systems are that of experiment_systems.py;
-both look at the document and tell its mistakes through spec_document.py. An experiment itself is in experiment.py.
+What one of the tables means is the matter of experiment_reader.py, which looks at the document and tells its mistakes
+through shape.py. An experiment itself is in experiment.py.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from pathlib import Path
 
 from kahanmaps.errors import InputError, SystemFileError, reading
 from kahanmaps.experiments.experiment import Experiment
-from kahanmaps.experiments.experiment_reader import DEFAULT_LIMITS, read_experiment
-from kahanmaps.experiments.spec_document import SpecDocument
+from kahanmaps.experiments.experiment_reader import DEFAULT_LIMITS, ExperimentReader
+from kahanmaps.experiments.shape import SpecDocument
 
 __all__ = [
     "DEFAULT_LIMITS",
@@ -123,7 +123,7 @@ def _read(document: SpecDocument, where: str, max_tasks: int) -> Spec:
     for name, table in tables.items():
         _require_name(document, name)
         if isinstance(table, dict):
-            experiment = read_experiment(document, name)
+            experiment = ExperimentReader(document, name).read()
             if experiment is not None:
                 experiments.append(experiment)
     spec = Spec(document.sound("name") or "", tuple(experiments), document.documents)

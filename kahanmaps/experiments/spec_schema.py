@@ -6,11 +6,11 @@ import json
 from typing import Any
 
 from kahanmaps.experiments.experiment import PARAMETERS
+from kahanmaps.experiments.experiment_reader import TIME_STEP
 from kahanmaps.experiments.options import FAMILY, VOCABULARY
 from kahanmaps.experiments.registry import task_kinds
 from kahanmaps.experiments.shape import shape_schema
 from kahanmaps.experiments.spec import EXPERIMENT_NAME
-from kahanmaps.experiments.spec_document import TIME_STEP
 
 _VALUE = {"type": ["string", "integer", "number", "boolean"]}
 _VALUES = {"anyOf": [_VALUE, {"type": "array", "items": _VALUE, "minItems": 1}]}
