@@ -75,12 +75,7 @@ class ExperimentReader:
             constant["system"] = recipes[0]
         elif recipes:
             grid_axes = {"system": recipes, **axes}
-        try:
-            grid = Grid(grid_axes, zips)
-        except InputError as error:
-            self.mistake("zip", str(error))
-            return None
-        return Experiment(self.name, kind, recipes, constant, grid, limits)
+        return Experiment(self.name, kind, recipes, constant, Grid(grid_axes, zips), limits)
 
     def mistake(self, key: str, sentence: str) -> None:
         """Tell that something is wrong; `key` begins in this table."""

@@ -46,9 +46,9 @@ class RationalRange(Sequence[fmpq]):
             )
         if count >= _MOST:
             raise InputError(f"found a range from {show(first)} to {show(last)} in steps of {show(step)}: {_TOO_MANY}")
-        self.first = first
-        self.step = step
-        self._length = int(count.p // count.q) + 1
+        self._scale = lcm(int(first.q), int(last.q), int(step.q))
+        start, stop, scaled = (int((self._scale * part).p) for part in (first, last, step))
+        self.numerators = range(start, stop + (1 if scaled > 0 else -1), scaled)
 
     @classmethod
     def from_text(cls, text: str) -> RationalRange:
@@ -60,7 +60,7 @@ class RationalRange(Sequence[fmpq]):
         return cls(parse_number(first), parse_number(words[0]), parse_number(words[2]) if len(words) > 1 else fmpq(1))
 
     def __len__(self) -> int:
-        return self._length
+        return len(self.numerators)
 
     @overload
     def __getitem__(self, index: int) -> fmpq: ...
@@ -68,16 +68,8 @@ class RationalRange(Sequence[fmpq]):
     def __getitem__(self, index: slice) -> Sequence[fmpq]: ...
     def __getitem__(self, index: int | slice) -> fmpq | Sequence[fmpq]:
         if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(self._length))]
-        if not -self._length <= index < self._length:
-            raise IndexError(index)
-        return self.first + (index % self._length) * self.step
-
-    def __contains__(self, value: object) -> bool:
-        if not isinstance(value, fmpq):
-            return False
-        place = (value - self.first) / self.step
-        return bool(place.q == 1 and 0 <= place < self._length)
+            return [fmpq(numerator, self._scale) for numerator in self.numerators[index]]
+        return fmpq(self.numerators[index], self._scale)
 
     def common(self, other: RationalRange) -> fmpq | None:
         """The least value that both have, if there is one: a congruence, nothing is enumerated.
@@ -85,20 +77,22 @@ class RationalRange(Sequence[fmpq]):
         >>> RationalRange.from_text("0..9999 step 3").common(RationalRange.from_text("9998..0 step -7"))
         9
         """
-        scale = 1
-        for part in (self, other):
-            scale = lcm(scale, int(part.first.q), int(part.step.q))
-        (low, high, step), (its_low, its_high, its_step) = (
-            (*sorted((int((scale * part[0]).p), int((scale * part[-1]).p))), abs(int((scale * part.step).p)))
-            for part in (self, other)
-        )
-        shared = gcd(step, its_step)
-        if (its_low - low) % shared:
+        scale = lcm(self._scale, other._scale)
+        mine, its = self._increasing(scale), other._increasing(scale)
+        shared = gcd(mine.step, its.step)
+        if (its.start - mine.start) % shared:
             return None
-        steps = (its_low - low) // shared * pow(step // shared, -1, its_step // shared) % (its_step // shared)
-        value, period = low + steps * step, step * its_step // shared
-        value += -((value - max(low, its_low)) // period) * period
-        return fmpq(value, scale) if value <= min(high, its_high) else None
+        modulus = its.step // shared
+        steps = (its.start - mine.start) // shared * pow(mine.step // shared, -1, modulus) % modulus
+        value, period = mine.start + steps * mine.step, mine.step * modulus
+        value += -((value - max(mine.start, its.start)) // period) * period
+        return fmpq(value, scale) if value <= min(mine[-1], its[-1]) else None
+
+    def _increasing(self, scale: int) -> range:
+        """The values times `scale`, from the least to the largest."""
+        found = self.numerators if self.numerators.step > 0 else self.numerators[::-1]
+        factor = scale // self._scale
+        return range(found.start * factor, found.stop * factor, found.step * factor)
 
 
 class Values(Sequence[Any]):
@@ -118,10 +112,8 @@ class Values(Sequence[Any]):
     def __getitem__(self, index: slice) -> Sequence[Any]: ...
     def __getitem__(self, index: int | slice) -> Any:
         if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
-        if not -len(self) <= index < len(self):
-            raise IndexError(index)
-        index %= len(self)
+            return [self[k] for k in range(len(self))[index]]
+        index = range(len(self))[index]
         which = bisect_right(self._ends, index)
         value = self.pieces[which][index - (self._ends[which - 1] if which else 0)]
         return self.option.read(value) if isinstance(value, fmpq) else value
@@ -151,7 +143,8 @@ def read_values(option: Option, raw: Any) -> tuple[Values | None, list[Mistake]]
                 found = RationalRange.from_text(item)
                 # Between the ends nothing can go wrong that does not go wrong there, but for eps = 0 and fractions.
                 values = Values(option, [found])
-                for k in {0, min(1, len(found) - 1), len(found) - 1, _index_of_zero(found)}:
+                zero = found.numerators.index(0) if 0 in found.numerators else 0
+                for k in {0, min(1, len(found) - 1), len(found) - 1, zero}:
                     values[k]
                 ranges[number] = found
                 pieces.append(found)
@@ -185,12 +178,6 @@ def _twice(items: Sequence[Any], ranges: Mapping[int, RationalRange]) -> Iterato
                 told = f"found {show(common)}, which is in place {min(other, number)} as well: expected it once"
                 yield (max(other, number),), told
                 break
-
-
-def _index_of_zero(values: RationalRange) -> int:
-    """Where a range is 0, or 0 if it never is."""
-    place = -values.first / values.step
-    return int(place.p) if place.q == 1 and 0 <= place < len(values) else 0
 
 
 class Grid:
@@ -235,6 +222,3 @@ class Grid:
             for group, place in zip(self.groups, reversed(places), strict=True)
             for name in group
         }
-
-    def __iter__(self) -> Iterator[dict[str, Any]]:
-        return (self[k] for k in range(self.size))

@@ -132,7 +132,8 @@ def test_a_range_is_what_a_loop_gives(first, last, step):
 
 @given(ranges, rationals(8))
 def test_a_range_knows_what_is_in_it(found, value):
-    assert (value in found) == any(value == entry for entry in found)
+    common = found.common(RationalRange(value, value, fmpq(1)))
+    assert (common is not None) == any(value == entry for entry in found)
 
 
 @given(ranges, ranges)
@@ -153,7 +154,8 @@ def test_a_range_has_places_from_both_ends_and_slices():
 
 def test_a_huge_range_is_not_enumerated():
     values = RationalRange.from_text(f"0..{HUGE} step 1/2")
-    assert (len(values), values[-1], fmpq(1, 3) in values) == (2 * HUGE + 1, HUGE, False)
+    assert (len(values), values[-1]) == (2 * HUGE + 1, HUGE)
+    assert values.common(RationalRange(fmpq(1, 3), fmpq(1, 3), fmpq(1))) is None
     assert values.common(RationalRange.from_text(f"1/6..{HUGE} step 1/3")) == fmpq(1, 2)
 
 
@@ -230,7 +232,9 @@ def test_a_value_is_found_twice_exactly_where_it_is_there_twice(pieces):
     raw, values = [], []
     for piece in pieces:
         is_one = isinstance(piece, fmpq)
-        raw.append(str(piece) if is_one else f"{piece[0]}..{piece[-1]} step {piece.step}")
+        raw.append(
+            str(piece) if is_one else f"{piece[0]}..{piece[-1]} step {piece[1] - piece[0] if len(piece) > 1 else 1}"
+        )
         values += [fraction(value) for value in ([piece] if is_one else piece)]
     assert bool(read_values(exact("c", "a parameter, which may be 0"), raw)[1]) == (len(set(values)) < len(values))
 
