@@ -75,8 +75,6 @@ def found_data(store: Store, found: Found) -> dict[str, Any]:
     from kahanmaps.version import __version__
 
     task, record, places, attempts = found
-    recipes = (task.system, task.options.get("other"))
-    digests = [recipe["document"] for recipe in recipes if isinstance(recipe, dict) and "document" in recipe]
     return {
         "command": "batch show",
         "version": __version__,
@@ -88,7 +86,7 @@ def found_data(store: Store, found: Found) -> dict[str, Any]:
         "places": [{"experiment": name, "number": number} for name, number in places],
         "attempts": attempts,
         **({} if record is None else {k: v for k, v in record.to_json().items() if k != "key"}),
-        "documents": {key: json.loads(store.document(key)) for key in digests},
+        "documents": {key: json.loads(store.document(key)) for key in task.documents},
     }
 
 

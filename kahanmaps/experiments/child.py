@@ -11,27 +11,27 @@ own. It ends when its standard input ends, and on Linux at the moment its parent
 
 from __future__ import annotations
 
-import errno
 import json
 import os
+import platform
 import signal
 import sys
 import time
 import traceback
 from collections.abc import Mapping
 from contextlib import suppress
+from importlib.metadata import version
 from typing import IO, Any
 
-from kahanmaps.errors import InputError, KahanmapsError
+from kahanmaps.errors import InputError, KahanmapsError, is_out_of_memory
 from kahanmaps.experiments.options import OTHER
 from kahanmaps.experiments.recipes import system_from
 from kahanmaps.experiments.records import Outcome, Task, canonical
 from kahanmaps.experiments.registry import task_kind, task_kinds
-from kahanmaps.experiments.versions import host_name, versions
+from kahanmaps.version import __version__
 
 _TAIL = 2000  # characters of a message or a traceback that are kept
 _PR_SET_PDEATHSIG = 1
-_NOT_LOADED = ("failed to map segment", "cannot allocate memory", "Cannot allocate memory")  # what ld.so says
 
 
 def main(parent: int) -> None:
@@ -42,7 +42,7 @@ def main(parent: int) -> None:
     me = os.getpid()
     documents: dict[str, str] = {}
     task_kinds()  # importing them is no part of any task
-    ready = canonical({"ready": {"host": host_name(), "versions": versions()}})
+    ready = canonical({"ready": {"host": platform.node(), "versions": _versions()}})
     idle = _address_space()
     answers.write(ready + "\n")
     answers.flush()
@@ -58,6 +58,18 @@ def main(parent: int) -> None:
         answers.flush()
         if record["outcome"] == Outcome.OUT_OF_MEMORY:
             return  # what is left of the memory nobody knows
+
+
+def _versions() -> dict[str, str]:
+    """The versions that a result may depend on."""
+    import flint
+
+    return {
+        "kahanmaps": __version__,
+        "python": platform.python_version(),
+        "python-flint": version("python-flint"),
+        "flint": str(getattr(flint, "__FLINT_VERSION__", "unknown")),
+    }
 
 
 def perform(task: Task, memory: int | None, documents: Mapping[str, str], idle: int | None = None) -> dict[str, Any]:
@@ -85,23 +97,15 @@ def perform(task: Task, memory: int | None, documents: Mapping[str, str], idle: 
 
 def _failure(error: Exception) -> dict[str, Any]:
     """What an error means for the record; one that nobody raised on purpose has its traceback in it."""
-    if _is_for_want_of_memory(error):
+    cause: BaseException | None = error
+    while cause is not None and not is_out_of_memory(cause):
+        cause = cause.__cause__ or cause.__context__
+    if cause is not None:  # MemoryError or what says the same, a module not loaded say; or raised from it
         return {"outcome": Outcome.OUT_OF_MEMORY, "message": "out of memory"}
     if isinstance(error, InputError):
         return {"outcome": Outcome.FAILED, "message": str(error)[:_TAIL]}
     found = {"outcome": Outcome.FAILED, "message": f"{type(error).__name__}: {error}"[:_TAIL]}
     return found if isinstance(error, KahanmapsError) else {**found, "stderr": traceback.format_exc()[-_TAIL:]}
-
-
-def _is_for_want_of_memory(error: BaseException | None) -> bool:
-    """Whether an error, or what it was raised from, is MemoryError or says the same: of a module not loaded, say."""
-    while error is not None:
-        if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
-            return True
-        if isinstance(error, ImportError) and any(words in str(error) for words in _NOT_LOADED):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
 
 
 def _result(task: Task, documents: Mapping[str, str]) -> dict[str, Any]:

@@ -20,13 +20,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from signal import SIGKILL
-from typing import IO, Any
+from typing import IO, Any, cast
 
 from kahanmaps.errors import KahanmapsError
 from kahanmaps.experiments.endings import TRIES, ending, is_from_outside
 from kahanmaps.experiments.executor import Documents
-from kahanmaps.experiments.options import OTHER
-from kahanmaps.experiments.records import Job, Outcome, Record, Task
+from kahanmaps.experiments.records import Job, Outcome, Record
 
 GROUP_SECONDS = 5.0  # of work for one child: starting it costs about a fifth of a second
 _STDERR_KEPT = 2000
@@ -75,6 +74,7 @@ class LocalChildren:
         self._selector = selectors.DefaultSelector()
         self._children: list[_Child] = []
         self._waiting: deque[_Work] = deque()
+        self._records: list[Record] = []
         self._stillborn = 0
         self._looked = self._checked = time.monotonic()
 
@@ -95,9 +95,8 @@ class LocalChildren:
     def wait(self, timeout: float) -> list[Record]:
         """The records that came in, after at most `timeout` seconds."""
         end = time.monotonic() + timeout
-        records: list[Record] = []
         self._make_up_for(self._looked)
-        while self.in_flight and not records:
+        while self.in_flight and not self._records:
             deadlines = [d for child in self._children if (d := child.deadline()) is not None]
             until = max(self._looked, min([end, *deadlines, self._looked + _LOOK_EVERY]))
             ready = self._selector.select(until - self._looked)
@@ -105,13 +104,14 @@ class LocalChildren:
             for key, _ in ready:
                 child, stream = key.data
                 if child in self._children:
-                    records += self._hear(child, stream)
+                    self._hear(child, stream)
             if self._looked - self._checked >= _LOOK_EVERY:
                 self._checked = self._looked
-                records += self._dead()
-            records += self._late()
+                self._look_for_the_dead()
+            self._end_the_late()
             if time.monotonic() >= end:
                 break
+        records, self._records = self._records, []
         return records
 
     def _make_up_for(self, until: float) -> None:
@@ -159,7 +159,7 @@ class LocalChildren:
         child.read_the_rest()  # before the task is sent: what comes from now on is its own
         child.stderr.clear()
         try:
-            for key in documents_of(work.job.task):
+            for key in work.job.task.documents:
                 if key not in child.documents:
                     child.write({"document": key, "text": self._documents(key)})
                     child.documents.add(key)
@@ -168,22 +168,22 @@ class LocalChildren:
             pass  # it has died; its end of file will tell
         work.begun = time.monotonic()
 
-    def _hear(self, child: _Child, stream: Any) -> list[Record]:
+    def _hear(self, child: _Child, stream: Any) -> None:
         """What a child has to say: answers, talk, or the end of file that means its death."""
         try:
             data = os.read(stream.fileno(), _READ)
         except BlockingIOError:
-            return []
-        if stream is child.talk:
-            if data:
-                child.stderr.append(data)
-            else:
-                self._selector.unregister(stream)
-            return []
-        return self._heard(child, data) if data else self._died(child)
+            return
+        if stream is child.answers:
+            self._heard(child, data)
+        elif data:
+            child.stderr.append(data)
+        else:
+            self._selector.unregister(stream)
 
-    def _heard(self, child: _Child, data: bytes) -> list[Record]:
-        records = []
+    def _heard(self, child: _Child, data: bytes) -> None:
+        if not data:
+            self._died(child)
         for line in child.lines(data):
             try:
                 message = json.loads(line)
@@ -196,22 +196,19 @@ class LocalChildren:
                 if child.work is not None:
                     self._send(child)
             elif child.work is not None and message["key"] == child.work.job.task.key:
-                records += self._finished(child, child.work, message)
-        return records
+                self._finished(child, child.work, message)
 
-    def _dead(self) -> list[Record]:
+    def _look_for_the_dead(self) -> None:
         """The children that are dead, where something they have started keeps their end of the pipe open."""
-        records = []
         for child in list(self._children):
             while child in self._children and child.process.poll() is not None:
                 try:
                     data = os.read(child.answers.fileno(), _READ)
                 except BlockingIOError:
                     data = b""
-                records += self._heard(child, data) if data else self._died(child)
-        return records
+                self._heard(child, data)
 
-    def _finished(self, child: _Child, work: _Work, message: dict[str, Any]) -> list[Record]:
+    def _finished(self, child: _Child, work: _Work, message: dict[str, Any]) -> None:
         child.work = None
         child.seconds += message.get("seconds", 0.0)
         was_fresh, child.is_fresh = child.is_fresh, False
@@ -222,15 +219,13 @@ class LocalChildren:
         is_doubtful = out_of_memory or (message["outcome"] == Outcome.FAILED and "stderr" in message)
         if is_doubtful and not was_fresh and not work.alone:
             self._again(work)
-            return []
-        record = Record.from_json({**message, **child.circumstances()})
-        self._go_on()
-        return [record]
+        else:
+            self._hand_back(child, message)
 
-    def _died(self, child: _Child) -> list[Record]:
+    def _died(self, child: _Child) -> None:
         status = child.status()
         child.read_the_rest()
-        work, told, was_fresh = child.work, child.told(), child.is_fresh
+        work, told = child.work, child.told()
         self._bury(child)
         if not child.is_ready:
             self._stillborn += 1
@@ -239,41 +234,31 @@ class LocalChildren:
             if work is not None:
                 work.begun = None
                 self._give(work)
-            return []
-        if work is None:
-            return []
-        message = f"the child {ending(status)}"
-        if is_from_outside(status):
-            return self._ended_from_outside(child, work, message, told)
-        if any(words in told.lower() for words in _NO_MEMORY):
-            outcome, message = Outcome.OUT_OF_MEMORY, "out of memory"
-            is_doubtful = False
-        else:
+        elif work is not None and is_from_outside(status):
+            self._ended_from_outside(child, work, f"the child {ending(status)}")
+        elif work is not None:
+            has_memory = not any(words in told.lower() for words in _NO_MEMORY)
             # The signal of a fault may have been sent as well, but hardly twice. Status 0 is the end of the questions;
             # where there is none, the end may have been slow.
-            outcome = Outcome.CRASHED
-            is_doubtful = (status is None or status <= 0) and not work.had_fault
-            work.had_fault = True
-        if is_doubtful or not was_fresh:
-            self._again(work)
-            return []
-        record = self._record(child, work, outcome, message, told)
-        self._go_on()
-        return [record]
+            is_doubtful = has_memory and (status is None or status <= 0) and not work.had_fault
+            work.had_fault = work.had_fault or has_memory
+            if is_doubtful or not child.is_fresh:
+                self._again(work)
+            elif has_memory:
+                self._failed(child, work, Outcome.CRASHED, f"the child {ending(status)}")
+            else:
+                self._failed(child, work, Outcome.OUT_OF_MEMORY, "out of memory")
 
-    def _ended_from_outside(self, child: _Child, work: _Work, message: str, told: str) -> list[Record]:
-        """Have the work done by another child; or the record that it is lost."""
+    def _ended_from_outside(self, child: _Child, work: _Work, message: str) -> None:
+        """Have the work done by another child; or it is lost."""
         work.tries += 1
         if work.tries < self._tries:
             self._again(work)
-            return []
-        record = self._record(child, work, Outcome.LOST, message, told)
-        self._go_on()
-        return [record]
+        else:
+            self._failed(child, work, Outcome.LOST, message)
 
-    def _late(self) -> list[Record]:
+    def _end_the_late(self) -> None:
         """The children whose time is over."""
-        records = []
         now = time.monotonic()
         for child in list(self._children):
             work = child.work
@@ -283,17 +268,20 @@ class LocalChildren:
                 self._bury(child)
                 message = f"not done within {work.job.limits.time:g} seconds"
                 if was_stopped:
-                    message += ", stopped from outside"
-                    records += self._ended_from_outside(child, work, message, child.told())
-                    continue
-                records.append(self._record(child, work, Outcome.TIMEOUT, message, child.told()))
-                self._go_on()
-        return records
+                    self._ended_from_outside(child, work, f"{message}, stopped from outside")
+                else:
+                    self._failed(child, work, Outcome.TIMEOUT, message)
 
-    def _record(self, child: _Child, work: _Work, outcome: Outcome, message: str, stderr: str) -> Record:
+    def _failed(self, child: _Child, work: _Work, outcome: Outcome, message: str) -> None:
         seconds = 0.0 if work.begun is None else time.monotonic() - work.begun
-        key = work.job.task.key
-        return Record(key, outcome, message=message, stderr=stderr, seconds=seconds, **child.circumstances())
+        found = {"key": work.job.task.key, "outcome": outcome, "message": message, "stderr": child.told()}
+        self._hand_back(child, {**found, "seconds": seconds})
+
+    def _hand_back(self, child: _Child, found: dict[str, Any]) -> None:
+        """The record of a job, with where and when."""
+        finished = datetime.now(UTC).isoformat(timespec="seconds")
+        self._records.append(Record.from_json({**found, **(child.ready or {}), "finished": finished}))
+        self._go_on()
 
     def _again(self, work: _Work) -> None:
         work.alone, work.begun = True, None
@@ -308,9 +296,8 @@ class LocalChildren:
     def _bury(self, child: _Child) -> None:
         if child in self._children:
             self._children.remove(child)
-        registered = self._selector.get_map()
         for stream in (child.answers, child.talk):
-            if stream in registered:
+            with suppress(KeyError):
                 self._selector.unregister(stream)
         child.end()
 
@@ -342,9 +329,8 @@ class _Child:
             )
         except OSError as error:
             raise ChildrenError(f"a child process cannot be started: {error.strerror or error}") from error
-        self.input = _pipe(self.process.stdin)
-        self.answers = _pipe(self.process.stdout)
-        self.talk = _pipe(self.process.stderr)
+        pipes = (self.process.stdin, self.process.stdout, self.process.stderr)
+        self.input, self.answers, self.talk = cast("tuple[IO[bytes], IO[bytes], IO[bytes]]", pipes)
         for stream in (self.answers, self.talk):
             os.set_blocking(stream.fileno(), False)
 
@@ -372,10 +358,6 @@ class _Child:
         with suppress(AttributeError, ChildProcessError):
             return os.waitid(os.P_PID, self.process.pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
         return False
-
-    def circumstances(self) -> dict[str, Any]:
-        """Where and when."""
-        return {**(self.ready or {}), "finished": datetime.now(UTC).isoformat(timespec="seconds")}
 
     def write(self, message: dict[str, Any]) -> None:
         """Send a message; a pipe takes whole lines or fails."""
@@ -415,15 +397,3 @@ class _Child:
         for stream in (self.input, self.answers, self.talk):
             with suppress(OSError):
                 stream.close()
-
-
-def _pipe(stream: IO[bytes] | None) -> IO[bytes]:
-    if stream is None:
-        raise AssertionError("a pipe that was asked for is missing")
-    return stream
-
-
-def documents_of(task: Task) -> list[str]:
-    """The digests of the documents that a task needs."""
-    recipes = (task.system, task.options.get(OTHER))
-    return [recipe["document"] for recipe in recipes if recipe and "document" in recipe]

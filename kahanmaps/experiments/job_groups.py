@@ -9,7 +9,6 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import NamedTuple
 
-from kahanmaps.experiments.children import documents_of
 from kahanmaps.experiments.executor import Documents
 from kahanmaps.experiments.records import Limits, Task
 
@@ -91,7 +90,7 @@ class Grouping:
 
     def add(self, group: JobGroup, task: Task, limits: Limits, tries: int = 0) -> None:
         """Put a job into the group, with the documents that it needs."""
-        for wanted in documents_of(task):
+        for wanted in task.documents:
             if wanted not in group.documents:
                 group.documents[wanted] = self._documents(wanted)
                 group.sent += len(group.documents[wanted])

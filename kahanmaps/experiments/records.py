@@ -76,6 +76,12 @@ class Task:
         """The hash of the canonical text."""
         return digest(self.text)
 
+    @property
+    def documents(self) -> list[str]:
+        """The digests of the documents that it needs, those of its system and of a second one."""
+        recipes = (self.system, self.options.get("other"))
+        return [recipe["document"] for recipe in recipes if isinstance(recipe, Mapping) and "document" in recipe]
+
     @classmethod
     def from_text(cls, text: str) -> Task:
         """The task with this canonical text."""
