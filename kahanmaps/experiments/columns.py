@@ -11,7 +11,16 @@ from typing import Any
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.export import Entry, entries, plain
 from kahanmaps.experiments.records import Row
-from kahanmaps.experiments.summary import _WORDS, OF_THE_RUN, _approximate, _is_number, _must_exist, _order, _place
+from kahanmaps.experiments.summary import (
+    _WORDS,
+    OF_THE_RUN,
+    _approximate,
+    _is_number,
+    _must_exist,
+    _order,
+    _place,
+    names_of_entry,
+)
 
 _MOST_CATEGORIES = 60
 
@@ -57,22 +66,19 @@ def value_pairs(rows: Iterable[Row], x: str, y: str, by: str | None = None) -> P
     names = list(dict.fromkeys([x, y] if by is None else [x, y, by]))
     codes = {name: _Codes() for name in (x, by) if name is not None}
     held, xs, series = array("d"), array("q"), array("q")
-    full_names: dict[Entry, tuple[str, str]] = {}
-    known, numeric = {*_WORDS, *OF_THE_RUN}, set(OF_THE_RUN)
+    seen, numeric = set[Entry](), set(OF_THE_RUN)
     missing = left_out = total = 0
     for row in rows:
         total += 1
         found = list(entries(row))
         for entry, value in found:
-            if entry not in full_names:
-                full_names[entry] = (entry.name, entry.full_name)
-                known.update(full_names[entry])
+            seen.add(entry)
             if _is_number(value):
-                numeric.update(full_names[entry])
+                numeric.update(names_of_entry(entry))
         if row.record is None:
             missing += 1
             continue
-        at = dict(zip(names, (value for _, value in _place(row, names, found, full_names)), strict=True))
+        at = dict(zip(names, (value for _, value in _place(row, names, found)), strict=True))
         at.update({name: getattr(row.record, name) for name in OF_THE_RUN if name in at and at[name] is None})
         number, value = at[y], at[x]
         if value is None or isinstance(number, bool) or not _is_number(number):
@@ -83,6 +89,7 @@ def value_pairs(rows: Iterable[Row], x: str, y: str, by: str | None = None) -> P
         if by is not None:
             series.append(codes[by].of(at[by]))
     if total:
+        known = {*_WORDS, *OF_THE_RUN}.union(*map(names_of_entry, seen))
         for name in names:
             _must_exist(name, known, "to draw")
         _must_exist(y, numeric, "of numbers")

@@ -242,10 +242,10 @@ class _Layout:
 
     def values(self, row: Row) -> list[Any]:
         """The values of a row, one for each column, None where it has none."""
-        known = _known(row)
+        fixed = known(row)
         values = [None] * len(self.names)
         for place, name in self._fixed:
-            values[place] = known[name]
+            values[place] = fixed[name]
         for entry, value in entries(row):
             if entry not in self._place:
                 raise _changed(row, entry.name)
@@ -313,32 +313,25 @@ def _row_groups(layout: _Layout, rows: Iterable[Row]) -> Iterator[list[list[Any]
         yield columns
 
 
-def _known(row: Row) -> dict[str, Any]:
+def known(row: Row) -> dict[str, Any]:
     """What every row has, in the order of JSON lines; of a missing task, None for what its record would say."""
-    record = row.record
+    task, record = row.task, row.record
     return {
         "experiment": row.experiment,
         "number": row.number,
-        "key": row.task.key,
-        "task": row.task.kind,
-        "system": row.task.system,
-        "options": row.task.options,
+        "key": task.key,
+        "task": task.kind,
+        "system": task.system,
+        "options": task.options,
         "outcome": record and str(record.outcome),
-        "verdict": record and record.verdict,
-        "result": record and record.result,
-        "message": record and record.message,
-        "stderr": record and record.stderr,
-        "seconds": record and record.seconds,
-        "peak_memory": record and record.peak_memory,
-        "host": record and record.host,
-        "versions": record and record.versions,
-        "finished": record and record.finished,
+        **{name: getattr(record, name, None) for name in ("verdict", "result", "message", "stderr")},
+        **{name: getattr(record, name, None) for name in ("seconds", "peak_memory", "host", "versions", "finished")},
     }
 
 
 def _result(row: Row, stable: bool) -> dict[str, Any]:
     left_out = {*OF_THE_RUN, "stderr", "versions"} if stable else set()
-    return {"record": "result", **{name: value for name, value in _known(row).items() if name not in left_out}}
+    return {"record": "result", **{name: value for name, value in known(row).items() if name not in left_out}}
 
 
 def _line(record: Mapping[str, Any]) -> str:

@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import difflib
 from array import array
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import lru_cache
 from heapq import merge
 from math import inf, isfinite
 from typing import Any
 
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.experiments.export import NUMBER, Entry, entries, plain
+from kahanmaps.experiments.export import NUMBER, Entry, entries, known, plain
 from kahanmaps.experiments.records import KEPT, Row, canonical
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
@@ -191,17 +192,12 @@ def summarise(
     by = tuple(dict.fromkeys(by))
     wanted = None if values is None else frozenset(values)
     gathering: dict[tuple[Any, ...], _Gathering] = {}
-    names, longer, numeric = set(_WORDS), set[str](), set(() if stable else OF_THE_RUN)
-    full_names: dict[Entry, tuple[str, str]] = {}  # thousands of rows have the same few entries
+    seen, numeric = set[Entry](), set(() if stable else OF_THE_RUN)
     has_results = False
     for row in rows:
         found = list(entries(row))
-        for entry, _ in found:
-            if entry not in full_names:
-                full_names[entry] = (entry.name, entry.full_name)
-                names.add(entry.name)
-                longer.add(entry.full_name)
-        place = _place(row, by, found, full_names)
+        seen.update(entry for entry, _ in found)
+        place = _place(row, by, found)
         identity = tuple(key for key, _ in place)
         group = gathering.get(identity)
         if group is None:
@@ -213,7 +209,7 @@ def summarise(
         measured = [] if stable else [(name, getattr(row.record, name)) for name in OF_THE_RUN]
         for entry, value in found:
             if entry.section == "result":
-                short, full = full_names[entry]
+                short, full = names_of_entry(entry)
                 measured.append((full if short in OF_THE_RUN else short, value))
         for name, value in measured:
             if _is_number(value):
@@ -221,6 +217,7 @@ def summarise(
                 if name not in by if wanted is None else name in wanted:
                     group.measure(name, value)
     if gathering:  # nobody can tell a mistaken name in nothing
+        names, longer = {*_WORDS, *(entry.name for entry in seen)}, {entry.full_name for entry in seen}
         for name in by:
             if name not in longer:
                 _must_exist(name, names, "to group by" if has_results else "to group by (there is no result yet)")
@@ -275,8 +272,8 @@ class _Gathering:
     missing: int = 0
     outcomes: Counter[str] = field(default_factory=Counter)
     verdicts: Counter[str] = field(default_factory=Counter)
-    numbers: dict[str, _Values] = field(default_factory=dict)
-    flags: dict[str, list[int]] = field(default_factory=dict)
+    numbers: defaultdict[str, _Values] = field(default_factory=lambda: defaultdict(_Values))
+    flags: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(lambda: [0, 0]))
 
     def add(self, row: Row) -> None:
         self.tasks += 1
@@ -289,10 +286,8 @@ class _Gathering:
 
     def measure(self, name: str, value: Any) -> None:
         if isinstance(value, bool):
-            self.flags.setdefault(name, [0, 0])[not value] += 1
+            self.flags[name][not value] += 1
         else:
-            if name not in self.numbers:
-                self.numbers[name] = _Values()
             self.numbers[name].add(value)
 
     def finish(self) -> Group:
@@ -308,9 +303,13 @@ class _Gathering:
         )
 
 
-def _place(
-    row: Row, by: Sequence[str], found: Sequence[tuple[Entry, Any]], full_names: Mapping[Entry, tuple[str, str]]
-) -> list[tuple[Any, Any]]:
+@lru_cache(10_000)  # thousands of rows have the same few entries
+def names_of_entry(entry: Entry) -> tuple[str, str]:
+    """What an entry may be called, the short name first."""
+    return entry.name, entry.full_name
+
+
+def _place(row: Row, by: Sequence[str], found: Sequence[tuple[Entry, Any]]) -> list[tuple[Any, Any]]:
     """For each name in `by`: what the row is sorted and recognised by, and its value."""
     if not by:
         return []
@@ -319,7 +318,7 @@ def _place(
     for section in ("result", "system", "option"):
         for entry, value in found:
             if entry.section == section:
-                values.update((name, value) for name in full_names[entry] if name in by)
+                values.update((name, value) for name in names_of_entry(entry) if name in by)
     place = []
     for name in by:
         if name in _WORDS:
@@ -331,20 +330,10 @@ def _place(
 
 
 def _word(row: Row, name: str) -> str | None:
-    match name:
-        case "task":
-            return row.task.kind
-        case "experiment":
-            return row.experiment
-        case "system":
-            return None if row.task.system is None else canonical(row.task.system)
-        case "document":
-            return (row.task.system or {}).get("document")
-        case "outcome":
-            return None if row.record is None else str(row.record.outcome)
-        case "message":
-            return None if row.record is None else row.record.message or None
-    return None if row.record is None else row.record.verdict
+    if name == "document":
+        return (row.task.system or {}).get(name)
+    value = known(row)[name]
+    return canonical(value) if isinstance(value, Mapping) else (value or None) if name == "message" else value
 
 
 def _order(value: Any) -> tuple[Any, ...]:
