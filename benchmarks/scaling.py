@@ -26,9 +26,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from kahanmaps.experiments.cluster import GROUP_MODULE, ClusterWorkers
+from kahanmaps.experiments.cluster import GROUP_MODULE, ClusterWorkers, record_on
 from kahanmaps.experiments.dask_client import RESULTS_AT_ONCE, Result
-from kahanmaps.experiments.group_results import record_on
 from kahanmaps.experiments.records import Limits, Outcome, Record, Task
 from kahanmaps.experiments.run import Batch, executor_for, plan
 from kahanmaps.experiments.spec import parse_spec

@@ -5,7 +5,7 @@ What is asked      spec.py (a spec in TOML), with shape and experiment_reader, e
                    and tasks.py (what can be done)
 What passes        records.py: tasks and their keys, limits, records
 Who does it        run.py (the loop), executor.py (what it drives); children.py and child.py here; cluster.py,
-                   dask_client, job_groups, group_results and group.py (the command on a worker) elsewhere
+                   dask_client, job_groups and group.py (the command on a worker) elsewhere
 What is kept       store.py, on database, schema, plans, results, merging, journals, locks
 What comes out     export.py, summary.py
 """

@@ -6,24 +6,27 @@ with it. A group is a few seconds of work, since the scheduler needs about as lo
 
 Nothing here touches the database: a record is handed back by `wait`, once, and is safe when the caller has stored it.
 
-How groups are filled is the matter of job_groups.py, what has become of them that of group_results.py, and all that
-talks to dask is in dask_client.py. Here it is decided what is sent when, and whose fault a failure was.
+How groups are filled is the matter of job_groups.py, all that talks to dask is in dask_client.py. Here it is decided
+what is sent when, and whose fault a failure was.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import subprocess
 import sys
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from itertools import count
 
 from kahanmaps.errors import InputError, KahanmapsError
-from kahanmaps.experiments.dask_client import DaskClient, Result
-from kahanmaps.experiments.endings import TRIES
+from kahanmaps.experiments.dask_client import DaskClient, Result, distributed, told
+from kahanmaps.experiments.endings import TRIES, ending
 from kahanmaps.experiments.executor import Documents, Executor
-from kahanmaps.experiments.group_results import Failure, failure_of, record_on
 from kahanmaps.experiments.job_groups import Grouping, JobGroup, KeptJob
 from kahanmaps.experiments.records import Job, Outcome, Record, Task
 
@@ -33,6 +36,7 @@ PASSED_ON = (TASKS_VARIABLE, "PYTHONPATH")  # variables that mean the same to th
 
 UNFIT_AFTER = 3  # groups that ended by themselves without a record, when there has never been one
 HOPELESS_AFTER = 10  # the same, however they ended
+TAIL = 2000  # characters of standard error kept
 SILENCE = 3.0  # seconds without a worker before a word is said; then again, ever more rarely
 
 
@@ -42,6 +46,21 @@ class ClusterLost(KahanmapsError):
 
 class WorkersUnfit(ClusterLost):
     """The workers cannot run tasks at all: not a word about any task, which is nobody's fault but the set-up's."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a group ended without all its records.
+
+    A task has a process of its own below the group command, whose limits the command keeps and whose death it tells in
+    a record: so what becomes of the command itself is the machine's doing, and no result. `is_unfit`: it ended by
+    itself, as if it could not be run at all; `is_the_workers`: they died, and it with them.
+    """
+
+    message: str
+    stderr: str
+    is_unfit: bool = False
+    is_the_workers: bool = False
 
 
 class ClusterWorkers(Executor):
@@ -168,10 +187,6 @@ class ClusterWorkers(Executor):
         self._dask.close()
         self._keys.clear()
         self._groups.clear()
-        self._again.clear()
-        self._suspects.clear()
-        self._held.clear()
-        self._open = JobGroup()
 
     # Groups
 
@@ -209,7 +224,7 @@ class ClusterWorkers(Executor):
     def _taken(self, result: Result) -> list[Record]:
         """The records that a group has printed. Jobs without one are put up for another try, or held."""
         group = self._groups.pop(result.number)
-        timeout = group.timeout
+        timeout = group.timeout  # with the jobs that it had
         records = []
         for line in result.stdout.split(b"\n"):
             record = record_on(line)
@@ -220,11 +235,11 @@ class ClusterWorkers(Executor):
             if record.outcome is Outcome.LOST:
                 self._failed_alone(record.key, job, Failure(record.message, record.stderr))
                 continue
-            self._grouping.learn(job.kind, record.seconds, len(line))
+            self._grouping.means[job.kind].learn(record.seconds, len(line))
             self._keys.discard(record.key)
             records.append(record)
         if group.jobs:
-            self._sort_out(group, failure_of(result, timeout))
+            self._sort_out(group, _failure_of(result, timeout))
         return records
 
     def _sort_out(self, group: JobGroup, failure: Failure) -> None:
@@ -272,12 +287,13 @@ class ClusterWorkers(Executor):
             if not is_all:
                 return []
         held, self._held = self._held, []
-        records = []
+        records, finished = [], datetime.now(UTC).isoformat(timespec="seconds")
         for key, job, failure in held:
             if failure.is_unfit and job.tries < TRIES:  # by now others have been run
                 self._again.append(job)
             else:
-                records.append(failure.record(key))
+                message, stderr = failure.message, failure.stderr
+                records.append(Record(key, Outcome.LOST, message=message, stderr=stderr, finished=finished))
         self._given_up += len(records)
         self._keys.difference_update(record.key for record in records)
         return records
@@ -302,3 +318,30 @@ def _with_environment(command: Sequence[str]) -> list[str]:
     """The command with our variables set. `env=` of subprocess.run would replace all that the worker has instead."""
     passed = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
     return ["/usr/bin/env", "PYTHONHASHSEED=0", *passed, *command]
+
+
+def record_on(line: bytes) -> Record | None:
+    """The record on a line; None if it is something else, such as the half of one."""
+    if not line.startswith(b"{"):
+        return None
+    try:
+        return Record.from_json(json.loads(line))
+    except (ValueError, TypeError, LookupError):
+        return None
+
+
+def _failure_of(result: Result, timeout: float | None) -> Failure:
+    """Why a group ended without all its records; `timeout` is the one that its command had."""
+    process, error = result.process, result.error
+    stderr = result.stderr.decode(errors="replace")[-TAIL:]
+    if process is not None:
+        status = process.returncode
+        message = f"the worker's command {ending(status)}" + (" and no record" if status == 0 else "")
+        return Failure(message, stderr, is_unfit=status >= 0)
+    if isinstance(error, subprocess.TimeoutExpired):
+        message = f"the worker's command did not end within {timeout or 0:g} s"
+        return Failure(message, stderr)
+    if isinstance(error, distributed().KilledWorker):
+        message = f"{error.allowed_failures + 1} workers died one after the other while they ran it"
+        return Failure(message, stderr, is_the_workers=True)
+    return Failure(f"the worker could not run its command: {told(error)}", stderr, is_unfit=True)

@@ -6,6 +6,7 @@ A group is plain text on its way out: what the command in `group` reads.
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 from dataclasses import asdict, dataclass, field
 from typing import NamedTuple
 
@@ -45,12 +46,8 @@ class JobGroup:
     @property
     def timeout(self) -> float | None:
         """How long the command may take: what its jobs may, and a generous start; None if one of them is unlimited."""
-        total = START_UP
-        for job in self.jobs.values():
-            if job.limits.time is None:
-                return None
-            total += job.limits.time + START_UP_OF_A_JOB
-        return total
+        times = [job.limits.time for job in self.jobs.values()]
+        return None if None in times else START_UP + sum((time or 0.0) + START_UP_OF_A_JOB for time in times)
 
     @property
     def text(self) -> bytes:
@@ -60,23 +57,22 @@ class JobGroup:
 
 
 class Grouping:
-    """Fills groups to about `seconds` of work and at most `largest` jobs; `documents` gives the text of a document."""
+    """Fills groups to about `seconds` of work and at most `largest` jobs; `documents` gives the text of a document.
+
+    `means` are of the records of each kind of task; one of which nothing is known takes a whole group's time.
+    """
 
     def __init__(self, documents: Documents, seconds: float, largest: int) -> None:
         self._documents = documents
         self._group_seconds = seconds
         self._largest_group = largest
-        self._means: dict[str, _Means] = {}
-
-    def learn(self, kind: str, seconds: float, size: int) -> None:
-        """One record more of this kind of task: how long it took, and its bytes."""
-        self._mean(kind).learn(seconds, size)
+        self.means: defaultdict[str, Means] = defaultdict(lambda: Means(seconds))
 
     def fits(self, group: JobGroup, kind: str) -> bool:
         """Whether the group comes nearer to its time with a job of this kind, and stays within its size."""
         return (
-            group.seconds + self._seconds(kind) / 2 <= self._group_seconds
-            and group.expected + self._mean(kind).size <= LARGEST_TEXT
+            group.seconds + self.means[kind].seconds / 2 <= self._group_seconds
+            and group.expected + self.means[kind].size <= LARGEST_TEXT
         )
 
     def is_full(self, group: JobGroup) -> bool:
@@ -95,24 +91,16 @@ class Grouping:
                 group.documents[wanted] = self._documents(wanted)
                 group.sent += len(group.documents[wanted])
         group.jobs[task.key] = KeptJob(task.kind, task.text, limits, tries)
-        group.seconds += self._seconds(task.kind)
-        group.expected += self._mean(task.kind).size
+        group.seconds += self.means[task.kind].seconds
+        group.expected += self.means[task.kind].size
         group.sent += len(task.text)
-
-    def _mean(self, kind: str) -> _Means:
-        return self._means.setdefault(kind, _Means())
-
-    def _seconds(self, kind: str) -> float:
-        """How long a task of this kind will take; a whole group's time while nothing is known of it."""
-        mean = self._mean(kind)
-        return mean.seconds if mean.seen else self._group_seconds
 
 
 @dataclass
-class _Means:
+class Means:
     """What a record of one kind of task takes, on average over the last ones."""
 
-    seconds: float = 0.0
+    seconds: float
     size: float = 0.0
     seen: int = 0
 
