@@ -16,7 +16,7 @@ import subprocess
 import threading
 import uuid
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
@@ -75,8 +75,7 @@ class DaskClient:
         """Have a worker run a command on this input. Never raises: a scheduler that is gone is told by `lost`."""
         try:
             # distributed warns of arguments beyond 10 MB: a single document may be as large.
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+            with warnings.catch_warnings(action="ignore"):
                 future = self._client.submit(
                     subprocess.run,
                     command,
@@ -110,8 +109,7 @@ class DaskClient:
         for running in [self._counter, *self._fetching.copy()]:
             running.cancel()
         # A scheduler that is gone must not hold us up, and there is nothing to be done about its last words.
-        with contextlib.suppress(Exception), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with contextlib.suppress(Exception), warnings.catch_warnings(action="ignore"):
             self._client.close(timeout=2)
         _SILENCE.end()
 
@@ -180,22 +178,21 @@ def _connected(address: str, timeout: float) -> Any:
     _SILENCE.begin()
     try:
         # A warning of other versions of some package: our tasks are the standard library's, whose version may differ.
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            make = partial(client, **chosen, timeout=timeout, set_as_default=False, name="kahanmaps")
+        with warnings.catch_warnings(action="ignore"):
+            make = partial(client, chosen, timeout=timeout, set_as_default=False, name="kahanmaps")
             return _in_time(make, timeout + 1)
-    except ImportError as error:  # what distributed raises when the scheduler says that versions cannot go together
+    except BaseException as error:
         _SILENCE.end()
-        raise InputError(f"the scheduler at {address} runs other versions than this client: {error}") from error
-    except Exception as error:
-        _SILENCE.end()
-        raise InputError(
-            f"no dask scheduler answers at {address} within {timeout:g} s ({told(error)}): "
-            "is the address right, and does `dask scheduler` run there?"
-        ) from error
-    except BaseException:
-        _SILENCE.end()
-        raise
+        if isinstance(error, ImportError):  # the scheduler says that versions cannot go together
+            sentence = f"the scheduler at {address} runs other versions than this client: {error}"
+        elif isinstance(error, Exception):
+            sentence = (
+                f"no dask scheduler answers at {address} within {timeout:g} s ({told(error)}): "
+                "is the address right, and does `dask scheduler` run there?"
+            )
+        else:
+            raise
+        raise InputError(sentence) from error
 
 
 def _in_time(make: Callable[[], Any], seconds: float) -> Any:
@@ -212,12 +209,12 @@ def _in_time(make: Callable[[], Any], seconds: float) -> Any:
     return made.result(seconds)
 
 
-def _scheduler(address: str) -> dict[str, str]:
+def _scheduler(address: str) -> str:
     """How a client is told where the scheduler is. A file is looked at first: distributed waits for it for ever."""
     path = Path(address)
     if "://" not in address and (path.is_file() or address.endswith(".json")):
         try:
-            return {"address": str(json.loads(path.read_text(encoding="utf-8"))["address"])}
+            return str(json.loads(path.read_text(encoding="utf-8"))["address"])
         except OSError as error:
             raise InputError(f"cannot read the scheduler file {address}: {error.strerror}") from None
         except (ValueError, LookupError, TypeError):
@@ -226,7 +223,7 @@ def _scheduler(address: str) -> dict[str, str]:
         raise InputError(
             f"{address!r} is not the address of a scheduler: write tcp://host:port, or the path of a scheduler file"
         )
-    return {"address": address}
+    return address
 
 
 def _loss(error: BaseException) -> str:
@@ -248,23 +245,18 @@ class _Silence:
         with self._lock:
             self._users += 1
             if self._users == 1:
-                for logger in _loggers():
+                # Those that distributed makes later hand on to the first ones, which are silent by then.
+                known = [name for name in logging.Logger.manager.loggerDict if name.split(".")[0] in _LOGGERS]
+                for logger in map(logging.getLogger, sorted({*_LOGGERS, *known})):
                     self._before.append((logger, logger.handlers, logger.propagate))
                     logger.handlers, logger.propagate = [logging.NullHandler()], False
 
     def end(self) -> None:
         with self._lock:
             self._users -= 1
-            if self._users == 0:
-                for logger, handlers, propagate in self._before:
-                    logger.handlers, logger.propagate = handlers, propagate
-                self._before.clear()
-
-
-def _loggers() -> Iterable[logging.Logger]:
-    """The loggers of distributed. Those it makes later hand on to the first ones, which are silent by then."""
-    names = [name for name in logging.Logger.manager.loggerDict if name.split(".")[0] in _LOGGERS]
-    return [logging.getLogger(name) for name in sorted({*_LOGGERS, *names})]
+            while self._users == 0 and self._before:
+                logger, handlers, propagate = self._before.pop()
+                logger.handlers, logger.propagate = handlers, propagate
 
 
 _SILENCE = _Silence()
