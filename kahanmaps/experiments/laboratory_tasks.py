@@ -1,29 +1,34 @@
-"""The tasks of the laboratory that ask what a map preserves and how it grows, of right-hand sides alone.
+"""The tasks of the laboratory: what a map preserves and how it grows, and what is seen of it from outside.
 
 As in tasks.py results are small, words and numbers to group by; `report = true` keeps all that was found. Without eps
 an analysis is for every eps. A time budget (`seconds`) may cut a result short: it belongs to the key, and "status" says
 what is open. The verdict is that of the formulas that were found; growth and numbers of integrals are measured, and
-have words of their own.
+have words of their own. Singularities, cycles and exponents are all measured: they have no verdict.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from flint import fmpq_poly
 
-from kahanmaps.algebra.text import format_univariate
+from kahanmaps.algebra.text import format_number, format_univariate
 from kahanmaps.checks.claims import Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.experiments.registry import Result, task
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.registry import Result, fields, task
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
+    from kahanmaps.laboratory.cycle_laws import Comparison
+    from kahanmaps.laboratory.cycles import Census
     from kahanmaps.laboratory.degrees import DegreeGrowth
     from kahanmaps.laboratory.densities import DensitySearch
     from kahanmaps.laboratory.integrals import IntegralSearch
+    from kahanmaps.laboratory.singularities import SingularityRun
 
 _ENDINGS = ("constant", "singular")  # of degrees without a recurrence that are known for all iterates
 
@@ -42,15 +47,15 @@ def degrees(
     from kahanmaps.laboratory.degrees import degree_growth
 
     found = degree_growth(system.system, eps, seconds=seconds, max_terms=terms, max_degree=max_degree, seed=seed)
-    result: Result = {
+    return {
         "status": found.ended,
         **_growth(found),
         "estimate": found.estimate,
         "degrees": list(found.degrees),
         "reached": len(found.degrees) - 1,
         "ending": found.message,
+        **_report(found, report),
     }
-    return _with_report(result, found, report)
 
 
 @task("find-integrals")
@@ -67,7 +72,7 @@ def integrals(
     from kahanmaps.laboratory.integrals import find_integrals
 
     found = find_integrals(system, symbols=symbolic or (), eps=eps, max_degree=max_degree, seconds=seconds, seed=seed)
-    result: Result = {
+    return {
         "verdict": _weakest(one.verdict for one in found.integrals),
         "status": _state_of_integrals(found),
         "integrals": len(found.integrals),
@@ -76,8 +81,8 @@ def integrals(
         "nullities": list(found.profile.nullities),
         "period": found.profile.period,
         "reason": found.reason,
+        **_report(found, report),
     }
-    return _with_report(result, found, report)
 
 
 @task("find-density")
@@ -94,7 +99,7 @@ def density(
     from kahanmaps.laboratory.densities import find_densities
 
     found = find_densities(system, symbols=symbolic or (), eps=eps, max_degree=max_degree, seconds=seconds, seed=seed)
-    result: Result = {
+    return {
         "verdict": _weakest(one.verdict for one in found.densities),
         "status": _state_of_densities(found),
         "densities": len(found.densities),
@@ -102,8 +107,8 @@ def density(
         "formulas": [one.text for one in found.densities],
         "period": found.period,
         "reason": found.reason,
+        **_report(found, report),
     }
-    return _with_report(result, found, report)
 
 
 @task("find-symmetry")
@@ -112,7 +117,7 @@ def symmetry(system: SystemFile, seconds: int = 30, report: bool = False) -> Res
     from kahanmaps.laboratory.symmetries import linear_symmetries
 
     found = linear_symmetries(system.system, seconds=seconds)
-    result: Result = {
+    return {
         "verdict": str(Verdict.PROVED if found.complete else Verdict.UNDECIDED),
         "status": "complete" if found.complete else "undecided",
         "group_order": found.order,
@@ -122,8 +127,8 @@ def symmetry(system: SystemFile, seconds: int = 30, report: bool = False) -> Res
         "scaling": found.scaling is not None,
         "generators": [one.text for one in found.generators],
         "open": found.undecided,
+        **_report(found, report),
     }
-    return _with_report(result, found, report)
 
 
 @task("find-commuting")
@@ -139,7 +144,7 @@ def commuting(
     from kahanmaps.laboratory.commuting import commuting_systems
 
     found = commuting_systems(system.system, shape, seed=seed, error_bits=error_bits, seconds=seconds)
-    result: Result = {
+    return {
         "verdict": str(found.verdict),
         "status": "complete" if found.complete else "undecided",
         "commuting": len(found.nontrivial),
@@ -150,8 +155,8 @@ def commuting(
         "systems": [one.rhs for one in found.nontrivial],
         "irrational": found.irrational,
         "open": found.undecided,
+        **_report(found, report),
     }
-    return _with_report(result, found, report)
 
 
 @task("analyze")
@@ -170,7 +175,7 @@ def analysis(
     found = analyze(system, symbols=symbolic or (), eps=eps, seconds=seconds, seed=seed)
     final, confined = found.conclusion, {run.verdict for run in found.singularities}
     unfinished = _unfinished(found)
-    result: Result = {
+    return {
         "status": "partial" if found.skipped or unfinished else "complete",
         "integrability": final.kind,
         "integrals": final.integrals if found.integrals_were_counted else None,
@@ -184,12 +189,135 @@ def analysis(
         "sentence": final.sentence,
         "unfinished": unfinished,
         "skipped": found.skipped,
+        **_report(found, report),
     }
-    return _with_report(result, found, report)
 
 
-def _with_report(result: Result, found: Any, whole: bool) -> Result:
-    return {**result, "report": found.to_json()} if whole else result
+@task("singularities")
+def confinement(
+    system: SystemFile,
+    eps: Any = None,
+    steps: int | None = None,
+    seconds: int = 60,
+    seed: int = 0,
+    report: bool = False,
+) -> Result:
+    """Are singularities confined? The hypersurfaces that the map contracts; without eps two values are compared."""
+    from kahanmaps.laboratory.fates import NOT_CONTRACTED, UNDECIDED
+    from kahanmaps.laboratory.singularities import default_eps, singularities
+
+    values = default_eps(system.system, seed) if eps is None else (eps,)
+    runs = [singularities(system.system, value, steps=steps, seed=seed, seconds=seconds) for value in values]
+    agree = len({run.shape for run in runs}) == 1
+    first = runs[0]
+    result: Result = {
+        "confinement": first.verdict if agree else UNDECIDED,
+        "status": "time" if any(run.stopped for run in runs) else "complete" if agree else "eps differ",
+        "tried": [format_number(run.eps) for run in runs],
+        "followed": first.followed,  # for so many steps, where something is not confined
+        **fields(first, "map_degree", "critical_degree"),
+        "contracted": sum(h.status != NOT_CONTRACTED for h in first.hypersurfaces),
+        "longest_pattern": max((h.confined_at for h in first.hypersurfaces if h.confined_at is not None), default=None),
+        "hypersurfaces": _hypersurfaces(first),
+    }
+    if report:
+        result["report"] = [
+            {
+                "eps": format_number(run.eps),
+                **fields(run, "verdict", "denominator"),
+                "polynomials": [h.polynomial for h in run.hypersurfaces],
+                "hypersurfaces": _hypersurfaces(run),
+            }
+            for run in runs
+        ]
+    return result
+
+
+@task("cycles")
+def cycles(
+    system: SystemFile,
+    prime: int,
+    eps: Any = None,
+    samples: int | None = None,
+    steps: int | None = None,
+    seconds: int = 60,
+    seed: int = 0,
+    report: bool = False,
+) -> Result:
+    """The cycles of the map over a finite field, and the laws that their lengths are compatible with."""
+    from kahanmaps.laboratory.cycle_laws import LAWS, compare
+    from kahanmaps.laboratory.cycles import cycle_census, default_eps
+    from kahanmaps.laboratory.reversors import find_reversor
+
+    if steps is not None and samples is None:
+        raise InputError(f"found steps = {steps} without samples, expected both: whole graphs have no last step")
+    reversor = find_reversor(system.system)
+    runs: list[tuple[Census, Comparison]] = []
+    for value in default_eps(prime) if eps is None else (eps,):
+        census = cycle_census(
+            system.system,
+            value,
+            prime,
+            reversor=reversor,
+            samples=samples,
+            steps=steps,
+            seed=seed,
+            seconds=seconds,
+        )
+        runs.append((census, compare(census, seed)))
+    whole = all(census.complete for census, _ in runs)
+    stopped = any(census.stopped for census, _ in runs)
+    verdicts = {law: {found.verdict(law) for _, found in runs} for law in LAWS}
+    shares = [found.share_within for _, found in runs if found.share_within is not None]
+    return {
+        "status": "time" if stopped else "complete" if whole else "sampled",
+        **{law.replace(" ", "_"): one.pop() if len(one) == 1 else "eps differ" for law, one in verdicts.items()},
+        "points": str(runs[0][0].points),  # may be longer than integers of databases
+        "bound": runs[0][1].bound,
+        "least_share_within_bound": min(shares, default=None),
+        "longest": max(census.longest for census, _ in runs),
+        "has_reversor": reversor is not None,
+        "runs": [_census(census, found, report) for census, found in runs],
+    }
+
+
+@task("lyapunov")
+def lyapunov(
+    system: SystemFile,
+    eps: Any,
+    orbits: int = 16,
+    box: Any = "1",
+    steps: int = 10_000,
+    transient: int | None = None,
+    seconds: int = 60,
+    seed: int = 0,
+) -> Result:
+    """Lyapunov exponents of float orbits from random starts, by the exact tangent map, per unit of time."""
+    from kahanmaps.maps.float_ensemble import starts_in_box
+    from kahanmaps.maps.float_lyapunov import lyapunov_exponents
+    from kahanmaps.maps.float_numbers import to_floats
+
+    starts = starts_in_box(orbits, system.system.dim, float(to_floats([box])[0]), seed)
+    skipped = steps // 10 if transient is None else transient
+    found = lyapunov_exponents(system.system, eps, starts, steps, transient=skipped, seconds=seconds)
+    mean, volume = found.mean, found.log_volume
+    return {
+        "status": "time" if found.stopped else "completed" if len(found.exponents) else "no orbit left",
+        "ended": found.ended,
+        "counted": found.steps,
+        "largest": _number(mean[0]),
+        "smallest": _number(mean[-1]),
+        "exponents": [_number(value) for value in mean],
+        "spread": [_number(value) for value in found.spread],
+        "change_from_half": [_number(value) for value in found.change],
+        "sum": _number(mean.sum()),
+        "log_volume": _number(volume.mean()) if len(volume) else None,
+        "residual": _number(found.residual) if len(volume) else None,
+    }
+
+
+def _report(found: Any, whole: bool) -> Result:
+    return {"report": found.to_json()} if whole else {}
 
 
 def _state_of_integrals(found: IntegralSearch) -> str:
@@ -240,3 +368,35 @@ def _growth(found: DegreeGrowth) -> Result:
         "recurrence": None if recurrence is None else recurrence.text,
         "closed_form": None if recurrence is None else recurrence.closed_form or None,
     }
+
+
+def _hypersurfaces(run: SingularityRun) -> list[Result]:
+    return [
+        {
+            **fields(h, "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at"),
+            "ranks": [step.rank for step in h.steps],
+            "poles": [step.pole for step in h.steps],
+        }
+        for h in run.hypersurfaces
+    ]
+
+
+def _census(census: Census, found: Comparison, lengths: bool) -> Result:
+    result: Result = {
+        "eps": format_number(census.eps),
+        **fields(census, "looked_at", "lost", "falling", "transient", "open", "periodic", "cycles", "longest", "mean"),
+        "share_within_bound": found.share_within,
+        "distance": found.distance,
+        "critical_distance": found.critical,
+        "compatible": list(found.compatible),
+        "not_compatible": list(found.refused),
+    }
+    if lengths:
+        result["lengths"] = [list(pair) for pair in census.lengths.items()]
+        result["reasons"] = dict(found.reasons)
+    return result
+
+
+def _number(value: Any) -> float | None:
+    """A float of numpy as one that JSON has."""
+    return float(value) if isfinite(value) else None

@@ -24,7 +24,7 @@ from kahanmaps.errors import InputError, quoted, suggestion
 from kahanmaps.experiments.options import OTHER, VOCABULARY, Option
 
 ENVIRONMENT = "KAHANMAPS_TASKS"
-LIBRARY = tuple(f"kahanmaps.experiments.{name}" for name in ("tasks", "laboratory_tasks", "dynamics_tasks"))
+LIBRARY = tuple(f"kahanmaps.experiments.{name}" for name in ("tasks", "laboratory_tasks"))
 Result = dict[str, Any]
 
 # What a task needs its system to be.
@@ -54,6 +54,11 @@ class TaskKind:
             for name, value in options.items()
         }
         return self.function(**made) if self.needs is None else self.function(system, **made)
+
+
+def fields(found: Any, *names: str) -> Result:
+    """These attributes of what was found, by their names."""
+    return {name: getattr(found, name) for name in names}
 
 
 _KINDS: dict[str, TaskKind] = {}

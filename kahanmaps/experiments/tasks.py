@@ -23,7 +23,7 @@ from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, task
+from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, fields, task
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.invariants.heights import height_growth
@@ -126,10 +126,7 @@ def family_space(system: SystemFile) -> Result:
     space = cubic_space(member.A, member.variables)
     return {
         "m": member.m,
-        "dimension": space.dimension,
-        "expected": space.expected,
-        "rank": space.rank,
-        "unknowns": space.unknowns,
+        **fields(space, "dimension", "expected", "rank", "unknowns"),
         "factors": [str(factor) for factor in member.factors],
         "generic": member.is_generic,
         "associated": 2 ** (len(member.factors) - 1),
