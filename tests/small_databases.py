@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from kahanmaps.experiments import merging, plans
+from kahanmaps.experiments import merging, tables
 from kahanmaps.experiments import store as store_module
 from kahanmaps.experiments.records import Limits, Outcome, Record, Task
 from kahanmaps.experiments.store import Store
@@ -59,7 +59,7 @@ def planned(path: Path, *numbers: int, records=(), experiment: str = "a", defini
 def small_chunks():
     """So that a dozen rows are many chunks. A context and not a fixture, because Hypothesis needs it anew each time."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (store_module, plans, merging):
+        for module in (store_module, tables, merging):
             for name in {"PLAN_CHUNK", "RESULT_CHUNK", "COUNT_CHUNK"} & set(vars(module)):
                 patch.setattr(module, name, 3)
         yield
@@ -69,7 +69,8 @@ PRELUDE = """
 import json, os, resource, sys, time, urllib.parse  # the last one for scripts that give up the right to load it later
 from kahanmaps.experiments import database
 from kahanmaps.experiments.records import Limits, Outcome, Record, Task
-from kahanmaps.experiments.store import Store, StoreError, Unavailable
+from kahanmaps.experiments.database import StoreError, Unavailable
+from kahanmaps.experiments.store import Store
 
 def task(number):
     return Task("orbit", {"family": {"m": 2, "seed": number}}, {"eps": "1/10"})

@@ -19,10 +19,10 @@ from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
-    from kahanmaps.experiments.executor import Executor
-    from kahanmaps.experiments.records import Job
+    from kahanmaps.experiments.records import Executor, Job
     from kahanmaps.experiments.spec import Spec
-    from kahanmaps.experiments.store import Planned, Store
+    from kahanmaps.experiments.store import Store
+    from kahanmaps.experiments.tables import Planned
 
 _SHOWN = 3  # tasks of each experiment in a dry run
 
@@ -190,7 +190,7 @@ def _tell_end(
     again = as_typed(words)
     why = as_typed(["kahanmaps", "batch", "summary", "--db", db, "--by", "outcome,message"])
     if progress.lost:
-        from kahanmaps.experiments.endings import TRIES
+        from kahanmaps.experiments.children import TRIES
 
         say(
             f"{_tasks(progress.lost)} lost, without a result: what did them was killed, or could not be run, "

@@ -16,7 +16,8 @@ from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import echo, on_terminal, print_table, shorten, tell, tell_entry
 
 if TYPE_CHECKING:
-    from kahanmaps.experiments.store import Checked, Found, Store
+    from kahanmaps.experiments.checking import Checked
+    from kahanmaps.experiments.store import Found, Store
 
 _VALUE_WIDTH = 300
 _PROBLEM_WIDTH = 100

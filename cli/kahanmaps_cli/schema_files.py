@@ -46,7 +46,7 @@ def schema(name: str) -> dict[str, Any]:
 
 
 def _spec_schema() -> dict[str, Any]:
-    from kahanmaps.experiments.spec_schema import spec_schema
+    from kahanmaps.experiments.spec import spec_schema
 
     return {"title": _SPEC_TITLE, **spec_schema()}
 

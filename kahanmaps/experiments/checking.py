@@ -10,9 +10,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from kahanmaps.experiments.database import Damaged, Database
-from kahanmaps.experiments.plans import seal, sound_experiments
 from kahanmaps.experiments.records import digest
-from kahanmaps.experiments.results import RESULT_CHUNK, is_as_written, put_result, record_columns, record_of
+from kahanmaps.experiments.tables import (
+    RESULT_CHUNK,
+    is_as_written,
+    put_result,
+    record_columns,
+    record_of,
+    seal,
+    sound_experiments,
+)
 
 _PROBLEMS = 20  # of the pages of a file, told at most
 
@@ -73,7 +80,7 @@ def add_checksums(database: Database) -> None:
     with database.upgrade():
         for (experiment,) in database.fetch("SELECT id FROM experiment"):
             seal(database, experiment)
-        for rows in _chunks(database, "result", "task", f"t.key, {record_columns(database)}", _RESULTS):
+        for rows in database.chunks("result", "task", f"t.key, {record_columns(database)}", RESULT_CHUNK, _RESULTS):
             for task, key, *row in rows:
                 if _can_be(database, key, row):
                     put_result(database, task, key, row[-2], row)
@@ -91,7 +98,7 @@ _RESULTS = "LEFT JOIN task AS t ON t.id = r.task"
 
 def _results(database: Database) -> Iterator[tuple[int, Any, bool]]:
     """The task of each result, its key, and whether the result is sound."""
-    for rows in _chunks(database, "result", "task", f"t.key, {record_columns(database)}", _RESULTS):
+    for rows in database.chunks("result", "task", f"t.key, {record_columns(database)}", RESULT_CHUNK, _RESULTS):
         for task, key, *row in rows:
             yield task, key, is_as_written(key, row) if database.format > 1 else _can_be(database, key, row)
 
@@ -105,17 +112,6 @@ def _can_be(database: Database, key: Any, row: list[Any]) -> bool:
 
 def _texts(database: Database, table: str, name: str) -> Iterator[tuple[Any, bool]]:
     """The name of each text, and whether it is the digest of the text."""
-    for rows in _chunks(database, table, "rowid", f"r.{name}, r.text"):
+    for rows in database.chunks(table, "rowid", f"r.{name}, r.text", RESULT_CHUNK):
         for _, found, text in rows:
             yield found, isinstance(text, str) and found == digest(text)
-
-
-def _chunks(database: Database, table: str, id: str, columns: str, join: str = "") -> Iterator[list[Any]]:
-    """Rows of a table with their numbers, some at a time, in their order."""
-    last = 0
-    sql = f"SELECT r.{id}, {columns} FROM {table} AS r {join} WHERE r.{id} > ? ORDER BY r.{id} LIMIT ?"
-    while rows := database.fetch(sql, (last, RESULT_CHUNK), is_lenient=True):
-        yield rows
-        # Not so where pages are damaged, and then it would go round for ever.
-        database.require(rows[-1][0] > last, f"the table {table}, number", rows[-1][0], f"more than {last}")
-        last = rows[-1][0]

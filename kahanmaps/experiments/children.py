@@ -19,14 +19,15 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from signal import SIGKILL
+from signal import SIGKILL, Signals
 from typing import IO, Any, cast
 
 from kahanmaps.errors import KahanmapsError
-from kahanmaps.experiments.endings import TRIES, ending, is_from_outside
-from kahanmaps.experiments.executor import Documents
-from kahanmaps.experiments.records import Job, Outcome, Record
+from kahanmaps.experiments.records import Documents, Job, Outcome, Record
 
+# How often in all a task is tried while what does it is killed from outside, before it is given up as lost: a lost
+# task has no result, and the next run tries it as often again.
+TRIES = 5
 GROUP_SECONDS = 5.0  # of work for one child: starting it costs about a fifth of a second
 _STDERR_KEPT = 2000
 _READ = 1 << 16
@@ -36,6 +37,22 @@ _STARTS = 3  # children that end before they are ready, one after the other: the
 _KILLED_STARTS = 20  # the same for children that somebody kills, for each that may work at a time
 # Words with which Python, FLINT and GMP end where there is no memory.
 _NO_MEMORY = ("allocate memory", "out of memory", "memoryerror", "cannot reallocate", "bad_alloc")
+
+
+# A task's own are the signals that the processor or a limit of its own raises: its code, or a library that it called,
+# has died. Any other one was sent from outside: by a cancelled job, a service that stops, a shutdown. SIGKILL may also
+# come from the system for want of memory, of which the dead say nothing.
+_OWN = {
+    Signals.SIGSEGV,
+    Signals.SIGABRT,
+    Signals.SIGFPE,
+    Signals.SIGBUS,
+    Signals.SIGILL,
+    Signals.SIGSYS,
+    Signals.SIGTRAP,
+    Signals.SIGXCPU,
+    Signals.SIGXFSZ,
+}
 
 
 class ChildrenError(KahanmapsError):
@@ -397,3 +414,26 @@ class _Child:
         for stream in (self.input, self.answers, self.talk):
             with suppress(OSError):
                 stream.close()
+
+
+def is_from_outside(status: int | None) -> bool:
+    """Whether a process that ended with this status, as `subprocess` has it, was killed by no doing of its own."""
+    return status is not None and status < 0 and -status not in _OWN
+
+
+def ending(status: int | None) -> str:
+    """How a process ended, in words.
+
+    >>> ending(-15), ending(7)
+    ('was killed by signal 15 (SIGTERM), from outside', 'ended with status 7')
+    """
+    if status is None:
+        return "closed the pipe for its answers"
+    if status >= 0:
+        return f"ended with status {status}"
+    words = f"was killed by signal {-status}"
+    with suppress(ValueError):
+        words += f" ({Signals(-status).name})"
+    if not is_from_outside(status):
+        return words
+    return f"{words}, from outside" + (" or for want of memory" if -status == SIGKILL else "")

@@ -24,11 +24,10 @@ from datetime import UTC, datetime
 from itertools import count
 
 from kahanmaps.errors import InputError, KahanmapsError
+from kahanmaps.experiments.children import TRIES, ending
 from kahanmaps.experiments.dask_client import DaskClient, Result, distributed, told
-from kahanmaps.experiments.endings import TRIES, ending
-from kahanmaps.experiments.executor import Documents, Executor
 from kahanmaps.experiments.job_groups import Grouping, JobGroup, KeptJob
-from kahanmaps.experiments.records import Job, Outcome, Record, Task
+from kahanmaps.experiments.records import Documents, Executor, Job, Outcome, Record, Task
 
 GROUP_MODULE = "kahanmaps.experiments.group"
 TASKS_VARIABLE = "KAHANMAPS_TASKS"

@@ -1,6 +1,6 @@
 """One SQLite file: opening and closing it, one transaction or one read at a time, and errors told in sentences.
 
-Opened for writing it holds the lock (locks.py) and has the journal that its file system allows (journals.py). What lies
+Opened for writing it holds the lock, and has the journal that its file system allows (locks.py). What lies
 in the file is not known here, except whether it is ours (schema.py).
 """
 
@@ -17,8 +17,15 @@ from pathlib import Path
 from typing import Any, Self
 
 from kahanmaps.errors import InputError, KahanmapsError, is_of_the_machine, quoted
-from kahanmaps.experiments.journals import is_mounted, journal_for
-from kahanmaps.experiments.locks import Lock, LockedByAnother, NotOurs, require_journal, require_plain
+from kahanmaps.experiments.locks import (
+    Lock,
+    LockedByAnother,
+    NotOurs,
+    is_mounted,
+    journal_for,
+    require_journal,
+    require_plain,
+)
 from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT, SCHEMA, UPGRADE
 from kahanmaps.whole_files import resolved
 
@@ -129,6 +136,19 @@ class Database:
         with self._errors():
             self._opened.text_factory = (lambda data: data.decode(errors="replace")) if is_lenient else str
             return self.execute(sql, values).fetchall()
+
+    def chunks(
+        self, table: str, id: str, columns: str, size: int, join: str = "", is_lenient: bool = True
+    ) -> Iterator[list[Any]]:
+        """Rows of the table `r` with their numbers, some at a time, in their order."""
+        last = 0
+        sql = f"SELECT r.{id}, {columns} FROM {table} AS r {join} WHERE r.{id} > ? ORDER BY r.{id} LIMIT ?"
+        while rows := self.fetch(sql, (last, size), is_lenient=is_lenient):
+            for id_of_row, *_ in rows:
+                # Not so where pages are damaged, and then it would go round for ever.
+                self.require(id_of_row > last, f"the table {table}, number", id_of_row, f"more than {last}")
+                last = id_of_row
+            yield rows
 
     @contextmanager
     def transaction(self) -> Iterator[None]:

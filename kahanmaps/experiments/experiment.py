@@ -1,18 +1,41 @@
-"""One experiment of a batch: many tasks of one kind, none of which is made before it is asked for."""
+"""One experiment of a batch, many tasks of one kind, none of which is made before it is asked for; and how it is read.
+
+`ExperimentReader` says what one table [experiments.NAME] of a spec means, or tells every mistake in it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
-from kahanmaps.experiments.grid import Grid, RationalRange, Values
-from kahanmaps.experiments.recipes import family_recipe
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError, suggestion
+from kahanmaps.experiments.grid import Grid, RationalRange, Values, read_values
+from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of, show
+from kahanmaps.experiments.recipes import family_recipe, find_file, recipe_of
 from kahanmaps.experiments.records import Limits, Task, canonical
-from kahanmaps.experiments.registry import TaskKind
+from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, task_kind
+from kahanmaps.experiments.shape import SpecDocument, read_memory, read_time
+from kahanmaps.family.draw import parse_chi
 
 PARAMETERS = "parameters."  # what the name of a value begins with that is a parameter of the system
+DEFAULT_LIMITS = Limits(time=3600.0, memory=4 * 10**9)
+TIME_STEP = "time_step"
+_EPS2 = "eps2"
+_FAMILY_WORD = "family"
+_FILES_AT_MOST = 10_000
+_POINTS_COMPARED = 1_000
+# m from what a random member is drawn with.
+_SIZES: Mapping[str, Callable[[Any], int]] = {
+    "m": int,
+    "eigenvalues": lambda text: int(text.count(",")) + 1,
+    "chi": lambda text: parse_chi(text).degree(),
+}
+_CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
+L = TypeVar("L")
 
 
 @dataclass(frozen=True)
@@ -79,3 +102,331 @@ def _axis_data(values: Sequence[Any]) -> Any:
         else:
             pieces.append(list(piece))
     return pieces
+
+
+class ExperimentReader:
+    """Reads the table of this name, once.
+
+    `files` are the systems of the key system, `others` those of the option other with their places; `is_family` says
+    that members are drawn at random instead. `kind` is None where the task is not known.
+    """
+
+    def __init__(self, spec: SpecDocument, name: str) -> None:
+        self.spec = spec
+        self.name = name
+        self.raw: dict[str, Any] = spec.document["experiments"][name]  # as it was written, whatever its shape
+        self.kind: TaskKind | None = None
+        self.files: list[SystemFile] = []
+        self.others: list[tuple[str, SystemFile]] = []
+        self.is_family = False
+
+    def read(self) -> Experiment | None:
+        """The experiment, or None after telling what is wrong with it."""
+        told_before = len(self.spec.mistakes)
+        if (name := self.sound("task")) is not None:
+            try:
+                self.kind = task_kind(name)
+            except InputError as error:
+                self.mistake("task", str(error))
+        recipes = self._read_systems()
+        kind = self.kind
+        if kind is None:
+            return None  # what an option means depends on the task
+        fixed, axes = self._read_values(kind, "options"), self._read_values(kind, "axes")
+        self._require_once()
+        zips = self._read_zips(axes)
+        limits = self._read_limits(kind, fixed)
+        self._require(kind)
+        self._compare_dimensions({**fixed, **axes}, zips)
+        if len(self.spec.mistakes) > told_before:
+            return None
+        constant = {key: values[0] for key, values in fixed.items()}
+        grid_axes: dict[str, Sequence[Any]] = dict(axes)
+        if len(recipes) == 1:
+            constant["system"] = recipes[0]
+        elif recipes:
+            grid_axes = {"system": recipes, **axes}
+        return Experiment(self.name, kind, recipes, constant, Grid(grid_axes, zips), limits)
+
+    def mistake(self, key: str, sentence: str) -> None:
+        """Tell that something is wrong; `key` begins in this table."""
+        self.spec.mistake(f"experiments.{self.name}.{key}", sentence)
+
+    def sound(self, *path: str | int) -> Any:
+        """The value at a place in this table, None where it is missing or has not the right shape."""
+        return self.spec.sound("experiments", self.name, *path)
+
+    def entries(self, part: str) -> list[tuple[str, str, Any]]:
+        """What the table of options or of axes says: canonical names of options, places, values."""
+        entries: list[tuple[str, str, Any]] = []
+        for key, raw in (self.sound(part) or {}).items():
+            if key == "parameters" and isinstance(raw, dict):
+                entries += [(f"{PARAMETERS}{name}", f"{part}.{key}.{name}", value) for name, value in raw.items()]
+            else:
+                entries.append(("eps" if key == TIME_STEP else key, f"{part}.{key}", raw))
+        return entries
+
+    def given(self) -> dict[str, str]:
+        """The options that the spec gives, right or wrong, and where."""
+        return {name: place for part in ("axes", "options") for name, place, _ in self.entries(part)}
+
+    def _require_once(self) -> None:
+        places: dict[str, str] = {}
+        for part in ("options", "axes"):
+            for name, place, _ in self.entries(part):
+                if name in places:
+                    both = {place.rpartition(".")[2], places[name].rpartition(".")[2]}
+                    hint = " (the time step is 2 eps)" if TIME_STEP in both and len(both) > 1 else ""
+                    self.mistake(place, f"found {places[name]} as well, expected one of the two{hint}")
+                places.setdefault(name, place)
+
+    def _read_values(self, kind: TaskKind, part: str) -> dict[str, Values]:
+        """The values in one of the tables, by canonical name; what is wrong is told and left out."""
+        found: dict[str, Values] = {}
+        known = self._known_options(kind)
+        for name, place, raw in self.entries(part):
+            if name == "parameters" and self.has_parameters:
+                self.mistake(place, f"found {show(raw)}, expected a table of parameters")
+                continue
+            option = self._parameter(name, place) if name.startswith(PARAMETERS) else known.get(name)
+            if option is None:
+                if not (name.startswith(PARAMETERS) and self.has_parameters):  # otherwise it is told already
+                    key = place.removeprefix(f"{part}.")
+                    names = [*known, *([TIME_STEP] if "eps" in known else [])]
+                    expected = ", ".join([*names, *(["parameters"] if self.has_parameters else [])])
+                    self.mistake(
+                        place,
+                        f"{kind.name} has no such option, expected one of {expected}{suggestion(key, names)}",
+                    )
+                continue
+            if part == "options" and isinstance(raw, list):
+                self.mistake(place, "found a list, expected one value; lists and ranges go to axes")
+                continue
+            values = self._read_one(place, option, raw)
+            if values is None:
+                continue
+            if part == "options" and len(values) > 1:
+                self.mistake(place, f"found {len(values)} values, expected one; lists and ranges go to axes")
+                continue
+            found[name] = values
+        return found
+
+    def _parameter(self, name: str, place: str) -> Option | None:
+        """A parameter of the systems; None after telling which of them has none of this name."""
+        if not self.has_parameters:
+            return None
+        key = name.removeprefix(PARAMETERS)
+        for file in self.files:
+            if key not in file.parameters:
+                known = ", ".join(file.parameters) or "none"
+                hint = suggestion(key, list(file.parameters))
+                self.mistake(place, f"{file.name} has no such parameter, its parameters are: {known}{hint}")
+                return None
+        return exact(name, "a parameter of the system")
+
+    def _read_one(self, place: str, option: Option, raw: Any) -> Values | None:
+        if option.name == OTHER:
+            references = raw if isinstance(raw, list) else [raw]
+            if not references or not all(isinstance(reference, str) for reference in references):
+                self.mistake(place, f"found {show(raw)}, expected a file, a name of the catalogue, or a list of these")
+                return None
+            recipes = self._read_files(place, references)
+            return Values(option, [recipes]) if recipes else None
+        if place.endswith(f".{TIME_STEP}"):
+            option = _time_step(option)
+        values, mistakes = read_values(option, raw)
+        for position, sentence in mistakes:
+            self.mistake(place + "".join(f"[{k}]" for k in position), sentence)
+        return values
+
+    def _known_options(self, kind: TaskKind) -> dict[str, Option]:
+        known = dict(kind.options)
+        is_lost = self.has_parameters and not self.files
+        if self.is_family or is_lost:  # what cannot be found may have meant a member
+            known |= FAMILY | {"seed": VOCABULARY["seed"]}
+        return known
+
+    def _read_zips(self, axes: Mapping[str, Values]) -> list[tuple[str, ...]]:
+        zips: list[tuple[str, ...]] = []
+        before: set[str] = set()
+        given = {name for name, _, _ in self.entries("axes")}
+        for number, _ in enumerate(self.sound("zip") or [], start=1):
+            place = f"zip[{number}]"
+            written = self.sound("zip", number - 1)
+            if written is None or any(self.sound("zip", number - 1, k) is None for k in range(len(written))):
+                continue
+            names = ["eps" if name == TIME_STEP else name for name in written]
+            unknown = [name for name in names if name not in axes]
+            for name in unknown:
+                if name not in given:  # otherwise something else is wrong with it, and told
+                    self.mistake(place, f"{name} is not an axis{suggestion(name, list(axes))}")
+            if len(names) < 2:
+                self.mistake(place, f"found {show(names)}, expected at least two axes that run together")
+                continue
+            twice = [name for k, name in enumerate(names) if name in names[:k] or name in before]
+            before |= set(names)
+            for name in twice:
+                self.mistake(place, f"found {name} twice, expected every axis in one zip at most")
+            if unknown or twice:
+                continue
+            lengths = {name: len(axes[name]) for name in names}
+            if len(set(lengths.values())) > 1:
+                told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+                self.mistake(place, f"{told} values, expected as many in each: a zip takes them together")
+                continue
+            zips.append(tuple(names))
+        return zips
+
+    def _read_limits(self, kind: TaskKind, fixed: dict[str, Values]) -> Limits:
+        own, common = self.sound("limits") or {}, self.spec.sound("limits") or {}
+        time = _limit(read_time, own.get("time", common.get("time")), DEFAULT_LIMITS.time)
+        memory = _limit(read_memory, own.get("memory", common.get("memory")), DEFAULT_LIMITS.memory)
+        place = self.given().get("max_digits")
+        if "digits" in own and self.sound("limits", "digits") is None:
+            pass  # told already, with the shape
+        elif "max_digits" not in kind.options:
+            if "digits" in own:
+                self.mistake("limits.digits", f"{kind.name} has no digit budget, expected time and memory only")
+        elif place is not None:
+            if "digits" in own:
+                self.mistake("limits.digits", f"found {place} as well, expected one of the two")
+        elif isinstance(digits := own.get("digits", common.get("digits")), int) and digits > 0:
+            fixed["max_digits"] = Values(VOCABULARY["max_digits"], [(digits,)])
+        return Limits(time, memory)
+
+    def _require(self, kind: TaskKind) -> None:
+        if any(self.sound(part) is None and part in self.raw for part in ("options", "axes")):
+            return  # what is missing may be in the table that has not the right shape
+        given = self.given()
+        for name in kind.required:
+            if name not in given:
+                self.mistake(f"axes.{name}", f"missing, expected {kind.options[name].help} (in axes or options)")
+        if _EPS2 in given and kind.needs == MEMBER_OR_OTHER:
+            for name, reason in ((OTHER, "it is the eps of a second system"), ("eps", "without it every eps is meant")):
+                if name not in given:
+                    self.mistake(given[_EPS2], f"found no {name}, expected one with eps2: {reason}")
+        if not self.is_family:
+            return
+        if not {"m", "eigenvalues", "chi"} & given.keys():
+            self.mistake("axes.m", "missing, expected m (half the dimension), eigenvalues or chi in axes or options")
+        for first, second in _CONTRADICTIONS:
+            if first in given and second in given:
+                self.mistake(given[second], f"found {given[first]} as well, expected one of {first} and {second}")
+
+    # Systems
+
+    @property
+    def has_parameters(self) -> bool:
+        """Whether the system is a file, or may be: what it is is not known where its place is wrong."""
+        return self.kind is not None and self.kind.needs is not None and not self.is_family
+
+    def _read_systems(self) -> list[dict[str, Any]]:
+        """The recipes of the systems, none where the task needs none; what is wrong is told and left out."""
+        raw = self.sound("system")
+        if raw is None:
+            if self.kind is not None and self.kind.needs is not None and self.raw.get("system") is None:
+                self.mistake(
+                    "system", 'missing, expected "family", a name of the catalogue, a path, or a list of these'
+                )
+            return []
+        if self.kind is not None and self.kind.needs is None:
+            self.mistake("system", f"found {show(raw)}, expected none: {self.kind.name} is about no particular system")
+            return []
+        references = raw if isinstance(raw, list) else [raw]
+        if not references:
+            self.mistake("system", "found an empty list, expected at least one system")
+        if _FAMILY_WORD in references:
+            self.is_family = True
+            if len(references) > 1:
+                self.mistake("system", 'found "family" among others, expected it alone: make another experiment')
+            return [{"family": {}}]
+        return self._read_files("system", references)
+
+    def _read_files(self, key: str, references: Sequence[str]) -> list[dict[str, Any]]:
+        """The recipes of the files that the value of a key names."""
+        recipes: dict[str, dict[str, Any]] = {}
+        for number, reference in enumerate(references, start=1):
+            place = f"{key}[{number}]" if len(references) > 1 else key
+            try:
+                for file in self._find(reference):
+                    recipe = recipe_of(file, self.spec.documents)
+                    if recipe["document"] in recipes:
+                        self.mistake(place, f"found {file.name} twice, expected every system once")
+                    recipes[recipe["document"]] = recipe
+                    if key == "system":
+                        self.files.append(file)
+                        self._require_kind(place, file)
+                    else:
+                        self.others.append((place, file))
+            except InputError as error:
+                self.mistake(place, str(error))
+        return list(recipes.values())
+
+    def _compare_dimensions(self, values: Mapping[str, Values], zips: Sequence[Sequence[str]]) -> None:
+        """Every start and every second system must fit every system; zipped ones are compared in pairs."""
+        drawn = next((name for name in _SIZES if name in values), None) if self.is_family else None
+        if drawn is not None and len(values[drawn]) <= _POINTS_COMPARED:
+            dims = [2 * _SIZES[drawn](value) for value in values[drawn]]
+        else:
+            dims = [file.system.dim for file in self.files]
+        starts = values.get("start", ())
+        if len(starts) <= _POINTS_COMPARED:
+            place = self.given().get("start", "")
+            places = [f"{place}[{k}]" if len(starts) > 1 else place for k in range(1, len(starts) + 1)]
+            found = [(place, start.count(",") + 1) for place, start in zip(places, starts, strict=True)]
+            self._compare(found, dims, "coordinates", any({drawn, "start"} <= set(names) for names in zips))
+        if OTHER in values:
+            found = [(place, file.system.dim) for place, file in self.others]
+            self._compare(found, dims, "variables", any({drawn, OTHER} <= set(names) for names in zips))
+
+    def _compare(self, found: Sequence[tuple[str, int]], dims: Sequence[int], what: str, zipped: bool) -> None:
+        for (place, count), partners in zip(found, [[d] for d in dims] if zipped else [dims] * len(found), strict=True):
+            wrong = sorted({dim for dim in partners if dim != count})
+            if wrong:
+                self.mistake(place, f"found {count} {what}, expected {wrong[0]}, the dimension of the system")
+
+    def _find(self, reference: str) -> list[SystemFile]:
+        """The system of a reference, or all those that match a pattern such as members/*.toml."""
+        if any(mark in reference for mark in "*?["):
+            if Path(reference).is_absolute() or not reference.endswith(".toml"):
+                raise InputError(
+                    f"found {show(reference)}, expected a pattern that ends in .toml and is relative to the folder of "
+                    "the spec, e.g. members/*.toml"
+                )
+            try:
+                paths = sorted(self.spec.folder.glob(reference))
+            except (ValueError, NotImplementedError) as error:
+                raise InputError(f"found {show(reference)}, which is no pattern: {error}") from error
+            if not paths or len(paths) > _FILES_AT_MOST:
+                raise InputError(f"found {len(paths)} files like {show(reference)}, expected 1 to {_FILES_AT_MOST}")
+            return [find_file(str(path.relative_to(self.spec.folder)), self.spec.folder) for path in paths]
+        try:
+            return [find_file(reference, self.spec.folder)]
+        except InputError as error:
+            hint = suggestion(reference, [_FAMILY_WORD])
+            raise InputError(f"{error}{hint}") from error
+
+    def _require_kind(self, place: str, file: SystemFile) -> None:
+        if self.kind is None or file.member is not None or self.kind.needs not in (MEMBER, MEMBER_OR_OTHER):
+            return
+        if self.kind.needs == MEMBER_OR_OTHER and OTHER in self.given():
+            return
+        also = ", or a second system as the option other" if self.kind.needs == MEMBER_OR_OTHER else ""
+        self.mistake(place, f"{file.name} is of kind [{file.kind}], expected one of kind [family]{also}")
+
+
+def _limit(read: Callable[[Any], L], raw: Any, default: L) -> L:
+    """What is given, if it has the right shape; if not, that is told already."""
+    try:
+        return default if raw is None else read(raw)
+    except ValueError:
+        return default
+
+
+def _time_step(eps: Option) -> Option:
+    """The option eps, given as the time step h = 2 eps."""
+
+    def read(value: Any) -> Any:
+        return eps.read(number_of(value) / 2)
+
+    return Option("eps", eps.help, read, eps.make, numbers=True)

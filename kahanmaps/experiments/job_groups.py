@@ -10,8 +10,7 @@ from collections import defaultdict
 from dataclasses import asdict, dataclass, field
 from typing import NamedTuple
 
-from kahanmaps.experiments.executor import Documents
-from kahanmaps.experiments.records import Limits, Task
+from kahanmaps.experiments.records import Documents, Limits, Task
 
 START_UP = 60.0  # seconds a group may take beyond the limits of its jobs, on a cold and busy worker,
 START_UP_OF_A_JOB = 5.0  # and for each job in it

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from kahanmaps.experiments.database import Database, StoreError
-from kahanmaps.experiments.plans import (
+from kahanmaps.experiments.records import Outcome, digest
+from kahanmaps.experiments.tables import (
+    ATTEMPTS,
     PLAN_CHUNK,
+    RESULT_CHUNK,
     add_document,
     add_experiment,
     add_tasks,
@@ -17,12 +20,14 @@ from kahanmaps.experiments.plans import (
     definition_of,
     document_of,
     fill_plan,
+    find_result,
+    put_result,
+    record_columns,
+    record_of,
     task_of,
     text_of_limits,
     whole_stretches,
 )
-from kahanmaps.experiments.records import Outcome, digest
-from kahanmaps.experiments.results import ATTEMPTS, RESULT_CHUNK, find_result, put_result, record_columns, record_of
 
 CONFLICTS_SHOWN = 5
 
@@ -92,15 +97,9 @@ def _merge_results(database: Database, source: Database, new: int) -> Merged:
     """What came along; `new` tasks came with the plans."""
     results = replaced = conflicts = 0
     conflicting: list[str] = []
-    last = 0
-    sql = f"""
-        SELECT t.id, t.key, t.text, {record_columns(source)} FROM result AS r JOIN task AS t ON t.id = r.task
-        WHERE r.task > ? ORDER BY r.task LIMIT ?"""
-    while rows := source.fetch(sql, (last, RESULT_CHUNK)):
-        for id, key, text, *row in rows:
-            # Not so where pages are damaged, and then it would go round for ever.
-            source.require(id > last, "the table of results, task", id, f"more than {last}")
-            last = id
+    columns, join = f"t.key, t.text, {record_columns(source)}", "JOIN task AS t ON t.id = r.task"
+    for rows in source.chunks("result", "task", columns, RESULT_CHUNK, join, is_lenient=False):
+        for _, key, text, *row in rows:
             _checked(source, key, text)
             source.require(record_of(source, key, row) is not None, f"the record of task {key}", None, "an outcome")
             found = find_result(database, key)

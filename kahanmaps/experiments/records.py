@@ -8,15 +8,18 @@ batch, on every machine.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from hashlib import sha256
-from typing import Any
+from typing import Any, Protocol
 from zlib import crc32
 
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
+# digest of a system document -> its canonical text
+Documents = Callable[[str], str]
+
 KEY_LENGTH = 32  # hexadecimal digits: 128 bits, no two tasks will ever share them
 
 
@@ -179,3 +182,24 @@ class Row:
     number: int
     task: Task
     record: Record | None
+
+
+class Executor(Protocol):
+    """Takes jobs while it is `free`, hands back records in `wait`; never raises for what happens inside a task."""
+
+    @property
+    def is_free(self) -> bool:
+        """Whether one more job may be submitted now."""
+
+    @property
+    def in_flight(self) -> int:
+        """How many jobs have been submitted and not yet handed back."""
+
+    def submit(self, job: Job) -> None:
+        """Take a job. Its record comes out of `wait` some time."""
+
+    def wait(self, timeout: float) -> list[Record]:
+        """Records that are ready, as soon as there is one, or none after `timeout` seconds."""
+
+    def close(self) -> None:
+        """End at once: whatever is in flight is killed and forgotten. May be called twice."""

@@ -14,10 +14,10 @@ from contextlib import closing
 from pathlib import Path
 
 from kahanmaps.experiments.children import GROUP_SECONDS, LocalChildren
-from kahanmaps.experiments.executor import Documents, Executor
-from kahanmaps.experiments.records import Job, Record
+from kahanmaps.experiments.records import Documents, Executor, Job, Record
 from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
-from kahanmaps.experiments.store import Planned, Store
+from kahanmaps.experiments.store import Store
+from kahanmaps.experiments.tables import Planned
 
 _POLL = 0.2  # seconds after which an interrupt is noticed, and it is said that nothing has come
 GRACE = 10.0  # seconds that tasks in flight have after an interrupt

@@ -19,22 +19,25 @@
 
 Reading it finds every mistake at once, each with its key; docs/batch.md has all keys.
 
-What one of the tables means is the matter of experiment_reader.py, which looks at the document and tells its mistakes
-through shape.py. An experiment itself is in experiment.py.
+What one of the tables means is the matter of experiment.py, which looks at the document and tells its mistakes through
+shape.py.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from kahanmaps.errors import InputError, SystemFileError, reading
-from kahanmaps.experiments.experiment import Experiment
-from kahanmaps.experiments.experiment_reader import DEFAULT_LIMITS, ExperimentReader
-from kahanmaps.experiments.shape import SpecDocument
+from kahanmaps.experiments.experiment import DEFAULT_LIMITS, PARAMETERS, TIME_STEP, Experiment, ExperimentReader
+from kahanmaps.experiments.options import FAMILY, VOCABULARY
+from kahanmaps.experiments.registry import task_kinds
+from kahanmaps.experiments.shape import SpecDocument, shape_schema
 
 __all__ = [
     "DEFAULT_LIMITS",
@@ -52,6 +55,8 @@ MAX_BYTES = 4_000_000
 MAX_TASKS = 1_000_000
 EXPERIMENT_NAME = r"[A-Za-z0-9_.+-]{1,80}"
 _LARGEST_TOLD = 3
+_VALUE = {"type": ["string", "integer", "number", "boolean"]}
+_VALUES = {"anyOf": [_VALUE, {"type": "array", "items": _VALUE, "minItems": 1}]}
 
 
 class SpecError(SystemFileError):
@@ -151,3 +156,46 @@ def _largest(experiments: Sequence[Experiment]) -> str:
     told = [f"{experiment.name} has {experiment.product}" for experiment in by_size[:_LARGEST_TOLD]]
     more = len(experiments) - len(told)
     return ", ".join(told) + (f" and {more} more" if more else "")
+
+
+def spec_schema() -> dict[str, Any]:
+    """The JSON schema (draft 2020-12) of what a batch spec in TOML is read as.
+
+    It knows which keys, tasks and options there are, not which options a task has and which values make sense: that is
+    what `read_spec` says. Numbers may be quoted or not.
+
+    >>> "orbit" in spec_schema()["$defs"]["experiment"]["properties"]["task"]["enum"]
+    True
+    """
+    found: dict[str, Any] = _untitled(shape_schema())
+    text = json.dumps(found).replace("_ExperimentShape", "experiment").replace("_LimitsShape", "limits")
+    found = json.loads(text)
+    found["properties"]["experiments"]["propertyNames"] = {"pattern": f"^{EXPERIMENT_NAME}$"}
+    experiment = found["$defs"]["experiment"]["properties"]
+    experiment["task"]["enum"] = sorted(task_kinds())
+    experiment["options"] |= _table(_VALUE)
+    experiment["axes"] |= _table(_VALUES)
+    return {"description": "Experiments, each a task for many systems and many values of its options.", **found}
+
+
+def _table(value: dict[str, Any]) -> dict[str, Any]:
+    """A table of options by name, each with a value of this kind."""
+    options = {name: {"description": option.help, **value} for name, option in {**VOCABULARY, **FAMILY}.items()}
+    options[TIME_STEP] = {"description": "the time step, 2 eps, instead of eps", **value}
+    parameters = {
+        "description": "values for parameters of the systems",
+        "type": "object",
+        "additionalProperties": value,
+    }
+    return {
+        "properties": {**options, PARAMETERS.removesuffix("."): parameters},
+        "patternProperties": {f"^{PARAMETERS.replace('.', '[.]')}": value},
+        "additionalProperties": False,
+    }
+
+
+def _untitled(part: Any) -> Any:
+    """Without the titles that pydantic makes of the names of fields."""
+    if isinstance(part, dict):
+        return {key: _untitled(value) for key, value in part.items() if not (key == "title" and isinstance(value, str))}
+    return [_untitled(item) for item in part] if isinstance(part, list) else part

@@ -12,7 +12,7 @@ Three rules keep it whole:
 * no reader holds the writer up: long reads go in chunks, each fetched completely before the first row is handed out.
 
 The file itself is the matter of database.py, its tables are in schema.py. What plans and results are in them is in
-plans.py and results.py, checking.py sees whether they are what was written, and merging.py makes one database of two.
+tables.py, checking.py sees whether they are what was written, and merging.py makes one database of two.
 """
 
 from __future__ import annotations
@@ -23,53 +23,36 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import NamedTuple, NoReturn, Self
+from typing import Any, NamedTuple, NoReturn, Self
 
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import note_source, quoted
 from kahanmaps.experiments.checking import Checked, add_checksums, check, forget_damaged
-from kahanmaps.experiments.database import Damaged, Database, StoreError, Unavailable
+from kahanmaps.experiments.database import Database, StoreError
 from kahanmaps.experiments.merging import Merged, merge
-from kahanmaps.experiments.plans import (
+from kahanmaps.experiments.records import KEY_LENGTH, Job, Limits, Outcome, Record, Row, Task
+from kahanmaps.experiments.schema import FORMAT
+from kahanmaps.experiments.tables import (
+    ATTEMPTS,
     PLAN_CHUNK,
+    RESULT_CHUNK,
     Chosen,
     Planned,
     choose,
     definition_of,
     document_of,
-    replace_plan,
-    stretches,
-    task_of,
-    whole_stretches,
-)
-from kahanmaps.experiments.records import KEY_LENGTH, Job, Limits, Outcome, Record, Row, Task
-from kahanmaps.experiments.results import (
-    ATTEMPTS,
-    RESULT_CHUNK,
     find_result,
     is_a_time,
     is_a_verdict,
     put_result,
     record_columns,
     record_of,
+    replace_plan,
     row_of,
+    stretches,
+    task_of,
+    whole_stretches,
 )
-from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT
-
-__all__ = [
-    "APPLICATION_ID",
-    "Checked",
-    "Damaged",
-    "Experiment",
-    "ExperimentStatus",
-    "FORMAT",
-    "Found",
-    "Merged",
-    "Planned",
-    "Store",
-    "StoreError",
-    "Unavailable",
-]
 
 COUNT_CHUNK = 50_000  # rows that are only counted: some 50 ms
 FOUND_AT_MOST = 20
@@ -214,14 +197,12 @@ class Store(Displayed):
         With `retry_failed` also those that failed: each is looked at once, so one that fails again does not come back.
         `shard` (i, n) is the i-th part of n, counting rows of the plan of these experiments; no task is in two parts.
         """
-        sql, chosen, numbers = self._pending_query("t.key, t.text", experiments, retry_failed, shard)
-        return self._pending_jobs(sql, chosen, numbers)
-
-    def _pending_jobs(self, sql: str, chosen: list[Chosen], numbers: tuple[int, ...]) -> Iterator[Job]:
-        for experiment in chosen:
-            for rows in stretches(self._database, sql, experiment, PLAN_CHUNK, (experiment.offset, *numbers)):
-                for key, text in rows:
-                    yield Job(task_of(self._database, key, text), experiment.limits)
+        found = self._pending("t.key, t.text", PLAN_CHUNK, experiments, retry_failed, shard)
+        return (
+            Job(task_of(self._database, key, text), experiment.limits)
+            for experiment, rows in found
+            for key, text in rows
+        )
 
     def count_pending(
         self,
@@ -231,16 +212,13 @@ class Store(Displayed):
         shard: tuple[int, int] = (1, 1),
     ) -> int:
         """How many jobs `pending` has with these arguments."""
-        sql, chosen, numbers = self._pending_query("count(*)", experiments, retry_failed, shard)
-        return sum(
-            rows[0][0]
-            for experiment in chosen
-            for rows in stretches(self._database, sql, experiment, COUNT_CHUNK, (experiment.offset, *numbers))
-        )
+        found = self._pending("count(*)", COUNT_CHUNK, experiments, retry_failed, shard)
+        return sum(rows[0][0] for _, rows in found)
 
-    def _pending_query(
-        self, what: str, experiments: Sequence[str] | None, retry_failed: bool, shard: tuple[int, int]
-    ) -> tuple[str, list[Chosen], tuple[int, ...]]:
+    def _pending(
+        self, what: str, size: int, experiments: Sequence[str] | None, retry_failed: bool, shard: tuple[int, int]
+    ) -> Iterator[tuple[Chosen, list[Any]]]:
+        """What is selected of the tasks without a result, some rows of the plan at a time."""
         part, parts = shard
         if not 1 <= part <= parts:
             raise StoreError(f"there is no part {part} of {parts}: parts are counted 1/{parts} to {parts}/{parts}")
@@ -260,7 +238,11 @@ class Store(Displayed):
                 WHERE q.task = p.task AND (q.experiment, q.number) < (p.experiment, p.number) {among}
             )
             ORDER BY p.number"""
-        return sql, chosen, (parts, part - 1)
+        return (
+            (experiment, rows)
+            for experiment in chosen
+            for rows in stretches(self._database, sql, experiment, size, (experiment.offset, parts, part - 1))
+        )
 
     # Results
 

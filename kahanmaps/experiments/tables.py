@@ -1,22 +1,42 @@
-"""The plans in a database: which task comes where in which experiment. Written as a whole, read in stretches.
+"""What lies in the tables of a database: plans, with the tasks and documents they need, and the results of tasks.
 
-Whatever writes here is part of a transaction that the caller has begun.
+A plan says which task comes where in which experiment; it is written as a whole and read in stretches. A result is the
+latest record of its task. Whatever writes here is part of a transaction that the caller has begun.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
 from kahanmaps.errors import quoted
-from kahanmaps.experiments.database import Damaged, Database, StoreError, shown
-from kahanmaps.experiments.records import Limits, Task, canonical, checksum, digest, has_checksum
+from kahanmaps.experiments.database import Damaged, Database, StoreError
+from kahanmaps.experiments.records import Limits, Outcome, Record, Task, canonical, checksum, digest, has_checksum
 
-_LONGEST_NAME = 1000
+_LONGEST_NAME, _LONGEST_VERDICT = 1000, 200
 _SEALED = "id, name, digest, limits, total, tasks"  # what the checksum of an experiment is of
 PLAN_CHUNK = 1000  # rows of the plan that one read takes: they are short
+RESULT_CHUNK = 50  # rows with their results, which may be megabytes
+
+_COLUMNS = (
+    "outcome",
+    "result",
+    "verdict",
+    "message",
+    "stderr",
+    "seconds",
+    "peak_memory",
+    "host",
+    "versions",
+    "finished",
+)
+ATTEMPTS = len(_COLUMNS)  # where the number of attempts stands in a row
+_PUT = f"""
+    INSERT OR REPLACE INTO result (task, {", ".join(_COLUMNS)}, attempts, checksum)
+    VALUES (?, {", ".join("?" * len(_COLUMNS))}, ?, ?)"""
 
 
 @dataclass(frozen=True)
@@ -46,7 +66,7 @@ class Chosen:
     offset: int
 
 
-# Reading
+# Plans read
 
 
 def choose(database: Database, experiments: Sequence[str] | None) -> list[Chosen]:
@@ -140,8 +160,11 @@ def whole_stretches(database: Database, sql: str, experiment: Chosen, size: int)
 def definition_of(database: Database, experiment: Chosen) -> str:
     """What an experiment was made from."""
     ((text, name),) = database.fetch("SELECT definition, digest FROM experiment WHERE id = ?", (experiment.id,))
-    is_sound = isinstance(text, str) and name == digest(text)
-    database.require(is_sound, f"the definition of {quoted(experiment.name)}", text, "the text of its digest")
+    return _text_of(database, f"the definition of {quoted(experiment.name)}", text, name)
+
+
+def _text_of(database: Database, what: str, text: Any, name: Any, known_by: str = "digest") -> str:
+    database.require(isinstance(text, str) and name == digest(text), what, text, f"the text of its {known_by}")
     return str(text)
 
 
@@ -160,13 +183,11 @@ def limits_of(database: Database, text: Any) -> Limits:
 def task_of(database: Database, key: Any, text: Any) -> Task:
     """The task with this key and text."""
     what = f"the task {key}"
-    if not isinstance(text, str) or key != digest(text):
-        raise database.damaged(f"{what}: found {shown(text)}, expected the text of its key")
-    data = database.table(text, what)
+    data = database.table(_text_of(database, what, text, key, "key"), what)
     kind, system, options = data.get("task"), data.get("system"), data.get("options")
-    if not (isinstance(kind, str) and isinstance(system, dict | None) and isinstance(options, dict)):
-        raise database.damaged(f"{what}: found {shown(text)}, expected a task")
-    return Task(kind, system, options)
+    is_sound = isinstance(kind, str) and isinstance(system, dict | None) and isinstance(options, dict)
+    database.require(is_sound, what, text, "a task")
+    return Task.from_text(text)
 
 
 def document_of(database: Database, name: str) -> str:
@@ -174,13 +195,10 @@ def document_of(database: Database, name: str) -> str:
     rows = database.fetch("SELECT text FROM document WHERE digest = ?", (name,))
     if not rows:
         raise StoreError(f"{database.name} has no document {name}: plan the experiment that needs it again")
-    text = rows[0][0]
-    is_sound = isinstance(text, str) and name == digest(text)
-    database.require(is_sound, f"the document {name}", text, "the text of its digest")
-    return str(text)
+    return _text_of(database, f"the document {name}", rows[0][0], name)
 
 
-# Writing
+# Plans written
 
 
 def text_of_limits(limits: Limits) -> str:
@@ -277,3 +295,104 @@ def add_tasks(database: Database, tasks: Sequence[tuple[str, str]]) -> int:
 def add_document(database: Database, name: str, text: str) -> None:
     """Keep a document; nothing if it is there."""
     database.execute("INSERT INTO document VALUES (?, ?) ON CONFLICT (digest) DO NOTHING", (name, text))
+
+
+# Results
+
+
+def record_columns(database: Database) -> str:
+    """What is selected from `result AS r` for `record_of`: the record, the attempts at it, and a checksum."""
+    last = "r.checksum" if database.format > 1 else "NULL"
+    return ", ".join([*(f"r.{column}" for column in _COLUMNS), "r.attempts", last])
+
+
+def is_a_verdict(value: Any) -> bool:
+    """Whether it can be the verdict of a task, or that there is none."""
+    return value is None or (isinstance(value, str) and len(value) <= _LONGEST_VERDICT)
+
+
+def is_a_time(value: Any) -> bool:
+    """Whether it can be how long a task took, in seconds."""
+    return isinstance(value, int | float) and 0 <= value < math.inf
+
+
+_OUTCOMES = frozenset(Outcome)
+# What a cell of a row can hold: SQLite keeps anything in any column.
+_SOUND: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "outcome": (lambda value: value in _OUTCOMES, f"one of {', '.join(Outcome)}"),
+    "verdict": (is_a_verdict, "a word or nothing"),
+    **dict.fromkeys(("message", "stderr", "host", "finished"), (lambda value: isinstance(value, str), "text")),
+    "seconds": (is_a_time, "a number of seconds"),
+    "peak_memory": (lambda value: value is None or isinstance(value, int), "a number of bytes or nothing"),
+}
+
+
+def find_result(database: Database, key: str) -> tuple[int, list[Any]] | None:
+    """The task and the row of its result, all None if it has none; None if there is no such task."""
+    found = database.execute(
+        f"SELECT t.id, {record_columns(database)} FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
+        "WHERE t.key = ?",
+        (key,),
+    ).fetchone()
+    if found is None:
+        return None
+    task, *row = found
+    record_of(database, key, row)  # nothing is said about a damaged one, and nothing written over it
+    return task, row
+
+
+def put_result(database: Database, task: int, key: str, attempts: int, row: Sequence[Any]) -> None:
+    """Write a row, whose attempts and checksum do not count, over the result there may be."""
+    cells = (*row[:ATTEMPTS], attempts)
+    database.execute(_PUT, (task, *cells, checksum([key, *cells])))
+
+
+def is_as_written(key: Any, row: Sequence[Any]) -> bool:
+    """Whether the row has its checksum."""
+    return has_checksum([key, *row[:-1]], row[-1])
+
+
+def row_of(record: Record) -> tuple[Any, ...]:
+    """The record as it lies in a row, without attempts; what JSON cannot hold is a ValueError."""
+    if not math.isfinite(record.seconds):
+        raise ValueError(f"a record cannot have taken {record.seconds} seconds")
+    return (
+        str(record.outcome),
+        None if record.result is None else canonical(dict(record.result)),
+        None if record.verdict is None else _encodable(record.verdict),
+        _encodable(record.message),
+        _encodable(record.stderr),
+        float(record.seconds),
+        record.peak_memory,
+        record.host,
+        canonical(dict(record.versions)),
+        record.finished,
+    )
+
+
+def record_of(database: Database, key: str, row: Sequence[Any]) -> Record | None:
+    """The record that lies in a row like this; None if the task has no result."""
+    if all(value is None for value in row):
+        return None
+    known = dict(zip(_COLUMNS, row[:ATTEMPTS], strict=True))
+    what = f"the record of task {key}"
+    for column, (is_sound, expected) in _SOUND.items():
+        database.require(is_sound(known[column]), f"{what}, {column}", known[column], expected)
+    database.require(isinstance(row[ATTEMPTS], int), f"{what}, attempts", row[ATTEMPTS], "a number")
+    if database.format > 1 and not is_as_written(key, row):
+        raise database.damaged(f"{what}: it has not its checksum")
+    outcome = Outcome(known["outcome"])
+    is_ok, has_result = outcome is Outcome.OK, known["result"] is not None
+    if is_ok is not has_result:
+        raise database.damaged(f"{what}: the outcome is {outcome}, and there is {'a' if has_result else 'no'} result")
+    known["outcome"] = outcome
+    known["result"] = database.table(known["result"], f"{what}, result") if is_ok else None
+    known["versions"] = database.table(known["versions"], f"{what}, versions")
+    if not all(isinstance(version, str) for version in known["versions"].values()):
+        raise database.damaged(f"{what}, versions: expected texts")
+    return Record(key=key, **known)
+
+
+def _encodable(text: str) -> str:
+    """What a child printed may have been no text at all: lone surrogates are no UTF-8, so they are written out."""
+    return text.encode(errors="backslashreplace").decode()

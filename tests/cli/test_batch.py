@@ -421,7 +421,8 @@ def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
 
 def _stored() -> int:
-    from kahanmaps.experiments.store import Store, StoreError
+    from kahanmaps.experiments.database import StoreError
+    from kahanmaps.experiments.store import Store
 
     try:
         with Store.open("study.db", readonly=True) as store:

@@ -23,8 +23,8 @@ import pytest
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments import cluster, job_groups
+from kahanmaps.experiments.children import TRIES
 from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers, WorkersUnfit, record_on
-from kahanmaps.experiments.endings import TRIES
 from kahanmaps.experiments.job_groups import JobGroup, KeptJob
 from kahanmaps.experiments.records import Job, Limits, Outcome, Task
 

@@ -65,7 +65,8 @@ def exported(db: str, capsys: pytest.CaptureFixture[str]) -> str:
 
 def done(db: str) -> int:
     """How many tasks have a record."""
-    from kahanmaps.experiments.store import Store, StoreError
+    from kahanmaps.experiments.database import StoreError
+    from kahanmaps.experiments.store import Store
 
     try:
         with Store.open(db, readonly=True) as store:

@@ -20,9 +20,10 @@ import pytest
 from small_databases import LIMITS, MEMORY, failed, ok, planned, task, tasks
 
 from kahanmaps.experiments import checking
+from kahanmaps.experiments.database import Damaged, StoreError
 from kahanmaps.experiments.export import write_csv, write_jsonl
 from kahanmaps.experiments.records import digest
-from kahanmaps.experiments.store import Damaged, Store, StoreError
+from kahanmaps.experiments.store import Store
 from kahanmaps.experiments.summary import summarise
 from kahanmaps_cli.main import main
 

@@ -21,8 +21,9 @@ from small_databases import LIMITS, killed, ok, output, planned, seed, seeds, sm
 
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.experiments import database
-from kahanmaps.experiments.database import Database
-from kahanmaps.experiments.store import APPLICATION_ID, FORMAT, Store, StoreError, Unavailable
+from kahanmaps.experiments.database import Database, StoreError, Unavailable
+from kahanmaps.experiments.schema import APPLICATION_ID, FORMAT
+from kahanmaps.experiments.store import Store
 
 # Files that cannot be used
 

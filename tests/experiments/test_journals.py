@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from kahanmaps.experiments.journals import file_system, journal_for
+from kahanmaps.experiments.locks import file_system, journal_for
 
 MOUNTS = r"""
 /dev/sda1 / ext4 rw 0 0

@@ -10,9 +10,10 @@ from itertools import product
 import pytest
 from small_databases import LIMITS, killed, ok, planned, seed, seeds, start, tasks
 
-from kahanmaps.experiments import journals
+from kahanmaps.experiments import locks
+from kahanmaps.experiments.database import StoreError, Unavailable
 from kahanmaps.experiments.locks import Lock
-from kahanmaps.experiments.store import Store, StoreError, Unavailable
+from kahanmaps.experiments.store import Store
 
 
 def test_a_second_writer_is_refused_and_told_who_the_first_is(path):
@@ -154,7 +155,7 @@ def test_a_file_that_is_mounted_by_itself_is_refused(path, monkeypatch):
     planned(path, 1)
     mounts = path.with_name("mounts")
     mounts.write_text(f"/dev/sda1 / ext4 rw 0 0\n/dev/sda1 {path} ext4 rw 0 0\n")
-    monkeypatch.setattr(journals, "_MOUNTS", mounts)
+    monkeypatch.setattr(locks, "_MOUNTS", mounts)
     with pytest.raises(StoreError, match=r"results\.db is mounted by itself.*mount its folder"):
         Store.open(path)
     mounts.write_text(f"/dev/sda1 / ext4 rw 0 0\n/dev/sda1 {path.parent} ext4 rw 0 0\n")

@@ -12,8 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, planned, seed, small_chunks, task, tasks
 
+from kahanmaps.experiments.database import StoreError
+from kahanmaps.experiments.merging import Merged
 from kahanmaps.experiments.records import Limits, digest
-from kahanmaps.experiments.store import Merged, Store, StoreError
+from kahanmaps.experiments.store import Store
 
 numbers = st.integers(0, 12)
 

@@ -19,8 +19,7 @@ from signal import Signals
 
 import pytest
 
-from kahanmaps.experiments.children import LocalChildren
-from kahanmaps.experiments.endings import TRIES, is_from_outside
+from kahanmaps.experiments.children import TRIES, LocalChildren, is_from_outside
 from kahanmaps.experiments.export import write_jsonl
 from kahanmaps.experiments.group import main as do_group
 from kahanmaps.experiments.records import Job, Limits, Outcome, Record, Task

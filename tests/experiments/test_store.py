@@ -17,10 +17,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, seed, seeds, small_chunks, task, tasks
 
-from kahanmaps.experiments import plans as plans_module
-from kahanmaps.experiments.plans import PLAN_CHUNK
+from kahanmaps.experiments import tables as tables_module
+from kahanmaps.experiments.database import StoreError, Unavailable
 from kahanmaps.experiments.records import Limits, Outcome, Record, Row, Task, digest
-from kahanmaps.experiments.store import ExperimentStatus, Planned, Store, StoreError, Unavailable
+from kahanmaps.experiments.store import ExperimentStatus, Store
+from kahanmaps.experiments.tables import PLAN_CHUNK, Planned
 
 # Records
 
@@ -361,7 +362,7 @@ def test_at_most_twenty_are_found_and_all_of_them_begin_as_asked(store, monkeypa
 
     similar = [Similar("orbit", None, {"n": number}) for number in range(30)]
     keys = {task.text: task.key for task in similar}
-    monkeypatch.setattr(plans_module, "digest", lambda text: keys.get(text, text))
+    monkeypatch.setattr(tables_module, "digest", lambda text: keys.get(text, text))
     store.plan("a", "1", LIMITS, similar, {})
     assert [found.task.options["n"] for found in store.find("abcd")] == list(range(20))
     assert [found.task.options["n"] for found in store.find(f"abcdf{1:026x}")] == list(range(16, 30))
