@@ -9,7 +9,7 @@ from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
 from math import gcd, lcm, prod
-from typing import Any, overload
+from typing import Any
 
 from flint import fmpq
 
@@ -62,11 +62,7 @@ class RationalRange(Sequence[fmpq]):
     def __len__(self) -> int:
         return len(self.numerators)
 
-    @overload
-    def __getitem__(self, index: int) -> fmpq: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[fmpq]: ...
-    def __getitem__(self, index: int | slice) -> fmpq | Sequence[fmpq]:
+    def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
             return [fmpq(numerator, self._scale) for numerator in self.numerators[index]]
         return fmpq(self.numerators[index], self._scale)
@@ -106,11 +102,7 @@ class Values(Sequence[Any]):
     def __len__(self) -> int:
         return self._ends[-1]
 
-    @overload
-    def __getitem__(self, index: int) -> Any: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Any]: ...
-    def __getitem__(self, index: int | slice) -> Any:
+    def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
             return [self[k] for k in range(len(self))[index]]
         index = range(len(self))[index]

@@ -56,10 +56,7 @@ def whole(name: str, help: str, least: int = 0, most: int = _LARGEST) -> Option:
     """A whole number from `least` to `most`."""
 
     def read(value: Any) -> int:
-        number = number_of(value)
-        if number.q != 1 or not least <= number <= most:
-            raise InputError(f"found {show(number)}, expected a whole number from {least} to {most}")
-        return int(number.p)
+        return _whole(value, f"a whole number from {least} to {most}", range(least, most + 1))
 
     return Option(name, help, read, int, numbers=True)
 
@@ -90,9 +87,7 @@ def point(name: str, help: str, most: int | None = None) -> Option:
     """Numbers separated by commas, in one text: a list would be several values."""
 
     def read(value: Any) -> str:
-        if not isinstance(value, str):
-            raise InputError(f'found {show(value)}, expected numbers separated by commas in one text, e.g. "1/2,-1/3"')
-        numbers = parse_point(value)
+        numbers = parse_point(_text(value, 'numbers separated by commas in one text, e.g. "1/2,-1/3"'))
         if most is not None and len(numbers) > most:
             raise InputError(f"found {len(numbers)} numbers, expected at most {most}")
         return format_point(numbers)
@@ -100,18 +95,16 @@ def point(name: str, help: str, most: int | None = None) -> Option:
     return Option(name, help, read, parse_point)
 
 
-def whole_numbers(name: str, help: str, expected: str, allowed: Callable[[fmpq], bool], ordered: bool) -> Option:
+def whole_numbers(name: str, help: str, expected: str, allowed: Sequence[int], ordered: bool = False) -> Option:
     """Whole numbers separated by commas, in one text; a single one may stand without quotes.
 
     Without `ordered` they are a set: canonical is then in increasing order, every number once.
     """
 
     def read(value: Any) -> str:
-        numbers = parse_point(value) if isinstance(value, str) else (number_of(value),)
-        for number in numbers:
-            if number.q != 1 or not allowed(number):
-                raise InputError(f"found {show(number)}, expected {expected}, separated by commas in one text")
-        return format_point(numbers if ordered else sorted(set(numbers)))
+        given = parse_point(value) if isinstance(value, str) else (value,)
+        numbers = [_whole(number, f"{expected}, separated by commas in one text", allowed) for number in given]
+        return ",".join(map(str, numbers if ordered else sorted(set(numbers))))
 
     return Option(name, help, read, lambda value: tuple(int(number) for number in value.split(",")))
 
@@ -128,32 +121,41 @@ def _read_arithmetic(value: Any) -> str:
 
 
 def _read_prime(value: Any) -> str:
-    number = number_of(value)
-    if number.q != 1 or number < 2 or number.p.bit_length() > _PRIME_BITS:
-        raise InputError(f"found {show(number)}, expected a prime of at most {_PRIME_BITS} bits")
-    GF(int(number.p))
-    return format_number(number)  # not an integer: JSON and databases may hold no long ones
+    expected = f"a prime of at most {_PRIME_BITS} bits"
+    number = _whole(value, expected, range(2, 1 << _PRIME_BITS))
+    GF(number)
+    return str(number)  # not an integer: JSON and databases may hold no long ones
 
 
 def _read_names(value: Any) -> str:
-    if not isinstance(value, str):
-        raise InputError(f'found {show(value)}, expected names of parameters in one text, e.g. "a1,a2"')
-    names = sorted({name.strip() for name in value.split(",")})
+    expected = 'names of parameters in one text, e.g. "a1,a2"'
+    names = sorted({name.strip() for name in _text(value, expected).split(",")})
     for name in names:
         if name == "eps":
             raise InputError("found eps, expected names of parameters: without a value of eps it is in all formulas")
         if not _NAME.fullmatch(name):
-            raise InputError(f'found the name {show(name)}, expected names of parameters in one text, e.g. "a1,a2"')
+            raise InputError(f"found the name {show(name)}, expected {expected}")
     return ",".join(names)
 
 
 def _read_chi(value: Any) -> str:
-    if not isinstance(value, str):
-        raise InputError(f'found {show(value)}, expected a polynomial in t, as text, e.g. "t^2 - 2"')
-    polynomial = parse_chi(value)
+    polynomial = parse_chi(_text(value, 'a polynomial in t, as text, e.g. "t^2 - 2"'))
     if polynomial.degree() > MAX_M:
         raise InputError(f"found a polynomial of degree {polynomial.degree()}, expected at most {MAX_M}")
     return format_univariate(polynomial / polynomial.leading_coefficient())
+
+
+def _text(value: Any, expected: str) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"found {show(value)}, expected {expected}")
+    return value
+
+
+def _whole(value: Any, expected: str, allowed: Sequence[int]) -> int:
+    number = number_of(value)
+    if number.q != 1 or int(number.p) not in allowed:
+        raise InputError(f"found {show(number)}, expected {expected}")
+    return int(number.p)
 
 
 def show(value: Any, width: int = 60) -> str:
@@ -191,13 +193,7 @@ VOCABULARY = {
         whole("orbits", "how many orbits", 1, 10**6),
         exact("box", "coordinates of random starts are drawn from -R to R"),
         whole("every", "take every so many steps only", 1, 10**9),
-        whole_numbers(
-            "at",
-            "iterates to reach directly",
-            "whole numbers from 0 to 10^18",
-            lambda n: 0 <= n <= 10**18,
-            ordered=False,
-        ),
+        whole_numbers("at", "iterates to reach directly", "whole numbers from 0 to 10^18", range(10**18 + 1)),
         whole("seed", "seed of everything drawn at random"),
         whole("error_bits", "random points until the probability of error is below 2^-BITS", 1, 10_000),
         whole("max_digits", "digit budget of exact orbits", least=1),
@@ -208,8 +204,7 @@ VOCABULARY = {
             "sections",
             "sections of the paper, 1 to 9, 10: beyond the paper",
             "whole numbers from 1 to 10",
-            lambda n: 1 <= n <= 10,
-            ordered=False,
+            range(1, 11),
         ),
         whole("order", "order in eps^2 of the series of the integrals", 1, 20),
         whole("ball_bits", "also over complex balls of so many bits", 32, 100_000),
@@ -240,7 +235,7 @@ FAMILY = {
             "signs",
             "which associated system: 1 or -1 for each factor of chi",
             "1 or -1",
-            lambda n: n * n == 1,
+            (1, -1),
             ordered=True,
         ),
     )
