@@ -6,6 +6,7 @@ import codecs
 import json
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -180,26 +181,20 @@ def print_checked(db: str, found: Checked, as_json: bool, quiet: bool) -> None:
 
 def export_rows(store: Store, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:
     """Write the results; a file is complete or is not there."""
-    from kahanmaps.experiments.export import write_parquet
+    from kahanmaps.experiments.export import write_csv, write_jsonl, write_parquet
     from kahanmaps.whole_files import whole_file
 
-    if output is None or output == "-":
-        _write(store, form, sys.stdout, stable, only)
-        return
-    if form == "parquet":
+    if form == "parquet" and output is not None:
         write_parquet(lambda: store.rows(only), output, stable=stable)
         return
-    with whole_file(output) as stream:
-        _write(store, form, codecs.getwriter("utf-8")(stream), stable, only)
-
-
-def _write(store: Store, form: str, stream: Any, stable: bool, only: list[str] | None) -> None:
-    from kahanmaps.experiments.export import write_csv, write_jsonl
-
-    if form == "csv":
-        write_csv(lambda: store.rows(only), stream, stable=stable)
-    else:
-        write_jsonl(store.rows(only), stream, stable=stable)
+    with ExitStack() as stack:
+        stream: Any = sys.stdout
+        if output not in (None, "-"):
+            stream = codecs.getwriter("utf-8")(stack.enter_context(whole_file(output)))
+        if form == "csv":
+            write_csv(lambda: store.rows(only), stream, stable=stable)
+        else:
+            write_jsonl(store.rows(only), stream, stable=stable)
 
 
 def print_tasks(name: str | None, as_json: bool) -> None:

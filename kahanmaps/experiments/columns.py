@@ -106,27 +106,22 @@ class _Codes:
     """Different values, numbered as they come."""
 
     def __init__(self) -> None:
-        self._codes: dict[Any, int] = {}
-        self._values: list[Any] = []
+        self._values: dict[Any, tuple[int, Any]] = {}  # by what they are sorted by
 
     def of(self, value: Any) -> int:
-        key = _order(value)
-        if key not in self._codes:
-            self._codes[key] = len(self._values)
-            self._values.append(value)
-        return self._codes[key]
+        return self._values.setdefault(_order(value), (len(self._values), value))[0]
 
     def column(self, name: str, codes: Sequence[int], words: bool = False) -> Column:
         """The numbers, or the places among the words in their order."""
-        if not words and all(_is_number(value) and not isinstance(value, bool) for value in self._values):
-            numbers = [_approximate(Fraction(value)) for value in self._values]
+        values = [value for _, value in self._values.values()]
+        if not words and all(_is_number(value) and not isinstance(value, bool) for value in values):
+            numbers = [_approximate(Fraction(value)) for value in values]
             return Column(name, array("d", (numbers[code] for code in codes)), None)
-        if len(self._values) > _MOST_CATEGORIES:
+        if len(values) > _MOST_CATEGORIES:
             raise InputError(
-                f"found {len(self._values)} different values of {name}, expected numbers, or at most "
-                f"{_MOST_CATEGORIES} words"
+                f"found {len(values)} different values of {name}, expected numbers, or at most {_MOST_CATEGORIES} words"
             )
-        order = sorted(range(len(self._values)), key=lambda code: _order(self._values[code]))
-        place = {code: float(k) for k, code in enumerate(order)}
-        texts = tuple(plain(self._values[code]) or "none" for code in order)
+        ordered = [self._values[key] for key in sorted(self._values)]
+        place = {code: float(k) for k, (code, _) in enumerate(ordered)}
+        texts = tuple(plain(value) or "none" for _, value in ordered)
         return Column(name, array("d", (place[code] for code in codes)), texts)

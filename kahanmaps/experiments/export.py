@@ -24,7 +24,8 @@ import csv
 import json
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from importlib import import_module
 from typing import IO, Any, NamedTuple
 
@@ -171,7 +172,7 @@ def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: boo
     """Write a table below a row of names. `rows` is called twice: for the columns, of which only names are kept, then
     for the values. Open files with newline="", or "\\n" becomes what the machine likes.
     """
-    layout = _Layout.of(rows(), stable)
+    layout = _Layout(rows(), stable)
     # The csv module may quote only those line ends that are in its terminator: with both of them there, no cell can
     # break a line, whatever the version of Python. _NewlineEnds then writes "\n".
     writer = csv.writer(_NewlineEnds(stream), lineterminator="\r\n")
@@ -193,7 +194,7 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
         raise InputError("Parquet files need pyarrow, which is not installed: pip install pyarrow") from error
     from kahanmaps.checks.settings import CONVENTION
 
-    layout = _Layout.of(rows(), stable)
+    layout = _Layout(rows(), stable)
     types = {"int64": arrow.int64(), "bool": arrow.bool_(), "float64": arrow.float64(), "string": arrow.string()}
     metadata = {"convention": CONVENTION} if stable else {"convention": CONVENTION, "version": __version__}
     fields = [arrow.field(plain(name), types[kind]) for name, kind in zip(layout.names, layout.types, strict=True)]
@@ -217,7 +218,12 @@ class _NewlineEnds:
 class _Layout:
     """The columns of a table, with the kinds of values that occur in those that are not always there."""
 
-    def __init__(self, kinds: Mapping[Entry, frozenset[str]], stable: bool) -> None:
+    def __init__(self, rows: Iterable[Row], stable: bool) -> None:
+        """The layout for these rows; they are read, not kept."""
+        kinds: defaultdict[Entry, set[str]] = defaultdict(set)
+        for row in rows:
+            for entry, value in entries(row):
+                kinds[entry].add(_kind(value))
         called = names_of(kinds)
         recipe, options, result = (
             [entry for entry in called if entry.section == section] for section in ("system", "option", "result")
@@ -230,15 +236,6 @@ class _Layout:
         ]
         self._place = {entry: place for place, entry in enumerate(columns) if isinstance(entry, Entry)}
         self._fixed = [(place, name) for place, name in enumerate(columns) if isinstance(name, str)]
-
-    @classmethod
-    def of(cls, rows: Iterable[Row], stable: bool) -> _Layout:
-        """The layout for these rows; they are read, not kept."""
-        kinds: dict[Entry, set[str]] = {}
-        for row in rows:
-            for entry, value in entries(row):
-                kinds.setdefault(entry, set()).add(_kind(value))
-        return cls({entry: frozenset(found) for entry, found in kinds.items()}, stable)
 
     def values(self, row: Row) -> list[Any]:
         """The values of a row, one for each column, None where it has none."""
@@ -273,10 +270,10 @@ def _kind(value: Any) -> str:
     return "none" if value is None else "text"
 
 
-def _type(kinds: frozenset[str]) -> str:
+def _type(kinds: Set[str]) -> str:
     """The type of a column of Parquet with values of these kinds.
 
-    >>> [_type(frozenset(kinds)) for kinds in (["small", "none"], ["small", "float64"], ["int64", "float64"], ["none"])]
+    >>> [_type(kinds) for kinds in ({"small", "none"}, {"small", "float64"}, {"int64", "float64"}, {"none"})]
     ['int64', 'float64', 'string', 'string']
     """
     if kinds <= {"none"}:

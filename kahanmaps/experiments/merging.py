@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from kahanmaps.experiments.database import Database, StoreError
-from kahanmaps.experiments.records import Outcome, digest
+from kahanmaps.experiments.records import Outcome, canonical, digest
 from kahanmaps.experiments.tables import (
     ATTEMPTS,
     PLAN_CHUNK,
@@ -25,7 +25,6 @@ from kahanmaps.experiments.tables import (
     record_columns,
     record_of,
     task_of,
-    text_of_limits,
     whole_stretches,
 )
 
@@ -77,7 +76,7 @@ def _merge_plans(database: Database, source: Database) -> int:
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
         chunks = whole_stretches(source, sql, experiment, PLAN_CHUNK)
         tasks = (_checked(source, key, text) for rows in chunks for _, key, text in rows)
-        _, _, added = fill_plan(database, id, definition, text_of_limits(experiment.limits), tasks)
+        _, _, added = fill_plan(database, id, definition, canonical(asdict(experiment.limits)), tasks)
         new += added
     return new
 

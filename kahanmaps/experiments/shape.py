@@ -32,10 +32,9 @@ def read_time(value: Any) -> float | None:
     >>> read_time("1.5 min"), read_time("none")
     (90.0, None)
     """
-    if value == _NONE:
-        return None
     expected = "seconds, or a text like 90 s, 5 min, 2 h, none"
-    return float(_with_unit(value, _TIME_UNITS, expected, Fraction(1, 1000), _MOST_SECONDS))
+    found = _with_unit(value, _TIME_UNITS, expected, Fraction(1, 1000), _MOST_SECONDS)
+    return None if found is None else float(found)
 
 
 def read_memory(value: Any) -> int | None:
@@ -44,13 +43,14 @@ def read_memory(value: Any) -> int | None:
     >>> read_memory("1.5 GB")
     1500000000
     """
+    expected = "bytes, or a text like 500 MB, 2 GB, 1 GiB, none"
+    found = _with_unit(value, _MEMORY_UNITS, expected, Fraction(1), _MOST_BYTES)
+    return None if found is None else int(found)
+
+
+def _with_unit(value: Any, units: Mapping[str, int], expected: str, least: Fraction, most: int) -> Fraction | None:
     if value == _NONE:
         return None
-    expected = "bytes, or a text like 500 MB, 2 GB, 1 GiB, none"
-    return int(_with_unit(value, _MEMORY_UNITS, expected, Fraction(1), _MOST_BYTES))
-
-
-def _with_unit(value: Any, units: Mapping[str, int], expected: str, least: Fraction, most: int) -> Fraction:
     text = value if isinstance(value, str) else show(value)
     found = re.fullmatch(r"\s*([0-9]{1,18}(?:\.[0-9]{1,9})?(?:[eE][+-]?[0-9]{1,2})?)\s*([A-Za-z]*)\s*", text)
     if found is None or (found[2] and found[2] not in units):
@@ -151,16 +151,10 @@ def _mistake(detail: Any) -> tuple[Place, str, str]:
 def _field(place: Place) -> tuple[type[BaseModel], str]:
     """The shape that a place belongs to, and the name of its field."""
     keys = [str(part) for part in place]
-    if keys[0] == "experiments" and len(keys) > 2:
-        keys = keys[2:]
-        shape: type[BaseModel] = _ExperimentShape
-    elif keys[0] == "experiments" and len(keys) == 2:
-        return _SpecShape, ""
-    else:
-        shape = _SpecShape
-    if keys[0] == "limits" and len(keys) > 1:
-        return _LimitsShape, keys[1]
-    return shape, keys[0]
+    shape: type[BaseModel] = _SpecShape
+    if keys[0] == "experiments" and len(keys) > 1:
+        shape, keys = (_ExperimentShape, keys[2:]) if len(keys) > 2 else (shape, [""])
+    return (_LimitsShape, keys[1]) if keys[0] == "limits" and len(keys) > 1 else (shape, keys[0])
 
 
 def key_of(place: Place) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import islice
 from typing import Any
 
@@ -201,11 +201,6 @@ def document_of(database: Database, name: str) -> str:
 # Plans written
 
 
-def text_of_limits(limits: Limits) -> str:
-    """The limits as they lie in a row."""
-    return canonical({"time": limits.time, "memory": limits.memory})
-
-
 def replace_plan(
     database: Database,
     experiment: str,
@@ -215,7 +210,7 @@ def replace_plan(
     documents: Mapping[str, str],
 ) -> Planned:
     """Plan an experiment, new or with another definition than before; see `Store.plan`."""
-    limits_text = text_of_limits(limits)
+    limits_text = canonical(asdict(limits))
     before = database.execute(f"SELECT {_SEALED}, checksum FROM experiment WHERE name = ?", (experiment,)).fetchone()
     # One that is damaged is planned anew.
     if before is not None and before[2] == digest(definition) and has_checksum(before[:-1], before[-1]):
