@@ -13,7 +13,7 @@ from itertools import islice
 from typing import Any
 
 from kahanmaps.errors import quoted
-from kahanmaps.experiments.database import Damaged, Database, StoreError
+from kahanmaps.experiments.database import Damaged, Database, StoreError, shown
 from kahanmaps.experiments.records import Limits, Outcome, Record, Task, canonical, checksum, digest, has_checksum
 
 _LONGEST_NAME, _LONGEST_VERDICT = 1000, 200
@@ -185,9 +185,9 @@ def task_of(database: Database, key: Any, text: Any) -> Task:
     what = f"the task {key}"
     data = database.table(_text_of(database, what, text, key, "key"), what)
     kind, system, options = data.get("task"), data.get("system"), data.get("options")
-    is_sound = isinstance(kind, str) and isinstance(system, dict | None) and isinstance(options, dict)
-    database.require(is_sound, what, text, "a task")
-    return Task.from_text(text)
+    if not (isinstance(kind, str) and isinstance(system, dict | None) and isinstance(options, dict)):
+        raise database.damaged(f"{what}: found {shown(text)}, expected a task")
+    return Task(kind, system, options)
 
 
 def document_of(database: Database, name: str) -> str:

@@ -22,10 +22,9 @@ from pathlib import Path
 import pytest
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments import cluster, job_groups
+from kahanmaps.experiments import cluster
 from kahanmaps.experiments.children import TRIES
-from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers, WorkersUnfit, record_on
-from kahanmaps.experiments.job_groups import JobGroup, KeptJob
+from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers, JobGroup, KeptJob, WorkersUnfit, record_on
 from kahanmaps.experiments.records import Job, Limits, Outcome, Task
 
 pytest.importorskip("distributed")
@@ -349,8 +348,8 @@ def test_a_job_whose_group_always_ends_early_is_lost_after_a_few_tries_and_has_n
 
 
 def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_is_lost(shared, monkeypatch):
-    monkeypatch.setattr(job_groups, "START_UP", 0.5)
-    monkeypatch.setattr(job_groups, "START_UP_OF_A_JOB", 0.05)
+    monkeypatch.setattr(cluster, "START_UP", 0.5)
+    monkeypatch.setattr(cluster, "START_UP_OF_A_JOB", 0.05)
     limits = Limits(time=0.05)
     good = jobs_of(12, limits=limits)
     bad = jobs_of(1, limits=limits, sleep=600, claim=0)
@@ -367,7 +366,7 @@ def test_a_group_that_hangs_is_ended_and_only_the_guilty_job_is_lost(shared, mon
 
 def test_a_group_with_an_unlimited_job_has_no_limit():
     limited, unlimited = KeptJob("test", "", Limits(time=1.0)), KeptJob("test", "", Limits())
-    assert JobGroup({"limited": limited}).timeout == job_groups.START_UP + job_groups.START_UP_OF_A_JOB + 1.0
+    assert JobGroup({"limited": limited}).timeout == cluster.START_UP + cluster.START_UP_OF_A_JOB + 1.0
     group = JobGroup({"limited": limited, "unlimited": unlimited})
     assert group.timeout is None
 

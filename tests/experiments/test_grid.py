@@ -306,11 +306,6 @@ def test_a_grid_without_axes_is_one_point():
     assert list(Grid({})) == [{}]
 
 
-def test_axes_of_different_lengths_cannot_be_zipped():
-    with pytest.raises(InputError, match="found 2 values of a and 3 of b, expected as many: a zip takes them together"):
-        Grid({"a": [1, 2], "b": [1, 2, 3]}, [["a", "b"]])
-
-
 @pytest.mark.parametrize("index", [-1, 4])
 def test_there_is_nothing_outside_a_grid(index):
     with pytest.raises(IndexError):
