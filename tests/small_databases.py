@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from kahanmaps.experiments import merging, tables
 from kahanmaps.experiments import store as store_module
+from kahanmaps.experiments import tables
 from kahanmaps.experiments.records import Limits, Outcome, Record, Task
 from kahanmaps.experiments.store import Store
 
@@ -59,7 +59,7 @@ def planned(path: Path, *numbers: int, records=(), experiment: str = "a", defini
 def small_chunks():
     """So that a dozen rows are many chunks. A context and not a fixture, because Hypothesis needs it anew each time."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (store_module, tables, merging):
+        for module in (store_module, tables):
             for name in {"PLAN_CHUNK", "RESULT_CHUNK", "COUNT_CHUNK"} & set(vars(module)):
                 patch.setattr(module, name, 3)
         yield

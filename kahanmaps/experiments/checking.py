@@ -9,17 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from kahanmaps.experiments import tables
 from kahanmaps.experiments.database import Damaged, Database
 from kahanmaps.experiments.records import digest
-from kahanmaps.experiments.tables import (
-    RESULT_CHUNK,
-    is_as_written,
-    put_result,
-    record_columns,
-    record_of,
-    seal,
-    sound_experiments,
-)
 
 _PROBLEMS = 20  # of the pages of a file, told at most
 
@@ -49,7 +41,7 @@ def check(database: Database) -> Checked:
     whole: dict[str, int] = {}
     damaged: dict[str, tuple[str, ...]] = {}
     for kind, rows in {
-        "experiments": sound_experiments(database),
+        "experiments": tables.sound_experiments(database),
         "tasks": _texts(database, "task", "key"),
         "documents": _texts(database, "document", "digest"),
         "results": ((key, is_sound) for _, key, is_sound in _results(database)),
@@ -79,11 +71,10 @@ def add_checksums(database: Database) -> None:
     """Bring a file to the latest format. What cannot be what was written stays without a checksum, and is damaged."""
     with database.upgrade():
         for (experiment,) in database.fetch("SELECT id FROM experiment"):
-            seal(database, experiment)
-        for rows in database.chunks("result", "task", f"t.key, {record_columns(database)}", RESULT_CHUNK, _RESULTS):
-            for task, key, *row in rows:
-                if _can_be(database, key, row):
-                    put_result(database, task, key, row[-2], row)
+            tables.seal(database, experiment)
+        for task, key, row in _rows(database):
+            if _can_be(database, key, row):
+                tables.put_result(database, task, key, row[-2], row)
 
 
 def _problems(database: Database) -> list[str]:
@@ -93,25 +84,29 @@ def _problems(database: Database) -> list[str]:
         return [str(error)]
 
 
-_RESULTS = "LEFT JOIN task AS t ON t.id = r.task"
+def _rows(database: Database) -> Iterator[tuple[int, Any, list[Any]]]:
+    """The task of each result, its key, and the row."""
+    columns, join = f"t.key, {tables.record_columns(database)}", "LEFT JOIN task AS t ON t.id = r.task"
+    for rows in database.chunks("result", "task", columns, tables.RESULT_CHUNK, join):
+        for task, key, *row in rows:
+            yield task, key, row
 
 
 def _results(database: Database) -> Iterator[tuple[int, Any, bool]]:
     """The task of each result, its key, and whether the result is sound."""
-    for rows in database.chunks("result", "task", f"t.key, {record_columns(database)}", RESULT_CHUNK, _RESULTS):
-        for task, key, *row in rows:
-            yield task, key, is_as_written(key, row) if database.format > 1 else _can_be(database, key, row)
+    for task, key, row in _rows(database):
+        yield task, key, tables.is_as_written(key, row) if database.format > 1 else _can_be(database, key, row)
 
 
 def _can_be(database: Database, key: Any, row: list[Any]) -> bool:
     try:
-        return isinstance(key, str) and record_of(database, key, row) is not None
+        return isinstance(key, str) and tables.record_of(database, key, row) is not None
     except Damaged:
         return False
 
 
 def _texts(database: Database, table: str, name: str) -> Iterator[tuple[Any, bool]]:
     """The name of each text, and whether it is the digest of the text."""
-    for rows in database.chunks(table, "rowid", f"r.{name}, r.text", RESULT_CHUNK):
+    for rows in database.chunks(table, "rowid", f"r.{name}, r.text", tables.RESULT_CHUNK):
         for _, found, text in rows:
             yield found, isinstance(text, str) and found == digest(text)

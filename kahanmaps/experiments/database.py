@@ -388,16 +388,14 @@ class Database:
         """The one place where errors of SQLite become sentences."""
         try:
             yield
-        except (sqlite3.OperationalError, UnicodeDecodeError) as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            code = _primary_code(error)
             # Our own statements are wrong only where a table or a column is gone; and what has no code comes from
             # Python, where a text or a name is not UTF-8.
-            if _primary_code(error) in (sqlite3.SQLITE_ERROR, None):
+            is_refused = isinstance(error, (sqlite3.OperationalError, UnicodeDecodeError))
+            if code in ((sqlite3.SQLITE_ERROR, None) if is_refused else _OF_DAMAGE):
                 raise self.damaged(quoted(str(error), 100)) from error
-            raise self._failure(error) from error
-        except sqlite3.Error as error:
-            if _primary_code(error) in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_CONSTRAINT, sqlite3.SQLITE_MISMATCH):
-                raise self.damaged(quoted(str(error), 100)) from error
-            raise self._failure(error) from error
+            raise (Unavailable if code in _OF_THE_MACHINE else StoreError)(self._sentence(error)) from error
 
     def _unopened(self, error: OSError) -> KahanmapsError:
         if is_of_the_machine(error):
@@ -406,10 +404,6 @@ class Database:
 
     def _in_the_way(self, found: NotOurs) -> StoreError:
         return StoreError(f"{self.name} cannot be used: {found}; look at it, and remove it or move it away")
-
-    def _failure(self, error: Exception) -> KahanmapsError:
-        kind = Unavailable if _primary_code(error) in _OF_THE_MACHINE else StoreError
-        return kind(self._sentence(error))
 
     def _sentence(self, error: Exception) -> str:
         match _primary_code(error):
@@ -445,6 +439,7 @@ class Database:
         return f"{self.name} is not an SQLite database: check the name"
 
 
+_OF_DAMAGE = {sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_CONSTRAINT, sqlite3.SQLITE_MISMATCH}
 _OF_THE_MACHINE = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
 
 

@@ -19,7 +19,7 @@ from kahanmaps.checks.claims import Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import Result, fields, task
+from kahanmaps.experiments.registry import Result, fields, task, whole_report
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
@@ -54,7 +54,7 @@ def degrees(
         "degrees": list(found.degrees),
         "reached": len(found.degrees) - 1,
         "ending": found.message,
-        **_report(found, report),
+        **whole_report(found, report),
     }
 
 
@@ -81,7 +81,7 @@ def integrals(
         "nullities": list(found.profile.nullities),
         "period": found.profile.period,
         "reason": found.reason,
-        **_report(found, report),
+        **whole_report(found, report),
     }
 
 
@@ -107,7 +107,7 @@ def density(
         "formulas": [one.text for one in found.densities],
         "period": found.period,
         "reason": found.reason,
-        **_report(found, report),
+        **whole_report(found, report),
     }
 
 
@@ -127,7 +127,7 @@ def symmetry(system: SystemFile, seconds: int = 30, report: bool = False) -> Res
         "scaling": found.scaling is not None,
         "generators": [one.text for one in found.generators],
         "open": found.undecided,
-        **_report(found, report),
+        **whole_report(found, report),
     }
 
 
@@ -155,7 +155,7 @@ def commuting(
         "systems": [one.rhs for one in found.nontrivial],
         "irrational": found.irrational,
         "open": found.undecided,
-        **_report(found, report),
+        **whole_report(found, report),
     }
 
 
@@ -189,7 +189,7 @@ def analysis(
         "sentence": final.sentence,
         "unfinished": unfinished,
         "skipped": found.skipped,
-        **_report(found, report),
+        **whole_report(found, report),
     }
 
 
@@ -314,10 +314,6 @@ def lyapunov(
         "log_volume": _number(volume.mean()) if len(volume) else None,
         "residual": _number(found.residual) if len(volume) else None,
     }
-
-
-def _report(found: Any, whole: bool) -> Result:
-    return {"report": found.to_json()} if whole else {}
 
 
 def _state_of_integrals(found: IntegralSearch) -> str:

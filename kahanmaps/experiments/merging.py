@@ -7,26 +7,9 @@ from contextlib import closing
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from kahanmaps.experiments import tables
 from kahanmaps.experiments.database import Database, StoreError
 from kahanmaps.experiments.records import Outcome, canonical, digest
-from kahanmaps.experiments.tables import (
-    ATTEMPTS,
-    PLAN_CHUNK,
-    RESULT_CHUNK,
-    add_document,
-    add_experiment,
-    add_tasks,
-    choose,
-    definition_of,
-    document_of,
-    fill_plan,
-    find_result,
-    put_result,
-    record_columns,
-    record_of,
-    task_of,
-    whole_stretches,
-)
 
 CONFLICTS_SHOWN = 5
 
@@ -60,8 +43,8 @@ def merge(database: Database, other: str | os.PathLike[str]) -> Merged:
 def _merge_plans(database: Database, source: Database) -> int:
     """How many tasks are new."""
     new = 0
-    for experiment in choose(source, None):
-        definition = definition_of(source, experiment)
+    for experiment in tables.choose(source, None):
+        definition = tables.definition_of(source, experiment)
         mine = database.execute("SELECT digest FROM experiment WHERE name = ?", (experiment.name,)).fetchone()
         if mine is not None:
             if mine[0] != digest(definition):
@@ -70,50 +53,52 @@ def _merge_plans(database: Database, source: Database) -> int:
                     f"{source.name}: rename it in one of them; nothing was merged"
                 )
             continue
-        id = add_experiment(database, experiment.name)
+        id = tables.add_experiment(database, experiment.name)
         sql = """
             SELECT p.number, t.key, t.text FROM plan AS p JOIN task AS t ON t.id = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
-        chunks = whole_stretches(source, sql, experiment, PLAN_CHUNK)
+        chunks = tables.whole_stretches(source, sql, experiment, tables.PLAN_CHUNK)
         tasks = (_checked(source, key, text) for rows in chunks for _, key, text in rows)
-        _, _, added = fill_plan(database, id, definition, canonical(asdict(experiment.limits)), tasks)
+        _, _, added = tables.fill_plan(database, id, definition, canonical(asdict(experiment.limits)), tasks)
         new += added
     return new
 
 
 def _checked(source: Database, key: Any, text: Any) -> tuple[str, str]:
     """Key and text of a task, which no damage has touched."""
-    task_of(source, key, text)
+    tables.task_of(source, key, text)
     return key, text
 
 
 def _merge_documents(database: Database, source: Database) -> None:
     for (name,) in source.fetch("SELECT digest FROM document"):  # one by one: each may be long
-        add_document(database, name, document_of(source, name))
+        tables.add_document(database, name, tables.document_of(source, name))
 
 
 def _merge_results(database: Database, source: Database, new: int) -> Merged:
     """What came along; `new` tasks came with the plans."""
     results = replaced = conflicts = 0
     conflicting: list[str] = []
-    columns, join = f"t.key, t.text, {record_columns(source)}", "JOIN task AS t ON t.id = r.task"
-    for rows in source.chunks("result", "task", columns, RESULT_CHUNK, join, is_lenient=False):
+    columns, join = f"t.key, t.text, {tables.record_columns(source)}", "JOIN task AS t ON t.id = r.task"
+    for rows in source.chunks("result", "task", columns, tables.RESULT_CHUNK, join, is_lenient=False):
         for _, key, text, *row in rows:
             _checked(source, key, text)
-            source.require(record_of(source, key, row) is not None, f"the record of task {key}", None, "an outcome")
-            found = find_result(database, key)
+            source.require(
+                tables.record_of(source, key, row) is not None, f"the record of task {key}", None, "an outcome"
+            )
+            found = tables.find_result(database, key)
             if found is None:
-                new += add_tasks(database, [(key, text)])
-                found = find_result(database, key)
+                new += tables.add_tasks(database, [(key, text)])
+                found = tables.find_result(database, key)
                 assert found is not None
             task, mine = found
-            attempts = row[ATTEMPTS] + (mine[ATTEMPTS] or 0)
+            attempts = row[tables.ATTEMPTS] + (mine[tables.ATTEMPTS] or 0)
             if mine[0] is None:
                 results += 1
-                put_result(database, task, key, attempts, row)
+                tables.put_result(database, task, key, attempts, row)
             elif row[0] == Outcome.OK != mine[0]:
                 replaced += 1
-                put_result(database, task, key, attempts, row)
+                tables.put_result(database, task, key, attempts, row)
             elif row[0] == Outcome.OK and row[1:3] != mine[1:3]:
                 conflicts += 1
                 if conflicts <= CONFLICTS_SHOWN:

@@ -61,6 +61,11 @@ def fields(found: Any, *names: str) -> Result:
     return {name: getattr(found, name) for name in names}
 
 
+def whole_report(found: Any, is_wanted: bool) -> Result:
+    """The entry "report" of a result, if it is wanted: all that was found."""
+    return {"report": found.to_json()} if is_wanted else {}
+
+
 _KINDS: dict[str, TaskKind] = {}
 
 

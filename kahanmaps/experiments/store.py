@@ -27,32 +27,13 @@ from typing import Any, NamedTuple, NoReturn, Self
 
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import note_source, quoted
+from kahanmaps.experiments import tables
 from kahanmaps.experiments.checking import Checked, add_checksums, check, forget_damaged
 from kahanmaps.experiments.database import Database, StoreError
 from kahanmaps.experiments.merging import Merged, merge
 from kahanmaps.experiments.records import KEY_LENGTH, Job, Limits, Outcome, Record, Row, Task
 from kahanmaps.experiments.schema import FORMAT
-from kahanmaps.experiments.tables import (
-    ATTEMPTS,
-    PLAN_CHUNK,
-    RESULT_CHUNK,
-    Chosen,
-    Planned,
-    choose,
-    definition_of,
-    document_of,
-    find_result,
-    is_a_time,
-    is_a_verdict,
-    put_result,
-    record_columns,
-    record_of,
-    replace_plan,
-    row_of,
-    stretches,
-    task_of,
-    whole_stretches,
-)
+from kahanmaps.experiments.tables import Chosen, Planned
 
 COUNT_CHUNK = 50_000  # rows that are only counted: some 50 ms
 FOUND_AT_MOST = 20
@@ -158,8 +139,8 @@ class Store(Displayed):
     def experiments(self) -> list[Experiment]:
         """What is planned, in order."""
         return [
-            Experiment(one.name, definition_of(self._database, one), one.limits, one.total, one.tasks)
-            for one in choose(self._database, None)
+            Experiment(one.name, tables.definition_of(self._database, one), one.limits, one.total, one.tasks)
+            for one in tables.choose(self._database, None)
         ]
 
     def plan(
@@ -173,7 +154,7 @@ class Store(Displayed):
         """
         self._database.must_write()
         with self._database.large_cache(), self._database.transaction():
-            return replace_plan(self._database, experiment, definition, limits, tasks, documents)
+            return tables.replace_plan(self._database, experiment, definition, limits, tasks, documents)
 
     def merge(self, other: str | os.PathLike[str]) -> Merged:
         """Take over what another database has, all or nothing; doing it again changes nothing.
@@ -197,9 +178,9 @@ class Store(Displayed):
         With `retry_failed` also those that failed: each is looked at once, so one that fails again does not come back.
         `shard` (i, n) is the i-th part of n, counting rows of the plan of these experiments; no task is in two parts.
         """
-        found = self._pending("t.key, t.text", PLAN_CHUNK, experiments, retry_failed, shard)
+        found = self._pending("t.key, t.text", tables.PLAN_CHUNK, experiments, retry_failed, shard)
         return (
-            Job(task_of(self._database, key, text), experiment.limits)
+            Job(tables.task_of(self._database, key, text), experiment.limits)
             for experiment, rows in found
             for key, text in rows
         )
@@ -222,7 +203,7 @@ class Store(Displayed):
         part, parts = shard
         if not 1 <= part <= parts:
             raise StoreError(f"there is no part {part} of {parts}: parts are counted 1/{parts} to {parts}/{parts}")
-        chosen = choose(self._database, experiments)
+        chosen = tables.choose(self._database, experiments)
         # A task planned twice belongs to its first row among the chosen ones: so it comes once, without a memory of
         # what has come, and lies in one shard.
         among = "" if experiments is None else f"AND q.experiment IN ({', '.join(str(c.id) for c in chosen)})"
@@ -241,7 +222,7 @@ class Store(Displayed):
         return (
             (experiment, rows)
             for experiment in chosen
-            for rows in stretches(self._database, sql, experiment, size, (experiment.offset, parts, part - 1))
+            for rows in tables.stretches(self._database, sql, experiment, size, (experiment.offset, parts, part - 1))
         )
 
     # Results
@@ -253,35 +234,35 @@ class Store(Displayed):
         """
         self._database.must_write()
         records = [record for record in records if record.outcome is not Outcome.LOST]
-        rows = [row_of(record) for record in records]  # what JSON cannot hold is refused here
+        rows = [tables.row_of(record) for record in records]  # what JSON cannot hold is refused here
         with self._database.transaction():
             for record, row in zip(records, rows, strict=True):
-                found = find_result(self._database, record.key)
+                found = tables.find_result(self._database, record.key)
                 if found is None:
                     raise StoreError(
                         f"{self._database.name} has no task {record.key}: plan it before its result is added"
                     )
                 task, before = found
                 is_kept = before[0] == Outcome.OK and not record.is_ok
-                attempts = (before[ATTEMPTS] or 0) + 1
-                put_result(self._database, task, record.key, attempts, before if is_kept else row)
+                attempts = (before[tables.ATTEMPTS] or 0) + 1
+                tables.put_result(self._database, task, record.key, attempts, before if is_kept else row)
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
         """The tasks with their records in plan order; with `missing` also those that have none."""
-        return self._rows(choose(self._database, experiments), missing)
+        return self._rows(tables.choose(self._database, experiments), missing)
 
     def _rows(self, chosen: list[Chosen], missing: bool) -> Iterator[Row]:
         # All rows of the plan, so that what is missing is seen.
         sql = f"""
-            SELECT p.number, t.key, t.text, {record_columns(self._database)}
+            SELECT p.number, t.key, t.text, {tables.record_columns(self._database)}
             FROM plan AS p JOIN task AS t ON t.id = p.task LEFT JOIN result AS r ON r.task = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
         for experiment in chosen:
-            for rows in whole_stretches(self._database, sql, experiment, RESULT_CHUNK):
+            for rows in tables.whole_stretches(self._database, sql, experiment, tables.RESULT_CHUNK):
                 for number, key, text, *cells in rows:
-                    record = record_of(self._database, key, cells)
+                    record = tables.record_of(self._database, key, cells)
                     if record is not None or missing:
-                        yield Row(experiment.name, number, task_of(self._database, key, text), record)
+                        yield Row(experiment.name, number, tables.task_of(self._database, key, text), record)
 
     def unplanned(self) -> int:
         """How many results no plan asks for."""
@@ -301,7 +282,7 @@ class Store(Displayed):
 
     def status(self) -> list[ExperimentStatus]:
         """How far each experiment has come."""
-        return [self._status(experiment) for experiment in choose(self._database, None)]
+        return [self._status(experiment) for experiment in tables.choose(self._database, None)]
 
     def _status(self, experiment: Chosen) -> ExperimentStatus:
         # A task planned twice counts at its first row; the look at earlier rows costs most, and mostly there are none.
@@ -317,9 +298,14 @@ class Store(Displayed):
         outcomes: Counter[Outcome] = Counter()
         verdicts: Counter[str] = Counter()
         seconds = 0.0
-        for rows in stretches(self._database, sql, experiment, COUNT_CHUNK):
+        for rows in tables.stretches(self._database, sql, experiment, COUNT_CHUNK):
             for outcome, verdict, count, time, without in rows:
-                if outcome not in set(Outcome) or not is_a_verdict(verdict) or without or not is_a_time(time):
+                if (
+                    outcome not in set(Outcome)
+                    or not tables.is_a_verdict(verdict)
+                    or without
+                    or not tables.is_a_time(time)
+                ):
                     self._name_the_damage(experiment)
                 outcomes[Outcome(outcome)] += count
                 if verdict is not None:
@@ -345,22 +331,22 @@ class Store(Displayed):
                 "digits"
             )
         rows = self._database.fetch(
-            f"SELECT t.id, t.key, t.text, {record_columns(self._database)} "
+            f"SELECT t.id, t.key, t.text, {tables.record_columns(self._database)} "
             "FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
             "WHERE t.key >= ? AND t.key < ? ORDER BY t.key LIMIT ?",
             (prefix, f"{prefix}g", FOUND_AT_MOST),  # g comes after every hexadecimal digit
         )
-        choose(self._database, None)  # what is damaged in the plans is told
+        tables.choose(self._database, None)  # what is damaged in the plans is told
         return [
             Found(
-                task_of(self._database, key, text),
-                record_of(self._database, key, record),
+                tables.task_of(self._database, key, text),
+                tables.record_of(self._database, key, record),
                 self._database.fetch(
                     "SELECT e.name, p.number FROM plan AS p JOIN experiment AS e ON e.id = p.experiment "
                     "WHERE p.task = ? ORDER BY p.experiment, p.number",
                     (id,),
                 ),
-                record[ATTEMPTS] or 0,
+                record[tables.ATTEMPTS] or 0,
             )
             for id, key, text, *record in rows
         ]
@@ -370,8 +356,8 @@ class Store(Displayed):
         rows = self._database.fetch("SELECT text FROM task WHERE key = ?", (key,))
         if not rows:
             raise StoreError(f"{self._database.name} has no task {key}: plan the experiment that has it")
-        return task_of(self._database, key, rows[0][0])
+        return tables.task_of(self._database, key, rows[0][0])
 
     def document(self, digest: str) -> str:
         """The text of the document with this digest."""
-        return document_of(self._database, digest)
+        return tables.document_of(self._database, digest)

@@ -6,7 +6,7 @@ Results are small: counts, verdicts, numbers, and what a refutation needs to be 
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from hashlib import sha256
 from typing import Any
@@ -23,7 +23,7 @@ from kahanmaps.checks.preserve import check_measure, check_poisson
 from kahanmaps.checks.settings import Settings, random_starts
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, fields, task
+from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, fields, task, whole_report
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.invariants.heights import height_growth
@@ -164,13 +164,12 @@ def orbit(
         max_digits=max_digits,
         structure=structure,
     )
-    last: OrbitPoint | None = None
-    for reached in walk:
-        last = reached
-    if last is None:  # of iterates reached directly there may be none
+    reached = deque(walk, 1)
+    if not reached:  # of iterates reached directly there may be none
         first = walk.orbit.start
         exact = numbers.kind == "exact"
-        last = OrbitPoint(0, numbers.field, IntegerPoint.from_rationals(first) if exact else first)
+        reached.append(OrbitPoint(0, numbers.field, IntegerPoint.from_rationals(first) if exact else first))
+    last = reached[0]
     end = walk.end
     result: Result = {
         "start": _text(point),
@@ -284,22 +283,18 @@ def _of_report(report: Report, whole: bool) -> Result:
     counted = [finding for finding in report.findings if finding.applies and not finding.control]
     counts = Counter(finding.verdict for finding in counted)
     controls = [finding for finding in report.findings if finding.control]
-    result: Result = {
+    doubtful = [finding.to_json() for finding in counted if finding.verdict in (Verdict.REFUTED, Verdict.UNDECIDED)]
+    return {
         "verdict": str(report.verdict),
         "claims": len(counted),
         **{str(verdict): counts[verdict] for verdict in Verdict},
         "controls": len(controls),
         "controls_refuted": sum(finding.verdict is Verdict.REFUTED for finding in controls),
         "ended_early": report.ended_early,
+        **({"m": report.context["m"]} if "m" in report.context else {}),
+        **({"doubtful": doubtful} if doubtful else {}),
+        **whole_report(report, whole),
     }
-    if "m" in report.context:
-        result["m"] = report.context["m"]
-    doubtful = [f for f in counted if f.verdict in (Verdict.REFUTED, Verdict.UNDECIDED)]
-    if doubtful:
-        result["doubtful"] = [finding.to_json() for finding in doubtful]
-    if whole:
-        result["report"] = report.to_json()
-    return result
 
 
 def _member(system: SystemFile) -> Any:

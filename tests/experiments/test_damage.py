@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 from small_databases import LIMITS, MEMORY, failed, ok, planned, task, tasks
 
-from kahanmaps.experiments import checking
+from kahanmaps.experiments import tables
 from kahanmaps.experiments.database import Damaged, StoreError
 from kahanmaps.experiments.export import write_csv, write_jsonl
 from kahanmaps.experiments.records import digest
@@ -338,7 +338,7 @@ def test_an_upgrade_that_is_cut_off_leaves_the_old_format(sound, monkeypatch):
     def cut_off(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(checking, "put_result", cut_off)
+    monkeypatch.setattr(tables, "put_result", cut_off)
     with pytest.raises(KeyboardInterrupt):
         Store.open(sound)
     with Store.open(sound, readonly=True) as store:
