@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
+from kahanmaps.experiments.experiment import Experiment
 from kahanmaps.experiments.records import Task
-from kahanmaps.experiments.spec import Experiment, SpecError, parse_spec
+from kahanmaps.experiments.spec import SpecError, parse_spec
 
 LORENZ = '[experiments.a]\ntask = "orbit"\nsystem = "lorenz"\n'
 FAMILY = '[experiments.a]\ntask = "orbit"\nsystem = "family"\n'

@@ -88,46 +88,6 @@ class JobGroup:
         return json.dumps({"documents": self.documents, "jobs": jobs}).encode()
 
 
-class Grouping:
-    """Fills groups to about `seconds` of work and at most `largest` jobs; `documents` gives the text of a document.
-
-    `means` are of the records of each kind of task; one of which nothing is known takes a whole group's time.
-    """
-
-    def __init__(self, documents: Documents, seconds: float, largest: int) -> None:
-        self._documents = documents
-        self._group_seconds = seconds
-        self._largest_group = largest
-        self.means: defaultdict[str, Means] = defaultdict(lambda: Means(seconds))
-
-    def fits(self, group: JobGroup, kind: str) -> bool:
-        """Whether the group comes nearer to its time with a job of this kind, and stays within its size."""
-        return (
-            group.seconds + self.means[kind].seconds / 2 <= self._group_seconds
-            and group.expected + self.means[kind].size <= LARGEST_TEXT
-        )
-
-    def is_full(self, group: JobGroup) -> bool:
-        """Whether the group is to be sent without another job."""
-        return (
-            len(group.jobs) >= self._largest_group
-            or group.seconds >= self._group_seconds
-            or group.sent >= LARGEST_TEXT
-            or group.expected >= LARGEST_TEXT
-        )
-
-    def add(self, group: JobGroup, task: Task, limits: Limits, tries: int = 0) -> None:
-        """Put a job into the group, with the documents that it needs."""
-        for wanted in task.documents:
-            if wanted not in group.documents:
-                group.documents[wanted] = self._documents(wanted)
-                group.sent += len(group.documents[wanted])
-        group.jobs[task.key] = KeptJob(task.kind, task.text, limits, tries)
-        group.seconds += self.means[task.kind].seconds
-        group.expected += self.means[task.kind].size
-        group.sent += len(task.text)
-
-
 @dataclass
 class Means:
     """What a record of one kind of task takes, on average over the last ones."""
@@ -190,7 +150,11 @@ class ClusterWorkers(Executor):
     ) -> None:
         self.address = address
         self._command = _with_environment(command or [python or sys.executable, "-m", GROUP_MODULE])
-        self._grouping = Grouping(documents, group_seconds, largest_group)
+        self._documents = documents
+        self._group_seconds = group_seconds
+        self._largest_group = largest_group
+        # Of the records of each kind of task; one of which nothing is known takes a whole group's time.
+        self._means: defaultdict[str, Means] = defaultdict(lambda: Means(group_seconds))
         self._talk = talk or (lambda text: None)
 
         self._keys: set[str] = set()  # of jobs in flight
@@ -235,11 +199,11 @@ class ClusterWorkers(Executor):
         """Take a job into the open group, which is sent when it is full, or by `wait` when a worker might idle."""
         if job.task.key in self._keys:
             raise InputError(f"task {job.task.key} is in flight already: submit it again when its record is back")
-        if self._open.jobs and not self._grouping.fits(self._open, job.task.kind):
+        if self._open.jobs and not self._fits(self._open, job.task.kind):
             self._send_open()
-        self._grouping.add(self._open, job.task, job.limits)
+        self._add(self._open, job.task, job.limits)
         self._keys.add(job.task.key)
-        if self._grouping.is_full(self._open):
+        if self._is_full(self._open):
             self._send_open()
 
     def wait(self, timeout: float) -> list[Record]:
@@ -285,6 +249,33 @@ class ClusterWorkers(Executor):
 
     # Groups
 
+    def _fits(self, group: JobGroup, kind: str) -> bool:
+        """Whether the group comes nearer to its time with a job of this kind, and stays within its size."""
+        return (
+            group.seconds + self._means[kind].seconds / 2 <= self._group_seconds
+            and group.expected + self._means[kind].size <= LARGEST_TEXT
+        )
+
+    def _is_full(self, group: JobGroup) -> bool:
+        """Whether the group is to be sent without another job."""
+        return (
+            len(group.jobs) >= self._largest_group
+            or group.seconds >= self._group_seconds
+            or group.sent >= LARGEST_TEXT
+            or group.expected >= LARGEST_TEXT
+        )
+
+    def _add(self, group: JobGroup, task: Task, limits: Limits, tries: int = 0) -> None:
+        """Put a job into the group, with the documents that it needs."""
+        for wanted in task.documents:
+            if wanted not in group.documents:
+                group.documents[wanted] = self._documents(wanted)
+                group.sent += len(group.documents[wanted])
+        group.jobs[task.key] = KeptJob(task.kind, task.text, limits, tries)
+        group.seconds += self._means[task.kind].seconds
+        group.expected += self._means[task.kind].size
+        group.sent += len(task.text)
+
     @property
     def _window(self) -> int:
         """How many groups may be at the scheduler: one that runs and one that waits for each thread."""
@@ -304,7 +295,7 @@ class ClusterWorkers(Executor):
 
     def _send_alone(self, job: KeptJob, is_suspect: bool = False) -> None:
         group = JobGroup(is_alone=True, is_suspect=is_suspect)
-        self._grouping.add(group, Task.from_text(job.text), job.limits, job.tries)
+        self._add(group, Task.from_text(job.text), job.limits, job.tries)
         self._send(group)
 
     def _send(self, group: JobGroup) -> None:
@@ -330,7 +321,7 @@ class ClusterWorkers(Executor):
             if record.outcome is Outcome.LOST:
                 self._failed_alone(record.key, job, Failure(record.message, record.stderr))
                 continue
-            self._grouping.means[job.kind].learn(record.seconds, len(line))
+            self._means[job.kind].learn(record.seconds, len(line))
             self._keys.discard(record.key)
             records.append(record)
         if group.jobs:

@@ -6,10 +6,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, suggestion
@@ -35,7 +35,6 @@ _SIZES: Mapping[str, Callable[[Any], int]] = {
     "chi": lambda text: parse_chi(text).degree(),
 }
 _CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
-L = TypeVar("L")
 
 
 @dataclass(frozen=True)
@@ -233,7 +232,8 @@ class ExperimentReader:
             recipes = self._read_files(place, references)
             return Values(option, [recipes]) if recipes else None
         if place.endswith(f".{TIME_STEP}"):
-            option = _time_step(option)
+            read_eps = option.read  # of half the time step
+            option = replace(option, read=lambda value: read_eps(number_of(value) / 2))
         values, mistakes = read_values(option, raw)
         for position, sentence in mistakes:
             self.mistake(place + "".join(f"[{k}]" for k in position), sentence)
@@ -278,9 +278,10 @@ class ExperimentReader:
         return zips
 
     def _read_limits(self, kind: TaskKind, fixed: dict[str, Values]) -> Limits:
-        own, common = self.sound("limits") or {}, self.spec.sound("limits") or {}
-        time = _limit(read_time, own.get("time", common.get("time")), DEFAULT_LIMITS.time)
-        memory = _limit(read_memory, own.get("memory", common.get("memory")), DEFAULT_LIMITS.memory)
+        own = self.sound("limits") or {}
+        time, memory, digits = (
+            self.sound("limits", name) or self.spec.sound("limits", name) for name in ("time", "memory", "digits")
+        )
         place = self.given().get("max_digits")
         if "digits" in own and self.sound("limits", "digits") is None:
             pass  # told already, with the shape
@@ -290,9 +291,12 @@ class ExperimentReader:
         elif place is not None:
             if "digits" in own:
                 self.mistake("limits.digits", f"found {place} as well, expected one of the two")
-        elif isinstance(digits := own.get("digits", common.get("digits")), int) and digits > 0:
+        elif digits is not None:
             fixed["max_digits"] = Values(VOCABULARY["max_digits"], [(digits,)])
-        return Limits(time, memory)
+        return Limits(
+            DEFAULT_LIMITS.time if time is None else read_time(time),
+            DEFAULT_LIMITS.memory if memory is None else read_memory(memory),
+        )
 
     def _require(self, kind: TaskKind) -> None:
         if any(self.sound(part) is None and part in self.raw for part in ("options", "axes")):
@@ -413,20 +417,3 @@ class ExperimentReader:
             return
         also = ", or a second system as the option other" if self.kind.needs == MEMBER_OR_OTHER else ""
         self.mistake(place, f"{file.name} is of kind [{file.kind}], expected one of kind [family]{also}")
-
-
-def _limit(read: Callable[[Any], L], raw: Any, default: L) -> L:
-    """What is given, if it has the right shape; if not, that is told already."""
-    try:
-        return default if raw is None else read(raw)
-    except ValueError:
-        return default
-
-
-def _time_step(eps: Option) -> Option:
-    """The option eps, given as the time step h = 2 eps."""
-
-    def read(value: Any) -> Any:
-        return eps.read(number_of(value) / 2)
-
-    return Option("eps", eps.help, read, eps.make, numbers=True)

@@ -34,22 +34,10 @@ from pathlib import Path
 from typing import Any
 
 from kahanmaps.errors import InputError, SystemFileError, reading
-from kahanmaps.experiments.experiment import DEFAULT_LIMITS, PARAMETERS, TIME_STEP, Experiment, ExperimentReader
+from kahanmaps.experiments.experiment import PARAMETERS, TIME_STEP, Experiment, ExperimentReader
 from kahanmaps.experiments.options import FAMILY, VOCABULARY
 from kahanmaps.experiments.registry import task_kinds
 from kahanmaps.experiments.shape import SpecDocument, shape_schema
-
-__all__ = [
-    "DEFAULT_LIMITS",
-    "EXPERIMENT_NAME",
-    "MAX_BYTES",
-    "MAX_TASKS",
-    "Experiment",
-    "Spec",
-    "SpecError",
-    "parse_spec",
-    "read_spec",
-]
 
 MAX_BYTES = 4_000_000
 MAX_TASKS = 1_000_000
@@ -126,7 +114,9 @@ def _read(document: SpecDocument, where: str, max_tasks: int) -> Spec:
     experiments = []
     tables = document.sound("experiments") or {}
     for name, table in tables.items():
-        _require_name(document, name)
+        if not re.fullmatch(EXPERIMENT_NAME, name):
+            expected = "expected a name of at most 80 letters, digits and the characters _ . + -"
+            document.mistake(f"experiments.{name}", expected)
         if isinstance(table, dict):
             experiment = ExperimentReader(document, name).read()
             if experiment is not None:
@@ -141,13 +131,6 @@ def _read(document: SpecDocument, where: str, max_tasks: int) -> Spec:
     if document.mistakes:
         raise SpecError(where, document.mistakes)
     return spec
-
-
-def _require_name(document: SpecDocument, name: str) -> None:
-    if not re.fullmatch(EXPERIMENT_NAME, name):
-        document.mistake(
-            f"experiments.{name}", "expected a name of at most 80 letters, digits and the characters _ . + -"
-        )
 
 
 def _largest(experiments: Sequence[Experiment]) -> str:

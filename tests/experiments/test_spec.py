@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from specs import COMMUTE, FAMILY, LORENZ, ROTOR, SPACE, UNIVERSAL, keys, mistakes, only, option, task_of, tasks
 
 from kahanmaps.documents.catalog import names
+from kahanmaps.experiments.experiment import DEFAULT_LIMITS
 from kahanmaps.experiments.records import Limits, Task
-from kahanmaps.experiments.spec import DEFAULT_LIMITS, parse_spec, read_spec
+from kahanmaps.experiments.spec import parse_spec, read_spec
 
 # What a spec says
 
