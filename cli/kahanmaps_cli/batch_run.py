@@ -4,27 +4,32 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
+from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from kahanmaps.errors import counted, quoted, suggestion
-from kahanmaps_cli.batch_progress import BatchProgress, duration
-from kahanmaps_cli.batch_show import print_status, status_data
+from kahanmaps_cli.batch_show import duration, print_status, status_data
 from kahanmaps_cli.progress import as_typed, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.signals import interruptible
-from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.terminal import is_coloured, tell
 
 if TYPE_CHECKING:
-    from kahanmaps.experiments.records import Executor, Job
+    from kahanmaps.experiments.records import Executor, Job, Record
     from kahanmaps.experiments.spec import Spec
     from kahanmaps.experiments.store import Store
     from kahanmaps.experiments.tables import Planned
 
 _SHOWN = 3  # tasks of each experiment in a dry run
+_LINE_EVERY = 10.0  # seconds between words on how it is coming along, where there is no terminal
+_SHOW_EVERY = 0.1  # the same for the bar on a terminal
 
 
 def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
@@ -227,7 +232,6 @@ def _missing(db: str, spec: Spec, options: Mapping[str, Any]) -> int | None:
 
 
 def _tasks(number: int) -> str:
-
     return counted(number, "task")
 
 
@@ -249,3 +253,99 @@ def _pairs(values: Mapping[str, Any]) -> str:
 
 def _word(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else json.dumps(value)
+
+
+class BatchProgress:
+    """A context that is told of records; `todo` of them are expected."""
+
+    def __init__(self, todo: int, quiet: bool) -> None:
+        self.todo = todo
+        self.outcomes: Counter[str] = Counter()
+        self.why_lost = ""  # the last of them
+        self._quiet = quiet
+        self._in_flight = 0
+        self._begin = self._last = time.monotonic()
+        self._bar: Any = None
+        self._bar_task: Any = None
+        if not quiet and sys.stderr.isatty():
+            self._bar = _bar()
+            self._bar_task = self._bar.add_task("", total=todo, text="")
+
+    @property
+    def done(self) -> int:
+        """How many tasks have come to a result."""
+        return sum(self.outcomes.values()) - self.lost
+
+    @property
+    def lost(self) -> int:
+        """How many were given up without a result."""
+        return self.outcomes["lost"]
+
+    @property
+    def seconds(self) -> float:
+        """Since the beginning."""
+        return time.monotonic() - self._begin
+
+    def tell(self, records: Sequence[Record], in_flight: int) -> None:
+        """Some more records, or none for a while; how many tasks are being done."""
+        self._in_flight = in_flight
+        for record in records:
+            self.outcomes[str(record.outcome)] += 1
+            if record.outcome == "lost":
+                self.why_lost = record.message
+        now = time.monotonic()
+        if self._quiet or now - self._last < (_SHOW_EVERY if self._bar is not None else _LINE_EVERY):
+            return
+        self._last = now
+        if self._bar is not None:
+            self._bar.update(self._bar_task, completed=self.done, text=self.text())
+        else:
+            say(f"{self.done} of {self.todo} tasks, {self.text()}")
+
+    def text(self) -> str:
+        """Rate, remaining time, failures."""
+        rate = self.done / max(self.seconds, 1e-9)
+        pieces = [f"{rate:.3g} a second"]
+        if self.done and self.done < self.todo:
+            pieces.append(f"about {duration((self.todo - self.done) / rate)} left")
+        if self._in_flight:
+            pieces.append(f"{self._in_flight} running")
+        bad = self.done - self.outcomes["ok"]
+        if bad:
+            pieces.append(f"{bad} failed")
+        if self.lost:
+            pieces.append(f"{self.lost} lost")
+        return ", ".join(pieces)
+
+    def __enter__(self) -> BatchProgress:
+        if self._bar is not None:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.update(self._bar_task, completed=self.done, text=self.text())
+            self._bar.stop()
+
+
+def _bar() -> Any:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    return Progress(
+        BarColumn(bar_width=None, style="default", complete_style="cyan", finished_style="green"),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[text]}", markup=False),
+        console=Console(
+            stderr=True,
+            markup=False,
+            emoji=False,
+            highlight=False,
+            color_system="standard" if is_coloured(sys.stderr) else None,
+        ),
+        transient=True,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )

@@ -27,6 +27,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from importlib import import_module
+from io import StringIO
 from typing import IO, Any, NamedTuple
 
 from kahanmaps.errors import InputError, quoted
@@ -173,12 +174,17 @@ def write_csv(rows: Callable[[], Iterable[Row]], stream: IO[str], *, stable: boo
     for the values. Open files with newline="", or "\\n" becomes what the machine likes.
     """
     layout = _Layout(rows(), stable)
-    # The csv module may quote only those line ends that are in its terminator: with both of them there, no cell can
-    # break a line, whatever the version of Python. _NewlineEnds then writes "\n".
-    writer = csv.writer(_NewlineEnds(stream), lineterminator="\r\n")
-    writer.writerow([cell(name) for name in layout.names])
+    stream.write(_csv_line(layout.names))
     for row in rows():
-        writer.writerow([cell(value) for value in layout.values(row)])
+        stream.write(_csv_line(layout.values(row)))
+
+
+def _csv_line(values: Iterable[Any]) -> str:
+    # The csv module may quote only those line ends that are in its terminator: with both of them there, no cell can
+    # break a line, whatever the version of Python.
+    line = StringIO(newline="")
+    csv.writer(line, lineterminator="\r\n").writerow([cell(value) for value in values])
+    return line.getvalue().removesuffix("\r\n") + "\n"
 
 
 def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str], *, stable: bool = False) -> None:
@@ -203,16 +209,6 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
         for columns in _row_groups(layout, rows()):
             arrays = [arrow.array(values, field.type) for values, field in zip(columns, fields, strict=True)]
             writer.write_table(arrow.Table.from_arrays(arrays, schema=schema), row_group_size=_ROW_GROUP)
-
-
-class _NewlineEnds:
-    """A stream for csv.writer, which writes a row at a time."""
-
-    def __init__(self, stream: IO[str]) -> None:
-        self._stream = stream
-
-    def write(self, text: str) -> int:
-        return self._stream.write(text.removesuffix("\r\n") + "\n")
 
 
 class _Layout:

@@ -118,10 +118,6 @@ class Store(Displayed):
         self._database.must_write()
         return forget_damaged(self._database)
 
-    def lock(self) -> None:
-        """Become the one that writes, until `close`; opening for writing does it. Another writer: StoreError."""
-        self._database.lock()
-
     def close(self) -> None:
         """Leave one complete file behind. May be called twice."""
         self._database.close()

@@ -122,7 +122,9 @@ def verify_in_general(
 @task("family-space", needs=MEMBER)
 def family_space(system: SystemFile) -> Result:
     """The space of cubics that belong to A, and how many associated systems there are."""
-    member = _member(system)
+    member = system.member
+    if member is None:
+        raise InputError(f"{system.name} is of kind [{system.kind}], expected one of kind [family]")
     space = cubic_space(member.A, member.variables)
     return {
         "m": member.m,
@@ -295,12 +297,6 @@ def _of_report(report: Report, whole: bool) -> Result:
         **({"doubtful": doubtful} if doubtful else {}),
         **whole_report(report, whole),
     }
-
-
-def _member(system: SystemFile) -> Any:
-    if system.member is None:
-        raise InputError(f"{system.name} is of kind [{system.kind}], expected one of kind [family]")
-    return system.member
 
 
 def _float_structure(system: SystemFile, method: str | None) -> Structure | NoStructure:

@@ -531,15 +531,15 @@ def test_two_batches_do_not_write_to_one_database(batch, start):
 
 
 def test_progress_is_a_line_now_and_then_where_there_is_no_terminal(monkeypatch: pytest.MonkeyPatch):
-    from kahanmaps_cli import batch_progress
+    from kahanmaps_cli import batch_run
 
-    monkeypatch.setattr(batch_progress, "_LINE_EVERY", 0.0)
+    monkeypatch.setattr(batch_run, "_LINE_EVERY", 0.0)
     said: list[str] = []
-    monkeypatch.setattr(batch_progress, "say", said.append)
+    monkeypatch.setattr(batch_run, "say", said.append)
     from kahanmaps.experiments.records import Outcome as Word
     from kahanmaps.experiments.records import Record
 
-    progress = batch_progress.BatchProgress(4, quiet=False)
+    progress = batch_run.BatchProgress(4, quiet=False)
     progress.tell([Record("a", Word.OK), Record("b", Word.FAILED)], 2)
     assert len(said) == 1
     assert said[0].startswith("2 of 4 tasks, ")

@@ -31,7 +31,7 @@ with Store.open(path, create=True) as store:
         with Store.open(path, readonly=True) as reader:
             assert reader.status() == []
             with pytest.raises(StoreError, match=who):
-                reader.lock()
+                reader._database.lock()
         process.kill()
     Store.open(path).close()
 
