@@ -37,7 +37,10 @@ class Checked:
 
 def check(database: Database) -> Checked:
     """Read all of it; see `Store.check`."""
-    pages = _problems(database)
+    try:
+        pages = database.problems(_PROBLEMS)
+    except Damaged as error:
+        pages = [str(error)]
     whole: dict[str, int] = {}
     damaged: dict[str, tuple[str, ...]] = {}
     for kind, rows in {
@@ -75,13 +78,6 @@ def add_checksums(database: Database) -> None:
         for task, key, row in _rows(database):
             if _can_be(database, key, row):
                 tables.put_result(database, task, key, row[-2], row)
-
-
-def _problems(database: Database) -> list[str]:
-    try:
-        return database.problems(_PROBLEMS)
-    except Damaged as error:
-        return [str(error)]
 
 
 def _rows(database: Database) -> Iterator[tuple[int, Any, list[Any]]]:

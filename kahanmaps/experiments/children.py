@@ -160,7 +160,7 @@ class LocalChildren:
                 return
             child = self._new_child()
         child.work = work
-        if child.is_ready:
+        if child.ready is not None:
             self._send(child)
 
     def _new_child(self) -> _Child:
@@ -244,7 +244,7 @@ class LocalChildren:
         child.read_the_rest()
         work, told = child.work, child.told()
         self._bury(child)
-        if not child.is_ready:
+        if child.ready is None:
             self._stillborn += 1
             if self._stillborn >= (_KILLED_STARTS * self.jobs if is_from_outside(status) else _STARTS):
                 raise ChildrenError(f"a child process cannot start (it {ending(status)}): {told or 'it says nothing'}")
@@ -324,7 +324,7 @@ class _Child:
 
     def __init__(self) -> None:
         self.work: _Work | None = None
-        self.ready: dict[str, Any] | None = None
+        self.ready: dict[str, Any] | None = None  # what it says of itself when it can take tasks
         self.seconds = 0.0
         self.is_fresh = True  # it has done nothing yet
         self.documents: set[str] = set()
@@ -350,11 +350,6 @@ class _Child:
         self.input, self.answers, self.talk = cast("tuple[IO[bytes], IO[bytes], IO[bytes]]", pipes)
         for stream in (self.answers, self.talk):
             os.set_blocking(stream.fileno(), False)
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether it has said that it can take tasks."""
-        return self.ready is not None
 
     def deadline(self) -> float | None:
         """When its task has to be done; None if it may take its time, or is done and being told."""

@@ -67,9 +67,8 @@ def value_pairs(rows: Iterable[Row], x: str, y: str, by: str | None = None) -> P
     codes = {name: _Codes() for name in (x, by) if name is not None}
     held, xs, series = array("d"), array("q"), array("q")
     seen, numeric = set[Entry](), set(OF_THE_RUN)
-    missing = left_out = total = 0
+    missing = left_out = 0
     for row in rows:
-        total += 1
         found = list(entries(row))
         for entry, value in found:
             seen.add(entry)
@@ -88,7 +87,7 @@ def value_pairs(rows: Iterable[Row], x: str, y: str, by: str | None = None) -> P
         xs.append(codes[x].of(value))
         if by is not None:
             series.append(codes[by].of(at[by]))
-    if total:
+    if held or missing or left_out:
         known = {*_WORDS, *OF_THE_RUN}.union(*map(names_of_entry, seen))
         for name in names:
             _must_exist(name, known, "to draw")

@@ -306,11 +306,8 @@ class Database:
         self.execute("PRAGMA query_only = ON")
 
     def _has_journal(self) -> bool:
-        for end in ("-wal", "-journal"):
-            beside = self.path.with_name(self.path.name + end)
-            if beside.exists() and beside.stat().st_size > 0:
-                return True
-        return False
+        beside = [Path(f"{self.path}{end}") for end in ("-wal", "-journal")]
+        return any(path.exists() and path.stat().st_size > 0 for path in beside)
 
     def _open_to_write(self, create: bool) -> None:
         self._connect("mode=rwc" if create else "mode=rw")

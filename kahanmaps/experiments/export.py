@@ -31,7 +31,7 @@ from io import StringIO
 from typing import IO, Any, NamedTuple
 
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.experiments.records import Row
+from kahanmaps.experiments.records import Row, encodable
 from kahanmaps.version import __version__
 from kahanmaps.whole_files import whole_file
 
@@ -133,7 +133,7 @@ def plain(value: Any) -> str:
     if value is None:
         return ""
     if isinstance(value, str):
-        return _encodable(value)
+        return encodable(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, (int, float)):
@@ -334,8 +334,3 @@ def _line(record: Mapping[str, Any]) -> str:
 
 def _json(value: Any) -> str:
     return _ENCODER.encode(value)
-
-
-def _encodable(text: str) -> str:
-    """The text, with lone surrogates (a file name that was no UTF-8) spelled out: no file could hold them."""
-    return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode("utf-8")

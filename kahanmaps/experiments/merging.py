@@ -36,7 +36,8 @@ def merge(database: Database, other: str | os.PathLike[str]) -> Merged:
             raise StoreError(f"{source.name} is this database itself: there is nothing to merge")
         with database.large_cache(), database.transaction():
             new = _merge_plans(database, source)
-            _merge_documents(database, source)
+            for (name,) in source.fetch("SELECT digest FROM document"):  # one by one: each may be long
+                tables.add_document(database, name, tables.document_of(source, name))
             return _merge_results(database, source, new)
 
 
@@ -70,11 +71,6 @@ def _checked(source: Database, key: Any, text: Any) -> tuple[str, str]:
     return key, text
 
 
-def _merge_documents(database: Database, source: Database) -> None:
-    for (name,) in source.fetch("SELECT digest FROM document"):  # one by one: each may be long
-        tables.add_document(database, name, tables.document_of(source, name))
-
-
 def _merge_results(database: Database, source: Database, new: int) -> Merged:
     """What came along; `new` tasks came with the plans."""
     results = replaced = conflicts = 0
@@ -83,21 +79,16 @@ def _merge_results(database: Database, source: Database, new: int) -> Merged:
     for rows in source.chunks("result", "task", columns, tables.RESULT_CHUNK, join, is_lenient=False):
         for _, key, text, *row in rows:
             _checked(source, key, text)
-            source.require(
-                tables.record_of(source, key, row) is not None, f"the record of task {key}", None, "an outcome"
-            )
+            record = tables.record_of(source, key, row)
+            source.require(record is not None, f"the record of task {key}", None, "an outcome")
+            new += tables.add_tasks(database, [(key, text)])
             found = tables.find_result(database, key)
-            if found is None:
-                new += tables.add_tasks(database, [(key, text)])
-                found = tables.find_result(database, key)
-                assert found is not None
+            assert found is not None
             task, mine = found
             attempts = row[tables.ATTEMPTS] + (mine[tables.ATTEMPTS] or 0)
-            if mine[0] is None:
-                results += 1
-                tables.put_result(database, task, key, attempts, row)
-            elif row[0] == Outcome.OK != mine[0]:
-                replaced += 1
+            if mine[0] is None or row[0] == Outcome.OK != mine[0]:
+                results += mine[0] is None
+                replaced += mine[0] is not None
                 tables.put_result(database, task, key, attempts, row)
             elif row[0] == Outcome.OK and row[1:3] != mine[1:3]:
                 conflicts += 1

@@ -37,6 +37,11 @@ def digest(text: str) -> str:
     return sha256(text.encode()).hexdigest()[:KEY_LENGTH]
 
 
+def encodable(text: str) -> str:
+    """The text, with lone surrogates spelled out: a file name or what a child printed may be no UTF-8."""
+    return text if text.isascii() else text.encode(errors="backslashreplace").decode()
+
+
 def checksum(cells: Sequence[Any]) -> int:
     """By what it is seen that the cells of a row are still those that were written.
 

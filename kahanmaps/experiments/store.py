@@ -296,12 +296,8 @@ class Store(Displayed):
         seconds = 0.0
         for rows in tables.stretches(self._database, sql, experiment, COUNT_CHUNK):
             for outcome, verdict, count, time, without in rows:
-                if (
-                    outcome not in set(Outcome)
-                    or not tables.is_a_verdict(verdict)
-                    or without
-                    or not tables.is_a_time(time)
-                ):
+                is_sound = tables.is_a_verdict(verdict) and tables.is_a_time(time) and not without
+                if outcome not in set(Outcome) or not is_sound:
                     self._name_the_damage(experiment)
                 outcomes[Outcome(outcome)] += count
                 if verdict is not None:

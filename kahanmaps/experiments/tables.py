@@ -14,7 +14,17 @@ from typing import Any
 
 from kahanmaps.errors import quoted
 from kahanmaps.experiments.database import Damaged, Database, StoreError, shown
-from kahanmaps.experiments.records import Limits, Outcome, Record, Task, canonical, checksum, digest, has_checksum
+from kahanmaps.experiments.records import (
+    Limits,
+    Outcome,
+    Record,
+    Task,
+    canonical,
+    checksum,
+    digest,
+    encodable,
+    has_checksum,
+)
 
 _LONGEST_NAME, _LONGEST_VERDICT = 1000, 200
 _SEALED = "id, name, digest, limits, total, tasks"  # what the checksum of an experiment is of
@@ -354,9 +364,9 @@ def row_of(record: Record) -> tuple[Any, ...]:
     return (
         str(record.outcome),
         None if record.result is None else canonical(dict(record.result)),
-        None if record.verdict is None else _encodable(record.verdict),
-        _encodable(record.message),
-        _encodable(record.stderr),
+        None if record.verdict is None else encodable(record.verdict),
+        encodable(record.message),
+        encodable(record.stderr),
         float(record.seconds),
         record.peak_memory,
         record.host,
@@ -386,8 +396,3 @@ def record_of(database: Database, key: str, row: Sequence[Any]) -> Record | None
     if not all(isinstance(version, str) for version in known["versions"].values()):
         raise database.damaged(f"{what}, versions: expected texts")
     return Record(key=key, **known)
-
-
-def _encodable(text: str) -> str:
-    """What a child printed may have been no text at all: lone surrogates are no UTF-8, so they are written out."""
-    return text.encode(errors="backslashreplace").decode()
