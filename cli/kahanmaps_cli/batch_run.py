@@ -129,14 +129,14 @@ def _do(jobs: Iterator[Job], store: Store, progress: BatchProgress, options: Map
 
         def interrupt() -> None:
             batch.interrupt()
-            if not options["quiet"] and batch.in_flight:
-                say(f"finishing {_tasks(batch.in_flight)} in flight (Ctrl-C again ends at once)")
+            if not options["quiet"] and executor.in_flight:
+                say(f"finishing {_tasks(executor.in_flight)} in flight (Ctrl-C again ends at once)")
 
         with interruptible(interrupt):
             for records in batch:
                 if records:
                     store.add(records)
-                progress.tell(records, batch.in_flight)
+                progress.tell(records, executor.in_flight)
                 if options["as_jsonl"]:
                     for record in records:
                         click.echo(json.dumps({"record": "result", **record.to_json()}))

@@ -347,9 +347,8 @@ class Database:
     def _check_format(self, may_be_empty: bool = False) -> bool:
         """Refuse what is not ours; whether it is empty, if it may be."""
         # First of all the schema: pragmas alone are answered for files that SQLite cannot read.
-        tables = self.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
-        application = self.execute("PRAGMA application_id").fetchone()[0]
-        version = self.execute("PRAGMA user_version").fetchone()[0]
+        asked = ("SELECT count(*) FROM sqlite_master", "PRAGMA application_id", "PRAGMA user_version")
+        tables, application, version = (self.execute(sql).fetchone()[0] for sql in asked)
         if not tables and not application and not version:
             if may_be_empty:
                 return True

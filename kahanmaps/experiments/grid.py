@@ -181,14 +181,10 @@ class Grid:
     """
 
     def __init__(self, axes: Mapping[str, Sequence[Any]], zips: Sequence[Sequence[str]] = ()) -> None:
-        groups: list[tuple[str, ...]] = []
-        for name in axes:
-            together = next((tuple(names) for names in zips if name in names), (name,))
-            if together not in groups:
-                groups.append(together)
+        together = (next((tuple(names) for names in zips if name in names), (name,)) for name in axes)
         self.axes = axes
-        self.groups = groups
-        self._lengths = [len(axes[group[0]]) for group in groups]
+        self.groups: list[tuple[str, ...]] = list(dict.fromkeys(together))
+        self._lengths = [len(axes[group[0]]) for group in self.groups]
 
     @property
     def size(self) -> int:

@@ -38,11 +38,6 @@ class Batch:
         self.abandoned = 0
 
     @property
-    def in_flight(self) -> int:
-        """How many tasks are being done."""
-        return self._executor.in_flight
-
-    @property
     def was_interrupted(self) -> bool:
         """Whether somebody asked for the end."""
         return self._until is not None
