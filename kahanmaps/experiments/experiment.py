@@ -372,7 +372,7 @@ class ExperimentReader:
         if drawn is not None and len(values[drawn]) <= _POINTS_COMPARED:
             dims = [2 * _SIZES[drawn](value) for value in values[drawn]]
         else:
-            dims = [file.system.dim for file in self.files]
+            dims = [file.dim for file in self.files]
         starts = values.get("start", ())
         if len(starts) <= _POINTS_COMPARED:
             place = self.given().get("start", "")
@@ -380,7 +380,7 @@ class ExperimentReader:
             found = [(place, start.count(",") + 1) for place, start in zip(places, starts, strict=True)]
             self._compare(found, dims, "coordinates", any({drawn, "start"} <= set(names) for names in zips))
         if OTHER in values:
-            found = [(place, file.system.dim) for place, file in self.others]
+            found = [(place, file.dim) for place, file in self.others]
             self._compare(found, dims, "variables", any({drawn, OTHER} <= set(names) for names in zips))
 
     def _compare(self, found: Sequence[tuple[str, int]], dims: Sequence[int], what: str, zipped: bool) -> None:

@@ -46,7 +46,7 @@ def degrees(
     """The degrees of the iterates: the kind of growth, the dynamical degree, a recurrence."""
     from kahanmaps.laboratory.degrees import degree_growth
 
-    found = degree_growth(system.system, eps, seconds=seconds, max_terms=terms, max_degree=max_degree, seed=seed)
+    found = degree_growth(system.map, eps, seconds=seconds, max_terms=terms, max_degree=max_degree, seed=seed)
     return {
         "status": found.ended,
         **_growth(found),
@@ -206,8 +206,8 @@ def confinement(
     from kahanmaps.laboratory.fates import NOT_CONTRACTED, UNDECIDED
     from kahanmaps.laboratory.singularities import default_eps, singularities
 
-    values = default_eps(system.system, seed) if eps is None else (eps,)
-    runs = [singularities(system.system, value, steps=steps, seed=seed, seconds=seconds) for value in values]
+    values = default_eps(system.map, seed) if eps is None else (eps,)
+    runs = [singularities(system.map, value, steps=steps, seed=seed, seconds=seconds) for value in values]
     agree = len({run.shape for run in runs}) == 1
     first = runs[0]
     result: Result = {

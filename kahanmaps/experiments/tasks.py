@@ -265,7 +265,7 @@ def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = 
 
 def _drawn(system: SystemFile, seed: int) -> tuple[fmpq, ...]:
     """A start for the system: one of the seed alone could lie on a curve on which the system is made to be special."""
-    return next(random_starts(system.system.dim, seed_for(seed, system.system.rhs)))
+    return next(random_starts(system.dim, seed_for(seed, system.map.subject)))
 
 
 def _settings(eps: Any, start: Any, steps: int, seed: int, error_bits: int, max_digits: int | None) -> Settings:

@@ -1,0 +1,49 @@
+"""Batches of maps that are not Kahan's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from kahanmaps.experiments.run import run
+from kahanmaps.experiments.spec import parse_spec
+from kahanmaps.experiments.store import Store
+
+FILES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
+SPEC = """
+name = "maps"
+[experiments.degrees]
+task = "degrees"
+system = [{files}]
+options = { terms = 3 }
+[experiments.confined]
+task = "singularities"
+system = [{files}]
+options = { eps = "1/3" }
+[experiments.orbits]
+task = "orbit"
+system = [{files}]
+options = { eps = "1/10", steps = 3 }
+axes = { arithmetic = ["exact", "float", "mod:10007"] }
+[experiments.measures]
+task = "check-measure"
+system = [{files}]
+[experiments.integrals]
+task = "find-integrals"
+system = [{files}]
+"""
+
+
+def test_a_batch_takes_all_kinds_of_map_and_says_of_each_task_that_does_not(tmp_path):
+    text = SPEC.replace("{files}", ", ".join(f'"{path}"' for path in FILES))
+    database = tmp_path / "maps.db"
+    list(run(parse_spec(text, "maps.toml"), database))
+    found, verdicts = {}, set()
+    with Store.open(database) as store:
+        for row in store.rows():
+            found.setdefault(row.task.kind, []).append((row.record.outcome, row.record.result or {}))
+            verdicts.add((row.task.kind, row.record.verdict))
+    assert sorted(result["degrees"][3] for _, result in found["degrees"]) == [8, 9, 19, 19]
+    assert [outcome for outcome, _ in found["singularities"]] == ["ok"] * 4
+    assert {(outcome, result["status"]) for outcome, result in found["orbit"]} == {("ok", "completed")}
+    assert {verdict for kind, verdict in verdicts if kind == "check-measure"} == {"proved"}
+    assert [outcome for outcome, _ in found["find-integrals"]] == ["failed"] * 4
