@@ -134,7 +134,7 @@ def test_a_picture_that_cannot_be_drawn_is_told_with_the_reason(volterra, monkey
     def refuse(*_):
         raise InputError("found a bad day")
 
-    monkeypatch.setattr("kahanmaps.plots.automatic_starts.automatic_starts", refuse)
+    monkeypatch.setattr("kahanmaps.reports.portraits.automatic_starts", refuse)
     page = require_sound(report_html(volterra))
     assert "not drawn, for found a bad day" in page.text
     assert page.tags.count("svg") == 2
