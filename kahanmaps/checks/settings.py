@@ -70,13 +70,14 @@ class Settings:
     def context(self, files: Sequence[SystemFile], **more: Any) -> dict[str, Any]:
         """What is needed to redo the check, as plain data: the systems themselves among it."""
         time_step = "every" if self.eps is None else format_number(2 * self.eps)
+        meaning = convention(*(file.map for file in files))
         return {
             "version": __version__,
             "system": files[0].name,
             **({"other": files[1].name} if len(files) > 1 else {}),
             "eps": "every" if self.eps is None else format_number(self.eps),
-            "time_step": time_step if files[0].map.has_time_step else None,
-            "convention": convention(files[0].map),
+            "time_step": time_step if meaning == CONVENTION else None,
+            "convention": meaning,
             "arithmetic": "exact",
             "seed": self.seed,
             "error_bits": self.error_bits,
@@ -86,11 +87,12 @@ class Settings:
         }
 
 
-def convention(map_: BirationalMap) -> str:
-    """What eps is, in a sentence that every record carries."""
-    if not map_.has_eps:
+def convention(*maps: BirationalMap) -> str:
+    """What eps is, in a sentence that every record carries: for the maps of which it speaks together."""
+    with_eps = [map_ for map_ in maps if map_.has_eps]
+    if not with_eps:
         return NO_EPS
-    return CONVENTION if map_.has_time_step else NO_TIME_STEP
+    return CONVENTION if any(map_.has_time_step for map_ in with_eps) else NO_TIME_STEP
 
 
 def eps_words(context: Mapping[str, Any]) -> str:
