@@ -274,7 +274,6 @@ class BirationalMap(DisplayedAsFormula, ABC):
 
     variables: tuple[str, ...]
     title: str  # what kind of map it is, in a word or two
-    has_eps: bool = True
     has_time_step: bool = True  # which is 2 eps
     denominator_name = "det M"
 
@@ -282,6 +281,11 @@ class BirationalMap(DisplayedAsFormula, ABC):
     def dim(self) -> int:
         """The number of variables."""
         return len(self.variables)
+
+    @property
+    def has_eps(self) -> bool:
+        """Whether the map depends on eps."""
+        return True
 
     @property
     @abstractmethod
@@ -336,7 +340,7 @@ class ImplicitMap(BirationalMap):
                 raise InputError(f"expected {n} rows of {n + 1} polynomials in {', '.join(names)}")
 
     @cached_property
-    def has_eps(self) -> bool:  # type: ignore[override]
+    def has_eps(self) -> bool:
         """Whether eps occurs."""
         return any("eps" not in entry.unused_gens() for row in self.rows for entry in row)
 
