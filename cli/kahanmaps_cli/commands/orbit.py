@@ -89,6 +89,7 @@ def command(
           --start 1,1/2,1/3 --eps 1/10 --steps 5 --integral y^2+2*x^2
 
     SYSTEM is a file, a name of the catalogue, or - for standard input. Numbers are exact: integers, p/q, decimals.
+    A file may hold another map than Kahan's; one that does not depend on eps needs none.
     Ctrl-C ends after the step in flight and leaves a valid file; a second and third one end at once.
 
     Members of the commuting family are stepped in their normal form, and --at reaches an iterate directly, by
