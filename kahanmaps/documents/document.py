@@ -13,7 +13,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.numerals import check_names
-from kahanmaps.algebra.polynomials import RationalFunction, substitute
+from kahanmaps.algebra.polynomials import RationalFunction, names_of, substitute
 from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomial, parse_rational_function
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.documents.structured_facts import read_structured_facts
@@ -44,14 +44,15 @@ _KEYS = {
 
 
 def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> Kahan:
-    """The Kahan map of right-hand sides in the variables, then eps, which may not occur."""
+    """The Kahan map of right-hand sides in the variables, symbols, then eps, which may not occur."""
+    symbols = names_of(rhs[0])[len(rhs) :]
     if any("eps" not in polynomial.unused_gens() for polynomial in rhs):
-        return Kahan(QuadraticSystem(tuple(rhs), ("eps",)))
-    return Kahan(QuadraticSystem(tuple(substitute(polynomial, {"eps": fmpq(1)}) for polynomial in rhs)))
+        return Kahan(QuadraticSystem(tuple(rhs), symbols))
+    return Kahan(QuadraticSystem(tuple(substitute(p, {"eps": fmpq(1)}) for p in rhs), symbols[:-1]))
 
 
-# What makes a map of right-hand sides (polynomials in the variables, then eps) and their degree, and the degree: the
-# usual one and the largest.
+# What makes a map of right-hand sides (polynomials in the variables, symbols, then eps) and their degree, and the
+# degree: the usual one and the largest.
 _DISCRETIZATIONS: dict[str, tuple[Callable[[Sequence[fmpq_mpoly], int], BirationalMap], int, int]] = {
     "kahan": (_kahan, 2, 2),
     "polarised": (polarised_map, 3, MAX_DEGREE),
@@ -95,6 +96,7 @@ class DocumentReader:
         self.parameters: dict[str, fmpq] = {}
         self.unsure = False  # some parameter has no value: what depends on values is not judged
         self.variables: tuple[str, ...] | None = None
+        self.symbols: tuple[str, ...] = ()  # parameters that the map is to contain as symbols
 
     def read(self) -> Contents:
         """The contents. Raises SystemFileError with every mistake of the document."""
@@ -120,17 +122,13 @@ class DocumentReader:
         section = self._table(kind) if kind else None
         if section is not None:
             self._unknown_keys(kind, section)
-            if kind == "system":
-                map_ = self._read_system(section)
-            elif kind == "bilinear":
-                map_ = self._read_bilinear(section)
-            elif kind == "map":
-                map_ = self._read_map(section)
-            elif kind == "hamiltonian":
+            if kind == "hamiltonian":
                 hamiltonian = self._read_hamiltonian(section)
-            else:
+            elif kind == "family":
                 member = self._read_member(section)
                 hamiltonian = member.chosen.hamiltonian if member else None
+            else:
+                map_ = self._read_given(kind, section)
             if hamiltonian is not None:
                 map_ = Kahan(hamiltonian.system)
             elif map_ is not None:
@@ -143,6 +141,22 @@ class DocumentReader:
         if self.mistakes or map_ is None:
             raise SystemFileError(self.where, self.mistakes)
         return Contents(name, kind, self.parameters, map_, hamiltonian, member, integrals, density, self._normalised())
+
+    def read_map(self, kind: str, symbols: Sequence[str]) -> BirationalMap:
+        """The map of a section other than [hamiltonian] and [family], with these parameters as symbols."""
+        self._read_parameters()
+        self._read_variables(kind)
+        self.symbols = tuple(symbols)
+        self.parameters = {name: value for name, value in self.parameters.items() if name not in symbols}
+        map_ = self._read_given(kind, self.document[kind])
+        if map_ is None or self.mistakes:
+            raise SystemFileError(f"{self.where} with {', '.join(symbols)} as symbols", self.mistakes)
+        return map_
+
+    def _read_given(self, kind: str, section: Mapping[str, Any]) -> BirationalMap | None:
+        if kind == "system":
+            return self._read_system(section)
+        return self._read_bilinear(section) if kind == "bilinear" else self._read_map(section)
 
     def _mistake(self, key: str, sentence: str) -> None:
         # Keys come from the file: nothing in them may reach a terminal as an escape sequence.
@@ -230,13 +244,18 @@ class DocumentReader:
         self._mistake(path, f"found {_show(value)}, expected an expression in quotes")
         return None
 
-    def _polynomial(self, path: str, value: Any, at_most: int, more: Sequence[str] = ()) -> fmpq_mpoly | None:
-        """A polynomial in the variables and `more` names, its degree in the variables bounded."""
+    def _polynomial(
+        self, path: str, value: Any, at_most: int, more: Sequence[str] = (), *, of_map: bool = True
+    ) -> fmpq_mpoly | None:
+        """A polynomial in the variables, `more` names and, of a map, the symbols and eps; its degree in the variables
+        is bounded.
+        """
         text = self._text(path, value)
         if text is None or self.variables is None:
             return None
         try:
-            polynomial = parse_polynomial(text, (*self.variables, *more), self.parameters)
+            tail = (*self.symbols, "eps") if of_map else ()
+            polynomial = parse_polynomial(text, (*self.variables, *more, *tail), self.parameters)
         except InputError as error:
             self._mistake(path, str(error))
             return None
@@ -307,7 +326,7 @@ class DocumentReader:
             return None
         given = self._required("system", section, "rhs")
         found = [
-            self._polynomial(f"system.rhs[{i + 1}]", value, degree, ["eps"])
+            self._polynomial(f"system.rhs[{i + 1}]", value, degree)
             for i, value in enumerate(given if isinstance(given, list) else ())
         ]
         rhs = self._list("system", "rhs", given, "right-hand side")
@@ -328,7 +347,7 @@ class DocumentReader:
             return None
         try:
             check_names(new)
-            check_names((*self.variables, *new, *self.parameters, "eps"))
+            check_names((*self.variables, *new, *self.parameters, *self.symbols, "eps"))
         except InputError as error:
             hint = "" if "new" in section else ': give new = ["..."], names for the coordinates of the new point'
             self._mistake("bilinear.new", f"{error}{hint}")
@@ -340,7 +359,7 @@ class DocumentReader:
             if len(sides) != 2:
                 self._mistake(path, f'found {_show(value)}, expected LEFT = RIGHT, e.g. "X - x = 2*eps*x*X"')
                 continue
-            left, right = (self._polynomial(path, side, 1, [*new, "eps"]) for side in sides)
+            left, right = (self._polynomial(path, side, 1, new) for side in sides)
             if left is not None and right is not None:
                 found.append(left - right)
         if len(found) != len(given) or self.unsure:
@@ -375,7 +394,7 @@ class DocumentReader:
 
     def _read_hamiltonian(self, section: Mapping[str, Any]) -> CubicHamiltonian | None:
         value = self._required("hamiltonian", section, "H")
-        H = self._polynomial("hamiltonian.H", value, 3) if value is not None else None
+        H = self._polynomial("hamiltonian.H", value, 3, of_map=False) if value is not None else None
         given = self._required("hamiltonian", section, "J")
         if given is None:
             return None
@@ -404,7 +423,7 @@ class DocumentReader:
         given, value = self._required("family", section, "A"), self._required("family", section, "H")
         size = len(self.variables) if self.variables is not None else None
         A = self._matrix("family.A", given, size) if given is not None else None
-        H = self._polynomial("family.H", value, 3) if value is not None else None
+        H = self._polynomial("family.H", value, 3, of_map=False) if value is not None else None
         signs = section.get("signs", [])
         signs_are_good = isinstance(signs, list) and all(type(sign) is int and sign in (1, -1) for sign in signs)
         if not signs_are_good:
@@ -424,7 +443,7 @@ class DocumentReader:
         if text is None or self.variables is None:
             return None
         try:
-            return parse_rational_function(text, (*self.variables, "eps"), self.parameters)
+            return parse_rational_function(text, (*self.variables, *self.symbols, "eps"), self.parameters)
         except InputError as error:
             self._mistake(path, str(error))
             return None

@@ -1,4 +1,4 @@
-"""The system of a file with some of its parameters left as symbols."""
+"""The system or map of a file with some of its parameters left as symbols."""
 
 from __future__ import annotations
 
@@ -7,9 +7,31 @@ from typing import Any
 
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, quoted
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> BirationalMap:
+    """The map of a file, the parameters named in `symbols` without values, the others with theirs.
+
+    Raises InputError as `with_symbols` does, for maps that are no Kahan maps only where a name is no parameter.
+
+    >>> from kahanmaps.documents.files import parse_system
+    >>> lyness = 'variables = ["x", "y"]\\nparameters.a = 2\\n[map]\\nimage = ["y", "(a + y)/x"]'
+    >>> print(map_with_symbols(parse_system(lyness), ["a"]))
+    -y + x_new = 0
+    x*y_new - y - a = 0
+    """
+    if file.is_quadratic:
+        return Kahan(with_symbols(file, symbols))
+    symbols = _parameters(file, symbols)
+    if not symbols:
+        return file.map
+    return DocumentReader(dict(file.document), file.name, {}).read_map(file.kind, symbols)
 
 
 def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSystem:
@@ -31,11 +53,7 @@ def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSyst
     >>> with_symbols(load("euler_top"), ["a1"]).rhs
     (x2*x3*a1, -2*x1*x3, x1*x2)
     """
-    system, symbols = file.system, tuple(dict.fromkeys(symbols))
-    for name in symbols:
-        if name not in file.parameters:
-            known = ", ".join(file.parameters) or "none"
-            raise InputError(f"found the symbol {quoted(name)}, expected eps or a parameter of the system: {known}")
+    system, symbols = file.system, _parameters(file, symbols)
     names = (*file.variables, *symbols)
     if not symbols:
         return system
@@ -58,3 +76,12 @@ def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSyst
     zero = ring(names).constant(0)
     rhs = tuple(sum((a * g for a, g in zip(row, gradient, strict=True)), zero) for row in J)
     return QuadraticSystem(rhs, symbols)
+
+
+def _parameters(file: SystemFile, symbols: Sequence[str]) -> tuple[str, ...]:
+    """The names, each once. Raises InputError for one that is no parameter."""
+    for name in symbols:
+        if name not in file.parameters:
+            known = ", ".join(file.parameters) or "none"
+            raise InputError(f"found the symbol {quoted(name)}, expected eps or a parameter of the system: {known}")
+    return tuple(dict.fromkeys(symbols))

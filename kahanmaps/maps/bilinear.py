@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from flint import fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import ImplicitMap
@@ -23,7 +23,8 @@ def bilinear_map(variables: Sequence[str], equations: Sequence[fmpq_mpoly]) -> I
 
     Args:
         variables: the names of the n coordinates of x.
-        equations: polynomials over Q in the n coordinates of x, the n of x~ and eps, in this order.
+        equations: polynomials over Q in the n coordinates of x, the n of x~, symbols if there are any, and eps, in this
+            order.
 
     Returns:
         The map, exact; its inverse is known.
@@ -40,7 +41,7 @@ def bilinear_map(variables: Sequence[str], equations: Sequence[fmpq_mpoly]) -> I
     names, n = tuple(variables), len(variables)
     if len(equations) != n:
         raise InputError(f"found {len(equations)} equations for {n} variables, expected as many")
-    context = ring((*names, "eps"))
+    context = ring((*names, *names_of(equations[0])[2 * n :]))
     rows = []
     for equation in equations:
         row = [context.constant(0)] * (n + 1)
@@ -52,6 +53,6 @@ def bilinear_map(variables: Sequence[str], equations: Sequence[fmpq_mpoly]) -> I
                     f"found the term {term}, expected terms of degree at most 1 in the old point and in the new one"
                 )
             column = next((j for j, exponent in enumerate(new) if exponent), n)
-            row[column] = row[column] + context.from_dict({(*old, monomial[2 * n]): coefficient})
+            row[column] = row[column] + context.from_dict({(*old, *monomial[2 * n :]): coefficient})
         rows.append(tuple(row))
     return ImplicitMap(names, tuple(rows), TITLE)

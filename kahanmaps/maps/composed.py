@@ -41,25 +41,28 @@ def composed_map(*maps: tuple[BirationalMap, int] | BirationalMap) -> ImplicitMa
     ]
     if not steps:
         raise InputError("found no map to compose, expected at least one")
-    variables = steps[0][0].variables
+    variables, names = steps[0][0].variables, steps[0][0].names
     if any(one.dim != len(variables) for one, _ in steps):
         raise InputError(f"found maps of the dimensions {', '.join(str(one.dim) for one, _ in steps)}, expected one")
-    image = _formulas(variables, steps)
+    if any(one.symbols != steps[0][0].symbols for one, _ in steps):
+        raise InputError("found maps with different symbols, expected the same for all")
+    image = _formulas(names, steps)
     try:
-        inverse = _formulas(variables, [(one, -sign) for one, sign in reversed(steps)])
+        inverse = _formulas(names, [(one, -sign) for one, sign in reversed(steps)])
     except InputError:
         inverse = None
     return explicit_map(variables, image, inverse)
 
 
-def _formulas(variables: Sequence[str], steps: Sequence[tuple[BirationalMap, int]]) -> list[RationalFunction]:
-    """The coordinates of the image of (x_1, ..., x_n) as functions of them and eps, in lowest terms."""
-    field = FunctionField([*variables, "eps"], _BUDGET, reduces=True)
-    *x, eps = field.variables
-    point: tuple[Any, ...] = tuple(x)
+def _formulas(names: Sequence[str], steps: Sequence[tuple[BirationalMap, int]]) -> list[RationalFunction]:
+    """The coordinates of the image of (x_1, ..., x_n) as functions of the names, eps last, in lowest terms."""
+    field = FunctionField(names, _BUDGET, reduces=True)
+    n = steps[0][0].dim
+    *values, eps = field.variables[n:]
+    point: tuple[Any, ...] = tuple(field.variables[:n])
     try:
         for one, sign in steps:
-            over = one.at(eps, field)
+            over = one.at(eps, field, values)
             point = (over if sign > 0 else over.inverse).step(point)
     except BudgetExceeded as error:
         raise InputError("found a composition with formulas too large to be multiplied out") from error

@@ -23,7 +23,7 @@ def explicit_map(
 
     Args:
         variables: the names of the n coordinates.
-        image: n rational functions of the variables, then eps.
+        image: n rational functions of the variables, then symbols, if there are any, and eps.
         inverse: the same for the inverse map, where it is known. That it is the inverse is not tested here.
 
     Returns:

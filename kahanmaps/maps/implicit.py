@@ -270,7 +270,7 @@ class EquationMap(MapOver):
 
 
 class BirationalMap(DisplayedAsFormula, ABC):
-    """A birational map over Q in named variables, which may depend on eps."""
+    """A birational map over Q in named variables, which may depend on eps and on symbols: numbers without a value."""
 
     variables: tuple[str, ...]
     title: str  # what kind of map it is, in a word or two
@@ -281,6 +281,16 @@ class BirationalMap(DisplayedAsFormula, ABC):
     def dim(self) -> int:
         """The number of variables."""
         return len(self.variables)
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """The symbols in the coefficients, without eps."""
+        return ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What formulas of the map are polynomials in: the variables, the symbols, eps."""
+        return (*self.variables, *self.symbols, "eps")
 
     @property
     def has_eps(self) -> bool:
@@ -298,13 +308,16 @@ class BirationalMap(DisplayedAsFormula, ABC):
         """About how many decimal digits the longest coefficient has, over one denominator."""
 
     @abstractmethod
-    def at(self, eps: Any, over: Field = QQ) -> MapOver:
-        """The map over a field, at eps: an exact number, or an element of the field, not zero."""
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> MapOver:
+        """The map over a field, at eps: an exact number, or an element of the field, not zero.
+
+        `values` are those of the symbols, elements of the field.
+        """
 
     @property
     @abstractmethod
     def matrix(self) -> list[list[fmpq_mpoly]]:
-        """The entries of M, polynomials in the variables, then eps."""
+        """The entries of M, polynomials in the `names`."""
 
     @abstractmethod
     def written(self) -> dict[str, list[str]]:
@@ -315,7 +328,7 @@ class BirationalMap(DisplayedAsFormula, ABC):
 class ImplicitMap(BirationalMap):
     """The map of M(x, eps) x~ = r(x, eps): `rows` are those of (M | -r).
 
-    Entries are polynomials over Q in the variables, then eps. `backward` are the rows of the inverse map where they are
+    Entries are polynomials over Q in the variables, then symbols, if there are any, then eps. `backward` are the rows of the inverse map where they are
     known; they are not needed where M and r are of degree 1 in the variables. `title` says in a word or two what kind
     of map it is, `has_time_step` that it approximates a flow for the time 2 eps.
 
@@ -333,11 +346,15 @@ class ImplicitMap(BirationalMap):
     _last: list[tuple[Field, Any, EquationMap]] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        n = len(self.variables)
-        names = (*self.variables, "eps")
+        n, names = len(self.variables), self.names
         for rows in (self.rows, self.backward or self.rows):
             if len(rows) != n or any(len(row) != n + 1 or any(names_of(e) != names for e in row) for row in rows):
                 raise InputError(f"expected {n} rows of {n + 1} polynomials in {', '.join(names)}")
+
+    @cached_property
+    def symbols(self) -> tuple[str, ...]:
+        """The symbols in the coefficients, without eps."""
+        return names_of(self.rows[0][-1])[len(self.variables) : -1]
 
     @cached_property
     def has_eps(self) -> bool:
@@ -354,7 +371,7 @@ class ImplicitMap(BirationalMap):
 
     @cached_property
     def equations(self) -> tuple[fmpq_mpoly, ...]:
-        """M x~ - r, polynomials in x, the new point with names like x_new, and eps; all of them are 0.
+        """M x~ - r, polynomials in x, the new point with names like x_new, symbols and eps; all of them are 0.
 
         >>> x, eps = ring(["x", "eps"]).gens()
         >>> ImplicitMap(("x",), ((1 - eps*x, -x),), "Riccati").equations
@@ -363,8 +380,8 @@ class ImplicitMap(BirationalMap):
         n, ending = len(self.variables), "_new"
         while any(name + ending in self.variables for name in self.variables):
             ending += "_"
-        context = ring((*self.variables, *(name + ending for name in self.variables), "eps"))
-        old = [*context.gens()[:n], context.gens()[-1]]
+        context = ring((*self.variables, *(name + ending for name in self.variables), *self.names[n:]))
+        old = [*context.gens()[:n], *context.gens()[2 * n :]]
         new = [*context.gens()[n : 2 * n], context.constant(1)]
         return tuple(
             sum((entry.compose(*old, ctx=context) * y for entry, y in zip(row, new, strict=True)), context.constant(0))
@@ -381,35 +398,37 @@ class ImplicitMap(BirationalMap):
     def digits(self) -> int:
         return digits_of(entry for row in self.rows for entry in row)
 
-    def at(self, eps: Any, over: Field = QQ) -> EquationMap:
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> EquationMap:
         """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where it has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         for known, at, found in self._last:
-            if known is over and at is element:
+            if known is over and at is element and not values:
                 return found
-        backward = None if self.backward is None else equation_of(self.backward, over, element)
-        found = EquationMap(equation_of(self.rows, over, element), element, backward, self.variables)
-        self._last[:] = [(over, element, found)]
+        point = (*values, element)
+        backward = None if self.backward is None else equation_of(self.backward, over, point)
+        found = EquationMap(equation_of(self.rows, over, point), element, backward, self.variables)
+        self._last[:] = [] if values else [(over, element, found)]
         return found
 
     def __repr__(self) -> str:
         return f"ImplicitMap({self.title} in {', '.join(self.variables)})"
 
 
-def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, eps: Any) -> Equation:
-    """The equation of (M | -r), polynomials in the variables, then eps, over a field. Raises BadPrime."""
+def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequence[Any]) -> Equation:
+    """The equation of (M | -r) over a field, at values of what stands behind the variables, eps last. Raises BadPrime.
+    """
     rows = list(rows)
     n = len(rows)
-    context = ring(("eps",))
+    context = ring(names_of(rows[0][-1])[n:])
     by_monomial: list[list[dict[Exponents, Any]]] = []
     for row in rows:
         found: list[dict[Exponents, Any]] = []
         for entry in row:
             collected: dict[Exponents, dict[tuple[int, ...], fmpq]] = {}
             for monomial, coefficient in entry.terms():
-                collected.setdefault(tuple(monomial[:n]), {})[(monomial[n],)] = coefficient
+                collected.setdefault(tuple(monomial[:n]), {})[tuple(monomial[n:])] = coefficient
             with over.working():
-                found.append({m: evaluate(context.from_dict(c), over, (eps,)) for m, c in collected.items()})
+                found.append({m: evaluate(context.from_dict(c), over, point) for m, c in collected.items()})
         by_monomial.append(found)
     degree = max((sum(m) for row in by_monomial for entry in row for m in entry), default=0)
     if degree <= 1:
@@ -450,7 +469,7 @@ def why_no_map(map_: ImplicitMap) -> str:
         over = random_prime_field(rng)
         x = tuple(over.random(rng) for _ in range(map_.dim))
         try:
-            found = map_.at(over.random(rng), over)
+            found = map_.at(over.random(rng), over, [over.random(rng) for _ in map_.symbols])
             image = found.step(x)
             back = x if map_.backward is None else found.inverse.step(image)
         except BadPrime:

@@ -23,7 +23,6 @@ from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
-from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import BirationalMap, Equation, MapOver, nonzero_eps
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 
@@ -102,7 +101,8 @@ class KahanMap(DisplayedAsFormula, KahanMapOver):
     """The map Phi(., eps) of a rational system over a field (the rationals unless another is given).
 
     `eps` is an exact number (int, Fraction, text, fmpq) or an element of the field, not zero; the time step is 2 eps.
-    It is put in where it stands in the coefficients of the system as well. Over QQ and GF(p) everything is exact, over
+    It is put in where it stands in the coefficients of the system as well, as `values`, elements of the field, are for
+    the other symbols. Over QQ and GF(p) everything is exact, over
     RR(bits) it is enclosed.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
@@ -113,24 +113,27 @@ class KahanMap(DisplayedAsFormula, KahanMapOver):
     (1, 1/3)
     """
 
-    def __init__(self, system: QuadraticSystem, eps: Any, field: Field = QQ) -> None:
-        self.system = system
+    def __init__(self, system: QuadraticSystem, eps: Any, field: Field = QQ, values: Sequence[Any] = ()) -> None:
+        self.system, self.values = system, tuple(values)
         self.variables = system.variables
         element = nonzero_eps(eps, field)
-        super().__init__(system.over(field, [element] * len(system.symbols)), element)
+        rest = iter(self.values)
+        super().__init__(
+            system.over(field, [element if name == "eps" else next(rest) for name in system.symbols]), element
+        )
 
     @cached_property
     def inverse(self) -> KahanMap:
         """The inverse map, Phi(., -eps)."""
         with self.field.working():
-            return KahanMap(self.system, -self.eps, self.field)
+            return KahanMap(self.system, -self.eps, self.field, self.values)
 
     def __repr__(self) -> str:
         return f"KahanMap({', '.join(self.system.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
 
 
 class Kahan(BirationalMap):
-    """The Kahan map of a quadratic system, whose only symbol may be eps: then the map is an adjusted Kahan map.
+    """The Kahan map of a quadratic system; if eps is among its symbols, the map is an adjusted Kahan map.
 
     >>> Kahan(QuadraticSystem.from_text(["x"], ["x^2"])).at("1/2").step(["1/5"])
     (1/4,)
@@ -140,11 +143,13 @@ class Kahan(BirationalMap):
     denominator_name = "det(I - eps f')"
 
     def __init__(self, system: QuadraticSystem) -> None:
-        if system.symbols not in ((), ("eps",)):
-            raise InputError(f"found the symbols {', '.join(system.symbols)}, expected none but eps")
         self.system = system
         self.variables = system.variables
         self._last: KahanMap | None = None
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        return tuple(name for name in self.system.symbols if name != "eps")
 
     @property
     def subject(self) -> tuple[Any, ...]:
@@ -154,18 +159,17 @@ class Kahan(BirationalMap):
     def digits(self) -> int:
         return self.system.digits
 
-    def at(self, eps: Any, over: Field = QQ) -> KahanMap:
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> KahanMap:
         """The map Phi(., eps) over a field. Raises InputError for eps = 0, BadPrime where it has no reduction."""
         last = self._last
-        if last is None or last.field is not over or last.eps is not eps:
-            self._last = last = KahanMap(self.system, eps, over)
+        if last is None or last.field is not over or last.eps is not eps or last.values != tuple(values):
+            self._last = last = KahanMap(self.system, eps, over, values)
         return last
 
     @property
     def matrix(self) -> list[list[fmpq_mpoly]]:
-        names = (*self.variables, "eps")
-        eps = ring(names).gens()[-1]
-        rows = self.system.jacobian(names)
+        eps = ring(self.names).gens()[-1]
+        rows = self.system.jacobian(self.names)
         return [[int(i == j) - eps * entry for j, entry in enumerate(row)] for i, row in enumerate(rows)]
 
     def written(self) -> dict[str, list[str]]:

@@ -15,7 +15,7 @@ from itertools import permutations
 from math import factorial
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly
+from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.errors import InputError
@@ -29,7 +29,7 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     """The polarised map of x' = f(x), f of degree at most `degree`, with the time step 2 eps.
 
     Args:
-        rhs: the n components of f, polynomials over Q in the n variables, then eps.
+        rhs: the n components of f, polynomials over Q in the n variables, then symbols, if there are any, and eps.
         degree: d, from 2 to 6; a field of a lower degree has a map for each d.
 
     Returns:
@@ -45,13 +45,14 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
     """
     if not 2 <= degree <= MAX_DEGREE:
         raise InputError(f"found the degree {degree}, expected 2 to {MAX_DEGREE}")
-    names, n = names_of(rhs[0])[:-1], len(rhs)
+    n = len(rhs)
+    names, rest = names_of(rhs[0])[:n], names_of(rhs[0])[n:]
     found = max((sum(m[:n]) for f in rhs for m in f.monoms()), default=0)
     if found > degree:
         raise InputError(f"found right-hand sides of degree {found}, expected at most {degree}")
     copies = degree - 1
     variables = (*names, *(f"{name}_{k}" for k in range(1, copies) for name in names))
-    context = ring((*variables, "eps"))
+    context = ring((*variables, *rest))
     known = [context.gens()[k * n : (k + 1) * n] for k in range(copies)]
     step = 2 * copies * context.gens()[-1]
     last = [_linear_in_one_point(f, known, step, degree) for f in rhs]
@@ -83,7 +84,7 @@ def _linear_in_one_point(
     for monomial, coefficient in f.terms():
         factors: list[int | None] = [j for j, exponent in enumerate(monomial[:n]) for _ in range(exponent)]
         factors += [None] * (degree - len(factors))
-        share = step * (coefficient / fmpq(factorial(degree))) * _power_of_eps(step, int(monomial[n]))
+        share = step * step.context().from_dict({(*[0] * (n * copies), *monomial[n:]): coefficient / factorial(degree)})
         for places in permutations(factors):
             product = share
             for point, j in zip(known, places[:copies], strict=True):
@@ -94,7 +95,3 @@ def _linear_in_one_point(
             else:
                 linear[j] = linear[j] + product
     return linear, free
-
-
-def _power_of_eps(like: fmpq_mpoly, exponent: int) -> fmpq_mpoly:
-    return like.context().gens()[-1] ** exponent
