@@ -29,11 +29,11 @@ Told = Callable[[int], None]
 
 def structure_for(file: SystemFile, wish: str | None) -> Structure | NoStructure:
     """The normal form that steps are made in, or why there is none."""
-    from kahanmaps.family.structure import NoStructure, structure_of
+    from kahanmaps.family.structure import NoStructure
 
     if wish == "generic":
         return NoStructure("generic, as asked for")
-    structure = structure_of(file.system, file.hamiltonian, file.member)
+    structure = file.structure
     if not isinstance(structure, NoStructure) and structure.T is not None:
         structure = NoStructure("ensembles use normal forms for J = [[0, I], [-I, 0]] only")
     if isinstance(structure, NoStructure) and wish == "normal-form":
@@ -111,7 +111,7 @@ class FloatRun(Run):
 
         self.asked = len(integrals)
         self.ensemble = FloatEnsemble(
-            file.system,
+            file.map,
             eps,
             starts,
             backward=options["backward"],
@@ -234,7 +234,7 @@ class ModularRun(Run):
         self.eps = eps
         self.backward: bool = options["backward"]
         self.ensemble = ModularEnsemble(
-            file.system,
+            file.map,
             eps,
             starts,
             options["arithmetic"][1],

@@ -192,10 +192,10 @@ def the_eps(eps: Any, time_step: Any, required: bool = True) -> Any:
     return eps
 
 
-def require_eps(file: SystemFile, eps: Any) -> None:
-    """Where a map depends on eps it has to be given."""
-    if eps is None and file.map.has_eps:
-        the_eps(None, None)
+def eps_of(file: SystemFile, options: Mapping[str, Any]) -> Any:
+    """eps from --eps or --time-step, which have to be given where the map depends on it; None where it does not."""
+    eps = the_eps(options["eps"], options["time_step"], required=file.map.has_eps)
+    return eps if file.map.has_eps else None
 
 
 def load_system(

@@ -205,7 +205,7 @@ def witness_lines(witness: Witness, width: int | None) -> list[str]:
     where = "" if witness.field == "QQ" else f" over {witness.field}"
     more = [f"  {name} = ({numbers(vector)})" for name, vector in witness.vectors.items()]
     return [
-        f"witness: x = ({numbers(witness.point)}), eps = {witness.eps}{where}",
+        f"witness: x = ({numbers(witness.point)}){f', eps = {witness.eps}' if witness.eps else ''}{where}",
         *more,
         f"  {witness.left_label} = {numbers(witness.left)}",
         f"  {witness.right_label} = {numbers(witness.right)}",

@@ -52,17 +52,16 @@ def symbols_and_eps(options: dict[str, Any]) -> tuple[tuple[str, ...], Any]:
 
 
 def scope(found: Any) -> str:
-    """For which eps and which symbols the formulas hold."""
-    if found.eps is None:
-        step = "every eps (the time step is 2 eps)"
-    else:
-        step = f"eps = {found.eps} (time step 2 eps = {2 * found.eps})"
+    """For which eps and which symbols the formulas hold, to follow the name of the map."""
+    from kahanmaps.checks.settings import eps_record, eps_words
+
+    step = eps_words(eps_record(found.eps, found.file.map))
     return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
 
 
 def heading(name: str, found: Any) -> dict[str, Any]:
     """What is needed to redo a search, as plain data."""
-    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.checks.settings import eps_record
     from kahanmaps.version import __version__
 
     return {
@@ -71,9 +70,7 @@ def heading(name: str, found: Any) -> dict[str, Any]:
         "system": found.file.name,
         "parameters": {key: str(value) for key, value in found.file.parameters.items()},
         "symbols": list(found.symbols),
-        "eps": "every" if found.eps is None else str(found.eps),
-        "time_step": "every" if found.eps is None else str(2 * found.eps),
-        "convention": CONVENTION,
+        **eps_record(found.eps, found.file.map),
         "arithmetic": "exact formulas, from residues modulo primes",
         "seed": found.seed,
     }
@@ -100,7 +97,7 @@ def print_search(
         for label, one, _ in formulas:
             click.echo(f"{label} = {one.to_json()['latex']}")
     else:
-        tell(f"{name}: {found.file.name}, {scope(found)}")
+        tell(f"{name}: {found.file.name}{scope(found)}")
         for label, one, origin in formulas:
             tell(f"{label}\t{one.verdict}\t{formula(one.text)}\n\t{origin}{one.evidence.summary}")
         if count:

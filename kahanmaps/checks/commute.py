@@ -51,7 +51,8 @@ def commutativity(
     first, second = names
     labels = (f"Phi_{second}(Phi_{first}(x))", f"Phi_{first}(Phi_{second}(x))")
     subject = (first_map.subject, second_map.subject, *([] if ratio == 1 else [ratio]))
-    return Identity(f.dim, sides, eps, *labels, subject=subject)
+    has_eps = first_map.has_eps or second_map.has_eps
+    return Identity(f.dim, sides, eps, *labels, has_eps=has_eps, subject=subject)
 
 
 def check_commute(

@@ -57,7 +57,7 @@ def conservation(system: QuadraticSystem | BirationalMap, integral: PhaseFunctio
         return None if after is None or before is None else ([after], [before])
 
     subject = (map_.subject, integral.subject)
-    return Identity(map_.dim, sides, eps, "I(x~)", "I(x)", subject=subject)
+    return Identity(map_.dim, sides, eps, "I(x~)", "I(x)", has_eps=map_.has_eps, subject=subject)
 
 
 def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:

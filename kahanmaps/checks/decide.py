@@ -59,6 +59,7 @@ class Identity:
     right_label: str = "right side"
     entries: tuple[str, ...] = ()  # names of the entries, where a witness should show only one that differs
     scope: str = ""  # for what it is stated, in words, where there is more to say than eps
+    has_eps: bool = True  # whether the sides depend on it
     no_value: str = "a denominator seems to vanish identically"  # where it is defined nowhere
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
@@ -94,7 +95,10 @@ class Identity:
     @property
     def where(self) -> str:
         """For what it is stated, as a part of a sentence."""
-        return f", {self.scope or ('for every eps' if self.eps is None else f'for eps = {self.eps}')}"
+        scope = self.scope
+        if not scope and self.has_eps:
+            scope = "for every eps" if self.eps is None else f"for eps = {self.eps}"
+        return f", {scope}" if scope else ""
 
     def trials(self, seed: int) -> Iterator[Trial]:
         """The identity at random points, each over GF(p) for another random p."""
@@ -284,7 +288,7 @@ def witness_of(identity: Identity, field: Field, point: tuple[Any, ...], eps: An
         labels = (f"{identity.entries[k]} of {labels[0]}", f"{identity.entries[k]} of {labels[1]}")
     return Witness(
         tuple(field.format(entry) for entry in point),
-        field.format(eps),
+        field.format(eps) if identity.has_eps else "",
         tuple(field.format(entry) for entry in left),
         tuple(field.format(entry) for entry in right),
         *labels,

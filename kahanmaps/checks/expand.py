@@ -43,7 +43,9 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
             raise NotEqual("the two sides, expanded, are different rational functions")
     except BudgetExceeded:
         return None
-    scope = f" of {'x and eps' if identity.eps is None else f'x, for eps = {identity.eps}'}, multiplied out"
+    scope = " of x, multiplied out"
+    if identity.has_eps:
+        scope = f" of {'x and eps' if identity.eps is None else f'x, for eps = {identity.eps}'}, multiplied out"
     return Evidence(
         METHOD,
         f"both sides are the same rational function{f', {identity.scope}' if identity.scope else scope}",

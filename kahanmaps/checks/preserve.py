@@ -51,7 +51,7 @@ def density_identity(system: QuadraticSystem | BirationalMap, density: PhaseFunc
         labels = ("phi(x~) det M(x)", "phi(x) det N(x, x~)")
     subject = (map_.subject, density.subject)
     no_value = "the map seems to have no inverse, or no value, or a denominator to vanish identically"
-    return Identity(map_.dim, sides, eps, *labels, no_value=no_value, subject=subject)
+    return Identity(map_.dim, sides, eps, *labels, no_value=no_value, has_eps=map_.has_eps, subject=subject)
 
 
 def _image(kahan: MapOver, point: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -69,15 +69,11 @@ class Settings:
 
     def context(self, files: Sequence[SystemFile], **more: Any) -> dict[str, Any]:
         """What is needed to redo the check, as plain data: the systems themselves among it."""
-        time_step = "every" if self.eps is None else format_number(2 * self.eps)
-        meaning = convention(*(file.map for file in files))
         return {
             "version": __version__,
             "system": files[0].name,
             **({"other": files[1].name} if len(files) > 1 else {}),
-            "eps": "every" if self.eps is None else format_number(self.eps),
-            "time_step": time_step if meaning == CONVENTION else None,
-            "convention": meaning,
+            **eps_record(self.eps, *(file.map for file in files)),
             "arithmetic": "exact",
             "seed": self.seed,
             "error_bits": self.error_bits,
@@ -93,6 +89,20 @@ def convention(*maps: BirationalMap) -> str:
     if not with_eps:
         return NO_EPS
     return CONVENTION if any(map_.has_time_step for map_ in with_eps) else NO_TIME_STEP
+
+
+def eps_record(eps: fmpq | None, *maps: BirationalMap) -> dict[str, str | None]:
+    """What every record says of eps, None standing for every one: its value, the time step, and what eps is.
+
+    The value is None where the maps do not depend on eps.
+    """
+    meaning = convention(*maps)
+    time_step = "every" if eps is None else format_number(2 * eps)
+    return {
+        "eps": None if meaning == NO_EPS else "every" if eps is None else format_number(eps),
+        "time_step": time_step if meaning == CONVENTION else None,
+        "convention": meaning,
+    }
 
 
 def eps_words(context: Mapping[str, Any]) -> str:
@@ -190,9 +200,10 @@ def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
         if witness is not None:
             text = f"fails at step {tried + poles - 1} of an exact orbit"
             return Evidence("exact orbit", text, _orbit_data(run, tried, poles)), witness
-    text = f"held exactly at {tried} point{'s' * (tried != 1)} of an orbit, eps = {format_number(run.eps)}"
+    at = f", eps = {format_number(run.eps)}" if identity.has_eps else ""
+    text = f"held exactly at {tried} point{'s' * (tried != 1)} of an orbit{at}"
     if not tried:
-        text = f"could not be tried at any point of an orbit, eps = {format_number(run.eps)}"
+        text = f"could not be tried at any point of an orbit{at}"
     if poles:
         text += f", undefined at {poles}"
     if not run.end.is_whole:

@@ -158,7 +158,8 @@ def _witness(witness: Witness, room: Room = NOTEBOOK) -> str:
         return f"{shown}, … ({len(values)} numbers)" if len(values) > room.entries else shown
 
     where = "" if witness.field == "QQ" else f" over {witness.field}"
-    lines = [f"x = ({numbers(witness.point)}), eps = {markup.shortened(witness.eps, room.number)}{where}"]
+    eps = f", eps = {markup.shortened(witness.eps, room.number)}" if witness.eps else ""
+    lines = [f"x = ({numbers(witness.point)}){eps}{where}"]
     lines += [f"{name} = ({numbers(vector)})" for name, vector in list(witness.vectors.items())[: room.entries]]
     if len(witness.vectors) > room.entries:
         lines.append(f"… and {len(witness.vectors) - room.entries} more vectors")

@@ -23,6 +23,7 @@ from kahanmaps.documents.toml_text import to_toml
 from kahanmaps.errors import InputError, SystemFileError, reading
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
+from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
@@ -75,9 +76,15 @@ class SystemFile(Displayed):
         if self.kind == "system" and not isinstance(self.map, Kahan):
             what = f"stands for a {self.map.title}"
         raise InputError(
-            f"{self.name} {what}, expected a quadratic system of its own: other maps are for orbit, check-commute, "
-            "check-integrals, check-measure, degrees and singularities"
+            f"{self.name} {what}, expected a quadratic vector field without eps: what is asked for is about fields"
         )
+
+    @property
+    def structure(self) -> Structure | NoStructure:
+        """The normal form of the system, looked for anew each time, or why there is none."""
+        if not self.is_quadratic:
+            return NoStructure(f"it is {self.map.kind}")
+        return structure_of(self.system, self.hamiltonian, self.member)
 
     def require_claim(self, what: str, function: RationalFunction) -> None:
         """Raises InputError unless the function is one of the system's variables and eps, in this order."""

@@ -251,11 +251,11 @@ def cycles(
 
     if steps is not None and samples is None:
         raise InputError(f"found steps = {steps} without samples, expected both: whole graphs have no last step")
-    reversor = find_reversor(system.system)
+    reversor = find_reversor(system.system) if system.is_quadratic else None
     runs: list[tuple[Census, Comparison]] = []
-    for value in default_eps(prime) if eps is None else (eps,):
+    for value in (1,) if not system.map.has_eps else default_eps(prime) if eps is None else (eps,):
         census = cycle_census(
-            system.system,
+            system.map,
             value,
             prime,
             reversor=reversor,
@@ -297,9 +297,9 @@ def lyapunov(
     from kahanmaps.maps.float_lyapunov import lyapunov_exponents
     from kahanmaps.maps.float_numbers import to_floats
 
-    starts = starts_in_box(orbits, system.system.dim, float(to_floats([box])[0]), seed)
+    starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     skipped = steps // 10 if transient is None else transient
-    found = lyapunov_exponents(system.system, eps, starts, steps, transient=skipped, seconds=seconds)
+    found = lyapunov_exponents(system.map, eps, starts, steps, transient=skipped, seconds=seconds)
     mean, volume = found.mean, found.log_volume
     return {
         "status": "time" if found.stopped else "completed" if len(found.exponents) else "no orbit left",

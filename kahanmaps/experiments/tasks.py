@@ -25,11 +25,10 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, Result, fields, task, whole_report
 from kahanmaps.family.cubics import cubic_space
-from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.heights import height_growth
 from kahanmaps.maps.arithmetic import Arithmetic
 from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.methods import choose_method
 from kahanmaps.maps.orbit import orbit as find_orbit
 from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, OrbitPoint
@@ -154,7 +153,7 @@ def orbit(
         raise InputError("iterates reached directly (at) need exact, mod:P or ball:BITS arithmetic")
     structure: Structure | NoStructure = NoStructure("as asked for")
     if method != "generic" and system.is_quadratic:
-        structure = _float_structure(system, method) if numbers.kind == "float" else _structure(system)
+        structure = _float_structure(system, method) if numbers.kind == "float" else system.structure
     walk = find_orbit(
         system.map,
         point,
@@ -202,13 +201,13 @@ def ensemble(
     from kahanmaps.maps.fast import to_floats
     from kahanmaps.maps.float_ensemble import FloatEnsemble, starts_in_box
 
-    starts = starts_in_box(orbits, system.system.dim, float(to_floats([box])[0]), seed)
+    starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     structure = _float_structure(system, method)
     chosen = choose_method(method, "float", structure, None)
     form = structure.form if chosen.name == "normal-form" and isinstance(structure, Structure) else None
     # The kernel makes no difference to the numbers, and compiling one takes longer than a short task.
     kernel = "numpy" if orbits * steps < _WORTH_COMPILING else None
-    run = FloatEnsemble(system.system, eps, starts, form=form, kernel=kernel, threads=1)
+    run = FloatEnsemble(system.map, eps, starts, form=form, kernel=kernel, threads=1)
     run.advance(steps)
     words, counts = run.status.tolist(), Counter(run.status.tolist())
     alive = [k for k, word in enumerate(words) if word == "completed"]
@@ -232,9 +231,8 @@ def heights(
 ) -> Result:
     """How fast the numbers of an orbit grow: the kind of growth, and its constant."""
     point = start if start is not None else _drawn(system, seed)
-    structure = _structure(system)
     growth = height_growth(
-        KahanMap(system.system, eps), point, steps, structure=structure, every=every, max_digits=max_digits
+        system.map.at(eps), point, steps, structure=system.structure, every=every, max_digits=max_digits
     )
     found = growth.to_json()
     return {
@@ -249,7 +247,7 @@ def heights(
 @task("period")
 def period(system: SystemFile, eps: Any, start: Any = None, prime: int | None = None, seed: int = 0) -> Result:
     """The exact period of an orbit of a member of the family, modulo a prime or over the rationals."""
-    structure = _structure(system)
+    structure = system.structure
     if isinstance(structure, NoStructure):
         raise InputError(f"no period of {system.name} can be computed: {structure.reason}")
     point = start if start is not None else _drawn(system, seed)
@@ -300,14 +298,10 @@ def _of_report(report: Report, whole: bool) -> Result:
 
 
 def _float_structure(system: SystemFile, method: str | None) -> Structure | NoStructure:
-    structure = NoStructure("as asked for") if method == "generic" else _structure(system)
+    structure = NoStructure("as asked for") if method == "generic" else system.structure
     if isinstance(structure, Structure) and structure.T is not None:
         return NoStructure("in machine numbers only J = [[0, I], [-I, 0]] has one")
     return structure
-
-
-def _structure(system: SystemFile) -> Structure | NoStructure:
-    return structure_of(system.system, system.hamiltonian, system.member)
 
 
 def _text(point: Any) -> str:

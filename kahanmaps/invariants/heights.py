@@ -44,8 +44,8 @@ from typing import Any
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.methods import choose_method
 from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, Iterates, Orbit, OrbitEnd, OrbitPoint, require_steps
 
@@ -195,7 +195,7 @@ def height_of(point: OrbitPoint) -> int:
 
 
 def height_growth(
-    kahan_map: KahanMap,
+    kahan_map: MapOver,
     start: Sequence[Any],
     steps: int,
     *,
@@ -204,7 +204,7 @@ def height_growth(
     max_digits: int | None = DEFAULT_MAX_DIGITS,
     deadline: float | None = None,
 ) -> HeightGrowth:
-    """The heights of an orbit over Q at the steps 0, every, 2 every, ... up to `steps`, as far as it goes.
+    """The heights of an orbit of a map over Q at the steps 0, every, 2 every, ... up to `steps`, as far as it goes.
 
     It is interrupted after the step in flight when time.monotonic() passes the `deadline`.
 
@@ -214,6 +214,7 @@ def height_growth(
     and 8 s for 300, but 0.8 s with `every` = 15, which tells nearly as much.
 
     >>> from kahanmaps.documents.catalog import load
+    >>> from kahanmaps.maps.kahan import KahanMap
     >>> found = height_growth(KahanMap(load("weierstrass").system, "1/10"), [1, "1/2"], 40)
     >>> found.heights[:6], found.kind, decimal_text(found.constant)
     ((2, 7, 17, 32, 52, 82), <Growth.QUADRATIC: 'quadratic'>, '3.04132')

@@ -1,6 +1,6 @@
-"""Everything about one Kahan map as one report: what is preserved, how it grows, what it belongs to, and a verdict.
+"""Everything about one map as one report: what is preserved, how it grows, what it belongs to, and a verdict.
 
-The analysis is given the right-hand sides only; what a file claims of its system is not read. Every statement carries
+The analysis is given the map only; what a file claims of its system is not read. Every statement carries
 how it is known: proved or supported (formulas, as identities in x and eps), or measured (modulo primes, or on orbits).
 The number of integrals and the growth are two separate findings: a map may have many integrals and grow exponentially.
 """
@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.text import format_number
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError
@@ -59,7 +58,7 @@ class Analysis(Findings, Displayed):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: the verdict, the statements, and all results."""
-        from kahanmaps.checks.settings import CONVENTION
+        from kahanmaps.checks.settings import eps_record
         from kahanmaps.version import __version__
 
         final = self.conclusion
@@ -70,9 +69,7 @@ class Analysis(Findings, Displayed):
             "system": self.file.name,
             **attributes(self.file, "parameters"),
             **attributes(self, "symbols"),
-            "eps": "every" if self.eps is None else format_number(self.eps),
-            "time_step": "every" if self.eps is None else format_number(2 * self.eps),
-            "convention": CONVENTION,
+            **eps_record(self.eps, self.file.map),
             **attributes(self, "seed", "seconds", "dim"),
             "verdict": {
                 "integrability": final.kind,
@@ -106,10 +103,10 @@ def analyze(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Analysis:
-    """What the Kahan map of a system preserves and how it grows, within a time budget.
+    """What a map preserves and how it grows, within a time budget.
 
     Args:
-        file: the system; its claims and facts are not looked at.
+        file: the map, of a differential equation its Kahan map; its claims and facts are not looked at.
         symbols: names of parameters that integrals and densities are to contain; all else is for the given values.
         eps: an exact number, to analyse the map at that eps only (time step 2 eps); None for every eps.
         seconds: time for everything, about; by default 16 for planar systems, up to 150 from dimension 6 on.
@@ -130,12 +127,13 @@ def analyze(
     if seconds is not None and not (seconds > 0 and math.isfinite(seconds)):
         raise InputError(f"found {seconds} seconds, expected a positive number")
     laboratory = Laboratory(file, symbols, eps, seed)  # refuses what is wrong before any work is done
+    map_, dim = file.map, file.dim
+    system = file.system if file.is_quadratic else None
     # Without its claims, so that none can be read; with symbols the file itself is needed, and its claims are not read.
-    bare = file if symbols else SystemFile.from_system(file.system, file.name)
-    total = seconds if seconds is not None else _SECONDS.get(file.system.dim, _MOST_SECONDS)
+    bare = file if symbols or system is None else SystemFile.from_system(system, file.name)
+    total = seconds if seconds is not None else _SECONDS.get(dim, _MOST_SECONDS)
     found = Analysis(file, laboratory.eps, total, seed, laboratory.symbols)
     began = time.monotonic()
-    system = bare.system
 
     def left() -> float:
         return total - (time.monotonic() - began)
@@ -156,21 +154,22 @@ def analyze(
             top = profile.degree if profile.dim - profile.codimension <= 1 else profile.first_degree + 1
             for degree in range(profile.first_degree, min(top, profile.degree, 4) + 1):
                 first = 1 + len({name for relation in found.relations for name in relation.names})
-                found.relations += sparse_relations(maps, degree, system.variables, first=first) or ()
+                found.relations += sparse_relations(maps, degree, map_.variables, first=first) or ()
 
     def hamiltonian() -> None:
-        if system.dim <= MAX_HAMILTONIAN_DIMENSION:
+        if system is not None and dim <= MAX_HAMILTONIAN_DIMENSION:
             found.hamiltonian = constant_structures(system, seed=seed)
 
     def family() -> None:
-        found.structure = structure_of(system)
+        if system is not None:
+            found.structure = structure_of(system)
 
     def degrees() -> None:
         # Where they are known to the end and are those that `degrees` would ask for itself.
-        known = patterns_of(found.singularities) if found.singularities and system.dim <= WRITTEN_DIMENSION else None
+        known = patterns_of(found.singularities) if found.singularities and dim <= WRITTEN_DIMENSION else None
         patterns = None if known is None or known.running else known
         found.degrees = degree_growth(
-            system,
+            map_,
             found.eps,
             seconds=share(0.25),
             max_degree=_MAX_DEGREE,
@@ -186,23 +185,23 @@ def analyze(
 
     def heights() -> None:
         found.heights = height_survey(
-            system, found.eps, starts=2, max_digits=5_000, seconds=share(0.08), seed=seed, progress=told("heights")
+            map_, found.eps, starts=2, max_digits=5_000, seconds=share(0.08), seed=seed, progress=told("heights")
         )
 
     def symmetries() -> None:
-        found.symmetries = linear_symmetries(system, seconds=share(0.1), progress=told("symmetries"))
+        if system is not None:
+            found.symmetries = linear_symmetries(system, seconds=share(0.1), progress=told("symmetries"))
 
     def commuting() -> None:
-        if found.eps is None:
+        if system is not None and found.eps is None:
             found.commuting = commuting_systems(system, seed=seed, seconds=share(0.1), progress=told("commuting"))
 
     def confinement() -> None:
-        values = default_eps(system, seed) if found.eps is None else (found.eps,)
-        part = share(0.2 if system.dim <= WRITTEN_DIMENSION else 0.1) / len(values)
-        if all(can_be_written(system, value, part) for value in values):
+        values = default_eps(map_, seed) if found.eps is None else (found.eps,)
+        part = share(0.2 if dim <= WRITTEN_DIMENSION else 0.1) / len(values)
+        if all(can_be_written(map_, value, part) for value in values):
             found.singularities = [
-                singularities(system, value, seed=seed, seconds=part, progress=told("singularities"))
-                for value in values
+                singularities(map_, value, seed=seed, seconds=part, progress=told("singularities")) for value in values
             ]
 
     parts: list[tuple[str, Callable[[], None]]] = [
@@ -216,7 +215,7 @@ def analyze(
         ("heights", heights),
     ]
     # Where degrees make use of them singularities come first; in more dimensions they are slow, and come last.
-    parts.insert(2 if system.dim <= WRITTEN_DIMENSION else len(parts), ("singularities", confinement))
+    parts.insert(2 if dim <= WRITTEN_DIMENSION else len(parts), ("singularities", confinement))
     for name, part in parts:
         if left() <= 0:
             found.skipped.append(f"{name}: the time was over")
@@ -226,5 +225,9 @@ def analyze(
             part()
         except KahanmapsError as error:
             found.skipped.append(f"{name}: {error}")
+    if system is None:
+        found.skipped.append(
+            "Hamiltonian structure, the commuting family, symmetries, commuting systems: for fields only"
+        )
     found.elapsed = time.monotonic() - began
     return found

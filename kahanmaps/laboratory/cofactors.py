@@ -1,12 +1,14 @@
-"""Cofactors that discrete Darboux polynomials of a Kahan map can be expected to have.
+"""Cofactors that discrete Darboux polynomials of a map can be expected to have.
 
 P o Phi = C P with polynomials P and a rational function C. The zeros and poles of C lie on what Phi contracts, which
-the Jacobi determinant det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)) shows. Candidates are the products of
+the Jacobi determinant shows: for Kahan maps det dPhi(x) = det(I + eps f'(x~))/det(I - eps f'(x)), and candidates are
+the products of
 
     D_i(x~, -eps)/D_i(x, eps)   for the irreducible factors D_i of det(I - eps f'(x)) over Q,
     l(x~)/l(x)                  for the affine l with l' = l L, which are Darboux polynomials themselves.
 
-A polynomial that is even in eps has a cofactor with C(x, eps) C(x~, -eps) = 1, as these have. Source: celledoni-2019.
+A polynomial that is even in eps has a cofactor with C(x, eps) C(x~, -eps) = 1, as these have. For other maps they are
+the products of the irreducible factors of det dPhi(x), and of 1/det M(x). Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -14,15 +16,17 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
 
-from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
 from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, monomial_values, null_space
+from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 _SPARE = 8
@@ -32,62 +36,98 @@ _MAX_DIMENSION = 16  # beyond it the determinant is not expanded: even a sparse 
 
 @dataclass(frozen=True, eq=False)
 class Cofactor:
-    """The function g(x~, -eps)/g(x, eps), for a polynomial g in the variables, the symbols and eps.
+    """A function of x that is made of a polynomial g in the variables, the symbols and eps, as `kind` says.
 
-    Without a polynomial it is det dPhi itself. `weight` is the degree of g in the variables.
+    "reversed": g(x~, -eps)/g(x, eps); "factor": g(x, eps); "pole": 1/g(x, eps). Without a polynomial it is det dPhi
+    itself. `weight` says from which degree on polynomials may have it for a cofactor, about.
     """
 
     name: str
     weight: int
     polynomial: fmpq_mpoly | None
+    kind: str = "reversed"
+
+    def over(self, map_: MapOver, x: Sequence[Any], image: Sequence[Any], values: Sequence[Any]) -> tuple[Any, Any]:
+        """Numerator and denominator of the value at a point, the symbols having these values."""
+        if self.polynomial is None:
+            return jacobian_determinant_sides(map_, x, image)
+        field, eps = map_.field, map_.eps
+        here = evaluate(self.polynomial, field, (*x, *values, eps))
+        if self.kind == "reversed":
+            return evaluate(self.polynomial, field, (*image, *values, -eps)), here
+        return (here, field.one) if self.kind == "factor" else (field.one, here)
 
     def sides(self, map_: ModularMap, x: Point, image: Point) -> tuple[int, int]:
-        """Numerator and denominator of the value at a point."""
-        if self.polynomial is None:
-            return map_.determinant(image, -1), map_.determinant(x)
-        field, g = GF(map_.prime), self.polynomial
+        """The same at a point modulo a prime."""
+        field = map_.map.field
+        given = ([field.convert(c) for c in entries] for entries in (x, image, map_.values))
+        above, below = self.over(map_.map, *given)
+        return int(above), int(below)
 
-        def at(point: Point, eps: int) -> int:
-            return int(evaluate(g, field, [field.convert(c) for c in (*point, *map_.values, eps)]))
-
-        return at(image, -map_.eps), at(x, map_.eps)
+    @property
+    def text(self) -> str:
+        """The function in words: C[g] is g(x~, -eps)/g(x, eps)."""
+        if self.polynomial is None or self.kind == "reversed":
+            return f"C[{self.name}]"
+        return f"({self.name})" if self.kind == "factor" else f"1/({self.name})"
 
 
 DETERMINANT = Cofactor("det dPhi", 1, None)
 
 
-def determinant_polynomial(system: QuadraticSystem) -> fmpq_mpoly | None:
-    """det(I - eps f'(x)) in (variables, symbols, eps); None where it is too large to be expanded."""
-    # Over one denominator a right-hand side has coefficients of about so many bits.
-    bits = max(sum(int(c.q.bit_length()) for c in p.coeffs()) for p in system.rhs)
-    bits += max((int(c.p.bit_length()) for p in system.rhs for c in p.coeffs()), default=0)
-    if system.dim > _MAX_DIMENSION or bits > LONG_COEFFICIENTS / 0.30103:
+def determinant_polynomial(map_: BirationalMap) -> fmpq_mpoly | None:
+    """det M in (variables, symbols, eps), for Kahan maps det(I - eps f'(x)); None where it is too large to expand."""
+    if map_.dim > _MAX_DIMENSION or map_.digits > LONG_COEFFICIENTS:
         return None
-    names = (*system.variables, *system.symbols, "eps")
-    field = FunctionField(names, _DETERMINANT_BUDGET)
-    jacobian = system.jacobian(names)
-    eps = field.variables[-1].above
-    one, n = field.context.constant(1), system.dim
-    entries = [
-        Function(field, (one if i == j else 0 * one) - eps * jacobian[i][j], one) for i in range(n) for j in range(n)
-    ]
+    field = FunctionField(map_.names, _DETERMINANT_BUDGET)
+    one, n = field.context.constant(1), map_.dim
     try:
+        entries = [Function(field, entry, one) for row in map_.matrix for entry in row]
         D: fmpq_mpoly = FunctionMatrix(field, n, n, entries).det().above
     except BudgetExceeded:
         return None
     return D
 
 
-def determinant_factors(system: QuadraticSystem) -> tuple[Cofactor, ...]:
+def jacobian_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
+    """The irreducible factors over Q of det dPhi(x) and those of 1/det M(x); det dPhi alone where it is too large."""
+    n, D = map_.dim, determinant_polynomial(map_)
+    field = FunctionField(map_.names, _DETERMINANT_BUDGET, reduces=True)
+    *x, eps = field.variables
+    try:
+        over = map_.at(eps, field, x[n:])
+        image = over.step(x[:n])
+        above, below = jacobian_determinant_sides(over, x[:n], image)
+        J = above / below
+    except BudgetExceeded:
+        D = None
+    if D is None:
+        return (Cofactor("det dPhi", n, None),)
+    degree_of_map = max(_degree_in(part, n) for entry in image for part in (entry.above, entry.below))
+    found = []
+    for kind, polynomials in (("factor", [J.above]), ("pole", [J.below, D])):
+        factors = {str(factor): factor for polynomial in polynomials for factor, _ in polynomial.factor()[1]}
+        for factor in factors.values():
+            if weight := -(-_degree_in(factor, n) // max(1, degree_of_map)):
+                found.append(Cofactor(format_polynomial(factor), weight, factor, kind))
+    return tuple(sorted(found, key=lambda one: (one.weight, one.kind, one.name)))
+
+
+def _degree_in(polynomial: fmpq_mpoly, n: int) -> int:
+    """The degree in the first n variables."""
+    return max((sum(int(e) for e in monomial[:n]) for monomial in polynomial.monoms()), default=0)
+
+
+def determinant_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
     """The cofactors of the irreducible factors over Q of det(I - eps f'(x)); det dPhi alone where it is too large."""
-    n = system.dim
-    D = determinant_polynomial(system)
+    n = map_.dim
+    D = determinant_polynomial(map_)
     if D is None:
         return (Cofactor("det dPhi", n, None),)
     found = []
     origin: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
     for factor, _ in D.factor()[1]:
-        weight = max(sum(int(e) for e in monomial[:n]) for monomial in factor.monoms())
+        weight = _degree_in(factor, n)
         if weight == 0:
             continue  # a number that depends on eps
         # D is 1 at eps = 0, so that every factor is a number there: divide by it, and cofactors become 1 at eps = 0.
@@ -111,9 +151,9 @@ class CofactorProduct:
     weight: int
 
     def text(self, cofactors: Sequence[Cofactor]) -> str:
-        """The product in words, e.g. C[x1]*C[x3]^2 with C[g] = g(x~, -eps)/g(x, eps)."""
+        """The product in words, e.g. C[x1]*C[x3]^2."""
         parts = [
-            f"C[{one.name}]" + (f"^{power}" if power > 1 else "")
+            one.text + (f"^{power}" if power > 1 else "")
             for one, power in zip(cofactors, self.powers, strict=True)
             if power
         ]

@@ -19,6 +19,8 @@ from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.reversors import require_reversor
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_POINTS = 2_000_000  # up to which the whole graph is made, up to dimension 6
@@ -81,7 +83,7 @@ class Census(Displayed):
 
 
 def cycle_census(
-    system: QuadraticSystem,
+    given: QuadraticSystem | BirationalMap,
     eps: Any,
     prime: int,
     *,
@@ -92,14 +94,14 @@ def cycle_census(
     seconds: float = 60.0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Census:
-    """The orbits of the Kahan map of a system on P^n over GF(p), all of them or those of random points.
+    """The orbits of a map on P^n over GF(p), all of them or those of random points.
 
-    `eps` is exact, half the time step; 2 < `prime` < 2^29. Up to 2,000,000 points (half as many with
-    each dimension above 6, where a step costs twice as much) the whole graph is made unless
-    `samples` says how many random points to follow; each is followed for at most `steps` steps (default
-    8 (p + 1 + 2 sqrt p)), all of them for about `seconds` seconds. `reversor` is a matrix R with R^2 = I and
-    f(R x) = -R f(x). Exact: counts, no estimates. Raises InputError for a wrong prime, matrix or number of samples,
-    BadPrime where eps or the system have no reduction. Source: roberts-vivaldi-2009.
+    A system stands for its Kahan map. `eps` is exact, for that half the time step; 2 < `prime` < 2^29. Up to 2,000,000
+    points (half as many with each dimension above 6, where a step costs twice as much) the whole graph is made unless
+    `samples` says how many random points to follow; each is followed for at most `steps` steps (default 8 (p + 1 + 2
+    sqrt p)), all of them for about `seconds` seconds. `reversor` is a matrix R with R^2 = I and f(R x) = -R f(x).
+    Exact: counts, no estimates. Raises InputError for a wrong prime, matrix or number of samples, BadPrime where eps or
+    the system have no reduction. Source: roberts-vivaldi-2009.
 
     >>> census = cycle_census(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]), "1/10", 31)
     >>> census.points, census.lost, census.falling, census.periodic, census.longest
@@ -107,16 +109,18 @@ def cycle_census(
     """
     from kahanmaps.maps.modular_projective import ProjectiveMap, graph_of, hasse_weil, random_points, walk_until_back
 
-    exact_eps = rational(eps)
+    exact_eps, map_ = rational(eps), as_map(given)
     if prime != 2:
-        _require_reduction(system, exact_eps, prime)
+        _require_reduction(map_, exact_eps, prime)
     if reversor is not None:
-        require_reversor(system, reversor)
+        if not isinstance(map_, Kahan):
+            raise InputError(f"found a reversor for {map_.kind}, expected none: f(R x) = -R f(x) is asked of fields f")
+        require_reversor(map_.system, reversor)
     if samples is not None and not 1 <= samples <= MAX_SAMPLES:
         raise InputError(f"found {samples} samples, expected 1 to {MAX_SAMPLES}")
     if steps is not None and steps < 1:
         raise InputError(f"found {steps} steps, expected at least 1")
-    chart = ProjectiveMap(system, exact_eps, prime)
+    chart = ProjectiveMap(map_, exact_eps, prime)
     known = (prime, exact_eps, chart.dim, chart.count)
     form = (chart.factor, chart.degree, chart.is_undefined)
     if samples is None and chart.count <= MAX_POINTS >> max(0, chart.dim - 6):
@@ -138,7 +142,7 @@ def cycle_census(
         seen = (*known, True, chart.count, graph.lost, graph.falling, rest, 0, 0, False)
         return Census(*seen, counts, far, symmetric, fixed, *form)
     wanted = DEFAULT_SAMPLES if samples is None else samples
-    starts = random_points(chart, wanted, seed_for(seed, system.rhs, exact_eps, prime))
+    starts = random_points(chart, wanted, seed_for(seed, map_.subject, exact_eps, prime))
     limit = 8 * hasse_weil(prime) if steps is None else steps
     end = time.monotonic() + seconds
     taken = limit
@@ -187,17 +191,18 @@ def default_eps(prime: int, count: int = 2) -> list[fmpq]:
     return found
 
 
-def _require_reduction(system: QuadraticSystem, eps: fmpq, prime: int) -> None:
-    """Raise BadPrime with a sentence for this command where eps or the system cannot be reduced."""
+def _require_reduction(map_: BirationalMap, eps: fmpq, prime: int) -> None:
+    """Raise BadPrime with a sentence for this command where eps or the map cannot be reduced."""
     field = GF(prime)
     if eps == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     if eps.q % prime == 0 or eps.p % prime == 0:
         raise BadPrime(f"the prime {prime} divides {eps} = eps above or below: take another prime or eps", prime)
     try:
-        system.over(field)
+        map_.at(eps, field)
     except BadPrime as error:
-        raise BadPrime(f"the prime {prime} divides a denominator of the system: take another prime", prime) from error
+        what = "system" if isinstance(map_, Kahan) else "map"
+        raise BadPrime(f"the prime {prime} divides a denominator of the {what}: take another prime", prime) from error
 
 
 def _counted(lengths: Any) -> dict[int, int]:

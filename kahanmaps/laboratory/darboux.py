@@ -1,4 +1,4 @@
-"""The discrete Darboux polynomials of a Kahan map: all P of bounded degree with P(x~) = C(x) P(x), for many C.
+"""The discrete Darboux polynomials of a map: all P of bounded degree with P(x~) = C(x) P(x), for many C.
 
 C runs through the products of the cofactors in cofactors.py. A space of such P is listed unless products of elements of
 spaces listed before span it. Source: celledoni-2019.
@@ -26,7 +26,6 @@ from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.identities import judged
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, product_of
-from kahanmaps.maps.kahan import KahanMapOver
 
 _MOST_TERMS = 2000  # of a polynomial: as many unknowns
 _MOST_PRODUCTS = 2000
@@ -112,7 +111,7 @@ def darboux_polynomials(
     deadline = time.monotonic() + seconds
     cofactors = laboratory.cofactors()
     found.cofactors = tuple(one.name for one in cofactors)
-    asked, dim = degree, laboratory.system.dim
+    asked, dim = degree, laboratory.map.dim
     while comb(dim + degree, dim) > _MOST_TERMS:
         degree -= 1
     if degree < asked:
@@ -191,28 +190,25 @@ def _list(
 
 
 def _judged(laboratory: Laboratory, cofactors: Sequence[Cofactor], product: CofactorProduct, P: fmpq_mpoly) -> Verdict:
-    """Whether P(x~) prod g(x, eps)^k = prod g(x~, -eps)^k P(x)."""
-    system, n = laboratory.system, laboratory.system.dim
+    """Whether P(x~) = P(x) prod C^k, the denominators multiplied out."""
+    map_, n = laboratory.map, laboratory.map.dim
 
     def sides(field: Field, place: tuple[Any, ...], eps: Any) -> Sides:
         point, values = place[:n], place[n:]
-        map_ = KahanMapOver(system.over(field, values), eps)
-        image = map_.step(point)
+        over = map_.at(eps, field, values)
+        image = over.step(point)
         left, right = evaluate(P, field, (*image, *values, eps)), evaluate(P, field, (*place, eps))
         for one, power in zip(cofactors, product.powers, strict=True):
+            above, below = one.over(over, point, image, values) if power else (field.one, field.one)
             for _ in range(power):
-                if one.polynomial is None:
-                    left, right = left * map_.determinant(point), right * map_.inverse.determinant(image)
-                else:
-                    left = left * evaluate(one.polynomial, field, (*place, eps))
-                    right = right * evaluate(one.polynomial, field, (*image, *values, -eps))
+                left, right = left * below, right * above
         return [left], [right]
 
     subject = (
-        system.symbols,
-        system.rhs,
+        map_.symbols,
+        map_.subject,
         P,
         [(one.polynomial, k) for one, k in zip(cofactors, product.powers, strict=True)],
     )
-    identity = Identity(n + len(system.symbols), sides, laboratory.eps, subject=subject)
+    identity = Identity(n + len(map_.symbols), sides, laboratory.eps, has_eps=map_.has_eps, subject=subject)
     return judged(identity, laboratory.seed)[0]

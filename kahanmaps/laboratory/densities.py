@@ -1,4 +1,4 @@
-"""Invariant measures dx/phi of a Kahan map with a polynomial phi, or its reciprocal, in closed form.
+"""Invariant measures dx/phi of a map with a polynomial phi, or its reciprocal, in closed form.
 
 dx/phi is invariant if phi(x~) = det dPhi(x) phi(x): phi is a discrete Darboux polynomial with the cofactor det dPhi.
 All of them up to a degree are one null space modulo a prime. Source: celledoni-2019.
@@ -83,7 +83,7 @@ class DensitySearch(Displayed):
     @property
     def note(self) -> str:
         """That orbits close, and for which eps; empty where they do not."""
-        return closing_note(self.period, self.eps)
+        return closing_note(self.period, self.eps, self.file.map)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -97,7 +97,7 @@ class DensitySearch(Displayed):
         """
         if not self.densities:
             return ""
-        return "\n".join([*toml_comment(self.eps), "[density]", f'phi = "{self.densities[0].text}"', ""])
+        return "\n".join([*toml_comment(self.eps, self.file.map), "[density]", f'phi = "{self.densities[0].text}"', ""])
 
 
 def find_densities(
@@ -110,10 +110,10 @@ def find_densities(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DensitySearch:
-    """The polynomials phi of the least degree for which the Kahan map preserves dx/phi; failing these, 1/phi.
+    """The polynomials phi of the least degree for which the map preserves dx/phi; failing these, 1/phi.
 
     Args:
-        file: the system.
+        file: the map; a differential equation stands for its Kahan map.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
         eps: an exact number, or None for formulas that contain eps (the time step is 2 eps).
         max_degree: of phi; by default as the number of unknowns allows, at most 12.
@@ -160,7 +160,7 @@ def _search(
     laboratory: Laboratory, max_degree: int | None, deadline: float, progress: Callable[[str], None]
 ) -> tuple[list[FoundDensity], int, str]:
     """Densities, the largest degree that was tried, and why there are none."""
-    dim = laboratory.system.dim
+    dim = laboratory.map.dim
     theorem = _theorem(laboratory)
     if theorem is not None:
         of_theorem = _degree_in(theorem.function.numerator, dim)
@@ -185,11 +185,11 @@ def _search(
 
 def _theorem(laboratory: Laboratory) -> FoundDensity | None:
     """det(I - eps f') of a Hamiltonian system with numbers for parameters, made primitive; None for others."""
-    if laboratory.symbols or laboratory.system.dim > MAX_DIMENSION:
+    if laboratory.symbols or laboratory.system is None or laboratory.system.dim > MAX_DIMENSION:
         return None
-    if constant_structures(laboratory.file.system).hamiltonian is None:
+    if constant_structures(laboratory.system).hamiltonian is None:
         return None
-    D = determinant_polynomial(laboratory.system)
+    D = determinant_polynomial(laboratory.map)
     if D is None:
         return None
     if laboratory.eps is not None:
@@ -238,7 +238,7 @@ def _formulas(
     for P in forms.bases[0]:
         one = P.context().constant(1)
         phi = RationalFunction(one, P) if inverse else RationalFunction(P, one)
-        verdict, evidence = verdict_on(laboratory.system, phi, laboratory.eps, laboratory.seed, is_density=True)
+        verdict, evidence = verdict_on(laboratory.map, phi, laboratory.eps, laboratory.seed, is_density=True)
         if verdict.holds:
             found.append(FoundDensity(phi, verdict, evidence))
     return found, f"a density of degree {degree} that was found modulo primes did not pass as an identity"

@@ -1,4 +1,4 @@
-"""What is known of one Kahan map: the results of all analyses, as far as there was time for them."""
+"""What is known of one map: the results of all analyses, as far as there was time for them."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ class Findings:
 
     @property
     def dim(self) -> int:
-        """The dimension of the system."""
-        return self.file.system.dim
+        """The dimension of the phase space."""
+        return self.file.dim
 
     @property
     def integral_count(self) -> int:

@@ -23,7 +23,8 @@ from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
 from kahanmaps.invariants.heights import Growth, HeightGrowth, height_growth
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 DEFAULT_EPS = (fmpq(1, 10), fmpq(3, 11))
@@ -52,10 +53,14 @@ class SurveyedOrbit:
 
 @dataclass(frozen=True)
 class HeightSurvey(Displayed):
-    """The orbits of the survey, in the order of eps and then of starts; `is_whole` is False where time ended it."""
+    """The orbits of the survey, in the order of eps and then of starts; `is_whole` is False where time ended it.
+
+    For a map that has no eps that of the orbits means nothing.
+    """
 
     orbits: tuple[SurveyedOrbit, ...]
     is_whole: bool
+    has_eps: bool = True
 
     @property
     def kinds(self) -> tuple[Growth, ...]:
@@ -80,9 +85,9 @@ class HeightSurvey(Displayed):
         decided = sum(orbit.growth.kind is not Growth.UNDECIDED for orbit in self.orbits)
         if self.kind is Growth.UNDECIDED:
             return f"undecided: {decided} of {counted(total, 'orbit')} decided"
-        eps = len({orbit.eps for orbit in self.orbits})
+        eps = {orbit.eps for orbit in self.orbits}
         many = f"{decided} of {counted(total, 'orbit')}" if decided < total else counted(total, "orbit")
-        return f"{self.kind}: {many}, {counted(eps, 'value')} of eps"
+        return f"{self.kind}: {many}" + (f", {counted(len(eps), 'value')} of eps" if self.has_eps else "")
 
     @property
     def _eps_differ(self) -> bool:
@@ -99,7 +104,7 @@ class HeightSurvey(Displayed):
 
 
 def height_survey(
-    system: QuadraticSystem,
+    given: QuadraticSystem | BirationalMap,
     eps: Any = None,
     *,
     starts: Sequence[Sequence[Any]] | int = DEFAULT_STARTS,
@@ -112,6 +117,7 @@ def height_survey(
 ) -> HeightSurvey:
     """The growth of heights along exact orbits over Q from given starts, or so many random ones, for one or two eps.
 
+    `given` is the map; a system stands for its Kahan map.
     `eps` is one exact number (time step 2 eps) or None for 1/10 and 3/11. Orbits end at `max_digits` digits a number;
     after `seconds` no orbit is begun, and the one in flight ends. A random start whose orbit meets a singular point is
     replaced by another.
@@ -130,24 +136,25 @@ def height_survey(
         raise InputError(f"found {seconds} seconds, expected a positive number")
     deadline = time.monotonic() + seconds
     orbits: list[SurveyedOrbit] = []
-    for value in DEFAULT_EPS if eps is None else (rational(eps),):
-        kahan_map = KahanMap(system, value)
-        draws = _generic_starts(system.dim, seed_for(seed, system.rhs, value))
-        given = [None] * starts if isinstance(starts, int) else [kahan_map.point(start) for start in starts]
-        for k, start in enumerate(given):
+    map_ = as_map(given)
+    for value in (fmpq(1),) if not map_.has_eps else DEFAULT_EPS if eps is None else (rational(eps),):
+        over = map_.at(value)
+        draws = _generic_starts(map_.dim, seed_for(seed, map_.subject, value))
+        wanted = [None] * starts if isinstance(starts, int) else [over.point(start) for start in starts]
+        for k, start in enumerate(wanted):
             if orbits and time.monotonic() > deadline:
-                return HeightSurvey(tuple(orbits), False)
-            progress(f"heights: eps = {value}, orbit {k + 1} of {len(given)}")
+                return HeightSurvey(tuple(orbits), False, map_.has_eps)
+            progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(wanted)}")
             for candidate in islice(draws, _DRAWS) if start is None else (start,):
                 found = height_growth(
-                    kahan_map, candidate, steps, structure=structure, max_digits=max_digits, deadline=deadline
+                    over, candidate, steps, structure=structure, max_digits=max_digits, deadline=deadline
                 )
                 if found.end.status != "singular" or time.monotonic() > deadline:
                     break
             orbits.append(SurveyedOrbit(value, tuple(candidate), found))
             if found.end.status == "interrupted":
-                return HeightSurvey(tuple(orbits), False)
-    return HeightSurvey(tuple(orbits), True)
+                return HeightSurvey(tuple(orbits), False, map_.has_eps)
+    return HeightSurvey(tuple(orbits), True, map_.has_eps)
 
 
 def _generic_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:

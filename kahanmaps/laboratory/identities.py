@@ -16,23 +16,28 @@ from kahanmaps.checks.decide import Identity, Sides, decide
 from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.judge import settle
 from kahanmaps.invariants.integrals import integral_condition
-from kahanmaps.invariants.measures import density_condition
-from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.invariants.measures import density_condition, jacobian_determinant_sides
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _BUDGET = 60_000_000
 
 
 def verdict_on(
-    system: QuadraticSystem, function: RationalFunction, eps: fmpq | None, seed: int = 0, *, is_density: bool
+    given: QuadraticSystem | BirationalMap,
+    function: RationalFunction,
+    eps: fmpq | None,
+    seed: int = 0,
+    *,
+    is_density: bool,
 ) -> tuple[Verdict, Evidence]:
-    """Whether I(x~) = I(x); of a density phi whether phi(x~) det(I - eps f'(x)) = phi(x) det(I + eps f'(x~)).
+    """Whether I(x~) = I(x); of a density phi whether phi(x~) = det dPhi(x) phi(x), which says that dx/phi is invariant.
 
-    The second says that dx/phi is invariant. Both are for every value of the symbols of the system and, if `eps` is
-    None, every eps.
+    Both are for every value of the symbols of the map and, if `eps` is None, every eps.
 
     Args:
-        system: the system, some of its parameters symbols.
+        given: the map, some of its parameters symbols; a system stands for its Kahan map.
         function: I or phi, an exact function of (variables, symbols, eps).
         eps: the paper's epsilon, an exact number (the time step is 2 eps), or None for every eps.
         seed: of the random points.
@@ -57,8 +62,9 @@ def verdict_on(
     >>> str(verdict_on(system, parse_rational_function("x^2", ["x", "eps"]), None, is_density=True)[0])
     'proved'
     """
-    identity = _identity(system, function, eps, is_density)
-    return judged(identity, seed, expands=system.dim <= MAX_DIMENSION)
+    map_ = as_map(given)
+    identity = _identity(map_, function, eps, is_density)
+    return judged(identity, seed, expands=map_.dim <= MAX_DIMENSION)
 
 
 def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verdict, Evidence]:
@@ -68,14 +74,14 @@ def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verd
     return found.verdict, found.evidence
 
 
-def _identity(system: QuadraticSystem, function: RationalFunction, eps: fmpq | None, is_density: bool) -> Identity:
+def _identity(map_: BirationalMap, function: RationalFunction, eps: fmpq | None, is_density: bool) -> Identity:
     """P(x~) Q(x) = P(x) Q(x~) for P/Q, of a density times the determinants: in x, the symbols and eps."""
-    n = system.dim
+    n = map_.dim
 
     def sides(field: Field, place: tuple[Any, ...], step: Any) -> Sides | None:
         point, values = place[:n], place[n:]
-        map_ = KahanMapOver(system.over(field, values), step)
-        image = map_.step(point)
+        over = map_.at(step, field, values)
+        image = over.step(point)
         here, there = (*place, step), (*image, *values, step)
         P, Q = (evaluate(part, field, here) for part in (function.numerator, function.denominator))
         P_there, Q_there = (evaluate(part, field, there) for part in (function.numerator, function.denominator))
@@ -84,16 +90,16 @@ def _identity(system: QuadraticSystem, function: RationalFunction, eps: fmpq | N
             return None
         left, right = P_there * Q, P * Q_there
         if is_density:
-            above, below = map_.inverse.determinant(image), map_.determinant(point)
+            above, below = jacobian_determinant_sides(over, point, image)
             if field.is_zero(above):
                 return None  # the map is not invertible here, and 0 = 0 says nothing
             left, right = left * below, right * above
         return [left], [right]
 
     condition = (density_condition if is_density else integral_condition)(function, n, eps)
-    step = "for every eps" if eps is None else f"for eps = {eps}"
-    symbols = f" and every {', '.join(system.symbols)}" if system.symbols else ""
+    step = [] if not map_.has_eps else ["every eps" if eps is None else f"eps = {eps}"]
+    values = " and ".join([*step, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
     told = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
-    scope = f"{step}{symbols}{told}"
-    subject = (system.symbols, system.rhs, function, is_density)
-    return Identity(n + len(system.symbols), sides, eps, scope=scope, subject=subject)
+    scope = f"for {values}{told}" if values else told.removeprefix(", ").strip()
+    subject = (map_.symbols, map_.subject, function, is_density)
+    return Identity(n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, subject=subject)

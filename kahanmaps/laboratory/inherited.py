@@ -23,7 +23,7 @@ from kahanmaps.errors import counted
 from kahanmaps.laboratory.affine_functions import QuotientForms, affine_integrals, quotient_by
 from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION, closed_forms, hamiltonian_function
 from kahanmaps.laboratory.modular_points import ModularMap, Point, rank
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.kahan import KahanMap, KahanMapOver
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -47,16 +47,17 @@ class InheritedIntegrals:
 
         `map_` is that of the system modulo a prime that divides none of its denominators.
         """
+        assert isinstance(map_.map, KahanMapOver)
         field, n, free = GF(map_.prime), map_.dim, self.quotient.free
         rows = [[int(entry) % map_.prime for entry in vector] for vector in self.quotient.integrals]
         image = map_.step(x)
         if image is None or not self.forms:
             return rows
         here, there = ([field.convert(c) for c in point] for point in (x, image))
-        S = field.convert_matrix(self.quotient.section)
-        A, A_there = (self._rows(field, map_.local.jacobian(point) * S) for point in (here, there))
+        S, local = field.convert_matrix(self.quotient.section), map_.map.local
+        A, A_there = (self._rows(field, local.jacobian(point) * S) for point in (here, there))
         one, eps = field.identity(len(free)), field.convert(map_.eps)
-        f = map_.local.value(here)
+        f = local.value(here)
         f_y = field.column([f[i] for i in free])
         u = field.column([there[i] - here[i] for i in free])
         change = (one - A * eps).inv() * (one + A_there * eps) - one  # du/dy

@@ -1,4 +1,4 @@
-"""Integrals of a Kahan map in closed form, found without being told anything but the right-hand sides.
+"""Integrals of a map in closed form, found without being told anything but the map.
 
 How many there are at least is found first: by theorems (inherited.py) and by the codimension of orbits, which is
 measured (hirota_kimura.py). Then spaces of polynomials with a common cofactor are sought modulo a prime (search.py);
@@ -35,6 +35,7 @@ from kahanmaps.laboratory.inherited import InheritedIntegrals, inherited_integra
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
 from kahanmaps.laboratory.search import AFFINE, Found, classes, may_be_conjugate, repeat, search
+from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
@@ -100,7 +101,7 @@ class IntegralSearch(Displayed):
     @property
     def note(self) -> str:
         """What is special about the orbits: that they close; empty where they do not."""
-        return closing_note(self.profile.period, self.eps)
+        return closing_note(self.profile.period, self.eps, self.file.map)
 
     @property
     def codimension(self) -> int:
@@ -155,26 +156,32 @@ class IntegralSearch(Displayed):
         if not self.integrals:
             return ""
         lines = ["[integrals]", *(f'{one.name} = "{one.text}"' for one in self.integrals)]
-        return "\n".join([*toml_comment(self.eps), *lines]) + "\n"
+        return "\n".join([*toml_comment(self.eps, self.file.map), *lines]) + "\n"
 
 
-def closing_note(period: int | None, eps: fmpq | None) -> str:
+def closing_note(period: int | None, eps: fmpq | None, map_: BirationalMap) -> str:
     """What orbits that close after `period` steps mean at this eps (None: at every one); empty where they do not.
 
-    >>> closing_note(4, fmpq(1))
+    >>> from kahanmaps.documents.catalog import load
+    >>> closing_note(4, fmpq(1), load("weierstrass").map)
     'orbits close after 4 steps: at eps = 1 the map is periodic (measured); nothing follows for other eps'
     """
     if period is None:
         return ""
     closes = f"orbits close after {period} step{'s' * (period != 1)}"
+    if not map_.has_eps:
+        return f"{closes}: the map is periodic (measured)"
     if eps is None:
         return f"{closes} at every eps that was tried: the map is periodic (measured)"
     return f"{closes}: at eps = {eps} the map is periodic (measured); nothing follows for other eps"
 
 
-def toml_comment(eps: fmpq | None) -> list[str]:
+def toml_comment(eps: fmpq | None, map_: BirationalMap) -> list[str]:
     """The line of a system file that says that formulas hold at one eps only; none where eps is in them."""
-    return [] if eps is None else [f"# for eps = {eps} only (time step 2 eps = {2 * eps}): check with --eps {eps}"]
+    if eps is None:
+        return []
+    step = f" (time step 2 eps = {2 * eps})" if map_.has_time_step else ""
+    return [f"# for eps = {eps} only{step}: check with --eps {eps}"]
 
 
 def find_integrals(
@@ -187,10 +194,10 @@ def find_integrals(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> IntegralSearch:
-    """Independent integrals of the Kahan map of a system, in closed form, each with its verdict.
+    """Independent integrals of a map in closed form, each with its verdict.
 
     Args:
-        file: the system.
+        file: the map; a differential equation stands for its Kahan map.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
         eps: an exact number, the formulas are then for this eps only; None: formulas contain eps (time step 2 eps).
         max_degree: the largest degree of relations along orbits; by default as dimension and time allow.
@@ -220,26 +227,30 @@ def find_integrals(
     deadline = time.monotonic() + seconds
     primes = laboratory.primes
 
-    # Without symbols the maps have the same values, none, and one system.
-    systems = {
-        values: inherited_integrals(laboratory.system.at(values), seed=seed)
-        for values in {map_.values for map_ in laboratory.maps}
-    }
-    inherited = [systems[map_.values] for map_ in laboratory.maps]
+    inherited: list[InheritedIntegrals] = []  # of each map; theorems speak of Kahan maps
+    if laboratory.system is not None:
+        # Without symbols the maps have the same values, none, and one system.
+        systems = {
+            values: inherited_integrals(laboratory.system.at(values), seed=seed)
+            for values in {map_.values for map_ in laboratory.maps}
+        }
+        inherited = [systems[map_.values] for map_ in laboratory.maps]
     by_theorems = 0
 
     def gradients(map_: ModularMap, x: Point) -> list[list[int]]:
-        return inherited[laboratory.maps.index(map_)].gradients(map_, x)
+        return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
 
     def result(integrals: Sequence[FoundIntegral], profile: Profile, reason: str) -> IntegralSearch:
         values = f", at random values of {', '.join(laboratory.symbols)}" if laboratory.symbols else ""
-        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, inherited[0].text + values)
+        theorems = inherited[0].text + values if inherited else ""
+        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems)
         return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found)
 
-    empty = Profile(file.system.dim, (), (), None, True, False)
+    empty = Profile(file.dim, (), (), None, True, False)
     if laboratory.defect:
         return result([], empty, laboratory.defect)
-    by_theorems = min(one.count(map_) for one, map_ in zip(inherited, laboratory.maps, strict=True))
+    if inherited:
+        by_theorems = min(one.count(map_) for one, map_ in zip(inherited, laboratory.maps, strict=True))
     try:
         profile = orbit_profile(
             laboratory.maps, max_degree=max_degree, seconds=seconds / 3, known=gradients, progress=progress
@@ -250,7 +261,7 @@ def find_integrals(
     except NoPoint as error:
         return result([], empty, str(error))
     integrals = _independent(laboratory, formulas, progress)
-    if not laboratory.symbols:
+    if inherited and not laboratory.symbols:
         integrals = _by_theorems(laboratory, inherited[0], integrals, deadline)
     done = result(integrals, profile, "")
     missing = done.codimension - len(integrals)
@@ -381,12 +392,10 @@ def _independent(
         if rank([*rows, row], map_.prime) == len(rows):
             continue
         progress("verifying an integral")
-        if _is_affine_integral(laboratory.system, function):
+        if laboratory.system is not None and _is_affine_integral(laboratory.system, function):
             verdict, evidence = Verdict.PROVED, _AFFINE_EVIDENCE
         else:
-            verdict, evidence = verdict_on(
-                laboratory.system, function, laboratory.eps, laboratory.seed, is_density=False
-            )
+            verdict, evidence = verdict_on(laboratory.map, function, laboratory.eps, laboratory.seed, is_density=False)
         if verdict.holds:
             rows.append(row)
             found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, verdict, evidence))
@@ -446,7 +455,7 @@ def _by_theorems(
 
 def _affine(laboratory: Laboratory, vector: Sequence[fmpz]) -> tuple[RationalFunction, str, Evidence]:
     """v.x as a function of the variables and eps."""
-    context = ring((*laboratory.system.variables, "eps"))
+    context = ring((*laboratory.map.variables, "eps"))
     total = sum((gen * v for gen, v in zip(context.gens(), vector, strict=False)), context.constant(0))
     return RationalFunction(total, context.constant(1)), AFFINE, _AFFINE_EVIDENCE
 
@@ -455,7 +464,7 @@ def _modified(
     laboratory: Laboratory, inherited: InheritedIntegrals, k: int
 ) -> tuple[RationalFunction, str, Evidence] | None:
     """The modified Hamiltonian that belongs to the k-th form; None where it is too long to be written out."""
-    field = FunctionField((*laboratory.system.variables, "eps"), reduces=False)
+    field = FunctionField((*laboratory.map.variables, "eps"), reduces=False)
     eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
     try:
         value = inherited.modified(k, field, eps, field.variables[:-1])

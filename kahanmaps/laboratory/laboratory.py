@@ -1,4 +1,4 @@
-"""The maps on which one system is examined, and the way from what is found on them to formulas."""
+"""The maps modulo primes on which one map is examined, and the way from what is found on them to formulas."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.documents.symbols import with_symbols
+from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.affine_functions import affine_cofactor, affine_darboux
 from kahanmaps.laboratory.closed_forms import ClosedForms, Spaces, closed_forms
-from kahanmaps.laboratory.cofactors import Cofactor, cofactor_of_affine, determinant_factors
+from kahanmaps.laboratory.cofactors import Cofactor, cofactor_of_affine, determinant_factors, jacobian_factors
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
+from kahanmaps.maps.kahan import Kahan
 
 
 class Laboratory:
-    """The maps on which a system is examined: two primes, each with its own eps and its own values of the symbols.
+    """The maps on which a file's map is examined: two primes, each with its own eps and its own values of the symbols.
 
-    With `eps` (exact; the time step is 2 eps) all maps are at that eps. Raises InputError for eps = 0, for eps both a
-    number and a symbol, and for symbols that `with_symbols` refuses.
+    With `eps` (exact; the time step is 2 eps) all maps are at that eps. `system` is there if the map is the Kahan map
+    of a system without eps in its coefficients: what theorems say of these is known then. Raises InputError for
+    eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
     >>> laboratory = Laboratory(load("euler_top"), ["a1"])
@@ -39,8 +41,11 @@ class Laboratory:
             raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
         if self.eps is not None and "eps" in symbols:
             raise InputError("found eps both as a number and as a symbol, expected one of the two")
-        self.system = with_symbols(file, self.symbols)
-        self.seed = seed_for(seed, self.symbols, self.system.rhs, self.eps)  # of all that is drawn for this system
+        self.map = map_with_symbols(file, self.symbols)
+        self.system = None
+        if isinstance(self.map, Kahan) and "eps" not in self.map.system.symbols:
+            self.system = self.map.system
+        self.seed = seed_for(seed, self.symbols, self.map.subject, self.eps)  # of all that is drawn for this map
         self.maps = list(self._drawn("laboratory", 2))
 
     def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:
@@ -49,7 +54,7 @@ class Laboratory:
             eps = int(GF(prime).convert(self.eps))
             if eps == 0:
                 raise BadPrime(f"the prime {prime} divides the numerator of eps", prime)
-        return ModularMap(self.system, prime, eps, values, self.seed)
+        return ModularMap(self.map, prime, eps, values, self.seed)
 
     def map_for(self, prime: int, values: Sequence[int]) -> ModularMap:
         """The map for values of what formulas contain: of the symbols and, where it enters as one, of eps last."""
@@ -73,8 +78,10 @@ class Laboratory:
     @property
     def eps_enters(self) -> str:
         """How eps enters formulas: "not", where it is a number, "by weight" for homogeneous f, else as a "symbol"."""
-        if self.eps is not None:
+        if self.eps is not None or not self.map.has_eps:
             return "not"
+        if self.system is None:
+            return "symbol"
         n = self.system.dim
         terms = [monomial for polynomial in self.system.rhs for monomial in polynomial.monoms()]
         return "by weight" if all(sum(int(e) for e in m[:n]) == 2 for m in terms) else "symbol"
@@ -82,14 +89,18 @@ class Laboratory:
     @property
     def defect(self) -> str:
         """Why the maps at the given eps are no birational maps, measured at random points; empty where they are."""
-        if self.eps is None:
+        if self.eps is None and self.system is not None:
             return ""  # det(I - eps f'(x)) is 1 at eps = 0
+        at = "" if self.eps is None else f"at eps = {self.eps} "
+        name, above = self.map.denominator_name, "det dPhi(x)"
+        if self.system is not None:
+            name, above = "det(I - eps f'(x))", "det(I + eps f'(x))"
         try:
-            pairs = [(map_, image) for map_ in self.maps for _, image in map_.pairs(2)]
+            pairs = [(map_, *pair) for map_ in self.maps for pair in map_.pairs(2)]
         except NoPoint:
-            return f"at eps = {self.eps} the map has no value anywhere: det(I - eps f'(x)) is identically 0"
-        if not any(map_.determinant(image, -1) for map_, image in pairs):
-            return f"at eps = {self.eps} the map is not invertible: det(I + eps f'(x)) is 0 at all images"
+            return f"{at}the map has no value anywhere: {name} is identically 0"
+        if not any(map_.determinant(x, image)[0] for map_, x, image in pairs):
+            return f"{at}the map is not invertible: {above} is 0 at all {'points' if self.system is None else 'images'}"
         return ""
 
     @property
@@ -99,6 +110,8 @@ class Laboratory:
 
     def cofactors(self) -> list[Cofactor]:
         """The cofactors that polynomials are tried with."""
+        if self.system is None:
+            return list(jacobian_factors(self.map))
         context = self.system.rhs[0].context()
         gens = context.gens()[: self.system.dim]
         affine = [
@@ -107,7 +120,7 @@ class Laboratory:
             # l is to divide l' with the symbols free, not only at the values that the file gives them
             if affine_cofactor(self.system, one.function.compose(*gens, ctx=context)) is not None
         ]
-        return [*affine, *determinant_factors(self.system)]
+        return [*affine, *determinant_factors(self.map)]
 
     def formulas(self, model: Spaces, spaces_on: Callable[[ModularMap], Spaces | None], deadline: float) -> ClosedForms:
         """The polynomials that span spaces known modulo primes: `model` on the first map, `spaces_on(map)` on others.
@@ -117,7 +130,7 @@ class Laboratory:
         return closed_forms(
             model,
             lambda prime, values: spaces_on(self.map_for(prime, values)),
-            self.system.variables,
+            self.map.variables,
             self.symbols,
             self.eps_enters,
             seed=self.seed,

@@ -10,8 +10,10 @@ from flint import nmod_mat
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import monomials
-from kahanmaps.errors import KahanmapsError, SingularStep
-from kahanmaps.maps.kahan import KahanMapOver
+from kahanmaps.errors import BadPrime, KahanmapsError, SingularStep
+from kahanmaps.invariants.measures import jacobian_determinant_sides
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Point = tuple[int, ...]
@@ -24,13 +26,18 @@ class NoPoint(KahanmapsError):
 
 
 class ModularMap:
-    """The Kahan map of a system modulo `prime`, at the residues `values` of its symbols and `eps`; time step 2 eps.
+    """A map modulo `prime`, at the residues `values` of its symbols and `eps`; a system stands for its Kahan map.
 
-    Everything drawn at random comes from `rng`.
+    Everything drawn at random comes from `rng`. Raises BadPrime where the prime divides denominators, or is eps.
     """
 
     def __init__(
-        self, system: QuadraticSystem, prime: int, eps: int, values: Sequence[int] = (), seed: int = 0
+        self,
+        system: QuadraticSystem | BirationalMap,
+        prime: int,
+        eps: int,
+        values: Sequence[int] = (),
+        seed: int = 0,
     ) -> None:
         self.prime = prime
         self.eps = eps
@@ -38,8 +45,9 @@ class ModularMap:
         self.values = tuple(values)
         self.rng = random.Random(f"{seed} {prime} {eps} {tuple(values)}")
         field = GF(prime)
-        self.local = system.over(field, [field.convert(value) for value in values])
-        self.map = KahanMapOver(self.local, field.convert(eps))
+        if eps % prime == 0:
+            raise BadPrime(f"found eps = 0 modulo {prime}: take another prime", prime)
+        self.map = as_map(system).at(field.convert(eps), field, [field.convert(value) for value in values])
 
     def random_point(self) -> Point:
         """A random point modulo the prime."""
@@ -52,9 +60,10 @@ class ModularMap:
         except SingularStep:
             return None
 
-    def determinant(self, x: Point, sign: int = 1) -> int:
-        """det(I - eps f'(x)), with sign = -1 det(I + eps f'(x))."""
-        return int((self.map if sign > 0 else self.map.inverse).determinant(x))
+    def determinant(self, x: Point, image: Point) -> tuple[int, int]:
+        """Numerator and denominator of det dPhi(x), as they come: for Kahan maps det(I +- eps f') at x~ and x."""
+        above, below = jacobian_determinant_sides(self.map, x, self.map.point(image))
+        return int(above), int(below)
 
     def pairs(self, count: int) -> Iterator[tuple[Point, Point]]:
         """So many random points with their images. Raises NoPoint where the map has hardly any."""

@@ -47,7 +47,7 @@ def conclude(found: Findings) -> Conclusion:
     measured = f" ({found.degrees.basis})" if found.degrees is not None else ""
     integrals = _count_text(found) if found.integrals_were_counted else "the integrals were not counted"
     period = found.integrals.profile.period if found.integrals is not None else None
-    suffix = "" if found.eps is None else f" All this at eps = {found.eps} only: other eps may differ."
+    suffix = f" All this at eps = {found.eps} only: other eps may differ." if found.eps is not None else ""
     if found.symbols:
         parts = "integrals" if found.densities is None else "integrals and densities"
         suffix += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
@@ -57,7 +57,7 @@ def conclude(found: Findings) -> Conclusion:
 
     if found.degrees is not None and found.degrees.ended == "singular" and len(found.degrees.degrees) == 1:
         return verdict("singular", f"The map is nowhere defined: {found.degrees.message}.")
-    if found.file.system.degree <= 1:
+    if found.file.is_quadratic and found.file.system.degree <= 1:
         closes = "" if period is None else f"; orbits close after {counted(period, 'step')} (measured)"
         return verdict("linear", f"The system is linear, and so is its Kahan map; {integrals}{closes}.")
     if said := contradictions(found):
@@ -200,7 +200,8 @@ def _singularity_lines(found: Findings) -> list[Statement]:
     if len(verdicts) > 1:
         return [Statement(UNDECIDED, f"the eps {values} disagree: {', '.join(sorted(verdicts))}")]
     first = min(found.singularities, key=lambda run: run.followed or 0)
-    lines = [Statement(UNDECIDED if first.verdict == "undecided" else MEASURED, f"{first.text} (eps = {values})")]
+    at = f" (eps = {values})" if found.file.map.has_eps else ""
+    lines = [Statement(UNDECIDED if first.verdict == "undecided" else MEASURED, f"{first.text}{at}")]
     ends = [h.confined_at for run in found.singularities for h in run.hypersurfaces if h.confined_at is not None]
     if ends:
         lines.append(Statement(MEASURED, f"the last confinement comes after {counted(max(ends), 'step')}"))
@@ -232,8 +233,8 @@ def _structure_lines(found: Findings) -> list[Statement]:
         lines.append(Statement(PROVED, f"Hamiltonian with {kind}, H = {H}"))
     elif structures is not None and structures.proved:
         lines.append(Statement(PROVED, f"not Hamiltonian with a constant J: {structures.reason}"))
-    darboux = affine_darboux(found.file.system)
-    if darboux.functions:
+    darboux = affine_darboux(found.file.system) if found.file.is_quadratic else None
+    if darboux is not None and darboux.functions:
         planes = ", ".join(format_polynomial(one.function) for one in darboux.functions)
         lines.append(Statement(PROVED, f"invariant hyperplanes of flow and map: {planes} = 0"))
     if isinstance(found.structure, Structure):

@@ -27,11 +27,13 @@ from kahanmaps.laboratory.cofactors import (
 from kahanmaps.laboratory.darboux_spaces import LARGEST_SPAN, DarbouxSpace, darboux_spaces, gradient_rank
 from kahanmaps.laboratory.hirota_kimura import Profile
 from kahanmaps.laboratory.modular_points import ModularMap, null_space
+from kahanmaps.maps.kahan import KahanMapOver
 
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
 _COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 5, 6: 4}
 _MOST_TERMS = 1000
 NOTHING: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
+_SPARE = 8
 AFFINE = "v.x with v.f(x) = 0"
 _FEW = 20  # with more relations than these, cofactors come first
 
@@ -65,13 +67,10 @@ class Found:
 
 
 def affine_space(map_: ModularMap) -> DarbouxSpace | None:
-    """The span of 1 and the affine integrals: v.x with v.f = 0; None where there are none."""
+    """The span of 1 and the affine integrals v.x, for Kahan maps those with v.f = 0; None where there are none."""
     n, prime = map_.dim, map_.prime
-    local = map_.local
-    columns = [[int(local.tensor[i * n + j, k]) for i in range(n)] for j in range(n) for k in range(j, n)]
-    columns += [[int(local.B[i, j]) for i in range(n)] for j in range(n)]
-    columns.append([int(local.c[i, 0]) for i in range(n)])
-    vectors = null_space(columns, n, prime)
+    changes = [[b - a for a, b in zip(x, image, strict=True)] for x, image in map_.pairs(n + _SPARE)]
+    vectors = null_space(changes, n, prime)
     if not vectors:
         return None
     return DarbouxSpace.spanned_by(n, 1, [[1] + [0] * n, *([0, *vector] for vector in vectors)], prime)
@@ -93,7 +92,8 @@ def search(
 
     affine = affine_space(map_)
     if affine is not None:
-        found.add(Step("affine", 1, None, AFFINE), [affine])
+        text = AFFINE if isinstance(map_.map, KahanMapOver) else "affine integral"
+        found.add(Step("affine", 1, None, text), [affine])
 
     def take_relations(least: int, most: int) -> None:
         sizes = takewhile(lambda size: size < LARGEST_SPAN, profile.nullities)

@@ -1,8 +1,9 @@
 """Lyapunov exponents of float orbits, many at once, by the exact tangent map.
 
-A frame of n tangent vectors goes along with each orbit by dPhi(x) = (I - eps f'(x))^{-1} (I + eps f'(x~)) and is made
-orthonormal again after every step; the logarithms of its lengths add up to the exponents. The tangent map is the exact
-derivative of the map, evaluated in double precision: nothing is differenced.
+A frame of n tangent vectors goes along with each orbit by dPhi(x) = M(x)^{-1} N(x, x~) (implicit.py), which is (I - eps
+f'(x))^{-1} (I + eps f'(x~)) for Kahan maps, and is made orthonormal again after every step; the logarithms of its
+lengths add up to the exponents. The tangent map is the exact derivative of the map, evaluated in double precision:
+nothing is differenced.
 Source: benettin-1980 for the method, petrera-suris-2016, eq. (Jac), for the tangent map.
 """
 
@@ -19,6 +20,8 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError
 from kahanmaps.maps.float_numbers import FloatArray, to_float
+from kahanmaps.maps.implicit import BirationalMap, Equation
+from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MAX_NUMBERS = 20_000_000  # entries of all frames together
@@ -26,16 +29,17 @@ MAX_NUMBERS = 20_000_000  # entries of all frames together
 
 @dataclass(frozen=True, eq=False)
 class Lyapunov:
-    """The exponents of an ensemble in machine numbers, largest first; the time step is 2 eps.
+    """The exponents of an ensemble in machine numbers, largest first.
 
-    `exponents` (orbits, dim) are per unit of time, over all counted steps of the orbits that went through, and `half`
-    the same over the first half of them: how far they differ tells how far they have converged. `log_volume` is the
-    mean of log |det dPhi| per unit of time, computed apart, which the exponents add up to. `ended` counts the orbits
-    that left the range of floats or met a pole; they are in no average. `steps` are those counted, after `transient`
-    steps that were not; fewer than asked for if `stopped` by the clock.
+    `unit` is the time of a step: 2 eps, and 1 for a map without a time step, whose exponents are per step. `exponents`
+    (orbits, dim) are per unit of time, over all counted steps of the orbits that went through, and `half` the same over
+    the first half of them: how far they differ tells how far they have converged. `log_volume` is the mean of log |det
+    dPhi| per unit of time, computed apart, which the exponents add up to. `ended` counts the orbits that left the range
+    of floats or met a pole; they are in no average. `steps` are those counted, after `transient` steps that were not;
+    fewer than asked for if `stopped` by the clock.
     """
 
-    eps: float
+    unit: float
     steps: int
     transient: int
     orbits: int
@@ -48,7 +52,7 @@ class Lyapunov:
     @property
     def per_step(self) -> FloatArray:
         """The exponents for each step instead of a unit of time: 2 eps times as large."""
-        return self.exponents * (2 * self.eps)
+        return self.exponents * self.unit
 
     @property
     def mean(self) -> FloatArray:
@@ -77,7 +81,7 @@ class Lyapunov:
 
 
 def lyapunov_exponents(
-    system: QuadraticSystem,
+    given: QuadraticSystem | BirationalMap,
     eps: Any,
     starts: Any,
     steps: int,
@@ -86,11 +90,12 @@ def lyapunov_exponents(
     seconds: float = 60.0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Lyapunov:
-    """The Lyapunov exponents of the float orbits of the Kahan map from `starts`, an array (orbits, dim) of floats.
+    """The Lyapunov exponents of the float orbits of a map from `starts`, an array (orbits, dim) of floats.
 
-    `eps` is exact, half the time step, of either sign; `steps` steps are counted after `transient` steps, both for at
-    most about `seconds` seconds. Double precision: the numbers carry rounding and, in chaos, only their statistics
-    mean anything. Returns a Lyapunov; raises InputError for eps = 0, no steps and starts of a wrong shape.
+    A system stands for its Kahan map. `eps` is exact, half the time step where there is one, of either sign; `steps`
+    steps are counted after `transient` steps, both for at most about `seconds` seconds. Double precision: the numbers
+    carry rounding and, in chaos, only their statistics mean anything. Returns a Lyapunov; raises InputError for eps =
+    0, no steps and starts of a wrong shape.
     Source: benettin-1980.
 
     >>> oscillator = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
@@ -106,12 +111,13 @@ def lyapunov_exponents(
     if steps < 2 or transient < 0:
         raise InputError(f"found {steps} steps after {transient}, expected at least 2 after 0 or more")
     x: FloatArray = np.array(starts, dtype=np.float64)
-    n = system.dim
+    map_ = as_map(given)
+    n = map_.dim
     if x.ndim != 2 or x.shape[1] != n or len(x) == 0 or not np.isfinite(x).all():
         raise InputError(f"found starts of the shape {x.shape}, expected rows of {n} finite numbers, at least one")
     if len(x) * n * n > MAX_NUMBERS:
         raise InputError(f"found {len(x)} starts, expected at most {MAX_NUMBERS // (n * n)} in dimension {n}")
-    walk = _Walk(system, size, x)
+    walk = _Walk(map_.at(rational(eps)).equation, x)
     end = time.monotonic() + seconds
     done = counted = half_at = 0
     half = walk.sums.copy()
@@ -127,12 +133,13 @@ def lyapunov_exponents(
         if counted == steps // 2:
             half, half_at = walk.sums.copy(), counted
     alive = walk.lanes if counted else walk.lanes[:0]
-    span, first = 2 * size * max(1, counted), 2 * size * max(1, half_at)
+    unit = 2 * size if map_.has_time_step else 1.0
+    span, first = unit * max(1, counted), unit * max(1, half_at)
     order = np.argsort(-walk.sums[alive] / span, axis=1)
     exponents = np.take_along_axis(walk.sums[alive] / span, order, axis=1)
     early = np.take_along_axis(half[alive] / first, order, axis=1)
     return Lyapunov(
-        size,
+        unit,
         counted,
         min(done, transient),
         len(x),
@@ -147,12 +154,14 @@ def lyapunov_exponents(
 class _Walk:
     """Points, frames and sums of logarithms of all orbits; `lanes` are those still going."""
 
-    def __init__(self, system: QuadraticSystem, eps: float, x: FloatArray) -> None:
-        n = system.dim
-        self._eps = eps
-        self._tensor = np.array([[[_double(2 * form[j, k]) for k in range(n)] for j in range(n)] for form in system.Q])
-        self._B = np.array([[_double(system.B[i, j]) for j in range(n)] for i in range(n)])
-        self._c = np.array([_double(entry) for entry in system.c])
+    def __init__(self, equation: Equation, x: FloatArray) -> None:
+        n = equation.dim
+        self._exponents = np.array(equation.exponents, dtype=np.int64)[:, :n]
+        self._coefficients = np.zeros((n, n + 1, len(equation.exponents)))
+        for i, row in enumerate(equation.terms):
+            for j, entry in enumerate(row):
+                for k, coefficient in entry:
+                    self._coefficients[i, j, k] = to_float(coefficient)
         self._x = x
         self._frames = np.broadcast_to(np.eye(n), (len(x), n, n)).copy()
         self.sums = np.zeros((len(x), n))
@@ -164,21 +173,34 @@ class _Walk:
         self.sums[:] = 0.0
         self.volumes[:] = 0.0
 
-    def _jacobians(self, x: FloatArray) -> FloatArray:
-        found: FloatArray = np.tensordot(x, self._tensor, axes=(1, 2)) + self._B
+    def _matrices(self, x: FloatArray) -> FloatArray:
+        """(M | -r) at the points."""
+        monomials = np.prod(x[:, None, :] ** self._exponents, axis=2)
+        found: FloatArray = np.tensordot(monomials, self._coefficients, axes=(1, 2))
+        return found
+
+    def _numerators(self, x: FloatArray, image: FloatArray) -> FloatArray:
+        """N = -(d/dx)(M x~ - r) at fixed x~."""
+        slopes = np.zeros((len(x), *self._exponents.shape))  # of each monomial by each variable
+        for k, exponents in enumerate(self._exponents.T):
+            less = self._exponents.copy()
+            less[:, k] -= exponents > 0
+            slopes[:, :, k] = exponents * np.prod(x[:, None, :] ** less, axis=2)
+        after = np.concatenate([image, np.ones((len(image), 1))], axis=1)
+        found: FloatArray = -(np.einsum("ijk,bj->bik", self._coefficients, after) @ slopes)
         return found
 
     def step(self) -> None:
         """One step of all orbits; those without an image, or with one out of range, end."""
-        x, eps, n = self._x, self._eps, self._x.shape[1]
+        x = self._x
         with np.errstate(all="ignore"):
-            below = np.eye(n) - eps * self._jacobians(x)
-            right = x + eps * (x @ self._B.T + 2 * self._c)
-            sound = np.isfinite(below).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
+            rows = self._matrices(x)
+            below, right = rows[:, :, :-1], -rows[:, :, -1]
+            sound: NDArray[Any] = np.asarray(np.isfinite(rows).all(axis=(1, 2)))
             sound[sound] = np.linalg.det(below[sound]) != 0.0
             image = np.full_like(x, np.nan)
             image[sound] = _solved(below[sound], right[sound][:, :, None])[:, :, 0]
-            above = np.eye(n) + eps * self._jacobians(image)
+            above = self._numerators(x, image)
             sound &= np.isfinite(above).all(axis=(1, 2))
             below, above = below[sound], above[sound]
             frames = _solved(below, above @ self._frames[sound])
@@ -208,10 +230,6 @@ def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
             except np.linalg.LinAlgError:
                 continue
     return found
-
-
-def _double(value: Any) -> float:
-    return to_float(rational(value))
 
 
 def _over_orbits(function: Any, values: FloatArray) -> FloatArray:

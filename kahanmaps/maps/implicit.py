@@ -298,6 +298,11 @@ class BirationalMap(DisplayedAsFormula, ABC):
         return True
 
     @property
+    def kind(self) -> str:
+        """What kind of map it is, with an article."""
+        return f"{'an' if self.title[0] in 'aeiou' else 'a'} {self.title}"
+
+    @property
     @abstractmethod
     def subject(self) -> tuple[Any, ...]:
         """All that determines the map, as `seed_for` takes it."""
@@ -328,9 +333,9 @@ class BirationalMap(DisplayedAsFormula, ABC):
 class ImplicitMap(BirationalMap):
     """The map of M(x, eps) x~ = r(x, eps): `rows` are those of (M | -r).
 
-    Entries are polynomials over Q in the variables, then symbols, if there are any, then eps. `backward` are the rows of the inverse map where they are
-    known; they are not needed where M and r are of degree 1 in the variables. `title` says in a word or two what kind
-    of map it is, `has_time_step` that it approximates a flow for the time 2 eps.
+    Entries are polynomials over Q in the variables, then symbols, if there are any, then eps. `backward` are the rows
+    of the inverse map where they are known; they are not needed where M and r are of degree 1 in the variables. `title`
+    says in a word or two what kind of map it is, `has_time_step` that it approximates a flow for the time 2 eps.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")
@@ -415,7 +420,9 @@ class ImplicitMap(BirationalMap):
 
 
 def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequence[Any]) -> Equation:
-    """The equation of (M | -r) over a field, at values of what stands behind the variables, eps last. Raises BadPrime.
+    """The equation of (M | -r) over a field, at values of what stands behind the variables, eps last.
+
+    Raises BadPrime.
     """
     rows = list(rows)
     n = len(rows)

@@ -1,12 +1,13 @@
-"""The Kahan map on all points of P^n over GF(p), as arrays: images, and the graph that they make.
+"""A map on all points of P^n over GF(p), as arrays: images, and the graph that they make.
 
 Points are columns of n + 1 residues whose last coordinate that is not zero is 1, numbered from 0: first those with
-X_1 = ... = 0, the affine space Z = 1 last. An image is the kernel vector of a matrix of linear forms (projective.py);
+X_1 = ... = 0, the affine space Z = 1 last. An image is the kernel vector of a matrix of forms (projective.py);
 where it vanishes, the forms without common factor decide, and where those vanish too, the map has no value.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isqrt
 from typing import Any
@@ -17,8 +18,9 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.errors import InputError
-from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.projective import homogeneous_map, linear_forms
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Integers = NDArray[np.int64]
@@ -30,10 +32,10 @@ _CHUNK = 1 << 15
 
 
 class ProjectiveMap:
-    """The Kahan map of a system at one exact eps (half the time step) on P^n over GF(p), 2 < p < 2^29; exact.
+    """A map at one exact eps on P^n over GF(p), 2 < p < 2^29; a system stands for its Kahan map. Exact.
 
     `factor` is the common factor of the n + 1 forms as text ("1": there is none), None where it was not looked for;
-    `degree` the degree of the forms without it; `is_undefined` says that det(I - eps f'(x)) vanishes identically.
+    `degree` the degree of the forms without it; `is_undefined` says that det M(x) vanishes identically.
     Raises InputError for a prime or dimension out of range, BadPrime where eps or the system have no reduction.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
@@ -42,26 +44,24 @@ class ProjectiveMap:
     (57, [2, 1, 0])
     """
 
-    def __init__(self, system: QuadraticSystem, eps: Any, prime: int) -> None:
-        field = GF(prime)
+    def __init__(self, given: QuadraticSystem | BirationalMap, eps: Any, prime: int) -> None:
+        field, map_ = GF(prime), as_map(given)
         if not 2 < prime < MAX_PRIME:
             raise InputError(
                 f"found the prime {prime}, expected one from 3 to {MAX_PRIME}"
                 + (": modulo 2 every Kahan map is the identity" if prime == 2 else "")
             )
-        if system.dim > MAX_DIMENSION:
-            raise InputError(f"found a system of dimension {system.dim}, expected at most {MAX_DIMENSION}")
-        self.prime, self.dim = prime, system.dim
-        self._forms = np.array(
-            [[[int(e) for e in entry] for entry in row] for row in linear_forms(KahanMap(system, eps, field))],
-            dtype=np.int64,
-        )
+        if map_.dim > MAX_DIMENSION:
+            raise InputError(f"found a map of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
+        self.prime, self.dim = prime, map_.dim
+        over = map_.at(eps, field)
+        self._equation = over.equation
         self.factor: str | None = None
-        self.degree = system.dim
+        self.degree = map_.dim * self._equation.degree
         self.is_undefined = False
         self._reduced: list[list[tuple[tuple[int, ...], int]]] | None = None
-        if system.dim <= MAX_FACTORED:
-            forms, factor = homogeneous_map(KahanMap(system, eps, field))
+        if map_.dim <= MAX_FACTORED:
+            forms, factor = homogeneous_map(over)
             self.factor = str(factor)
             self.is_undefined = bool(forms[-1].is_zero())
             self.degree = max((int(form.total_degree()) for form in forms if not form.is_zero()), default=0)
@@ -75,17 +75,18 @@ class ProjectiveMap:
 
     def images(self, points: Integers) -> Integers:
         """The images of points in columns, normalised; a column of zeros where the map has no value."""
-        p, n = self.prime, self.dim
+        p = self.prime
         found = np.empty_like(points)
         for low in range(0, points.shape[1], _CHUNK):
             X = points[:, low : low + _CHUNK]
+            monomials = [self._monomial(X, exponents) for exponents in self._equation.exponents]
             rows: list[list[Integers]] = []
-            for i in range(n):
+            for row in self._equation.terms:
                 entries = []
-                for j in range(n + 1):
+                for entry in row:
                     total = np.zeros(X.shape[1], dtype=np.int64)
-                    for k in np.flatnonzero(self._forms[i, j]):
-                        total = (total + self._forms[i, j, k] * X[k]) % p
+                    for k, coefficient in entry:
+                        total = (total + int(coefficient) * monomials[k]) % p
                     entries.append(total)
                 rows.append(entries)
             image = np.stack([entry % p for entry in kernel_minors(rows, lambda a, b: a * b % p)])
@@ -100,12 +101,16 @@ class ProjectiveMap:
         values = np.zeros_like(X)
         for i, terms in enumerate(self._reduced or []):
             for exponents, coefficient in terms:
-                term = np.full(X.shape[1], coefficient, dtype=np.int64)
-                for k, exponent in enumerate(exponents):
-                    for _ in range(exponent):
-                        term = term * X[k] % self.prime
-                values[i] = (values[i] + term) % self.prime
+                values[i] = (values[i] + coefficient * self._monomial(X, exponents)) % self.prime
         return values
+
+    def _monomial(self, X: Integers, exponents: Sequence[int]) -> Integers:
+        """The values of a monomial at the columns of X."""
+        value = np.ones(X.shape[1], dtype=np.int64)
+        for row, exponent in zip(X, exponents, strict=True):
+            for _ in range(exponent):
+                value = value * row % self.prime
+        return value
 
     def normalised(self, X: Integers) -> Integers:
         """The columns divided by their last coordinate that is not zero; columns of zeros stay."""

@@ -184,7 +184,7 @@ def _structure(
     if method == "generic":
         return NoStructure("not looked for")
     if not isinstance(map_, Kahan) or map_.system.symbols:
-        return NoStructure(f"it is an {map_.title}" if map_.title[0] in "aeiou" else f"it is a {map_.title}")
+        return NoStructure(f"it is {map_.kind}")
     if method is None and (reason := _why_not_to_look(map_, start, eps, steps, arithmetic, member)):
         return NoStructure(reason)
     structure = structure_of(map_.system, hamiltonian, member)

@@ -24,7 +24,7 @@ from kahanmaps.algebra.fields import RR, rational
 from kahanmaps.algebra.text import format_number
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import HypothesisError, InputError
-from kahanmaps.family.structure import NoStructure, structure_of
+from kahanmaps.family.structure import NoStructure
 from kahanmaps.maps.planar_block import PlanarBlock, Triple
 from kahanmaps.maps.splitting import Splitting
 from kahanmaps.plots.plane_cubics import PlaneCubic
@@ -118,7 +118,7 @@ def find_invariant_curves(
     epsilon = rational(eps)
     if epsilon == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
-    structure = structure_of(file.system, file.hamiltonian, file.member)
+    structure = file.structure
     if isinstance(structure, NoStructure):
         raise HypothesisError(
             f"{file.name} has no normal form whose planes could be drawn: {structure.reason}; expected a member of "

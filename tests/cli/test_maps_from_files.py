@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 from schema_helpers import mistakes
 
+from kahanmaps.checks.settings import NO_EPS
 from kahanmaps.documents.files import read_system
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
@@ -51,10 +53,38 @@ def test_backward_steps_need_an_inverse(kahanmaps, tmp_path):
     assert "the inverse of this map is not known" in found.err
 
 
+@pytest.mark.parametrize("path", EXAMPLES, ids=NAMES)
 @pytest.mark.parametrize(
-    "command", ["analyze", "find-integrals", "heights --eps 1/10", "ensemble --eps 1 --random 2 --steps 1"]
+    ("command", "schema"),
+    [
+        ("analyze --seconds 3", "analyze"),
+        ("find-integrals --seconds 5 --max-degree 4", "find-integrals"),
+        ("find-integrals --darboux 2", "darboux-polynomials"),
+        ("find-integrals --monomials 'q,p,1'", "hirota-kimura"),
+        ("find-density --seconds 5 --max-degree 4", "find-density"),
+        ("heights --eps 1/10 --steps 8 --random 1", "heights"),
+        ("ensemble --eps 1/10 --random 3 --box 1/4 --steps 5", "ensemble"),
+        ("ensemble --eps 1/10 --random 3 --steps 5 --arithmetic mod:10007", "ensemble"),
+        ("lyapunov --eps 1/10 --random 2 --box 1/8 --steps 20", "lyapunov"),
+        ("cycles --prime 7 --eps 1/3", "cycles"),
+    ],
 )
+def test_what_is_found_out_about_any_map(kahanmaps, path, command, schema):
+    file = read_system(path)
+    command = command.replace("q,p", ",".join(file.variables))
+    found = kahanmaps(f"{command} {path} --json -q")
+    assert found.status in (0, 3)
+    record = json.loads(found.out)
+    schema = "find-integrals" if schema in ("darboux-polynomials", "hirota-kimura") else schema
+    assert mistakes(schema, record) == []
+    if not file.map.has_eps:
+        assert record["convention"] == NO_EPS
+    plain = kahanmaps(f"{command} {path} -q").out
+    assert bool(re.search(r"\beps\b", plain)) == file.map.has_eps
+
+
+@pytest.mark.parametrize("command", ["find-symmetry", "find-commuting", "check-poisson", "period --start 1,2 --eps 1"])
 def test_other_commands_say_that_they_are_for_quadratic_systems(kahanmaps, command):
     found = kahanmaps(f"{command} {EXAMPLES[NAMES.index('mcmillan')]}")
     assert found.status == 2
-    assert "mcmillan is of kind [map], expected a quadratic system of its own" in " ".join(found.err.split())
+    assert "field" in found.err or "Hamiltonian" in found.err

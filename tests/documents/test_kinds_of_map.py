@@ -87,7 +87,7 @@ def test_a_change_of_time_changes_no_degree():
 def test_what_is_for_quadratic_systems_says_which_kind_of_map_it_found(name):
     file = example(name)
     for ask in (lambda: file.system, lambda: with_symbols(file), lambda: with_symbols(file, list(file.parameters))):
-        with pytest.raises(InputError, match="expected a quadratic system of its own"):
+        with pytest.raises(InputError, match="expected a quadratic vector field"):
             ask()
     with pytest.raises(InputError, match=f"{file.name} is of kind .{file.kind}.: Pi"):
         check_poisson(file)

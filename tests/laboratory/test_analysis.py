@@ -476,5 +476,5 @@ def test_what_is_said_of_singularities(runs, expected):
         )
         for eps, verdict, followed, ends in runs
     ]
-    lines = report._singularity_lines(SimpleNamespace(singularities=found))
+    lines = report._singularity_lines(SimpleNamespace(singularities=found, file=load("euler_top")))
     assert [(str(line.status), line.text) for line in lines] == expected

@@ -238,7 +238,7 @@ def test_simple_systems(file, texts, period):
 def test_maps_that_are_periodic_at_an_eps(file, eps, period):
     found = find_integrals(file, eps=eps)
     assert (found.profile.period, len(found.integrals)) == (period, file.system.dim)
-    assert found.note == closing_note(period, found.eps)
+    assert found.note == closing_note(period, found.eps, file.map)
     assert "nothing follows for other eps" in found.to_json()["note"]
     for one in found.integrals:
         assert one.evidence.summary.endswith(f"for eps = {eps}")

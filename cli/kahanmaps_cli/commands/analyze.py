@@ -70,13 +70,12 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
 
 
 def _title(found: Analysis) -> str:
-    if found.eps is None:
-        step = "every eps (the time step is 2 eps)"
-    else:
-        step = f"eps = {found.eps} (time step 2 eps = {2 * found.eps})"
+    from kahanmaps.checks.settings import eps_record, eps_words
+
+    step = eps_words(eps_record(found.eps, found.file.map))
     values = "".join(f", {name} = {value}" for name, value in found.file.parameters.items())
     formulas = f"; formulas for every {', '.join(found.symbols)}" if found.symbols else ""
-    return f"{found.file.name}, dimension {found.dim}{values}, {step}{formulas}"
+    return f"{found.file.name}, dimension {found.dim}{values}{step}{formulas}"
 
 
 def _print(found: Analysis) -> None:
@@ -91,13 +90,10 @@ def _print(found: Analysis) -> None:
 
 
 def _print_markdown(found: Analysis) -> None:
-    from kahanmaps.algebra.text import format_polynomial
     from kahanmaps.display.markup import code, markdown
 
     lines = [f"# {markdown(_title(found))}", "", "```"]
-    for variable, polynomial in zip(found.file.variables, found.file.system.rhs, strict=True):
-        lines.append(f"{variable}' = {format_polynomial(polynomial)}")
-    lines += ["```", "", f"**{markdown(found.conclusion.sentence)}**", ""]
+    lines += [*str(found.file.map).split("\n"), "```", "", f"**{markdown(found.conclusion.sentence)}**", ""]
     for name, told in found.sections:
         lines += [f"## {name}", ""]
         lines += [f"* *{one.status}*: {(code if '=' in one.text else markdown)(one.text)}" for one in told]

@@ -70,14 +70,18 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         raise click.UsageError("missing --prime P, or -p P")
     parameters = [pair for pair in options["parameters"] if pair[0]]
     file = load_system(system, options["variables"], options["rhs"], parameters)
-    reversor = _matrix(options["reversor"]) if options["reversor"] is not None else find_reversor(file.system)
+    reversor = None
+    if options["reversor"] is not None:
+        reversor = _matrix(options["reversor"])
+    elif file.is_quadratic:
+        reversor = find_reversor(file.system)
     runs: list[tuple[Census, Comparison]] = []
     with Progress(quiet) as progress:
         for prime in dict.fromkeys(options["primes"]):
             values = [*options["eps"], *(step / 2 for step in options["time_step"])] or default_eps(prime)
-            for eps in values:
+            for eps in values if file.map.has_eps else [1]:
                 census = cycle_census(
-                    file.system,
+                    file.map,
                     eps,
                     prime,
                     reversor=reversor,
@@ -128,12 +132,15 @@ def _print(
 ) -> None:
     from kahanmaps.algebra.text import format_number
 
-    tell(f"# {file.name}, the Kahan map on P^{file.system.dim} over GF(p), eps is half the time step")
+    what = "the Kahan map" if file.is_quadratic else file.map.kind
+    step = ", eps is half the time step" if file.map.has_time_step else ""
+    tell(f"# {file.name}, {what} on P^{file.dim} over GF(p){step}")
     rows = _rows(reversor)
     shown = "none known" if rows is None else ";".join(",".join(row) for row in rows)
     tell(f"reversing symmetry\t{shown}")
     for census, found in runs:
-        tell(f"\n# p = {census.prime}, eps = {format_number(census.eps)}")
+        at = f", eps = {format_number(census.eps)}" if file.map.has_eps else ""
+        tell(f"\n# p = {census.prime}{at}")
         for name, text in _lines(census):
             tell(f"{name}\t{text}")
         for law, reason in found.reasons.items():
@@ -147,10 +154,8 @@ def _lines(census: Census) -> list[tuple[str, str]]:
         lines.append(("map", "singular everywhere modulo this prime"))
     elif census.factor is None:
         lines.append(("map", f"forms of degree {census.degree}; a common factor was not looked for"))
-    elif census.degree < census.dim:
-        lines.append(
-            ("map", f"forms of degree {census.degree}, a factor of degree {census.dim - census.degree} divided out")
-        )
+    elif census.factor != "1":
+        lines.append(("map", f"forms of degree {census.degree}, a common factor divided out"))
     lines += [("lost", str(census.lost)), ("falling", str(census.falling))]
     lines.append(
         ("transient", str(census.transient))
@@ -180,14 +185,14 @@ def _record(
     common: list[str],
 ) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.checks.settings import convention
     from kahanmaps.version import __version__
 
     return {
         "command": "cycles",
         "version": __version__,
         "system": file.name,
-        "convention": CONVENTION,
+        "convention": convention(file.map),
         "arithmetic": "exact modulo primes",
         "seed": options["seed"],
         "samples": options["samples"],
@@ -199,7 +204,7 @@ def _record(
             {
                 "prime": census.prime,
                 "eps": format_number(census.eps),
-                "time_step": format_number(2 * census.eps),
+                "time_step": format_number(2 * census.eps) if file.map.has_time_step else None,
                 "points": str(census.points),
                 "complete": census.complete,
                 "looked_at": census.looked_at,

@@ -12,13 +12,13 @@ from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, FloatRun, ModularRun, Run
 from kahanmaps_cli.ensemble_starts import drawn, read_starts
 from kahanmaps_cli.options import (
     backward_option,
+    eps_of,
     eps_options,
     integral_option,
     load_system,
     output_options,
     random_starts_options,
     system_options,
-    the_eps,
 )
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic
@@ -77,24 +77,28 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
     Exit status: 0 all orbits completed, 2 wrong use, 3 some ended early, 130 interrupted.
     """
+    from flint import fmpq
+
+    from kahanmaps.algebra.fields import GF, QQ
     from kahanmaps.family.structure import NoStructure
 
-    eps = the_eps(options["eps"], options["time_step"])
     _require_sense(system, options)
     kind, prime = options["arithmetic"]
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     integrals = _integrals(options["integrals"], file)
-    _require_map(file, eps, kind, prime)
+    eps = eps_of(file, options)
+    number = fmpq(1) if eps is None else eps
+    file.map.at(number, GF(prime) if kind == "mod" else QQ)  # the demands on eps and the prime, in the words of orbit
     if options["starts"] is not None:
         starts = read_starts(options["starts"], file.variables, prime if kind == "mod" else None)
     else:
         box = 1 if options["box"] is None else options["box"]
         seed = options["seed"] or 0
-        starts = drawn(options["count"], file.system.dim, box, seed, prime if kind == "mod" else None)
+        starts = drawn(options["count"], file.dim, box, seed, prime if kind == "mod" else None)
     structure = structure_for(file, options["method"])
     form = None if isinstance(structure, NoStructure) else structure.form
     made = ModularRun if kind == "mod" else FloatRun
-    run: Run = made(file, eps, starts, form, integrals, options["steps"], options)
+    run: Run = made(file, number, starts, form, integrals, options["steps"], options)
     if verbose and not quiet:
         why = structure.reason if isinstance(structure, NoStructure) else structure.text
         say(f"method {run.method}: {why}; kernel {run.kernel}")
@@ -149,14 +153,6 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
 
 
-def _require_map(file: SystemFile, eps: Any, kind: str, prime: int) -> None:
-    """The demands of single orbits on eps and the prime, in the same words."""
-    from kahanmaps.algebra.fields import GF, QQ
-    from kahanmaps.maps.kahan import KahanMap
-
-    KahanMap(file.system, eps, GF(prime) if kind == "mod" else QQ)
-
-
 def _integrals(requests: tuple[tuple[str, str], ...], file: SystemFile) -> dict[str, RationalFunction]:
     from kahanmaps.algebra.text import parse_rational_function
 
@@ -180,9 +176,11 @@ def _arithmetic(options: dict[str, Any]) -> str:
 
 def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> None:
     """Tab-separated lines, aligned on a terminal."""
+    from kahanmaps.checks.settings import eps_record, eps_words
+
     backward = ", backward" if options["backward"] else ""
     arithmetic = _arithmetic(options)
-    tell(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), {arithmetic} arithmetic{backward}")
+    tell(f"# {file.name}{eps_words(eps_record(eps, file.map))}, {arithmetic} arithmetic{backward}")
     rows = [("orbits", str(run.shape[0])), ("steps", str(run.reached)), ("kernel", run.kernel)]
     rows += [(word, str(number)) for word, number in run.counts.items()]
     near = run.near()
@@ -201,7 +199,7 @@ def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> Non
 
 def _record(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.checks.settings import eps_record
     from kahanmaps.version import __version__
 
     steps, output = options["steps"], options["output"]
@@ -215,9 +213,7 @@ def _record(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> di
         "version": __version__,
         "system": file.name,
         "variables": list(file.variables),
-        "eps": format_number(eps),
-        "time_step": format_number(2 * eps),
-        "convention": CONVENTION,
+        **eps_record(eps, file.map),
         "arithmetic": _arithmetic(options),
         "method": run.method,
         "kernel": run.kernel,

@@ -106,8 +106,9 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
     if options["as_json"]:
         print_json({**heading("darboux-polynomials", found), **found.to_json(), "document": dict(file.document)})
     else:
-        tell(f"Darboux polynomials: {file.name}, {scope(found)}")
-        tell("P(x~) = C P(x), C a product of C[g] = g(x~, -eps)/g(x, eps); spaces spanned by products left out")
+        tell(f"Darboux polynomials: {file.name}{scope(found)}")
+        meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(found.cofactors) else ""
+        tell(f"P(x~) = C P(x){meaning}; spaces spanned by products left out")
         for space in found.spaces:
             tell(f"C = {space.cofactor}")
             for P in space.polynomials:
@@ -150,7 +151,7 @@ def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
                 rows.append(hirota_kimura_basis(laboratory.maps, functions, parts))
         except NoPoint as error:
             reason = str(error)
-    note = closing_note(next((row.period for row in rows if row.period), None), laboratory.eps)
+    note = closing_note(next((row.period for row in rows if row.period), None), laboratory.eps, file.map)
     if options["as_json"]:
         print_json(
             {
@@ -164,8 +165,8 @@ def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
             }
         )
         return 3 if reason else 0
-    step = "generic eps" if laboratory.eps is None else scope(laboratory)
-    tell(f"Hirota-Kimura bases: {file.name}, {step}, measured on two orbits modulo each of two primes")
+    step = ", generic eps" if laboratory.eps is None and file.map.has_eps else scope(laboratory)
+    tell(f"Hirota-Kimura bases: {file.name}{step}, measured on two orbits modulo each of two primes")
     for row in rows:
         tell(f"dimension {row.dimension}\t{', '.join(row.functions)}")
         for vector in row.constant:

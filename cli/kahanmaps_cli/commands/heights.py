@@ -70,7 +70,6 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     over.
     """
     from kahanmaps.errors import InputError
-    from kahanmaps.family.structure import structure_of
     from kahanmaps.invariants.heights import Growth
     from kahanmaps.laboratory.height_survey import DEFAULT_STARTS, height_survey
 
@@ -82,13 +81,13 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
     with Progress(quiet) as progress:
         found = height_survey(
-            file.system,
+            file.map,
             eps,
             starts=options["given"] or (DEFAULT_STARTS if options["count"] is None else options["count"]),
             steps=options["steps"],
             max_digits=options["max_digits"],
             seconds=options["seconds"],
-            structure=structure_of(file.system, file.hamiltonian, file.member),
+            structure=file.structure,
             seed=options["seed"],
             progress=progress,
         )
@@ -105,17 +104,22 @@ def _print(file: SystemFile, found: HeightSurvey) -> None:
     from kahanmaps.algebra.text import format_number
 
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
-    each = ", ".join(f"{value} (time step 2 eps = {2 * value})" for value in values)
-    tell(f"# {file.name}, eps = {each}, exact arithmetic: measured, not proved")
+    if file.map.has_time_step:
+        each = ", ".join(f"{value} (time step 2 eps = {2 * value})" for value in values)
+    else:
+        each = ", ".join(map(str, values))
+    eps = f", eps = {each}" if file.map.has_eps else ""
+    tell(f"# {file.name}{eps}, exact arithmetic: measured, not proved")
     for orbit in found.orbits:
         point = ",".join(format_number(entry) for entry in orbit.start)
-        tell("\t".join(["orbit", f"eps {orbit.eps}", f"start {point}", orbit.growth.text]))
+        eps_column = [f"eps {orbit.eps}"] if file.map.has_eps else []
+        tell("\t".join(["orbit", *eps_column, f"start {point}", orbit.growth.text]))
     tell(f"heights\t{found.text}")
 
 
 def _record(file: SystemFile, options: dict[str, Any], found: HeightSurvey) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.checks.settings import convention
     from kahanmaps.version import __version__
 
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
@@ -124,8 +128,8 @@ def _record(file: SystemFile, options: dict[str, Any], found: HeightSurvey) -> d
         "version": __version__,
         "system": file.name,
         "eps": [format_number(value) for value in values],
-        "time_step": [format_number(2 * value) for value in values],
-        "convention": CONVENTION,
+        "time_step": [format_number(2 * value) for value in values if file.map.has_time_step],
+        "convention": convention(file.map),
         "arithmetic": "exact",
         "seed": options["seed"],
         "steps": options["steps"],

@@ -9,13 +9,13 @@ import click
 
 from kahanmaps_cli.ensemble_starts import drawn, read_starts
 from kahanmaps_cli.options import (
+    eps_of,
     eps_options,
     load_system,
     output_options,
     random_starts_options,
     seconds_option,
     system_options,
-    the_eps,
 )
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
@@ -53,23 +53,25 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 all orbits went through, 2 wrong use, 3 some ended early or the clock stopped all.
     """
+    from flint import fmpq
+
     from kahanmaps.maps.float_lyapunov import lyapunov_exponents
 
-    eps = the_eps(options["eps"], options["time_step"])
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]
     _require_sense(options, steps, transient)
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    eps = eps_of(file, options)
     if options["starts"] is not None:
         starts = read_starts(options["starts"], file.variables, None)
     else:
         count = _DEFAULT_STARTS if options["count"] is None else options["count"]
         box = 1 if options["box"] is None else options["box"]
-        starts = drawn(count, file.system.dim, box, options["seed"] or 0, None)
+        starts = drawn(count, file.dim, box, options["seed"] or 0, None)
     with Progress(quiet) as progress:
         found = lyapunov_exponents(
-            file.system,
-            eps,
+            file.map,
+            fmpq(1) if eps is None else eps,
             starts,
             steps,
             transient=transient,
@@ -97,13 +99,18 @@ def _require_sense(options: dict[str, Any], steps: int, transient: int) -> None:
 
 
 def _print(file: SystemFile, eps: Any, found: Lyapunov) -> None:
-    tell(f"# {file.name}, eps = {eps} (time step 2 eps = {2 * eps}), double precision")
+    from kahanmaps.checks.settings import eps_record, eps_words
+
+    tell(f"# {file.name}{eps_words(eps_record(eps, file.map))}, double precision")
     tell(f"orbits\t{found.orbits - found.ended} of {found.orbits}")
     tell(f"steps\t{found.steps} after {found.transient}")
-    columns = zip(found.mean, found.mean * (2 * found.eps), found.spread, found.change, strict=True)
-    rows = [[str(k), *(f"{number:.6g}" for number in numbers)] for k, numbers in enumerate(columns, 1)]
-    first = "exponent" if on_terminal() else "# exponent"
-    print_table([[first, "per unit of time", "per step", "spread", "change from half"], *rows])
+    columns = {"per unit of time": found.mean} if file.map.has_time_step else {}
+    columns |= {"per step": found.mean * found.unit, "spread": found.spread, "change from half": found.change}
+    rows = [
+        [str(k), *(f"{number:.6g}" for number in numbers)]
+        for k, numbers in enumerate(zip(*columns.values(), strict=True), 1)
+    ]
+    print_table([["exponent" if on_terminal() else "# exponent", *columns], *rows])
     volume = found.log_volume.mean() if len(found.log_volume) else float("nan")
     tell(f"sum\t{found.mean.sum():.6g}")
     tell(f"log |det dPhi|\t{volume:.6g}\tresidual {found.residual:.2g}")
@@ -116,7 +123,7 @@ def _numbers(values: Any) -> list[float | None]:
 
 def _record(file: SystemFile, eps: Any, options: dict[str, Any], found: Lyapunov) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.checks.settings import eps_record
     from kahanmaps.version import __version__
 
     random = options["starts"] is None
@@ -126,9 +133,7 @@ def _record(file: SystemFile, eps: Any, options: dict[str, Any], found: Lyapunov
         "version": __version__,
         "system": file.name,
         "variables": list(file.variables),
-        "eps": format_number(eps),
-        "time_step": format_number(2 * eps),
-        "convention": CONVENTION,
+        **eps_record(eps, file.map),
         "arithmetic": "float",
         "starts": {"random": found.orbits, "box": box} if random else {"file": options["starts"]},
         "seed": (options["seed"] or 0) if random else None,
@@ -140,7 +145,7 @@ def _record(file: SystemFile, eps: Any, options: dict[str, Any], found: Lyapunov
         "transient": found.transient,
         "stopped": found.stopped,
         "per_time": _numbers(found.mean),
-        "per_step": _numbers(found.mean * (2 * found.eps)),
+        "per_step": _numbers(found.mean * found.unit),
         "spread": _numbers(found.spread),
         "change_from_half": _numbers(found.change),
         "sum": _numbers([found.mean.sum()])[0],

@@ -16,13 +16,12 @@ import click
 from kahanmaps_cli.numbers import json_float, short_float
 from kahanmaps_cli.options import (
     backward_option,
+    eps_of,
     eps_options,
     integral_option,
     load_system,
     quiet_option,
-    require_eps,
     system_options,
-    the_eps,
 )
 from kahanmaps_cli.orbit_formats import Csv, JsonLines, Npz, OutputFull, Text, Writer
 from kahanmaps_cli.orbit_run import OrbitRun
@@ -100,7 +99,6 @@ def command(
 
     Exit status: 0 done, 2 wrong use, 3 stopped early (singular point, digit budget, ...), 130 interrupted.
     """
-    eps = the_eps(options["eps"], options["time_step"], required=False)
     steps, at, every = options["steps"], options["at"], options["every"]
     if (steps is None) == (at is None):
         raise click.UsageError("give --steps N or --at N1,N2,..., one of the two")
@@ -115,8 +113,7 @@ def command(
     from kahanmaps.maps.orbits import OrbitEnd
 
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
-    require_eps(file, eps)
-    eps = eps if file.map.has_eps else None
+    eps = eps_of(file, options)
     if options["accuracy"] is not None and options["arithmetic"] != ("ball", 0):
         raise click.UsageError("--accuracy is for --arithmetic ball:auto")
     if options["kernel"] is not None and options["arithmetic"][0] != "float":

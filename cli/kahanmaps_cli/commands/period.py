@@ -96,9 +96,9 @@ def _require_point(file: SystemFile, eps: Any, start: Any, kind: str, prime: int
 
 def _structure(file: SystemFile) -> Structure | str:
     """The normal form, or why there is none."""
-    from kahanmaps.family.structure import NoStructure, structure_of
+    from kahanmaps.family.structure import NoStructure
 
-    structure = structure_of(file.system, file.hamiltonian, file.member)
+    structure = file.structure
     return structure.reason if isinstance(structure, NoStructure) else structure
 
 

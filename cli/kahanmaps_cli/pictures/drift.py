@@ -76,13 +76,13 @@ def command(system: str | None, **options: Any) -> int:
 
 def _surveyed(file: SystemFile, eps: Any, options: dict[str, Any]) -> DriftSurvey:
     from kahanmaps.errors import InputError
-    from kahanmaps.family.structure import NoStructure, structure_of
+    from kahanmaps.family.structure import NoStructure
     from kahanmaps.plots.drift import METHODS, small_start, survey_drift
 
     if eps == 0:
         raise InputError("found eps = 0, expected another number: nothing moves")
     functions = _functions(file, eps, options)
-    structure = structure_of(file.system, file.hamiltonian, file.member)
+    structure = file.structure
     form = None
     if isinstance(structure, NoStructure):
         reason = structure.reason

@@ -83,20 +83,19 @@ def command(system: str | None, **options: Any) -> int:
 
 def _surveyed(file: SystemFile, options: dict[str, Any]) -> HeightSurvey:
     from kahanmaps.errors import InputError
-    from kahanmaps.family.structure import structure_of
     from kahanmaps.laboratory.height_survey import DEFAULT_STARTS, height_survey
 
     if options["max_digits"] < 1:
         raise InputError(f"found --max-digits {options['max_digits']}, expected at least 1")
     with Progress(options["quiet"]) as progress:
         return height_survey(
-            file.system,
+            file.map,
             the_eps(options["eps"], options["time_step"], required=False),
             starts=options["given"] or (DEFAULT_STARTS if options["count"] is None else options["count"]),
             steps=options["steps"],
             max_digits=options["max_digits"],
             seconds=options["seconds"],
-            structure=structure_of(file.system, file.hamiltonian, file.member),
+            structure=file.structure,
             seed=options["seed"],
             progress=progress,
         )
