@@ -6,6 +6,8 @@
 PYTHON ?=
 ARGS ?=
 export PYTHON
+# Tests start hundreds of processes; none of them is to compile what another has compiled.
+unexport PYTHONDONTWRITEBYTECODE
 
 python := .venv/bin/python
 

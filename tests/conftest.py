@@ -2,9 +2,27 @@
 
 from __future__ import annotations
 
+import gc
+from collections.abc import Iterator
+
+import pytest
 from hypothesis import HealthCheck, settings
 
 # No deadline: exact numbers vary in size, and the time of one example with them, the more so on a busy machine; nor a
 # complaint that examples are drawn slowly, which there is no reason for but the same.
 settings.register_profile("kahanmaps", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("kahanmaps")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Collecting makes half a million objects that stay to the end: no search for garbage among them, then or later.
+
+    This saves a third of the time of collecting, and a tenth of that of the tests.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
