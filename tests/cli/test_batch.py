@@ -10,6 +10,7 @@ import io
 import json
 import os
 import re
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -20,6 +21,8 @@ from pathlib import Path
 
 import pytest
 from cli_helpers import COMMAND, Outcome, environment, shell, terminal
+
+import kahanmaps as km
 
 FAULTS = Path(__file__).parent.parent / "experiments"
 SPACE = """
@@ -63,6 +66,21 @@ def batch(kahanmaps: Callable[..., Outcome]) -> Callable[..., Outcome]:
         return kahanmaps("batch", *words)
 
     return run
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with SPACE as study.toml, and its results in study.db."""
+    folder = tmp_path_factory.mktemp("space")
+    (folder / "study.toml").write_text(SPACE)
+    list(km.run(folder / "study.toml", folder / "study.db"))
+    return folder
+
+
+@pytest.fixture
+def space(results: Path, tmp_path: Path) -> None:
+    """Both files where the test runs."""
+    shutil.copytree(results, tmp_path, dirs_exist_ok=True)
 
 
 def test_a_batch_runs_and_says_where_the_results_are(batch):
@@ -136,8 +154,7 @@ def test_a_dry_run_shows_a_second_system_by_its_name_and_one_task_as_one(batch):
     assert done.rows[1][3].startswith("other=lorenz s=10 r=28 b=8/3 steps=10 ")
 
 
-def test_a_dry_run_with_a_database_says_what_is_missing(batch):
-    batch("run", SPACE, "-q")
+def test_a_dry_run_with_a_database_says_what_is_missing(batch, space):
     wider = SPACE.replace("0..2", "0..4")
     assert batch("run", wider, "--dry-run").out.endswith("10 tasks, 4 of them without result\n")
     assert batch("run", wider, "--dry-run --db study.db --json").json["missing"] == 4
@@ -185,35 +202,30 @@ def test_absurd_products_are_refused_and_may_be_allowed(batch):
         ("tasks orbot", "did you mean orbit?"),
     ],
 )
-def test_wrong_use_is_status_2_and_a_sentence(batch, words: str, message: str):
-    batch("run", SPACE, "-q")
+def test_wrong_use_is_status_2_and_a_sentence(batch, words: str, message: str, space):
     done = batch(words)
     assert done.status == 2
     assert message in done.err
     assert "Traceback" not in done.err
 
 
-def test_status_may_be_asked_in_json(batch):
-    batch("run", SPACE, "-q")
+def test_status_may_be_asked_in_json(batch, space):
     data = batch("status --db study.db --json").json
     assert data["experiments"][0]["outcomes"] == {"ok": 6}
     assert data["unplanned"] == 0
 
 
-def test_results_that_no_experiment_asks_for_are_told(batch):
-    batch("run", SPACE, "-q")
+def test_results_that_no_experiment_asks_for_are_told(batch, space):
     batch("run", SPACE.replace("2..3", "3..3"), "-q")
     assert "3 more results belong to tasks that no experiment has now" in batch("status --db study.db").out
 
 
-def test_the_database_may_be_named_in_the_environment(batch, monkeypatch: pytest.MonkeyPatch):
-    batch("run", SPACE, "-q")
+def test_the_database_may_be_named_in_the_environment(batch, monkeypatch: pytest.MonkeyPatch, space):
     monkeypatch.setenv("KAHANMAPS_DB", "study.db")
     assert batch("status").status == 0
 
 
-def test_show_has_all_that_is_known_of_a_task(batch):
-    batch("run", SPACE, "-q")
+def test_show_has_all_that_is_known_of_a_task(batch, space):
     key = batch("export --db study.db --jsonl").records[1]["key"]
     shown = dict(line.split("\t", 1) for line in batch(f"show {key[:8]} --db study.db").out.splitlines())
     assert shown["task"] == "family-space"
@@ -244,8 +256,7 @@ def test_a_task_can_be_redone_from_what_show_prints(batch):
     assert again == data["result"]
 
 
-def test_export_writes_a_table_or_lines_to_a_file_or_out(batch):
-    batch("run", SPACE, "-q")
+def test_export_writes_a_table_or_lines_to_a_file_or_out(batch, space):
     rows = list(csv.DictReader(io.StringIO(batch("export --db study.db --csv").out)))
     assert [(row["m"], row["dimension"]) for row in rows] == [("2", "8")] * 3 + [("3", "12")] * 3
     batch("export --db study.db -o study.csv")  # the ending says which
@@ -262,8 +273,7 @@ def test_export_to_parquet(batch):
     assert parquet.read_table("study.parquet")["dimension"].to_pylist() == [8] * 3 + [12] * 3
 
 
-def test_an_export_follows_links_and_goes_through_pipes(batch):
-    batch("run", SPACE, "-q")
+def test_an_export_follows_links_and_goes_through_pipes(batch, space):
     expected = batch("export --db study.db --csv --stable").out
     os.symlink("real.csv", "link.csv")
     assert batch("export --db study.db --csv --stable -o link.csv").status == 0
@@ -278,15 +288,13 @@ def test_an_export_follows_links_and_goes_through_pipes(batch):
     assert sorted(os.listdir()) == ["link.csv", "pipe", "real.csv", "study.db", "study.toml"]
 
 
-def test_an_export_that_fails_leaves_the_old_file(batch):
-    batch("run", SPACE, "-q")
+def test_an_export_that_fails_leaves_the_old_file(batch, space):
     Path("out.csv").mkdir()
     assert batch("export --db study.db --csv -o out.csv").status == 2
     assert sorted(path.name for path in Path().iterdir() if "part" in path.name) == []
 
 
-def test_a_summary_groups_and_counts(batch):
-    batch("run", SPACE, "-q")
+def test_a_summary_groups_and_counts(batch, space):
     rows = batch("summary --db study.db --by m --value dimension --stable").rows
     assert rows[:3] == [["m", "tasks", "ok"], ["2", "3", "3"], ["3", "3", "3"]]
     assert ["3", "dimension", "3", "yes", *["12"] * 5] in rows
@@ -332,8 +340,7 @@ def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept
     assert batch("merge one.db one.db").status == 2
 
 
-def test_check_says_in_one_line_what_is_whole_and_what_is_damaged_and_run_does_it_again(batch):
-    batch("run", SPACE, "-q")
+def test_check_says_in_one_line_what_is_whole_and_what_is_damaged_and_run_does_it_again(batch, space):
     before = batch("export --db study.db --csv --stable").out
     done = batch("check --db study.db")
     assert done == Outcome(0, "study.db: whole: 1 experiment, 6 tasks, 0 documents, 6 results\n", "")
@@ -362,8 +369,7 @@ def test_check_says_in_one_line_what_is_whole_and_what_is_damaged_and_run_does_i
     assert batch("export --db study.db --csv --stable").out == before
 
 
-def test_check_of_pages_that_are_damaged_and_of_what_is_no_database(batch):
-    batch("run", SPACE, "-q")
+def test_check_of_pages_that_are_damaged_and_of_what_is_no_database(batch, space):
     content = bytearray(Path("study.db").read_bytes())
     content[4096 * 5 : 4096 * 5 + 8] = b"\xa5" * 8
     Path("study.db").write_bytes(content)
@@ -389,8 +395,7 @@ def test_every_help_has_an_example(batch, name: str):
     assert f"kahanmaps batch {name}" in batch(f"{name} --help").out
 
 
-def test_on_a_terminal_there_are_tables(batch):
-    batch("run", SPACE, "-q")
+def test_on_a_terminal_there_are_tables(batch, space):
     for words in (["status"], ["summary", "--by", "m"]):
         shown = terminal("batch", *words, "--db", "study.db", NO_COLOR="1")
         assert "━" in shown.out
@@ -513,8 +518,7 @@ def test_a_full_disk_ends_a_batch_with_status_3_and_what_was_stored_before(batch
         assert batch("run", SPACE, "-q", "-j", "1").status == 0
 
 
-def test_an_export_to_a_full_disk_ends_with_status_3_and_leaves_the_old_file(batch, tmp_path: Path):
-    batch("run", SPACE, "-q")
+def test_an_export_to_a_full_disk_ends_with_status_3_and_leaves_the_old_file(batch, tmp_path: Path, space):
     Path("old.csv").write_text("old")
     done = shell("ulimit -f 0; kahanmaps batch export --db study.db -o old.csv", tmp_path)
     assert (done.status, Path("old.csv").read_text()) == (3, "old")
@@ -547,8 +551,7 @@ def test_progress_is_a_line_now_and_then_where_there_is_no_terminal(monkeypatch:
     assert "left" in said[0]
 
 
-def test_an_empty_batch_database_has_an_empty_status(batch, kahanmaps: Callable[..., Outcome]):
-    batch("run", SPACE, "-q")
+def test_an_empty_batch_database_has_an_empty_status(batch, kahanmaps: Callable[..., Outcome], space):
     done = batch("merge empty.db study.db")
     assert done.status == 0
     assert batch("status --db empty.db").rows[1][:4] == ["space", "6", "0", "6"]
@@ -568,8 +571,7 @@ def test_the_documented_shell_examples_run(tmp_path: Path):
     assert done.out.splitlines()[-1] == "6"
 
 
-def test_what_a_reader_does_not_want_is_no_error(batch, tmp_path: Path):
-    batch("run", SPACE, "-q")
+def test_what_a_reader_does_not_want_is_no_error(batch, tmp_path: Path, space):
     done = shell("kahanmaps batch export --db study.db --jsonl | head -n 1; echo ${PIPESTATUS[0]}", tmp_path)
     assert done.out.splitlines()[-1] == "0"
     assert done.err == ""

@@ -28,11 +28,11 @@ name = "mixed"
 limits = { time = "30 s", memory = "150 MB" }
 [experiments.faults]
 task = "fault"
-axes = { order = [2, 5, 6, 8, 11, 12], seed = "0..2" }
+axes = { order = [2, 6, 8, 11], seed = "0..2" }
 [experiments.space]
 task = "family-space"
 system = "family"
-axes = { m = "2..3", seed = "0..9", draw = ["generic", "eigenvalues"] }
+axes = { m = "2..3", seed = "0..4", draw = ["generic", "eigenvalues"] }
 [experiments.top]
 task = "check-integrals"
 system = ["euler_top", "lorenz", "henon_heiles"]
@@ -46,11 +46,13 @@ axes = {{ seed = "0..{last}" }}
 """
 
 
-@pytest.fixture(autouse=True)
-def _fault_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(HERE))
-    monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
-    monkeypatch.setenv("PYTHONPATH", str(HERE))
+@pytest.fixture(scope="module", autouse=True)
+def _fault_tasks() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.syspath_prepend(str(HERE))
+        monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
+        monkeypatch.setenv("PYTHONPATH", str(HERE))
+        yield
 
 
 def exported(db: Path) -> str:
@@ -64,13 +66,9 @@ def exported(db: Path) -> str:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
     """What MIXED gives, one child at a time."""
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        monkeypatch.syspath_prepend(str(HERE))
-        monkeypatch.setenv("KAHANMAPS_TASKS", "fault_tasks")
-        monkeypatch.setenv("PYTHONPATH", str(HERE))
-        db = tmp_path_factory.mktemp("undisturbed") / "results.db"
-        records = list(run(MIXED, db))
-    assert len(records) == 18 + 40 + 6
+    db = tmp_path_factory.mktemp("undisturbed") / "results.db"
+    records = list(run(MIXED, db))
+    assert len(records) == 12 + 20 + 6
     assert {record.outcome for record in records} == {
         Outcome.OK,
         Outcome.CRASHED,
@@ -81,7 +79,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def test_results_do_not_depend_on_the_number_of_children(undisturbed: str, tmp_path: Path):
-    list(run(MIXED, tmp_path / "b.db", jobs=3))
+    list(run(MIXED, tmp_path / "b.db", jobs=2))
     assert exported(tmp_path / "b.db") == undisturbed
 
 
@@ -92,9 +90,9 @@ def test_results_do_not_depend_on_the_order_of_tasks(undisturbed: str, tmp_path:
 
 
 def test_results_do_not_depend_on_interruptions(undisturbed: str, tmp_path: Path):
-    for _ in range(4):
+    for _ in range(3):
         found = run(MIXED, tmp_path / "b.db", jobs=2)
-        assert len(list(islice(found, 15))) == 15
+        assert len(list(islice(found, 11))) == 11
         found.close()  # type: ignore[attr-defined]
     list(run(MIXED, tmp_path / "b.db", jobs=2))
     assert exported(tmp_path / "b.db") == undisturbed
@@ -102,7 +100,7 @@ def test_results_do_not_depend_on_interruptions(undisturbed: str, tmp_path: Path
 
 def test_shards_merged_are_the_whole(undisturbed: str, tmp_path: Path):
     counts = [len(list(run(MIXED, tmp_path / f"{i}.db", jobs=2, shard=(i, 3)))) for i in (1, 2, 3)]
-    assert counts == [22, 21, 21]
+    assert counts == [13, 13, 12]
     with Store.open(tmp_path / "all.db", create=True) as store:
         for i in (2, 3, 1):
             store.merge(tmp_path / f"{i}.db")
@@ -269,7 +267,7 @@ def killed_and_completed(folder: Path, kills: int, last: int, seed: int) -> None
 
 
 def test_a_batch_that_is_killed_again_and_again_comes_to_the_same_end(tmp_path: Path):
-    killed_and_completed(tmp_path, kills=6, last=400, seed=1)
+    killed_and_completed(tmp_path, kills=4, last=300, seed=1)
 
 
 @pytest.mark.slow
