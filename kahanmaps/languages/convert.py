@@ -8,18 +8,12 @@ from kahanmaps.algebra.numerals import is_name
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.languages.formulas import Formulas
-from kahanmaps.languages.julia import JULIA
+from kahanmaps.languages.language import LANGUAGES as TABLES
 from kahanmaps.languages.language import Language
 from kahanmaps.languages.latex import write_latex
-from kahanmaps.languages.maple import MAPLE
-from kahanmaps.languages.mathematica import MATHEMATICA
-from kahanmaps.languages.pari import PARI
-from kahanmaps.languages.sage import SAGE
-from kahanmaps.languages.sympy import SYMPY
 from kahanmaps.languages.writer import PARTS, write
 
-_TABLES: dict[str, Language] = {table.key: table for table in (SYMPY, PARI, MAPLE, MATHEMATICA, SAGE, JULIA)}
-LANGUAGES = ("latex", *_TABLES)
+LANGUAGES = ("latex", *TABLES)
 
 
 def convert(
@@ -65,7 +59,7 @@ def convert(
     parts = _parts(what, formulas)
     if language == "latex":
         return write_latex(formulas, parts, command)
-    return write(_TABLES[language], formulas, parts, name, command)
+    return write(Language.load(language), formulas, parts, name, command)
 
 
 def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:

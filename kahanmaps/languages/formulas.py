@@ -28,8 +28,7 @@ MAX_DIMENSION_OF_FORMULAS = 8
 class Formulas:
     """The formulas of a system file, its parameters numbers or, those in `symbols`, symbols.
 
-    `names` are the variables, then the symbols; `rhs` and `H` are in these names, `integrals` and `density` in these
-    names and eps. `forms` are the bilinear integrals x^T M x~/eps of a member of the commuting family, by their names.
+    `names` are the variables, then the symbols; `rhs` and `H` are in these names, all else in these names and eps.
     """
 
     file: SystemFile
@@ -73,15 +72,29 @@ class Formulas:
         return (*self.variables, *self.symbols)
 
     @cached_property
+    def new(self) -> tuple[str, ...]:
+        """Names for the coordinates of the image x~ of a point."""
+        ending = "_new"
+        while any(variable + ending in self.names for variable in self.variables):
+            ending += "_"
+        return tuple(variable + ending for variable in self.variables)
+
+    @cached_property
     def jacobian(self) -> list[list[fmpq_mpoly]]:
         """f'(x), row by row."""
         return [[polynomial.derivative(k) for k in range(self.dim)] for polynomial in self.rhs]
 
     @cached_property
-    def gradient(self) -> list[fmpq_mpoly]:
-        """grad H, for a Hamiltonian system."""
-        assert self.H is not None
-        return [self.H.derivative(k) for k in range(self.dim)]
+    def equation(self) -> list[list[fmpq_mpoly]]:
+        """The rows of (M | r), where M x~ = r is the Kahan map: M = I - eps f'(x), r = M x + 2 eps f(x)."""
+        context = ring((*self.names, "eps"))
+        *images, eps = context.gens()
+        rows = []
+        for i, (polynomial, slopes) in enumerate(zip(self.rhs, self.jacobian, strict=True)):
+            row = [int(i == j) - eps * slope.compose(*images, ctx=context) for j, slope in enumerate(slopes)]
+            product = sum((entry * x for entry, x in zip(row, images, strict=False)), context.constant(0))
+            rows.append([*row, product + 2 * eps * polynomial.compose(*images, ctx=context)])
+        return rows
 
     @cached_property
     def forms(self) -> dict[str, fmpq_mat]:
@@ -91,6 +104,24 @@ class Formulas:
             return {}
         J = member.chosen.hamiltonian.J
         return {f"H{k}": J * (member.A**k).transpose() for k in range(member.m)}
+
+    def of_two_points(self, form: fmpq_mat | None = None) -> RationalFunction:
+        """An integral in x and x~, variables `new`: x^T M x~/eps with a matrix M, else H(x) + grad H(x)^T (x~ - x)/3.
+
+        In the variables, those of x~, the symbols and eps.
+        """
+        n = self.dim
+        context = ring((*self.variables, *self.new, *self.symbols, "eps"))
+        generators = context.gens()
+        x, y, eps, one = generators[:n], generators[n : 2 * n], generators[-1], context.constant(1)
+        if form is not None:
+            terms = (x[i] * entry * y[j] for i, row in enumerate(form.tolist()) for j, entry in enumerate(row))
+            return RationalFunction(sum(terms, context.constant(0)), eps)
+        assert self.H is not None
+        images = (*x, *generators[2 * n : -1])
+        slopes = [self.H.derivative(k).compose(*images, ctx=context) for k in range(n)]
+        change = sum((slope * (b - a) for slope, a, b in zip(slopes, x, y, strict=True)), context.constant(0))
+        return RationalFunction(self.H.compose(*images, ctx=context) + change / 3, one)
 
     @cached_property
     def missing(self) -> dict[str, str]:
@@ -120,22 +151,8 @@ class Formulas:
         >>> [format_rational_function(component) for component in Formulas.of(load("harmonic")).closed_form()]
         ['(-x*eps^2 + 2*y*eps + x)/(eps^2 + 1)', '(-y*eps^2 - 2*x*eps + y)/(eps^2 + 1)']
         """
-        n = self.dim
-        if n > MAX_DIMENSION_OF_FORMULAS:
-            raise _too_large(f"dimension {n}, expected at most {MAX_DIMENSION_OF_FORMULAS}")
-        context = ring((*self.names, "eps"))
-        images = context.gens()[:-1]
-        eps = context.gens()[-1]
-        zero, one = context.constant(0), context.constant(1)
-
-        def lifted(polynomial: fmpq_mpoly) -> fmpq_mpoly:
-            return polynomial.compose(*images, ctx=context)
-
-        f = [lifted(polynomial) for polynomial in self.rhs]
-        rows = [
-            [(one if i == j else zero) - eps * lifted(entry) for j, entry in enumerate(row)]
-            for i, row in enumerate(self.jacobian)
-        ]
+        if self.dim > MAX_DIMENSION_OF_FORMULAS:
+            raise _too_large(f"dimension {self.dim}, expected at most {MAX_DIMENSION_OF_FORMULAS}")
 
         def times(left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
             product = left * right
@@ -143,14 +160,12 @@ class Formulas:
                 raise _too_large(f"a polynomial of {len(product)} terms, expected at most {MAX_TERMS} in all")
             return product
 
-        # (I - eps f' | 2 eps f) annihilates the vector of its maximal minors, the last of which is -+det.
-        minors = kernel_minors([[*row, 2 * eps * g] for row, g in zip(rows, f, strict=True)], times)
-        below = -minors[-1]
+        # (M | r) annihilates (x~, -1), hence the vector of its maximal minors, the last of which is -+det M.
+        *above, below = kernel_minors(self.equation, times)
         found = []
-        for k in range(n):
-            above = times(images[k], below) + minors[k]
-            common = above.gcd(below)
-            found.append(RationalFunction(above / common, below / common))
+        for minor in above:
+            common = minor.gcd(below)
+            found.append(RationalFunction(-minor / common, below / common))
         total = sum(len(function.numerator) + len(function.denominator) for function in found)
         if total > MAX_TERMS:
             raise _too_large(f"{total} terms, expected at most {MAX_TERMS}")

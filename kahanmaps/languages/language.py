@@ -1,60 +1,97 @@
-"""A language as a table: how it names things and writes numbers, vectors, functions and solutions of equations.
+"""A language as a table: how it writes numbers, vectors, functions and solutions of linear equations.
 
-Everything but LaTeX is written by `writer.py` from such a table. Names that are illegal or reserved are replaced, and
-different names stay different:
-
-I -> v_I in SymPy, vI in Mathematica    a_1 -> a1 in Mathematica    gamma -> v_gamma in PARI, Maple and SymPy
+The tables are the files of `tables/`, one a language; everything but LaTeX is written by `writer.py` from one of them.
+Exact numbers stay exact in all of them but C, Fortran and NumPy, whose numbers are floats.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.resources import files
 
-from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
+from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.reading import factors_of
+
+LANGUAGES = ("sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran")
 
 LINE = 100  # characters of a line of an expression, after which it is broken
 _DIGITS = 4000
 _TERMS_TOGETHER = 100  # a sum of more terms is bracketed in parts: parsers recurse
 
-
-def words(*lines: str) -> frozenset[str]:
-    """The words of some lines of text."""
-    return frozenset(" ".join(lines).split())
-
-
-PYTHON_KEYWORDS = words(
-    "False None True and as assert async await break class continue def del elif else except finally for from global",
-    "if import in is lambda nonlocal not or pass raise return try while with yield print",
-)
-
-# What the written functions call their own arguments and local names.
-_OURS = frozenset({"point", "eps", "image", "step", "M", "m"})
+# Names that mean nothing else in any of the languages: a small letter with digits (but not i, which may be the
+# imaginary unit, and e), and words with an underscore (but those of GP's debugger). All other words may be functions.
+_FREE = re.compile(r"(?![ei]$)[a-z][0-9]*|(?!dbg_)[a-z][A-Za-z0-9]*_[A-Za-z0-9_]*")
 
 
 @dataclass(frozen=True)
-class Naming:
-    """How a language names things.
+class Language:
+    """How a language writes what the Kahan map needs. The templates have keys in angle brackets.
 
-    `legal` is what a name must match, `prefix` what is put before one that is reserved; `underscores` says whether
-    names may contain them (then functions are called vector_field, otherwise vectorField). `is_reserved` holds for
-    names that mean something else in the language.
+    `definition` is a function, with its <name>, the <kind> of its value (of `kinds`: a number, a vector, a matrix), its
+    <arguments>, the same with their sizes as they are <declared>, the <local> names, if there are some, what makes
+    these of the arguments, <unpack>, and its value, <body>. An argument is a `point`, a `number`, such as eps, or a
+    `symbol`, a parameter that stays one. `take` takes a <point> apart into the local <names>, by <coordinates>, each
+    `coordinate` with its <name>, and its <number> or its <index>, which begins with 0; `between` is written between
+    them. `exact` makes an exact number of one that is given.
+
+    `vector`, `row` and `matrix` are what stands before and after entries and rows, the latter columns where they are
+    written `by_columns`. `call` is a call of a function. `solve`, `solve_matrix` and `det` are what to write for the
+    solution of a linear equation with a vector or a matrix as its right-hand side, and for a determinant; `solver` what
+    has to be defined for them. `head` and `tail` begin and end the file; `usage` is a call of the map.
+
+    <n> is the dimension everywhere, <solve>, <vector>, <matrix> and <module> are names for what the head defines.
+    `comment` is what stands before and after one, `avoided` what it must not contain, with something else for it.
     """
 
-    is_reserved: Callable[[str], bool]
-    prefix: str = "v_"
-    underscores: bool = True
-    legal: re.Pattern[str] = field(default=re.compile(r"[A-Za-z][A-Za-z0-9_]*"))
+    title: str
+    definition: str
+    take: str
+    coordinate: str
+    solve: str
+    det: str
+    usage: str
+    comment: tuple[str, str]
+    vector: tuple[str, str]
+    matrix: tuple[str, str]
+    row: tuple[str, str] = ("[", "]")
+    solve_matrix: str = ""
+    solver: str = ""
+    head: str = ""
+    tail: str = ""
+    point: str = "<name>"
+    number: str = "<name>"
+    symbol: str = "<name>"
+    exact: str = ""
+    local: str = ""
+    between: str = ","
+    call: str = "<name>(<arguments>)"
+    integer: str = "{}"
+    fraction: str = "{}/{}"
+    power: str = "^"  # "": products instead
+    hexadecimal: bool = (
+        False  # of Python, which reads integers of up to 4300 digits, and hexadecimal ones of any length
+    )
+    underscores: bool = True  # in names; else functions are called vectorField
+    by_columns: bool = False
+    between_rows: str = ","
+    continued: str = ""  # what ends a line that goes on
+    kinds: tuple[str, str, str] = ("", "", "")
+    avoided: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def load(cls, key: str) -> Language:
+        """The language of a table."""
+        return cls(**tomllib.loads(files(__package__).joinpath("tables", f"{key}.toml").read_text("utf-8")))
 
     def function(self, *words: str) -> str:
         """The name of a function from its words, each of letters, digits and _.
 
-        >>> plain = Naming(lambda name: False)
-        >>> plain.function("integral", "I1"), Naming(lambda name: False, underscores=False).function("integral", "a_b")
+        >>> Language.load("pari").function("integral", "I1"), Language.load("mathematica").function("integral", "a_b")
         ('integral_I1', 'integralAB')
         """
         pieces = [piece for word in words for piece in re.split(r"[^A-Za-z0-9]+", word) if piece]
@@ -64,91 +101,49 @@ class Naming:
         return first[0].lower() + first[1:] + "".join(piece[0].upper() + piece[1:] for piece in others)
 
     def safe(self, names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
-        """Every name with the one to use for it: itself where that is possible, always different ones.
+        """Every name with the one to use for it: itself where it means nothing else, always different ones.
 
-        `taken` are names in use for something else.
+        `taken` are names in use for something else. Fortran does not tell capital letters from small ones.
 
-        >>> pari = Naming(lambda name: name == "I")
-        >>> pari.safe(["x", "I", "v_I", "_y"])
-        {'x': 'x', 'I': 'v_v_I', 'v_I': 'v_I', '_y': 'y'}
+        >>> Language.load("pari").safe(["x", "I", "v_I", "_y"])
+        {'x': 'x', 'I': 'v_I_2', 'v_I': 'v_I', '_y': 'v_y'}
         """
-        used = {*taken, *_OURS}
-        found = {}
         wanted = list(names)
-        for name in wanted:  # those that may stay as they are come first, whatever the order
-            if self._is_free(name) and name not in used:
-                found[name] = name
-                used.add(name)
-        for name in wanted:
-            if name in found:
-                continue
-            body = re.sub(r"[^A-Za-z0-9_]" if self.underscores else r"[^A-Za-z0-9]", "", name).lstrip("_")
-            candidate = body if body != name and self._is_free(body) and body not in used else self.prefix + body
-            while candidate in used or not self._is_free(candidate):
-                candidate = self.prefix + candidate
-            found[name] = candidate
-            used.add(candidate)
+        used = {name.lower() for name in (*taken, "point", "image", "eps", "value")}
+        found = {}
+        for name in sorted(wanted, key=lambda name: not self._is_free(name)):
+            found[name] = self.fresh(name if self._is_free(name) else self.function("v", name), used)
         return {name: found[name] for name in wanted}
 
+    def fresh(self, first: str, used: set[str]) -> str:
+        """A name, with a number where it is in use, and from then on in use: `used` are names in small letters."""
+        name, number = first, 2
+        while name.lower() in used:
+            name = self.function(first, str(number))
+            number += 1
+        used.add(name.lower())
+        return name
+
     def _is_free(self, name: str) -> bool:
-        return self.legal.fullmatch(name) is not None and not self.is_reserved(name)
+        return _FREE.fullmatch(name) is not None and (self.underscores or "_" not in name)
 
+    def commented(self, line: str) -> str:
+        """A line as a comment."""
+        for mark, other in self.avoided.items():
+            line = line.replace(mark, other)
+        return f"{self.comment[0]}{line}{self.comment[1]}".rstrip() if line else ""
 
-@dataclass(frozen=True)
-class Language:
-    """How a language writes what the Kahan map needs.
-
-    `comment` turns a line of text into a comment, `integer` writes one and `fraction` two of them, `vector` and
-    `matrix` write entries that are texts. The arguments of a definition are the point, eps and the symbols: `point`
-    takes the names of the variables (none where the point is used as a whole), `argument` and `symbol` one name. `take`
-    writes what makes the variables out of the point, `convert` what makes an exact number of an argument ("": nothing).
-    `definition` is the template of a function, with <name>, <arguments> and <body>, and `function` that of the body
-    where its value is a formula, with <unpack> and <body>. `recipes` are the bodies of the functions that are the same
-    for all systems up to the dimension <n>, the further arguments <more> of a call, and the names of functions,
-    <vector_field> and so on; one with <arguments> is the whole definition. `naming` says which names may be used;
-    `head` is what the file loads first, with <functions>; `usage` is a call of the map.
-    """
-
-    key: str
-    title: str
-    naming: Naming
-    vector: Callable[[Sequence[str]], str]
-    matrix: Callable[[Sequence[Sequence[str]]], str]
-    take: Callable[[Sequence[str]], str]
-    definition: str
-    function: str
-    recipes: Mapping[str, str]
-    usage: str
-    point: Callable[[Sequence[str]], str] = lambda variables: "point"
-    argument: str = "{}"
-    symbol: str = "{}"
-    convert: str = ""
-    comment: Callable[[str], str] = lambda line: f"# {line}".rstrip()
-    integer: Callable[[fmpz], str] = str
-    fraction: str = "{}/{}"
-    power: str = "^"
-    head: str = ""
-
-    def number(self, value: fmpq) -> str:
+    def rational(self, value: fmpq) -> str:
         """An exact number."""
-        above = self.integer(value.p)
-        return above if value.q == 1 else self.fraction.format(above, self.integer(value.q))
+        above, below = self._integer(value.p), self._integer(value.q)
+        return above if value.q == 1 else self.fraction.format(above, below)
 
-    def arguments(self, variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-        """The list of arguments of a definition."""
-        first = [self.point(variables), *[self.argument.format("eps")] * eps]
-        return ", ".join([*first, *map(self.symbol.format, symbols)])
+    def _integer(self, value: fmpz) -> str:
+        text = str(value)
+        return self.integer.format(hex(int(value)) if self.hexadecimal and len(text) > _DIGITS else text)
 
-    def unpack(self, variables: Sequence[str], eps: bool, symbols: Sequence[str]) -> str:
-        """What makes the variables and exact numbers out of the arguments, before the rest of a body."""
-        lines = [self.take(variables)] if variables else []
-        lines += [self.convert.format(name) for name in (*["eps"] * eps, *symbols)]
-        return "".join(f"{line}\n{self.indent}" for line in lines if line)
-
-    @property
-    def indent(self) -> str:
-        """What the lines of a body begin with."""
-        return self.definition.partition("<body>")[0].rpartition("\n")[2]
+    def _power(self, name: str, exponent: int) -> str:
+        return f"{name}{self.power}{exponent}" if self.power else "*".join([name] * exponent)
 
     def polynomial(self, polynomial: fmpq_mpoly, safe: Mapping[str, str]) -> str:
         """A polynomial as an expression, exactly; blanks only around + and - between terms.
@@ -158,38 +153,42 @@ class Language:
         names = [safe[name] for name in names_of(polynomial)]
         terms: list[str] = []
         for monomial, coefficient in polynomial.terms():
-            factors = factors_of(abs(coefficient), monomial, names, self._power, self.number)
+            factors = factors_of(abs(coefficient), monomial, names, self._power, self.rational)
             terms.append((" - " if coefficient < 0 else " + ") + "*".join(factors))
-        if not terms:
-            return self.number(fmpq(0))
-        if len(terms) > _TERMS_TOGETHER:
-            parts = [terms[k : k + _TERMS_TOGETHER] for k in range(0, len(terms), _TERMS_TOGETHER)]
-            return " + ".join(f"({_joined(part)})" for part in parts)
-        return _joined(terms)
+        parts = ["".join(terms[k : k + _TERMS_TOGETHER]) for k in range(0, len(terms), _TERMS_TOGETHER)]
+        parts = ["-" + part[3:] if part.startswith(" - ") else part[3:] for part in parts]
+        if len(parts) > 1:
+            return " + ".join(f"({part})" for part in parts)
+        return parts[0] if parts else self.rational(fmpq(0))
 
-    def rational_function(self, function: RationalFunction, safe: Mapping[str, str]) -> str:
-        """A quotient of polynomials as an expression, exactly."""
-        above = self.polynomial(function.numerator, safe)
-        if function.is_polynomial:
-            return above
-        return f"({above})/({self.polynomial(function.denominator, safe)})"
+    def expression(self, function: RationalFunction | fmpq_mpoly, safe: Mapping[str, str]) -> str:
+        """A polynomial or a quotient of two as an expression, exactly, on several lines where it is long.
 
-    def constant_matrix(self, matrix: fmpq_mat) -> str:
-        """A matrix of numbers."""
-        return self.matrix([[self.number(entry) for entry in row] for row in matrix.tolist()])
+        Each line but the last ends with + or -: in no language that is a whole statement.
+        """
+        if not isinstance(function, RationalFunction):
+            text = self.polynomial(function, safe)
+        else:
+            text = self.polynomial(function.numerator, safe)
+            if not function.is_polynomial:
+                text = f"({text})/({self.polynomial(function.denominator, safe)})"
+        lines = [""]
+        for piece in re.split(r"(?<= [+-] )", text):
+            if lines[-1] and len(lines[-1]) + len(piece) > LINE:
+                lines.append("")
+            lines[-1] += piece
+        broken = f"{self.continued}\n        ".join(line.rstrip() for line in lines)
+        return f"({broken})" if len(lines) > 1 else broken
 
-    def _power(self, name: str, exponent: int) -> str:
-        return f"{name}{self.power}{exponent}"
+    def listed(self, kind: tuple[str, str], entries: Sequence[str], between: str = ",") -> str:
+        """Entries with commas between them, on one line where there is room and else one on each line."""
+        room = all("\n" not in entry for entry in entries) and sum(len(entry) + 2 for entry in entries) <= LINE
+        return kind[0] + (between + (" " if room else f"{self.continued}\n        ")).join(entries) + kind[1]
 
-
-def python_integer(value: fmpz) -> str:
-    """An integer for a Python that reads up to 4300 decimal digits, hexadecimal ones of any length.
-
-    >>> python_integer(fmpz(-7)), python_integer(fmpz(10)**5000)[:6]
-    ('-7', '0x31e2')
-    """
-    text = str(value)
-    return text if len(text) <= _DIGITS else hex(int(value))
+    def table(self, rows: Sequence[Sequence[str]]) -> str:
+        """A matrix of expressions, row by row."""
+        lines = zip(*rows, strict=True) if self.by_columns else rows
+        return self.listed(self.matrix, [self.listed(self.row, line) for line in lines], self.between_rows)
 
 
 def fill(template: str, values: Mapping[str, str]) -> str:
@@ -198,37 +197,4 @@ def fill(template: str, values: Mapping[str, str]) -> str:
     >>> print(fill("f(<x>)", {"x": "point"}))
     f(point)
     """
-    return re.sub(r"<([a-z_]+)>", lambda match: values[match[1]], template)
-
-
-def broken(text: str, indent: str) -> str:
-    """A long expression on several lines, each but the last ending with + or -.
-
-    A line that ends so cannot be a whole statement, in any of the languages.
-
-    >>> broken("a + b", "  ")
-    'a + b'
-    """
-    lines: list[str] = []
-    current = ""
-    for piece in re.split(r"(?<= [+-] )", text):
-        if current and len(current) + len(piece) > LINE:
-            lines.append(current.rstrip())
-            current = ""
-        current += piece
-    return f"\n{indent}".join([*lines, current])
-
-
-def listed(entries: Sequence[str], indent: str) -> str:
-    """Entries with commas between them, on one line where there is room and else one on each line.
-
-    >>> listed(["a", "b"], "  ")
-    'a, b'
-    """
-    room = all("\n" not in entry for entry in entries) and sum(len(entry) + 2 for entry in entries) <= LINE
-    return (", " if room else f",\n{indent}").join(entries)
-
-
-def _joined(terms: Sequence[str]) -> str:
-    text = "".join(terms)
-    return "-" + text[3:] if text.startswith(" - ") else text[3:]
+    return re.sub(r"<([A-Za-z]+)>", lambda match: values[match[1]], template)

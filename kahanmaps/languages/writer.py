@@ -4,50 +4,21 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.languages.formulas import Formulas
-from kahanmaps.languages.language import Language, broken, fill, listed
+from kahanmaps.languages.language import Language, fill
 from kahanmaps.sources import SOURCES
 from kahanmaps.version import __version__
 
-# Parts that are one function of every system.
-_FIXED = {
-    "system": "vector_field",
-    "map": "kahan_map",
-    "inverse": "kahan_inverse",
-    "jacobian": "kahan_jacobian",
-    "map-formulas": "kahan_map_formula",
-}
-PARTS = (*_FIXED, "integrals", "density")
+PARTS = ("system", "map", "inverse", "jacobian", "map-formulas", "integrals", "density")
 
-_INDENT = "        "
-# What a function calls, directly.
-_NEEDS = {
-    "kahan_map": ("vector_field", "vector_field_jacobian"),
-    "kahan_inverse": ("kahan_map",),
-    "kahan_jacobian": ("kahan_map",),
-    "modified_hamiltonian": ("hamiltonian", "hamiltonian_gradient", "kahan_map"),
-    "form": ("kahan_map",),
-    "determinant": ("vector_field_jacobian",),
-}
-_WORDS = {
-    "vector_field": "x' = f(x)",
-    "vector_field_jacobian": "f'(x), the matrix of the derivatives",
-    "kahan_map": "The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x)",
-    "kahan_inverse": "Its inverse, which is the map with -eps",
-    "kahan_jacobian": "Its Jacobi matrix: (I - eps f'(x))^(-1) (I + eps f'(x~))",
-    "kahan_map_formula": "The Kahan map as rational functions of x and eps",
-    "hamiltonian": "H, with f = J grad H",
-    "hamiltonian_gradient": "grad H",
-    "modified_hamiltonian": "An integral of the map, by a theorem: H + grad H . (x~ - x)/3",
-    "determinant": "dx/phi is invariant under the map, by a theorem: phi = det(I - eps f'(x))",
-    "density": "phi; the file says that dx/phi is invariant under the map",
-}
+_NUMBER, _VECTOR, _MATRIX = range(3)
 
 
 def write(language: Language, formulas: Formulas, parts: Sequence[str], prefix: str, command: str) -> str:
@@ -63,7 +34,7 @@ def write(language: Language, formulas: Formulas, parts: Sequence[str], prefix: 
     Raises:
         InputError: where the closed form of the map is asked for and too large.
     """
-    return _Writer(language, formulas, parts, prefix).text(command)
+    return _Writer(language, formulas, prefix).text(parts, command)
 
 
 def header(formulas: Formulas, command: str, width: int = 100) -> list[str]:
@@ -100,137 +71,169 @@ def header(formulas: Formulas, command: str, width: int = 100) -> list[str]:
 class _Writer:
     """One file: names are chosen first, then functions are written in the order of their needs."""
 
-    def __init__(self, language: Language, formulas: Formulas, parts: Sequence[str], prefix: str) -> None:
-        self.language = language
-        self.formulas = formulas
-        self.parts = parts
+    def __init__(self, language: Language, formulas: Formulas, prefix: str) -> None:
+        self.language, self.formulas = language, formulas
+        self.used: set[str] = set()
         self.prefix = [prefix] if prefix else []
-        self.functions: dict[str, str] = {}  # of fixed functions: what they are -> how they are called here
-        for key in (*_WORDS, "form"):
-            self.functions[key] = language.naming.function(*self.prefix, key)
-        self.functions["determinant"] = self.functions["density"]
-        self.used = set(self.functions.values())
-        self.claims = {name: self._new_function("integral", name) for name in formulas.integrals}
-        self.forms = {name: self._new_function("integral", name) for name in formulas.forms}
-        self.safe = language.naming.safe(formulas.names, self.used)
+        fixed = "vector_field kahan_matrix kahan_vector kahan_map kahan_inverse kahan_jacobian kahan_map_formula"
+        fixed += " modified_hamiltonian density"
+        # Of functions: what they are -> how they are called.
+        self.names = {key: self._new_name(key) for key in fixed.split()}
+        self.names |= {f"integral {name}": self._new_name("integral", name) for name in formulas.integrals}
+        self.names |= {name: self._new_name("integral", name) for name in formulas.forms}
+        self.words = {"n": str(formulas.dim), "map": self.names["kahan_map"]}
+        self.words |= {key: self._new_name("kahan", key) for key in ("solve", "module")}
+        self.words |= {key: self._new_name(key) for key in ("vector", "matrix")}
+        self.safe = language.safe((*formulas.names, *formulas.new), self.used)
         self.safe["eps"] = "eps"
         self.symbols = [self.safe[name] for name in formulas.symbols]
         self.written: dict[str, str] = {}  # name in the language -> text
 
-    def _new_function(self, *words: str) -> str:
-        name = first = self.language.naming.function(*self.prefix, *words)
-        number = 2
-        while name in self.used:
-            name = self.language.naming.function(first, str(number))
-            number += 1
-        self.used.add(name)
-        return name
+    def _new_name(self, *words: str) -> str:
+        return self.language.fresh(self.language.function(*self.prefix, *words), self.used)
 
-    def text(self, command: str) -> str:
+    def text(self, parts: Sequence[str], command: str) -> str:
         """The whole file."""
-        for part in self.parts:
-            self._part(part)
-        language = self.language
-        lines = header(self.formulas, command)
-        renamed = [f"{old} is called {new}" for old, new in self.safe.items() if old != new]
+        for part in parts:
+            getattr(self, f"_{part.replace('-', '_')}")()
+        language, formulas = self.language, self.formulas
+        lines = header(formulas, command)
+        renamed = [f"{name} is called {used}" for name in formulas.names if (used := self.safe[name]) != name]
         if renamed:
             lines.append(f"Names that {language.title} cannot use or reads otherwise: {', '.join(renamed)}")
-        values = [str(k) for k in range(1, self.formulas.dim + 1)]
-        if self.functions["kahan_map"] in self.written:
-            values_text = ", ".join(values) if len(values) <= 12 else f"1, 2, ..., {len(values)}"
-            usage = fill(language.usage, {**self.functions, "values": values_text, "more": self._more()})
-            lines.append(f"For example: {usage}")
-        top = "\n".join(language.comment(line) for line in lines)
-        head = fill(language.head, {"functions": listed(list(self.written), "  ")}) if language.head else ""
-        return "\n\n".join(filter(None, [top, head, *self.written.values()])) + "\n"
+        if self.names["kahan_map"] in self.written:
+            values = [str(k) for k in range(1, formulas.dim + 1)]
+            more = "".join(f", {name}" for name in self.symbols)
+            told = ", ".join(values) if len(values) <= 12 else f"1, 2, ..., {len(values)}"
+            lines.append(f"For example: {fill(language.usage, self.words | {'values': told, 'more': more})}")
+        solver = language.solver if any(self.words["solve"] in text for text in self.written.values()) else ""
+        words = self.words | {"functions": language.listed(("", ""), list(self.written))}
+        head, solver, tail = (fill(text, words) for text in (language.head, solver, language.tail))
+        top = "\n".join(map(language.commented, lines))
+        return "\n\n".join(filter(None, [top, head, solver, *self.written.values(), tail])) + "\n"
 
-    def _part(self, part: str) -> None:
+    def _system(self) -> None:
+        self._formulas("vector_field", "x' = f(x)", self.formulas.rhs, eps=False)
+
+    def _map(self) -> None:
+        rows = [[self._expression(entry) for entry in row[:-1]] for row in self.formulas.equation]
+        body = fill(self.language.table(rows), self.words)
+        self._function("kahan_matrix", "M = I - eps f'(x)", _MATRIX, body, {"point": self.formulas.variables})
+        right = [row[-1] for row in self.formulas.equation]
+        self._formulas("kahan_vector", "r = M x + 2 eps f(x)", right)
+        body = self._solve(self.language.solve, self._call("kahan_vector", "point", "eps"))
+        self._function(
+            "kahan_map", "The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r", _VECTOR, body
+        )
+
+    def _inverse(self) -> None:
+        self._map()
+        body = self._call("kahan_map", "point", "-eps")
+        self._function("kahan_inverse", "Its inverse, which is the map with -eps", _VECTOR, body)
+
+    def _jacobian(self) -> None:
+        self._map()
+        above = self._call("kahan_matrix", self._call("kahan_map", "point", "eps"), "-eps")
+        body = self._solve(self.language.solve_matrix or self.language.solve, above)
+        words = "Its Jacobi matrix: (I - eps f'(x))^(-1) (I + eps f'(x~))"
+        self._function("kahan_jacobian", words, _MATRIX, body)
+
+    def _map_formulas(self) -> None:
+        words = "The Kahan map as rational functions of x and eps"
+        self._formulas("kahan_map_formula", words, self.formulas.closed_form())
+
+    def _integrals(self) -> None:
         formulas = self.formulas
-        if part in _FIXED:
-            self._fixed(_FIXED[part])
-        elif part == "density":
-            self._fixed("determinant" if formulas.density is None else "density")
-        elif part == "integrals":
-            for name, function in formulas.integrals.items():
-                words = f"{name}: the file says that it is an integral of the map"
-                self._define(self.claims[name], words, self._expression(function), True)
-            for k, (name, matrix) in enumerate(formulas.forms.items()):
-                self._needed("form")
-                form = "J" if k == 0 else "J A^T" if k == 1 else f"J (A^T)^{k}"
-                words = f"An integral of the map, by a theorem: x^T M x~/eps with M = {form}"
-                self._recipe("form", self.forms[name], words, {"matrix": self.language.constant_matrix(matrix)})
-            if formulas.H is not None and not formulas.forms:
-                self._fixed("modified_hamiltonian")
+        for name, function in formulas.integrals.items():
+            words = f"{name}: the file says that it is an integral of the map"
+            body = self._expression(function)
+            self._function(f"integral {name}", words, _NUMBER, body, {"point": formulas.variables})
+        for k, (name, matrix) in enumerate(formulas.forms.items()):
+            form = "J" if k == 0 else "J A^T" if k == 1 else f"J (A^T)^{k}"
+            self._of_two_points(name, f"x^T M x~/eps with M = {form}", formulas.of_two_points(matrix))
+        if formulas.H is not None and not formulas.forms:
+            words = "H + grad H . (x~ - x)/3, where f = J grad H"
+            self._of_two_points("modified_hamiltonian", words, formulas.of_two_points())
 
-    def _needed(self, key: str) -> None:
-        for other in _NEEDS.get(key, ()):
-            self._fixed(other)
+    def _of_two_points(self, key: str, words: str, function: RationalFunction) -> None:
+        self._map()
+        of = f"{key} of two points"
+        self.names[of] = self._new_name(self.names[key], "of")
+        points = {"point": self.formulas.variables, "image": self.formulas.new}
+        self._function(of, words, _NUMBER, self._expression(function), points)
+        body = self._call(of, "point", self._call("kahan_map", "point", "eps"), "eps")
+        self._function(key, "An integral of the map, by a theorem", _NUMBER, body)
 
-    def _fixed(self, key: str) -> None:
-        """Write a function that every system has, once, after those that it calls."""
-        name, words, formulas = self.functions[key], _WORDS[key], self.formulas
-        if name in self.written:
+    def _density(self) -> None:
+        if self.formulas.density is not None:
+            words = "phi; the file says that dx/phi is invariant under the map"
+            body = self._expression(self.formulas.density)
+            self._function("density", words, _NUMBER, body, {"point": self.formulas.variables})
             return
-        self._needed(key)
-        if key == "vector_field":
-            self._define(name, words, self._vector(formulas.rhs), False)
-        elif key == "vector_field_jacobian":
-            rows = [[self._broken(entry) for entry in row] for row in formulas.jacobian]
-            self._define(name, words, self.language.matrix(rows), False)
-        elif key == "kahan_map_formula":
-            entries = [self._expression(function) for function in formulas.closed_form()]
-            self._define(name, words, self.language.vector(entries), True)
-        elif key == "hamiltonian":
-            assert formulas.H is not None
-            self._define(name, words, self._scalar(self._broken(formulas.H)), False)
-        elif key == "hamiltonian_gradient":
-            self._define(name, words, self._vector(formulas.gradient), False)
-        elif key == "density":
-            assert formulas.density is not None
-            self._define(name, words, self._expression(formulas.density), True)
-        else:
-            self._recipe(key, name, words, {})
+        self._map()
+        body = self._solve(self.language.det, "")
+        words = "dx/phi is invariant under the map, by a theorem: phi = det(I - eps f'(x))"
+        self._function("density", words, _NUMBER, body)
 
-    def _vector(self, entries: Iterable[fmpq_mpoly]) -> str:
-        return self.language.vector([self._broken(entry) for entry in entries])
+    def _expression(self, function: fmpq_mpoly | RationalFunction) -> str:
+        return self.language.expression(function, self.safe)
 
-    def _broken(self, polynomial: fmpq_mpoly) -> str:
-        return broken(self.language.polynomial(polynomial, self.safe), _INDENT)
+    def _call(self, key: str, *arguments: str) -> str:
+        values = {"name": self.names[key], "arguments": ", ".join([*arguments, *self.symbols])}
+        return fill(self.language.call, values)
 
-    def _expression(self, function: RationalFunction) -> str:
-        return self._scalar(broken(self.language.rational_function(function, self.safe), _INDENT))
+    def _solve(self, template: str, right: str) -> str:
+        return fill(template, self.words | {"M": self._call("kahan_matrix", "point", "eps"), "right": right})
 
-    def _scalar(self, text: str) -> str:
-        return f"({text})" if "\n" in text else text
+    def _formulas(
+        self, key: str, words: str, entries: Iterable[fmpq_mpoly | RationalFunction], eps: bool = True
+    ) -> None:
+        body = self.language.listed(self.language.vector, [self._expression(entry) for entry in entries])
+        self._function(key, words, _VECTOR, fill(body, self.words), {"point": self.formulas.variables}, eps)
 
-    def _define(self, name: str, words: str, body: str, eps: bool) -> None:
-        variables = [self.safe[variable] for variable in self.formulas.variables]
+    def _function(
+        self,
+        key: str,
+        words: str,
+        kind: int,
+        body: str,
+        points: Mapping[str, Sequence[str]] = MappingProxyType({"point": ()}),
+        eps: bool = True,
+    ) -> None:
+        """Write a function, once; `points` are its points and what their coordinates are called in the body.
+
+        A point without names for its coordinates is used as a whole.
+        """
+        language = self.language
+        taken = {point: [self.safe[name] for name in names] for point, names in points.items()}
+        local = [name for names in taken.values() for name in names]
+        numbers = [*["eps"] * eps, *self.symbols]
+        arguments = [fill(language.point, {"name": point, **self.words}) for point in taken]
+        arguments += [fill(language.number, {"name": "eps"})] * eps
+        arguments += [fill(language.symbol, {"name": name}) for name in self.symbols]
+        lines = []
+        for point, names in taken.items():
+            coordinates = [
+                fill(language.coordinate, {"name": name, "point": point, "number": str(k + 1), "index": str(k)})
+                for k, name in enumerate(names)
+            ]
+            if names:
+                every = language.listed(("", ""), coordinates, language.between)
+                lines.append(fill(language.take, {"coordinates": every, "point": point}))
+        lines += [fill(language.exact, {"name": name}) for name in numbers if local]
+        indent = language.definition.partition("<unpack>")[0].rpartition("\n")[2]
         values = {
-            "name": name,
-            "arguments": self.language.arguments(variables, eps, self.symbols),
-            "unpack": self.language.unpack(variables, eps, self.symbols),
+            "name": self.names[key],
+            "kind": fill(language.kinds[kind], self.words),
+            "arguments": ", ".join(arguments),
+            "declared": ", ".join([*(f"{point}({len(self.formulas.variables)})" for point in taken), *numbers]),
+            "local": fill(language.local, {"names": ", ".join(local)}) if local else "",
+            "unpack": "".join(f"{line}\n{indent}" for line in lines if line),
             "body": body,
         }
-        self._add(words, self.language.function, values)
-
-    def _recipe(self, key: str, name: str, words: str, more: dict[str, str]) -> None:
-        values = {
-            **self.functions,
-            "name": name,
-            "n": str(self.formulas.dim),
-            "more": self._more(),
-            "arguments": self.language.arguments([], True, self.symbols),
-            "unpack_eps": self.language.unpack([], True, []),
-            **more,
-        }
-        self._add(words, self.language.recipes[key], values)
-
-    def _add(self, words: str, template: str, values: dict[str, str]) -> None:
-        if "<arguments>" not in template:
-            body = fill(template.replace("\n", f"\n{self.language.indent}"), values)
-            template, values = self.language.definition, {**values, "body": body}
-        text = fill(template, values)
-        self.written[values["name"]] = f"{self.language.comment(words)}\n{text}"
-
-    def _more(self) -> str:
-        return "".join(f", {name}" for name in self.symbols)
+        text = fill(language.definition, values)
+        if language.continued:
+            together = text.replace(f"{language.continued}\n        ", " ").splitlines()
+            wrapped = [textwrap.wrap(line, 110, break_long_words=False) for line in together]
+            text = "\n".join(f"{language.continued}\n        ".join(line) for line in wrapped)
+        self.written[self.names[key]] = f"{language.commented(words)}\n{text}"

@@ -29,6 +29,16 @@ def test_the_command_in_the_comment_makes_the_same_file_again(kahanmaps):
     assert kahanmaps(told.split("kahanmaps ", 2)[2]).out == first
 
 
+def test_an_inline_system_becomes_a_system_file(kahanmaps, tmp_path):
+    system = "--vars x,y --rhs=a*x*y --rhs=-x^2 -p a=2/3"
+    path = tmp_path / "own.toml"
+    assert kahanmaps(f"convert {system} --to toml -o", path).status == 0
+    start = "--start 1,2 --eps 1/10 --steps 3 --format csv"
+    assert kahanmaps("orbit", path, start).out == kahanmaps(f"orbit {system} {start}").out
+    assert kahanmaps("convert", path, "--to toml").out == path.read_text()
+    assert kahanmaps("convert", path, "--to toml -p a=1").out != path.read_text()
+
+
 def test_parts_may_be_repeated_or_separated_by_commas(kahanmaps):
     one = kahanmaps("convert euler_top --to julia --what map,density").out
     two = kahanmaps("convert euler_top --to julia --what density --what map").out
@@ -81,6 +91,7 @@ def test_a_file_is_written_whole_and_told_on_standard_error(kahanmaps, tmp_path)
         ("paper_m3 --to pari --what map-formulas", "the closed form of the map is too large"),
         ("euler_top --to pari --symbolic b", "found the symbol 'b', expected eps or a parameter of the system"),
         ("paper_m2 --to pari --symbolic a", "found the symbol 'a'"),
+        ("euler_top --to toml --what map", "a system file holds the whole system"),
         ("euler_top --to pari --name 1x", "found the name '1x', expected a letter"),
         ("no_such_system --to pari", "no_such_system"),
         ("euler_top --to pari -o no_such_folder/x.gp", "no_such_folder"),
@@ -96,4 +107,4 @@ def test_wrong_use_is_told_with_what_was_expected(kahanmaps, options, told, tmp_
 
 def test_help_names_every_language_and_part(kahanmaps):
     words = kahanmaps("convert --help").out.replace("\n", " ").replace(",", " ").replace(".", " ").split()
-    assert {*LANGUAGES, *PARTS} <= set(words)
+    assert {*LANGUAGES, "toml", *PARTS} <= set(words)

@@ -17,6 +17,7 @@ from kahanmaps.version import __version__
 
 GOLDEN = Path(__file__).parent / "golden"
 EXTENSIONS = {"maple": "mpl", "mathematica": "wl", "julia": "jl", "sage": "sage", "latex": "tex"}
+EXTENSIONS |= {"numpy": "numpy", "c": "c", "fortran": "f90"}
 
 
 def weierstrass(language: str) -> str:

@@ -11,7 +11,7 @@ from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.progress import as_typed, say
 
 # Those of kahanmaps.languages.convert, which --help does not load.
-_LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia")
+_LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia", "numpy", "c", "fortran", "toml")
 
 
 @click.command("convert")
@@ -44,12 +44,19 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
       kahanmaps convert euler_top --to sympy --symbolic a1,a2,a3
       kahanmaps convert lagrange_top --to latex -o lagrange_top.tex
       kahanmaps convert weierstrass --to julia --what map-formulas,inverse
+      kahanmaps convert --vars x,y --rhs x*y --rhs=-x^2 --to toml -o my.toml
 
-    The output is a file that runs as it stands. eps is an argument of the map: the time step is 2 eps.
+    The output is a file that runs as it stands; toml is a system file. eps is an argument of the map: the time step is
+    2 eps. Numbers are exact, but in numpy, c and fortran.
     """
     from kahanmaps.languages.convert import convert
 
     file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    if language == "toml":
+        if options["parts"] or options["symbolic"] or options["name"]:
+            raise click.UsageError("a system file holds the whole system: leave out --what, --symbolic and --name")
+        _write(file.to_toml(), file.name, language, output, quiet)
+        return
     symbols = [name for name in _split(options["symbolic"] or "") if name != "eps"]
     parts = [part for text in options["parts"] for part in _split(text)]
     text = convert(
@@ -60,6 +67,10 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
         symbols=symbols,
         command=_command_line(system, language, options),
     )
+    _write(text, file.name, language, output, quiet)
+
+
+def _write(text: str, name: str, language: str, output: str | None, quiet: bool) -> None:
     if output is None or output == "-":
         click.echo(text, nl=False)
         return
@@ -67,7 +78,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
 
     write_whole(output, text.encode())
     if not quiet:
-        say(f"{output}: {file.name} for {language}, {len(text.splitlines())} lines")
+        say(f"{output}: {name} for {language}, {len(text.splitlines())} lines")
 
 
 def _split(text: str) -> list[str]:

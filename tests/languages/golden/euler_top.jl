@@ -23,32 +23,38 @@ exact(value) = value isa Union{Integer, Rational} ? Rational{BigInt}(value) : va
 
 # x' = f(x)
 function top_vector_field(point, a1, a2)
-    x1, x2, x3 = exact.(point)
+    x1 = exact(point[1]); x2 = exact(point[2]); x3 = exact(point[3])
     a1 = exact(a1)
     a2 = exact(a2)
     return [x2*x3*a1, x1*x3*a2, x1*x2]
 end
 
-# f'(x), the matrix of the derivatives
-function top_vector_field_jacobian(point, a1, a2)
-    x1, x2, x3 = exact.(point)
+# M = I - eps f'(x)
+function top_kahan_matrix(point, eps, a1, a2)
+    x1 = exact(point[1]); x2 = exact(point[2]); x3 = exact(point[3])
+    eps = exact(eps)
     a1 = exact(a1)
     a2 = exact(a2)
-    return hcat([0, x3*a2, x2],
-        [x3*a1, 0, x1],
-        [x2*a1, x1*a2, 0])
+    return hcat([1, -x3*a2*eps, -x2*eps], [-x3*a1*eps, 1, -x1*eps], [-x2*a1*eps, -x1*a2*eps, 1])
 end
 
-# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x)
-function top_kahan_map(point, eps, a1, a2)
+# r = M x + 2 eps f(x)
+function top_kahan_vector(point, eps, a1, a2)
+    x1 = exact(point[1]); x2 = exact(point[2]); x3 = exact(point[3])
     eps = exact(eps)
-    M = I - eps*top_vector_field_jacobian(point, a1, a2)
-    return collect(exact.(point)) + 2*eps*(M \ top_vector_field(point, a1, a2))
+    a1 = exact(a1)
+    a2 = exact(a2)
+    return [x1, x2, x3]
+end
+
+# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r
+function top_kahan_map(point, eps, a1, a2)
+    return exact.(top_kahan_matrix(point, eps, a1, a2)) \ exact.(top_kahan_vector(point, eps, a1, a2))
 end
 
 # F1: the file says that it is an integral of the map
 function top_integral_F1(point, eps, a1, a2)
-    x1, x2, x3 = exact.(point)
+    x1 = exact(point[1]); x2 = exact(point[2]); x3 = exact(point[3])
     eps = exact(eps)
     a1 = exact(a1)
     a2 = exact(a2)
@@ -57,7 +63,7 @@ end
 
 # F2: the file says that it is an integral of the map
 function top_integral_F2(point, eps, a1, a2)
-    x1, x2, x3 = exact.(point)
+    x1 = exact(point[1]); x2 = exact(point[2]); x3 = exact(point[3])
     eps = exact(eps)
     a1 = exact(a1)
     a2 = exact(a2)
@@ -66,7 +72,7 @@ end
 
 # phi; the file says that dx/phi is invariant under the map
 function top_density(point, eps, a1, a2)
-    x1, x2, x3 = exact.(point)
+    x1 = exact(point[1]); x2 = exact(point[2]); x3 = exact(point[3])
     eps = exact(eps)
     a1 = exact(a1)
     a2 = exact(a2)

@@ -16,6 +16,11 @@
 # Written by kahanmaps VERSION
 # For example: top_kahan_map([1, 2, 3], 1/10, a1, a2);
 
+top_kahan_solve := proc(M, b)
+  if LinearAlgebra:-Determinant(M) = 0 then error "det(I - eps f'(x)) = 0: the Kahan map has no value here" end if;
+  LinearAlgebra:-LinearSolve(M, b);
+end proc:
+
 # x' = f(x)
 top_vector_field := proc(point, a1, a2)
   local x1, x2, x3;
@@ -23,23 +28,23 @@ top_vector_field := proc(point, a1, a2)
   Vector([x2*x3*a1, x1*x3*a2, x1*x2]);
 end proc:
 
-# f'(x), the matrix of the derivatives
-top_vector_field_jacobian := proc(point, a1, a2)
+# M = I - eps f'(x)
+top_kahan_matrix := proc(point, eps, a1, a2)
   local x1, x2, x3;
   x1, x2, x3 := op(convert(point, list));
-  Matrix([[0, x3*a1, x2*a1],
-   [x3*a2, 0, x1*a2],
-   [x2, x1, 0]]);
+  Matrix([[1, -x3*a1*eps, -x2*a1*eps], [-x3*a2*eps, 1, -x1*a2*eps], [-x2*eps, -x1*eps, 1]]);
 end proc:
 
-# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x)
+# r = M x + 2 eps f(x)
+top_kahan_vector := proc(point, eps, a1, a2)
+  local x1, x2, x3;
+  x1, x2, x3 := op(convert(point, list));
+  Vector([x1, x2, x3]);
+end proc:
+
+# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r
 top_kahan_map := proc(point, eps, a1, a2)
-  local M;
-  M := LinearAlgebra:-IdentityMatrix(3)
-    - LinearAlgebra:-ScalarMultiply(top_vector_field_jacobian(point, a1, a2), eps);
-  if LinearAlgebra:-Determinant(M) = 0 then error "det(I - eps f'(x)) = 0: the Kahan map has no value here" end if;
-  Vector(convert(point, list))
-    + LinearAlgebra:-ScalarMultiply(LinearAlgebra:-LinearSolve(M, top_vector_field(point, a1, a2)), 2*eps);
+  top_kahan_solve(top_kahan_matrix(point, eps, a1, a2), top_kahan_vector(point, eps, a1, a2));
 end proc:
 
 # F1: the file says that it is an integral of the map

@@ -16,36 +16,41 @@
 # Written by kahanmaps VERSION
 # For example: top_kahan_map([1, 2, 3], 1/10, a1, a2)
 
-# x' = f(x)
-def top_vector_field(point, a1=SR.var("a1"), a2=SR.var("a2")):
-    x1, x2, x3 = vector(point)
-    return vector([x2*x3*a1, x1*x3*a2, x1*x2])
-
-# f'(x), the matrix of the derivatives
-def top_vector_field_jacobian(point, a1=SR.var("a1"), a2=SR.var("a2")):
-    x1, x2, x3 = vector(point)
-    return matrix([[0, x3*a1, x2*a1],
-        [x3*a2, 0, x1*a2],
-        [x2, x1, 0]])
-
-# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x)
-def top_kahan_map(point, eps, a1=SR.var("a1"), a2=SR.var("a2")):
-    M = identity_matrix(3) - eps*top_vector_field_jacobian(point, a1, a2)
+def top_kahan_solve(M, b):
     if M.is_singular():
         raise ZeroDivisionError("det(I - eps f'(x)) = 0: the Kahan map has no value here")
-    return vector(point) + 2*eps*M.solve_right(top_vector_field(point, a1, a2))
+    return M.solve_right(b)
+
+# x' = f(x)
+def top_vector_field(point, a1=SR.var("a1"), a2=SR.var("a2")):
+    [x1, x2, x3] = vector(point)
+    return vector([x2*x3*a1, x1*x3*a2, x1*x2])
+
+# M = I - eps f'(x)
+def top_kahan_matrix(point, eps, a1=SR.var("a1"), a2=SR.var("a2")):
+    [x1, x2, x3] = vector(point)
+    return matrix([[1, -x3*a1*eps, -x2*a1*eps], [-x3*a2*eps, 1, -x1*a2*eps], [-x2*eps, -x1*eps, 1]])
+
+# r = M x + 2 eps f(x)
+def top_kahan_vector(point, eps, a1=SR.var("a1"), a2=SR.var("a2")):
+    [x1, x2, x3] = vector(point)
+    return vector([x1, x2, x3])
+
+# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r
+def top_kahan_map(point, eps, a1=SR.var("a1"), a2=SR.var("a2")):
+    return top_kahan_solve(top_kahan_matrix(point, eps, a1, a2), top_kahan_vector(point, eps, a1, a2))
 
 # F1: the file says that it is an integral of the map
 def top_integral_F1(point, eps, a1=SR.var("a1"), a2=SR.var("a2")):
-    x1, x2, x3 = vector(point)
+    [x1, x2, x3] = vector(point)
     return (x2^2*a1*eps^2 - 1)/(x3^2*a1*a2*eps^2 - 1)
 
 # F2: the file says that it is an integral of the map
 def top_integral_F2(point, eps, a1=SR.var("a1"), a2=SR.var("a2")):
-    x1, x2, x3 = vector(point)
+    [x1, x2, x3] = vector(point)
     return (x3^2*a1*a2*eps^2 - 1)/(x1^2*a2*eps^2 - 1)
 
 # phi; the file says that dx/phi is invariant under the map
 def top_density(point, eps, a1=SR.var("a1"), a2=SR.var("a2")):
-    x1, x2, x3 = vector(point)
+    [x1, x2, x3] = vector(point)
     return x3^4*a1^2*a2^2*eps^4 - 2*x3^2*a1*a2*eps^2 + 1

@@ -16,32 +16,56 @@
 (* Written by kahanmaps VERSION *)
 (* For example: topKahanMap[{1, 2, 3}, 1/10, a1, a2] *)
 
-ClearAll[topVectorField, topVectorFieldJacobian, topKahanMap, topIntegralF1, topIntegralF2, topDensity];
+ClearAll[topVectorField,
+        topKahanMatrix,
+        topKahanVector,
+        topKahanMap,
+        topIntegralF1,
+        topIntegralF2,
+        topDensity];
+
+topKahanSolve[m_, b_] := If[Det[m] === 0,
+  Print["det(I - eps f'(x)) = 0: the Kahan map has no value here"]; Abort[],
+  LinearSolve[m, b]
+];
 
 (* x' = f(x) *)
-topVectorField[{x1_, x2_, x3_}, a1_, a2_] :=
-  {x2*x3*a1, x1*x3*a2, x1*x2};
+topVectorField[point_List, a1_, a2_] := Module[{x1, x2, x3},
+  {x1, x2, x3} = point;
+  {x2*x3*a1, x1*x3*a2, x1*x2}
+];
 
-(* f'(x), the matrix of the derivatives *)
-topVectorFieldJacobian[{x1_, x2_, x3_}, a1_, a2_] :=
-  {{0, x3*a1, x2*a1},
-   {x3*a2, 0, x1*a2},
-   {x2, x1, 0}};
+(* M = I - eps f'(x) *)
+topKahanMatrix[point_List, eps_, a1_, a2_] := Module[{x1, x2, x3},
+  {x1, x2, x3} = point;
+  {{1, -x3*a1*eps, -x2*a1*eps}, {-x3*a2*eps, 1, -x1*a2*eps}, {-x2*eps, -x1*eps, 1}}
+];
 
-(* The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x) *)
-topKahanMap[point_List, eps_, a1_, a2_] := Module[{m},
-  m = IdentityMatrix[3] - eps*topVectorFieldJacobian[point, a1, a2];
-  If[Det[m] === 0, $Failed, point + 2*eps*LinearSolve[m, topVectorField[point, a1, a2]]]
+(* r = M x + 2 eps f(x) *)
+topKahanVector[point_List, eps_, a1_, a2_] := Module[{x1, x2, x3},
+  {x1, x2, x3} = point;
+  {x1, x2, x3}
+];
+
+(* The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r *)
+topKahanMap[point_List, eps_, a1_, a2_] := Module[{},
+  topKahanSolve[topKahanMatrix[point, eps, a1, a2], topKahanVector[point, eps, a1, a2]]
 ];
 
 (* F1: the file says that it is an integral of the map *)
-topIntegralF1[{x1_, x2_, x3_}, eps_, a1_, a2_] :=
-  (x2^2*a1*eps^2 - 1)/(x3^2*a1*a2*eps^2 - 1);
+topIntegralF1[point_List, eps_, a1_, a2_] := Module[{x1, x2, x3},
+  {x1, x2, x3} = point;
+  (x2^2*a1*eps^2 - 1)/(x3^2*a1*a2*eps^2 - 1)
+];
 
 (* F2: the file says that it is an integral of the map *)
-topIntegralF2[{x1_, x2_, x3_}, eps_, a1_, a2_] :=
-  (x3^2*a1*a2*eps^2 - 1)/(x1^2*a2*eps^2 - 1);
+topIntegralF2[point_List, eps_, a1_, a2_] := Module[{x1, x2, x3},
+  {x1, x2, x3} = point;
+  (x3^2*a1*a2*eps^2 - 1)/(x1^2*a2*eps^2 - 1)
+];
 
 (* phi; the file says that dx/phi is invariant under the map *)
-topDensity[{x1_, x2_, x3_}, eps_, a1_, a2_] :=
-  x3^4*a1^2*a2^2*eps^4 - 2*x3^2*a1*a2*eps^2 + 1;
+topDensity[point_List, eps_, a1_, a2_] := Module[{x1, x2, x3},
+  {x1, x2, x3} = point;
+  x3^4*a1^2*a2^2*eps^4 - 2*x3^2*a1*a2*eps^2 + 1
+];

@@ -16,38 +16,42 @@ exact(value) = value isa Union{Integer, Rational} ? Rational{BigInt}(value) : va
 
 # x' = f(x)
 function vector_field(point)
-    x, y = exact.(point)
+    x = exact(point[1]); y = exact(point[2])
     return [y, 6*x^2 - 2]
 end
 
-# f'(x), the matrix of the derivatives
-function vector_field_jacobian(point)
-    x, y = exact.(point)
-    return hcat([0, 12*x],
-        [1, 0])
+# M = I - eps f'(x)
+function kahan_matrix(point, eps)
+    x = exact(point[1]); y = exact(point[2])
+    eps = exact(eps)
+    return hcat([1, -12*x*eps], [-eps, 1])
 end
 
-# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x)
-function kahan_map(point, eps)
+# r = M x + 2 eps f(x)
+function kahan_vector(point, eps)
+    x = exact(point[1]); y = exact(point[2])
     eps = exact(eps)
-    M = I - eps*vector_field_jacobian(point)
-    return collect(exact.(point)) + 2*eps*(M \ vector_field(point))
+    return [y*eps + x, y - 4*eps]
+end
+
+# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r
+function kahan_map(point, eps)
+    return exact.(kahan_matrix(point, eps)) \ exact.(kahan_vector(point, eps))
 end
 
 # Its inverse, which is the map with -eps
-kahan_inverse(point, eps) = kahan_map(point, -eps)
+function kahan_inverse(point, eps)
+    return kahan_map(point, -eps)
+end
 
 # Its Jacobi matrix: (I - eps f'(x))^(-1) (I + eps f'(x~))
 function kahan_jacobian(point, eps)
-    eps = exact(eps)
-    image = kahan_map(point, eps)
-    M = I - eps*vector_field_jacobian(point)
-    return M \ (I + eps*vector_field_jacobian(image))
+    return exact.(kahan_matrix(point, eps)) \ exact.(kahan_matrix(kahan_map(point, eps), -eps))
 end
 
 # The Kahan map as rational functions of x and eps
 function kahan_map_formula(point, eps)
-    x, y = exact.(point)
+    x = exact(point[1]); y = exact(point[2])
     eps = exact(eps)
     return [(-2*y*eps + 4*eps^2 - x)/(12*x*eps^2 - 1),
         (-12*x*y*eps^2 - 12*x^2*eps - y + 4*eps)/(12*x*eps^2 - 1)]
@@ -55,32 +59,27 @@ end
 
 # modified_H: the file says that it is an integral of the map
 function integral_modified_H(point, eps)
-    x, y = exact.(point)
+    x = exact(point[1]); y = exact(point[2])
     eps = exact(eps)
     return (-2*x*y^2*eps^2 + 8*x^2*eps^2 + 2*x^3 - 1//2*y^2 + 8//3*eps^2 - 2*x)/(12*x*eps^2 - 1)
 end
 
-# H, with f = J grad H
-function hamiltonian(point)
-    x, y = exact.(point)
-    return -2*x^3 + 1//2*y^2 + 2*x
+# H + grad H . (x~ - x)/3, where f = J grad H
+function modified_hamiltonian_of(point, image, eps)
+    x = exact(point[1]); y = exact(point[2])
+    x_new = exact(image[1]); y_new = exact(image[2])
+    eps = exact(eps)
+    return -2*x^2*x_new + 1//6*y^2 + 1//3*y*y_new + 4//3*x + 2//3*x_new
 end
 
-# grad H
-function hamiltonian_gradient(point)
-    x, y = exact.(point)
-    return [-6*x^2 + 2, y]
-end
-
-# An integral of the map, by a theorem: H + grad H . (x~ - x)/3
+# An integral of the map, by a theorem
 function modified_hamiltonian(point, eps)
-    step = kahan_map(point, eps) - collect(exact.(point))
-    return hamiltonian(point) + sum(hamiltonian_gradient(point) .* step)*1//3
+    return modified_hamiltonian_of(point, kahan_map(point, eps), eps)
 end
 
 # phi; the file says that dx/phi is invariant under the map
 function density(point, eps)
-    x, y = exact.(point)
+    x = exact(point[1]); y = exact(point[2])
     eps = exact(eps)
     return -12*x*eps^2 + 1
 end

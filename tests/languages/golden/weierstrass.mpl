@@ -9,6 +9,11 @@
 # Written by kahanmaps VERSION
 # For example: kahan_map([1, 2], 1/10);
 
+kahan_solve := proc(M, b)
+  if LinearAlgebra:-Determinant(M) = 0 then error "det(I - eps f'(x)) = 0: the Kahan map has no value here" end if;
+  LinearAlgebra:-LinearSolve(M, b);
+end proc:
+
 # x' = f(x)
 vector_field := proc(point)
   local x, y;
@@ -16,22 +21,23 @@ vector_field := proc(point)
   Vector([y, 6*x^2 - 2]);
 end proc:
 
-# f'(x), the matrix of the derivatives
-vector_field_jacobian := proc(point)
+# M = I - eps f'(x)
+kahan_matrix := proc(point, eps)
   local x, y;
   x, y := op(convert(point, list));
-  Matrix([[0, 1],
-   [12*x, 0]]);
+  Matrix([[1, -eps], [-12*x*eps, 1]]);
 end proc:
 
-# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x)
+# r = M x + 2 eps f(x)
+kahan_vector := proc(point, eps)
+  local x, y;
+  x, y := op(convert(point, list));
+  Vector([y*eps + x, y - 4*eps]);
+end proc:
+
+# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r
 kahan_map := proc(point, eps)
-  local M;
-  M := LinearAlgebra:-IdentityMatrix(2)
-    - LinearAlgebra:-ScalarMultiply(vector_field_jacobian(point), eps);
-  if LinearAlgebra:-Determinant(M) = 0 then error "det(I - eps f'(x)) = 0: the Kahan map has no value here" end if;
-  Vector(convert(point, list))
-    + LinearAlgebra:-ScalarMultiply(LinearAlgebra:-LinearSolve(M, vector_field(point)), 2*eps);
+  kahan_solve(kahan_matrix(point, eps), kahan_vector(point, eps));
 end proc:
 
 # Its inverse, which is the map with -eps
@@ -41,13 +47,7 @@ end proc:
 
 # Its Jacobi matrix: (I - eps f'(x))^(-1) (I + eps f'(x~))
 kahan_jacobian := proc(point, eps)
-  local M, image;
-  image := kahan_map(point, eps);
-  M := LinearAlgebra:-IdentityMatrix(2)
-    - LinearAlgebra:-ScalarMultiply(vector_field_jacobian(point), eps);
-  LinearAlgebra:-LinearSolve(M,
-    LinearAlgebra:-IdentityMatrix(2)
-    + LinearAlgebra:-ScalarMultiply(vector_field_jacobian(image), eps));
+  kahan_solve(kahan_matrix(point, eps), kahan_matrix(kahan_map(point, eps), -eps));
 end proc:
 
 # The Kahan map as rational functions of x and eps
@@ -55,7 +55,7 @@ kahan_map_formula := proc(point, eps)
   local x, y;
   x, y := op(convert(point, list));
   Vector([(-2*y*eps + 4*eps^2 - x)/(12*x*eps^2 - 1),
-   (-12*x*y*eps^2 - 12*x^2*eps - y + 4*eps)/(12*x*eps^2 - 1)]);
+        (-12*x*y*eps^2 - 12*x^2*eps - y + 4*eps)/(12*x*eps^2 - 1)]);
 end proc:
 
 # modified_H: the file says that it is an integral of the map
@@ -65,26 +65,17 @@ integral_modified_H := proc(point, eps)
   (-2*x*y^2*eps^2 + 8*x^2*eps^2 + 2*x^3 - 1/2*y^2 + 8/3*eps^2 - 2*x)/(12*x*eps^2 - 1);
 end proc:
 
-# H, with f = J grad H
-hamiltonian := proc(point)
-  local x, y;
+# H + grad H . (x~ - x)/3, where f = J grad H
+modified_hamiltonian_of := proc(point, image, eps)
+  local x, y, x_new, y_new;
   x, y := op(convert(point, list));
-  -2*x^3 + 1/2*y^2 + 2*x;
+  x_new, y_new := op(convert(image, list));
+  -2*x^2*x_new + 1/6*y^2 + 1/3*y*y_new + 4/3*x + 2/3*x_new;
 end proc:
 
-# grad H
-hamiltonian_gradient := proc(point)
-  local x, y;
-  x, y := op(convert(point, list));
-  Vector([-6*x^2 + 2, y]);
-end proc:
-
-# An integral of the map, by a theorem: H + grad H . (x~ - x)/3
+# An integral of the map, by a theorem
 modified_hamiltonian := proc(point, eps)
-  local image;
-  image := kahan_map(point, eps);
-  hamiltonian(point) + (LinearAlgebra:-Transpose(hamiltonian_gradient(point))
-    . (image - Vector(convert(point, list))))/3;
+  modified_hamiltonian_of(point, kahan_map(point, eps), eps);
 end proc:
 
 # phi; the file says that dx/phi is invariant under the map

@@ -9,23 +9,29 @@
 # Written by kahanmaps VERSION
 # For example: kahan_map([1, 2], 1/10)
 
-# x' = f(x)
-def vector_field(point):
-    x, y = vector(point)
-    return vector([y, 6*x^2 - 2])
-
-# f'(x), the matrix of the derivatives
-def vector_field_jacobian(point):
-    x, y = vector(point)
-    return matrix([[0, 1],
-        [12*x, 0]])
-
-# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x)
-def kahan_map(point, eps):
-    M = identity_matrix(2) - eps*vector_field_jacobian(point)
+def kahan_solve(M, b):
     if M.is_singular():
         raise ZeroDivisionError("det(I - eps f'(x)) = 0: the Kahan map has no value here")
-    return vector(point) + 2*eps*M.solve_right(vector_field(point))
+    return M.solve_right(b)
+
+# x' = f(x)
+def vector_field(point):
+    [x, y] = vector(point)
+    return vector([y, 6*x^2 - 2])
+
+# M = I - eps f'(x)
+def kahan_matrix(point, eps):
+    [x, y] = vector(point)
+    return matrix([[1, -eps], [-12*x*eps, 1]])
+
+# r = M x + 2 eps f(x)
+def kahan_vector(point, eps):
+    [x, y] = vector(point)
+    return vector([y*eps + x, y - 4*eps])
+
+# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r
+def kahan_map(point, eps):
+    return kahan_solve(kahan_matrix(point, eps), kahan_vector(point, eps))
 
 # Its inverse, which is the map with -eps
 def kahan_inverse(point, eps):
@@ -33,37 +39,30 @@ def kahan_inverse(point, eps):
 
 # Its Jacobi matrix: (I - eps f'(x))^(-1) (I + eps f'(x~))
 def kahan_jacobian(point, eps):
-    image = kahan_map(point, eps)
-    M = identity_matrix(2) - eps*vector_field_jacobian(point)
-    return M.solve_right(identity_matrix(2) + eps*vector_field_jacobian(image))
+    return kahan_solve(kahan_matrix(point, eps), kahan_matrix(kahan_map(point, eps), -eps))
 
 # The Kahan map as rational functions of x and eps
 def kahan_map_formula(point, eps):
-    x, y = vector(point)
+    [x, y] = vector(point)
     return vector([(-2*y*eps + 4*eps^2 - x)/(12*x*eps^2 - 1),
         (-12*x*y*eps^2 - 12*x^2*eps - y + 4*eps)/(12*x*eps^2 - 1)])
 
 # modified_H: the file says that it is an integral of the map
 def integral_modified_H(point, eps):
-    x, y = vector(point)
+    [x, y] = vector(point)
     return (-2*x*y^2*eps^2 + 8*x^2*eps^2 + 2*x^3 - 1/2*y^2 + 8/3*eps^2 - 2*x)/(12*x*eps^2 - 1)
 
-# H, with f = J grad H
-def hamiltonian(point):
-    x, y = vector(point)
-    return -2*x^3 + 1/2*y^2 + 2*x
+# H + grad H . (x~ - x)/3, where f = J grad H
+def modified_hamiltonian_of(point, image, eps):
+    [x, y] = vector(point)
+    [x_new, y_new] = vector(image)
+    return -2*x^2*x_new + 1/6*y^2 + 1/3*y*y_new + 4/3*x + 2/3*x_new
 
-# grad H
-def hamiltonian_gradient(point):
-    x, y = vector(point)
-    return vector([-6*x^2 + 2, y])
-
-# An integral of the map, by a theorem: H + grad H . (x~ - x)/3
+# An integral of the map, by a theorem
 def modified_hamiltonian(point, eps):
-    step = kahan_map(point, eps) - vector(point)
-    return hamiltonian(point) + hamiltonian_gradient(point)*step/3
+    return modified_hamiltonian_of(point, kahan_map(point, eps), eps)
 
 # phi; the file says that dx/phi is invariant under the map
 def density(point, eps):
-    x, y = vector(point)
+    [x, y] = vector(point)
     return -12*x*eps^2 + 1

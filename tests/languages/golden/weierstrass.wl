@@ -10,67 +10,82 @@
 (* For example: kahanMap[{1, 2}, 1/10] *)
 
 ClearAll[vectorField,
-  vectorFieldJacobian,
-  kahanMap,
-  kahanInverse,
-  kahanJacobian,
-  kahanMapFormula,
-  integralModifiedH,
-  hamiltonian,
-  hamiltonianGradient,
-  modifiedHamiltonian,
-  density];
+        kahanMatrix,
+        kahanVector,
+        kahanMap,
+        kahanInverse,
+        kahanJacobian,
+        kahanMapFormula,
+        integralModifiedH,
+        modifiedHamiltonianOf,
+        modifiedHamiltonian,
+        density];
+
+kahanSolve[m_, b_] := If[Det[m] === 0,
+  Print["det(I - eps f'(x)) = 0: the Kahan map has no value here"]; Abort[],
+  LinearSolve[m, b]
+];
 
 (* x' = f(x) *)
-vectorField[{x_, y_}] :=
-  {y, 6*x^2 - 2};
+vectorField[point_List] := Module[{x, y},
+  {x, y} = point;
+  {y, 6*x^2 - 2}
+];
 
-(* f'(x), the matrix of the derivatives *)
-vectorFieldJacobian[{x_, y_}] :=
-  {{0, 1},
-   {12*x, 0}};
+(* M = I - eps f'(x) *)
+kahanMatrix[point_List, eps_] := Module[{x, y},
+  {x, y} = point;
+  {{1, -eps}, {-12*x*eps, 1}}
+];
 
-(* The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x) *)
-kahanMap[point_List, eps_] := Module[{m},
-  m = IdentityMatrix[2] - eps*vectorFieldJacobian[point];
-  If[Det[m] === 0, $Failed, point + 2*eps*LinearSolve[m, vectorField[point]]]
+(* r = M x + 2 eps f(x) *)
+kahanVector[point_List, eps_] := Module[{x, y},
+  {x, y} = point;
+  {y*eps + x, y - 4*eps}
+];
+
+(* The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r *)
+kahanMap[point_List, eps_] := Module[{},
+  kahanSolve[kahanMatrix[point, eps], kahanVector[point, eps]]
 ];
 
 (* Its inverse, which is the map with -eps *)
-kahanInverse[point_List, eps_] := kahanMap[point, -eps];
+kahanInverse[point_List, eps_] := Module[{},
+  kahanMap[point, -eps]
+];
 
 (* Its Jacobi matrix: (I - eps f'(x))^(-1) (I + eps f'(x~)) *)
-kahanJacobian[point_List, eps_] := Module[{m, image},
-  m = IdentityMatrix[2] - eps*vectorFieldJacobian[point];
-  image = kahanMap[point, eps];
-  If[image === $Failed, $Failed,
-    Inverse[m].(IdentityMatrix[2] + eps*vectorFieldJacobian[image])]
+kahanJacobian[point_List, eps_] := Module[{},
+  kahanSolve[kahanMatrix[point, eps], kahanMatrix[kahanMap[point, eps], -eps]]
 ];
 
 (* The Kahan map as rational functions of x and eps *)
-kahanMapFormula[{x_, y_}, eps_] :=
+kahanMapFormula[point_List, eps_] := Module[{x, y},
+  {x, y} = point;
   {(-2*y*eps + 4*eps^2 - x)/(12*x*eps^2 - 1),
-   (-12*x*y*eps^2 - 12*x^2*eps - y + 4*eps)/(12*x*eps^2 - 1)};
+        (-12*x*y*eps^2 - 12*x^2*eps - y + 4*eps)/(12*x*eps^2 - 1)}
+];
 
 (* modified_H: the file says that it is an integral of the map *)
-integralModifiedH[{x_, y_}, eps_] :=
-  (-2*x*y^2*eps^2 + 8*x^2*eps^2 + 2*x^3 - 1/2*y^2 + 8/3*eps^2 - 2*x)/(12*x*eps^2 - 1);
+integralModifiedH[point_List, eps_] := Module[{x, y},
+  {x, y} = point;
+  (-2*x*y^2*eps^2 + 8*x^2*eps^2 + 2*x^3 - 1/2*y^2 + 8/3*eps^2 - 2*x)/(12*x*eps^2 - 1)
+];
 
-(* H, with f = J grad H *)
-hamiltonian[{x_, y_}] :=
-  -2*x^3 + 1/2*y^2 + 2*x;
+(* H + grad H . (x~ - x)/3, where f = J grad H *)
+modifiedHamiltonianOf[point_List, image_List, eps_] := Module[{x, y, vXNew, vYNew},
+  {x, y} = point;
+  {vXNew, vYNew} = image;
+  -2*x^2*vXNew + 1/6*y^2 + 1/3*y*vYNew + 4/3*x + 2/3*vXNew
+];
 
-(* grad H *)
-hamiltonianGradient[{x_, y_}] :=
-  {-6*x^2 + 2, y};
-
-(* An integral of the map, by a theorem: H + grad H . (x~ - x)/3 *)
-modifiedHamiltonian[point_List, eps_] := Module[{image},
-  image = kahanMap[point, eps];
-  If[image === $Failed, $Failed,
-    hamiltonian[point] + hamiltonianGradient[point].(image - point)/3]
+(* An integral of the map, by a theorem *)
+modifiedHamiltonian[point_List, eps_] := Module[{},
+  modifiedHamiltonianOf[point, kahanMap[point, eps], eps]
 ];
 
 (* phi; the file says that dx/phi is invariant under the map *)
-density[{x_, y_}, eps_] :=
-  -12*x*eps^2 + 1;
+density[point_List, eps_] := Module[{x, y},
+  {x, y} = point;
+  -12*x*eps^2 + 1
+];

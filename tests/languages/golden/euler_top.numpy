@@ -1,0 +1,53 @@
+# euler_top: Euler top
+#   x1' = x2*x3*a1
+#   x2' = x1*x3*a2
+#   x3' = x1*x2
+# eps is half the time step: the time step is 2 eps.
+# Parameters: a3 = 1
+# Parameters left as symbols: a1, a2
+# Convention of the source: the sources' epsilon is eps: x1~ - x1 = eps a1 (x2~ x3 + x2 x3~), and
+#   cyclic, so that the time step is 2 eps
+# Source: R. Hirota, K. Kimura. Discretization of the Euler top. J. Phys. Soc. Japan 69 (2000),
+#   627-630
+# Source: M. Petrera, Yu. B. Suris. On the Hamiltonian structure of Hirota-Kimura discretization of
+#   the Euler top. Math. Nachr. 283 (2010), 1654-1663. arXiv:0707.4382
+# Source: M. Petrera, A. Pfadler, Yu. B. Suris. On integrability of Hirota-Kimura type
+#   discretizations. Regul. Chaotic Dyn. 16 (2011), 245-289. arXiv:1008.1040
+# Written by kahanmaps VERSION
+# For example: top_kahan_map([1, 2, 3], 0.1, a1, a2)
+
+import numpy as np
+
+# x' = f(x)
+def top_vector_field(point, a1, a2):
+    [x1, x2, x3] = 1.0*np.asarray(point)
+    return np.array([x2*x3*a1, x1*x3*a2, x1*x2])
+
+# M = I - eps f'(x)
+def top_kahan_matrix(point, eps, a1, a2):
+    [x1, x2, x3] = 1.0*np.asarray(point)
+    return np.array([[1, -x3*a1*eps, -x2*a1*eps], [-x3*a2*eps, 1, -x1*a2*eps], [-x2*eps, -x1*eps, 1]])
+
+# r = M x + 2 eps f(x)
+def top_kahan_vector(point, eps, a1, a2):
+    [x1, x2, x3] = 1.0*np.asarray(point)
+    return np.array([x1, x2, x3])
+
+# The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r
+def top_kahan_map(point, eps, a1, a2):
+    return np.linalg.solve(top_kahan_matrix(point, eps, a1, a2), top_kahan_vector(point, eps, a1, a2))
+
+# F1: the file says that it is an integral of the map
+def top_integral_F1(point, eps, a1, a2):
+    [x1, x2, x3] = 1.0*np.asarray(point)
+    return (x2**2*a1*eps**2 - 1)/(x3**2*a1*a2*eps**2 - 1)
+
+# F2: the file says that it is an integral of the map
+def top_integral_F2(point, eps, a1, a2):
+    [x1, x2, x3] = 1.0*np.asarray(point)
+    return (x3**2*a1*a2*eps**2 - 1)/(x1**2*a2*eps**2 - 1)
+
+# phi; the file says that dx/phi is invariant under the map
+def top_density(point, eps, a1, a2):
+    [x1, x2, x3] = 1.0*np.asarray(point)
+    return x3**4*a1**2*a2**2*eps**4 - 2*x3**2*a1*a2*eps**2 + 1
