@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import random
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -34,6 +34,7 @@ from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
+from kahanmaps.maps.inverse import inverse_rows, why_not_birational
 
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, Any], ...]
@@ -88,7 +89,7 @@ class Equation:
     def transposed(self) -> Equation:
         """The equation with x and x~ exchanged (and another sign), that of the inverse map; in degree 1 only."""
         if self.degree != 1:
-            raise InputError("the inverse of this map is not known: give it as well")
+            raise InputError(f"found an equation of degree {self.degree} in the point, expected degree 1")
         n = self.dim
         terms = []
         for row in self.terms:
@@ -210,10 +211,17 @@ def det_of(name: str) -> str:
 
 
 class EquationMap(MapOver):
-    """The map of an equation over a field; `backward` is the equation of its inverse, where that is known."""
+    """The map of an equation over a field; `backward` gives the equation of its inverse when that is asked for.
+
+    Without it the equation is to be of degree 1, so that exchanging the two points gives the inverse.
+    """
 
     def __init__(
-        self, equation: Equation, eps: Any, backward: Equation | None = None, variables: tuple[str, ...] = ()
+        self,
+        equation: Equation,
+        eps: Any,
+        backward: Callable[[], Equation] | None = None,
+        variables: tuple[str, ...] = (),
     ) -> None:
         self.field, self.dim, self.eps, self.variables = equation.over, equation.dim, eps, variables
         self._equation, self._backward = equation, backward
@@ -225,8 +233,8 @@ class EquationMap(MapOver):
     @cached_property
     def inverse(self) -> EquationMap:
         """The inverse map. Raises InputError where it is not known."""
-        backward = self._equation.transposed() if self._backward is None else self._backward
-        return EquationMap(backward, self.eps, self._equation, self.variables)
+        backward = self._equation.transposed() if self._backward is None else self._backward()
+        return EquationMap(backward, self.eps, lambda: self._equation, self.variables)
 
     def _at(self, x: Sequence[Any]) -> list[list[Any]]:
         with self.field.working():
@@ -334,8 +342,9 @@ class ImplicitMap(BirationalMap):
     """The map of M(x, eps) x~ = r(x, eps): `rows` are those of (M | -r).
 
     Entries are polynomials over Q in the variables, then symbols, if there are any, then eps. `backward` are the rows
-    of the inverse map where they are known; they are not needed where M and r are of degree 1 in the variables. `title`
-    says in a word or two what kind of map it is, `has_time_step` that it approximates a flow for the time 2 eps.
+    of the inverse map where they are known; else, where M and r are of degree 1 in the variables, exchanging the points
+    gives it, and elimination elsewhere. `title` says in a word or two what kind of map it is, `has_time_step` that it
+    approximates a flow for the time 2 eps.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")
@@ -375,6 +384,11 @@ class ImplicitMap(BirationalMap):
         return [list(row[:-1]) for row in self.rows]
 
     @cached_property
+    def inverse_rows(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:
+        """The rows of the inverse map, those given or found by elimination. Raises InputError where they are not."""
+        return inverse_rows(self.rows) if self.backward is None else self.backward
+
+    @cached_property
     def equations(self) -> tuple[fmpq_mpoly, ...]:
         """M x~ - r, polynomials in x, the new point with names like x_new, symbols and eps; all of them are 0.
 
@@ -410,8 +424,11 @@ class ImplicitMap(BirationalMap):
             if known is over and at is element and not values:
                 return found
         point = (*values, element)
-        backward = None if self.backward is None else equation_of(self.backward, over, point)
-        found = EquationMap(equation_of(self.rows, over, point), element, backward, self.variables)
+        equation = equation_of(self.rows, over, point)
+        backward = None
+        if self.backward is not None or equation.degree > 1:
+            backward = lambda: equation_of(self.inverse_rows, over, point)  # noqa: E731
+        found = EquationMap(equation, element, backward, self.variables)
         self._last[:] = [] if values else [(over, element, found)]
         return found
 
@@ -478,6 +495,8 @@ def why_no_map(map_: ImplicitMap) -> str:
         try:
             found = map_.at(over.random(rng), over, [over.random(rng) for _ in map_.symbols])
             image = found.step(x)
+            if found.jacobian(x).det() == 0:
+                return "found a map whose image is not the whole space: det dPhi is 0 everywhere"
             back = x if map_.backward is None else found.inverse.step(image)
         except BadPrime:
             continue
@@ -485,4 +504,4 @@ def why_no_map(map_: ImplicitMap) -> str:
             return "found a map that has no value at random points: the new point is not determined"
         if back != x:
             return "found a map that does not lead back from the images of random points, expected the inverse map"
-    return ""
+    return "" if map_.backward is not None else why_not_birational(map_.rows)

@@ -1,0 +1,216 @@
+"""The inverse of a map M(x) x~ = r(x) by elimination, or that there is none.
+
+The n equations are polynomials in x and x~ that vanish on the graph of the map. The graph is irreducible, so that each
+of them may be replaced by its one irreducible factor that vanishes there, which a random point of the graph modulo a
+prime tells. Unknowns x_k that occur to the first degree are solved for and put into the other equations; failing that,
+resultants eliminate one. What remains of the last unknown is its minimal polynomial over the field of functions of x~:
+of degree 1 it is a coordinate of the inverse map, of degree d > 1 it says that a point has d or more preimages.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from flint import Ordering, fmpq_mpoly, fmpz_mod_mpoly_ctx
+
+from kahanmaps.algebra.chance import random_prime_field, seed_for
+from kahanmaps.algebra.fields import PrimeField
+from kahanmaps.algebra.matrices import solve
+from kahanmaps.algebra.polynomials import evaluate, names_of, ring
+from kahanmaps.errors import BadPrime, InputError, SingularMatrix
+
+Rows = tuple[tuple[fmpq_mpoly, ...], ...]
+Quotient = tuple[Any, Any]  # of polynomials
+Solution = dict[int, Quotient]  # the unknowns, by their places among the variables
+
+_MOST_TERMS = 3000  # of a polynomial
+_LARGEST_RESULTANT = 60_000  # terms of one times terms of the other times the sum of their degrees
+
+
+class NotBirational(InputError):
+    """A map of which a point has several preimages in general, or none."""
+
+
+class TooLarge(InputError):
+    """The polynomials grow beyond what elimination takes on."""
+
+
+def inverse_rows(rows: Rows) -> Rows:
+    """The rows (M | -r) of the inverse map, M diagonal; exact.
+
+    Args:
+        rows: those of a map, polynomials in the n variables, then symbols, if there are any, and eps.
+
+    Returns:
+        As many rows in the same names.
+
+    Raises:
+        InputError: where the map is not birational (NotBirational), or the elimination is too large (TooLarge).
+
+    >>> x, y, eps = ring(["x", "y", "eps"]).gens()
+    >>> one, zero = x**0, 0 * x
+    >>> henon = ((one, zero, -y), (zero, one, x - y**2))  # (x, y) -> (y, y^2 - x)
+    >>> inverse_rows(henon)
+    ((1, 0, -x^2 + y), (0, 1, -x))
+    """
+    n, names = len(rows), names_of(rows[0][-1])
+    context = ring((*(f"{name}." for name in names[:n]), *names))  # x, then x~ under the names of x, and the rest
+    old = [*context.gens()[:n], *context.gens()[2 * n :]]
+    new = [*context.gens()[n : 2 * n], context.constant(1)]
+    equations = [
+        sum((entry.compose(*old, ctx=context) * y for entry, y in zip(row, new, strict=True)), context.constant(0))
+        for row in rows
+    ]
+    found = _solved(equations, list(range(n)), _on_graph(rows))
+    home = ring(names)
+    back = [home.constant(0)] * n + list(home.gens())
+    inverse = []
+    for i in range(n):
+        above, below = (part.compose(*back, ctx=home) for part in found[i])
+        scale = below.leading_coefficient()
+        inverse.append((*(below / scale if i == j else home.constant(0) for j in range(n)), -above / scale))
+    return tuple(inverse)
+
+
+def why_not_birational(rows: Rows) -> str:
+    """Why a map is not birational, found modulo a prime at random eps and symbols; empty where it is or seems to be."""
+    n, names = len(rows), names_of(rows[0][-1])
+    field, sample = _graph_point(rows)
+    context = fmpz_mod_mpoly_ctx.get(
+        (*(f"{name}." for name in names[:n]), *names[:n]), modulus=field.prime, ordering=Ordering.degrevlex
+    )
+    equations = []
+    for row in rows:
+        terms: dict[tuple[int, ...], Any] = {}
+        for j, entry in enumerate(row):
+            for monomial, coefficient in entry.terms():
+                value = field.convert(coefficient)
+                for given, exponent in zip(sample[2 * n :], monomial[n:], strict=True):
+                    value = value * given**exponent
+                key = (*monomial[:n], *(int(j == k) for k in range(n)))
+                terms[key] = terms.get(key, field.zero) + value
+        equations.append(context.from_dict({key: int(value) for key, value in terms.items() if value != 0}))
+    try:
+        _solved(equations, list(range(n)), lambda polynomial: _vanishes(polynomial, field, sample))
+    except NotBirational as error:
+        return str(error)
+    except TooLarge:
+        return ""
+    return ""
+
+
+def _graph_point(rows: Rows) -> tuple[PrimeField, list[Any]]:
+    """A point (x, x~) of the graph modulo a random prime, followed by values of the symbols and eps."""
+    n, names = len(rows), names_of(rows[0][-1])
+    rng = random.Random(f"graph {seed_for(0, *(entry for row in rows for entry in row))}")
+    while True:
+        field = random_prime_field(rng)
+        given = [field.random(rng) for _ in names]
+        try:
+            values = [evaluate(entry, field, given) for row in rows for entry in row]
+            matrix = field.matrix(n, n, [values[i * (n + 1) + j] for i in range(n) for j in range(n)])
+            image = solve(matrix, field.column([-values[i * (n + 1) + n] for i in range(n)])).entries()
+        except (BadPrime, SingularMatrix):
+            continue
+        return field, [*given[:n], *image, *given[n:]]
+
+
+def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool:
+    total = field.zero
+    for monomial, coefficient in polynomial.terms():
+        value = field.convert(coefficient)
+        for given, exponent in zip(sample, monomial, strict=False):
+            value = value * given**exponent
+        total = total + value
+    return bool(total == 0)
+
+
+def _on_graph(rows: Rows) -> Callable[[Any], bool]:
+    field, sample = _graph_point(rows)
+    return lambda polynomial: _vanishes(polynomial, field, sample)
+
+
+def _solved(polynomials: Sequence[Any], unknowns: Sequence[int], on_graph: Callable[[Any], bool]) -> Solution:
+    """The unknowns as functions of all else, from polynomials that vanish on the graph."""
+    if not unknowns:
+        return {}
+    known: list[Any] = []
+    for polynomial in polynomials:
+        if not polynomial.is_zero() and (factor := _on_graph_factor(polynomial, on_graph)) not in known:
+            known.append(factor)
+    if len(known) < len(unknowns) or any(not any(p.degrees()[u] for u in unknowns) for p in known):
+        raise NotBirational("found a map whose image is not the whole space: det dPhi is 0 everywhere")
+    linear = [(len(p), p, u) for p in known for u in unknowns if p.degrees()[u] == 1]
+    if linear:
+        _, chosen, u = min(linear, key=lambda one: (sum(bool(one[1].degrees()[v]) for v in unknowns), one[0]))
+        rest, slope = _coefficients(chosen, u)
+        others = [_substituted(p, u, -rest, slope) for p in known if p is not chosen]
+        solution = _solved(others, [v for v in unknowns if v != u], on_graph)
+        (a, b), (c, d) = (_put_in(part, solution) for part in (-rest, slope))
+        return solution | {u: _lowest(a * d, b * c)}
+    return _by_resultants(known, unknowns, on_graph)
+
+
+def _by_resultants(known: Sequence[Any], unknowns: Sequence[int], on_graph: Callable[[Any], bool]) -> Solution:
+    if len(unknowns) == 1:
+        raise NotBirational(
+            "found a map that is not birational: in general a point of its image has at least "
+            f"{known[0].degrees()[unknowns[0]]} preimages"
+        )
+    u = min(unknowns, key=lambda v: sum(p.degrees()[v] for p in known))
+    through = sorted((p for p in known if p.degrees()[u]), key=lambda p: (p.degrees()[u], len(p)))
+    first, name = through[0], str(through[0].context().names()[u])
+    rest = [p for p in known if not p.degrees()[u]]
+    for p in through[1:]:
+        if len(first) * len(p) * (first.degrees()[u] + p.degrees()[u]) > _LARGEST_RESULTANT:
+            raise TooLarge("the inverse of this map is not known, and finding it is too large: give it as well")
+        rest.append(first.resultant(p, name))
+    others = [v for v in unknowns if v != u]
+    solution = _solved(rest, others, on_graph)
+    common = None
+    for p in through:
+        above, _ = _put_in(p, solution)
+        common = above if common is None else common.gcd(above)
+    return solution | _solved([common], [u], on_graph)
+
+
+def _on_graph_factor(polynomial: Any, on_graph: Callable[[Any], bool]) -> Any:
+    """The irreducible factor that vanishes on the graph."""
+    if len(polynomial) > _MOST_TERMS:
+        raise TooLarge("the inverse of this map is not known, and finding it is too large: give it as well")
+    return next(factor for factor, _ in polynomial.factor()[1] if on_graph(factor))
+
+
+def _coefficients(polynomial: Any, u: int) -> list[Any]:
+    """The coefficients of the powers of a variable, the lowest first."""
+    context = polynomial.context()
+    parts: list[dict[tuple[int, ...], Any]] = [{} for _ in range(polynomial.degrees()[u] + 1)]
+    for monomial, coefficient in polynomial.terms():
+        parts[monomial[u]][(*monomial[:u], 0, *monomial[u + 1 :])] = coefficient
+    return [context.from_dict(part) for part in parts]
+
+
+def _substituted(polynomial: Any, u: int, above: Any, below: Any) -> Any:
+    """The polynomial with above/below for a variable, times the power of `below` that makes it one again."""
+    *lower, total = _coefficients(polynomial, u)
+    power = below**0
+    for coefficient in reversed(lower):
+        power = power * below
+        total = total * above + coefficient * power
+    return total
+
+
+def _put_in(polynomial: Any, solution: Solution) -> Quotient:
+    """The polynomial with the solution for its unknowns."""
+    denominator = polynomial.context().constant(1)
+    for u, (above, below) in solution.items():
+        denominator = denominator * below ** int(polynomial.degrees()[u])
+        polynomial = _substituted(polynomial, u, above, below)
+    return _lowest(polynomial, denominator)
+
+
+def _lowest(above: Any, below: Any) -> Quotient:
+    common = above.gcd(below)
+    return above / common, below / common
