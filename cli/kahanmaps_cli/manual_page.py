@@ -13,7 +13,7 @@ from kahanmaps_cli.colour_option import is_colour_option
 
 _SYSTEM = (
     "SYSTEM is a file (docs/system-files.md describes the format), a name of the catalogue, - for standard input, or "
-    "left out for a system that stands on the line: --vars x,y --rhs 'x*y' --rhs=-x^2. Data goes to standard output, "
+    "left out for a system that stands on the line: --rhs \"x' = x*y; y' = -x^2\". Data goes to standard output, "
     "progress and talk to standard error."
 )
 _ENVIRONMENT = {

@@ -65,7 +65,9 @@ def _parameter_option(kind: NameValue, help_text: str) -> Callable[[F], F]:
 def _inline_options(parameter: Callable[[F], F]) -> Callable[[F], F]:
     return stack(
         click.option("--vars", "variables", metavar="X,Y,...", help="Inline system: its variables."),
-        click.option("--rhs", multiple=True, metavar="EXPR", help="Inline system: one right-hand side a variable."),
+        click.option(
+            "--rhs", multiple=True, metavar="EXPR", help="Inline system: a right-hand side, or \"x' = x*y; y' = -x\"."
+        ),
         parameter,
     )
 
@@ -212,13 +214,16 @@ def load_system(
     if variables is not None or rhs:
         if reference is not None:
             raise click.UsageError(f"give a SYSTEM ({reference}) or an inline one (--vars and --rhs), not both")
-        if variables is None or not rhs:
-            raise click.UsageError("an inline system needs both --vars X,Y,... and one --rhs EXPR for each variable")
-        return parse_system(_inline_file(variables.split(","), rhs, given), "inline")
+        if not rhs or (variables is None and not any("=" in text for text in rhs)):
+            raise click.UsageError(
+                "an inline system needs both --vars X,Y,... and one --rhs EXPR for each variable, "
+                "or --rhs \"x' = x*y; y' = -x\""
+            )
+        return parse_system(_inline_file(variables, rhs, given), "inline")
     if reference is None:
         raise click.UsageError(
             "missing SYSTEM: a file, a catalogue name ('kahanmaps systems' lists them), - for standard input, "
-            "or an inline system: --vars x,y --rhs 'x*y' --rhs '-x^2'"
+            "or an inline system: --rhs \"x' = x*y; y' = -x^2\""
         )
     if reference == "-":
         text = sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
@@ -256,13 +261,14 @@ def _files_like(path: str) -> str:
     return ""
 
 
-def _inline_file(variables: Sequence[str], rhs: Sequence[str], parameters: Mapping[str, str]) -> str:
+def _inline_file(variables: str | None, rhs: Sequence[str], parameters: Mapping[str, str]) -> str:
     """The system file that an inline system abbreviates, so that the same rules hold for it."""
 
     def quoted(texts: Sequence[str]) -> str:  # JSON strings are TOML strings
         return json.dumps([text.strip() for text in texts], ensure_ascii=False)
 
-    lines = [f"variables = {quoted(variables)}", "[system]", f"rhs = {quoted(rhs)}", "[parameters]"]
+    lines = [] if variables is None else [f"variables = {quoted(variables.split(','))}"]
+    lines += ["[system]", f"rhs = {quoted(rhs) if len(rhs) > 1 else quoted(rhs)[1:-1]}", "[parameters]"]
     lines += [f"{quoted([name])[1:-1]} = {quoted([value])[1:-1]}" for name, value in parameters.items()]
     return "\n".join(lines)
 

@@ -15,6 +15,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.numerals import check_names
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, substitute
 from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomial, parse_rational_function
+from kahanmaps.documents.equations import without_left_sides
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.documents.structured_facts import read_structured_facts
 from kahanmaps.errors import InputError, SystemFileError, counted, quoted, suggestion
@@ -100,6 +101,10 @@ class DocumentReader:
 
     def read(self) -> Contents:
         """The contents. Raises SystemFileError with every mistake of the document."""
+        try:
+            self.document = without_left_sides(self.document)
+        except InputError as error:
+            raise SystemFileError(self.where, [("system.rhs", str(error))]) from error
         self._unknown_keys("", self.document)
         kinds = [kind for kind in KINDS if kind in self.document]
         if len(kinds) != 1:

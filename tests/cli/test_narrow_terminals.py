@@ -114,11 +114,11 @@ def test_an_error_is_broken_at_words(kahanmaps, monkeypatch):
     talk_to_forty_columns(monkeypatch)
     lines = kahanmaps("analyze").err.splitlines()
     assert max(map(len, lines)) <= 40
-    assert " ".join(" ".join(lines).split()).endswith("--vars x,y --rhs 'x*y' --rhs '-x^2'")
+    assert " ".join(" ".join(lines).split()).endswith("--rhs \"x' = x*y; y' = -x^2\"")
 
 
 def test_an_error_in_a_pipe_is_one_line(kahanmaps):
-    assert kahanmaps("analyze").err.splitlines()[-1].endswith("--rhs '-x^2'")
+    assert kahanmaps("analyze").err.splitlines()[-1].endswith("y' = -x^2\"")
 
 
 def test_a_caret_points_where_it_did(monkeypatch, capsys):

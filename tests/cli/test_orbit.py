@@ -35,6 +35,18 @@ PRIMES = [10007, 2**61 - 1, 2**63 - 25, 2**63 + 29, 2**89 - 1]
 over_systems = pytest.mark.parametrize("orbit", [TOP, LORENZ, LOTKA_VOLTERRA], ids=lambda text: text.split()[1])
 
 
+def test_an_inline_system_may_be_written_as_equations(kahanmaps):
+    rest = "--start 1,2 --eps 1/10 --steps 3"
+    plain = kahanmaps(f"orbit --vars x,y --rhs x*y --rhs=-x {rest}").out
+    for system in (
+        "--rhs \"x' = x*y; y' = -x\"",
+        '--rhs "dx/dt = x*y" --rhs "dy/dt = -x"',
+        "--vars x,y --rhs 'x*y; -x'",
+    ):
+        assert kahanmaps(f"orbit {system} {rest}").out == plain
+    assert "or --rhs \"x' = x*y; y' = -x\"" in kahanmaps(f"orbit --rhs x*y {rest}").err
+
+
 def fractions(outcome: Outcome) -> list[list[Fraction]]:
     """The points of an orbit that was printed as JSON lines."""
     assert outcome.status == 0, outcome.err

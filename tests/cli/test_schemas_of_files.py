@@ -39,6 +39,13 @@ def test_what_family_new_writes_satisfies_the_schema(kahanmaps: Run, options: st
     assert mistakes("system-file", tomllib.loads(kahanmaps(f"family new {options} -q").out)) == []
 
 
+@pytest.mark.parametrize("rhs", ["\"x' = x*y; y' = -x\"", '["dx/dt = x*y", "dy/dt = -x"]'])
+def test_a_file_whose_equations_name_the_variables_satisfies_the_schema(rhs: str) -> None:
+    text = f"[system]\nrhs = {rhs}"
+    assert mistakes("system-file", tomllib.loads(text)) == []
+    assert parse_system(text).variables == ("x", "y")
+
+
 BAD_FILES = [
     'variables = ["x"]\n[system]\nrhs = ["x"]\n[hamiltonian]\nH = "x"\nJ = "standard"',
     'variables = ["x"]',
@@ -46,7 +53,7 @@ BAD_FILES = [
     'variables = ["1x"]\n[system]\nrhs = ["x"]',
     'variables = ["eps"]\n[system]\nrhs = ["1"]',
     'variables = []\n[system]\nrhs = ["x"]',
-    'variables = ["x"]\n[system]\nrhs = "x"',
+    'variables = ["x"]\n[system]\nrhs = 1',
     'variables = ["x"]\n[system]\nrsh = ["x"]',
     'variables = ["x"]\n[system]\nrhs = ["x"]\n[parameters]\neps = 1',
     'variables = ["x"]\n[system]\nrhs = ["x"]\n[parameters]\na = [1]',

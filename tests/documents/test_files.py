@@ -384,7 +384,7 @@ WRONG = [
     ("a parameter that is no name", 'parameters."2a" = 1\n' + OK, ["parameters.2a"]),
     ("101 variables", f"variables = {[f'x{k}' for k in range(101)]}\n[system]\nrhs = []\n", ["variables"]),
     ("missing rhs", 'variables = ["x"]\n[system]\n', ["system.rhs"]),
-    ("rhs as text", 'variables = ["x"]\n[system]\nrhs = "x"\n', ["system.rhs"]),
+    ("rhs as a number", 'variables = ["x"]\n[system]\nrhs = 1\n', ["system.rhs"]),
     ("too few right-hand sides", 'variables = ["x", "y"]\n[system]\nrhs = ["x"]\n', ["system.rhs"]),
     ("too many right-hand sides", 'variables = ["x"]\n[system]\nrhs = ["x", "1"]\n', ["system.rhs"]),
     ("degree 3", OK.replace("x*y", "x*y*x"), ["system.rhs[1]"]),
