@@ -10,7 +10,7 @@ import json
 import subprocess
 import sys
 
-HEAVY = {"numpy", "flint", "lark", "rich", "numba", "matplotlib", "pydantic", "distributed"}
+HEAVY = {"numpy", "flint", "rich", "numba", "matplotlib", "pydantic", "distributed"}
 
 COMMAND = """
 from kahanmaps_cli.main import main

@@ -1,45 +1,31 @@
-"""Expressions in text to polynomials: the grammar, its errors, and arithmetic that refuses before it hurts.
+"""Expressions in text to polynomials: how they are read, what is wrong in them, and arithmetic that refuses in time.
 
-The parser builds values from the bottom up while it reads; no tree is kept and nothing is run as code. A value is a
+Values are built from the bottom up while the text is read; no tree is kept and nothing is run as code. A value is a
 number, or a quotient of two polynomials. FLINT ends the process when memory runs out and does not see Ctrl-C, so
 the size and the cost of every operation are estimated, and if need be refused, before FLINT is called.
 
-Use `kahanmaps.algebra.text`; this file is loaded with the first expression because of lark.
+Use `kahanmaps.algebra.text`.
 """
 
 from __future__ import annotations
 
 import difflib
 import re
-import threading
 import unicodedata
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from math import isqrt
 from typing import Any, NamedTuple, TypeVar, cast
 
 from flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
-from lark import Lark, Token, Transformer
-from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
 from kahanmaps.algebra.numerals import BLANKS, Limits, is_name, number_in
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.errors import ExpressionError, quoted
 
-# Signs below powers, so that -x^2 is -(x^2); powers from the right, so that 2^3^2 is 2^9.
-GRAMMAR = r"""
-?start: sum
-?sum: product (SIGN product)*
-?product: signed (TIMES signed)*
-?signed: power | SIGN+ power -> negated
-?power: atom (POWER signed)?
-?atom: NUMBER -> number | NAME -> name | "(" sum ")"
-SIGN: /[+-]/
-TIMES: /[*\/]/
-POWER.1: /\*\*|\^/
-NAME: /[A-Za-z_][A-Za-z_0-9]*/
-NUMBER: /([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?/
-%ignore /[ \t\r\n]+/
-"""
+_TOKEN = re.compile(
+    r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|(?P<name>[A-Za-z_][A-Za-z_0-9]*)|\*\*|[-+*/^()]"
+)
+_END = "end"
 
 _WRITE = {
     "\u2212": "write the minus sign as -",
@@ -110,53 +96,102 @@ def read_constant(text: str, constants: Mapping[str, fmpq], limits: Limits) -> f
     return cast(fmpq, _parse(_Arithmetic(text, None, constants, limits, quotients=False)))
 
 
-class _Actions(Transformer[Token, Any]):
-    """What the parser does when it has read a piece; `work` is set for the duration of one parse."""
+class Token(str):
+    """A piece of the text, and where it starts; `kind` is number, name, itself for a mark, or end."""
 
-    work: _Arithmetic
+    kind: str
+    start_pos: int
 
-    def number(self, pieces: list[Token]) -> _Value:
-        return self.work.number(pieces[0])
-
-    def name(self, pieces: list[Token]) -> _Value:
-        return self.work.name(pieces[0])
-
-    def sum(self, pieces: list[Any]) -> _Value:
-        return self.work.sum(pieces)
-
-    def product(self, pieces: list[Any]) -> _Value:
-        return self.work.product(pieces)
-
-    def negated(self, pieces: list[Any]) -> _Value:
-        return self.work.negated(pieces)
-
-    def power(self, pieces: list[Any]) -> _Value:
-        return self.work.power(*pieces)
+    def __new__(cls, text: str, kind: str, start_pos: int) -> Token:
+        token = super().__new__(cls, text)
+        token.kind, token.start_pos = kind, start_pos
+        return token
 
 
-class _Parser(threading.local):
-    """One parser for each thread, since its actions hold the state of a parse. Building it takes a few ms."""
-
-    def __init__(self) -> None:
-        self.actions = _Actions()
-        self.lark = Lark(GRAMMAR, parser="lalr", lexer="basic", transformer=self.actions)
-
-
-_parser = _Parser()
+def _tokens(text: str) -> Iterator[Token]:
+    """The pieces of the text as they are asked for, so that the first mistake is the one that is told."""
+    column = 0
+    while column < len(text):
+        if text[column] in BLANKS:
+            column += 1
+            continue
+        match = _TOKEN.match(text, column)
+        if match is None:
+            hint = _WRITE.get(text[column], "use numbers, names and + - * / ^ ( )")
+            raise ExpressionError(f"found the character {_describe(text[column])}, {hint}", text, column)
+        yield Token(match[0], match.lastgroup or match[0], column)
+        column = match.end()
+    yield Token("", _END, len(text))
 
 
 def _parse(work: _Arithmetic) -> _Value:
     """The value of the text, or `ExpressionError`."""
-    text = work.text
-    _check_shape(text, work.limits)
-    actions = _parser.actions
-    actions.work = work
-    try:
-        return cast(_Value, _parser.lark.parse(text))
-    except UnexpectedInput as error:
-        raise _syntax_error(error, work) from None
-    finally:
-        del actions.work
+    _check_shape(work.text, work.limits)
+    reader = _Reader(work)
+    value = reader.sum()
+    if reader.next.kind != _END:
+        raise _syntax_error(reader.next, work)
+    return value
+
+
+class _Reader:
+    """A sum of products of powers, read from the left.
+
+    Signs are below powers, so that -x^2 is -(x^2), and powers go from the right, so that 2^3^2 is 2^9. Brackets alone
+    are read by recursion, and their depth is limited.
+    """
+
+    def __init__(self, work: _Arithmetic) -> None:
+        self.work = work
+        self.tokens = _tokens(work.text)
+        self.next = next(self.tokens)
+
+    def take(self) -> Token:
+        token, self.next = self.next, next(self.tokens, self.next)
+        return token
+
+    def sum(self) -> _Value:
+        pieces: list[Any] = [self.product()]
+        while self.next.kind in ("+", "-"):
+            pieces += [self.take(), self.product()]
+        return self.work.sum(pieces) if len(pieces) > 1 else cast(_Value, pieces[0])
+
+    def product(self) -> _Value:
+        pieces: list[Any] = [self.power()]
+        while self.next.kind in ("*", "/"):
+            pieces += [self.take(), self.power()]
+        return self.work.product(pieces) if len(pieces) > 1 else cast(_Value, pieces[0])
+
+    def power(self) -> _Value:
+        bases = []
+        signs, value = self.signs(), self.atom()
+        while self.next.kind in ("^", "**"):
+            bases.append((signs, value, self.take()))
+            signs, value = self.signs(), self.atom()
+        value = self.work.negated(signs, value)
+        for signs, base, operator in reversed(bases):
+            value = self.work.negated(signs, self.work.power(base, operator, value))
+        return value
+
+    def signs(self) -> list[Token]:
+        found = []
+        while self.next.kind in ("+", "-"):
+            found.append(self.take())
+        return found
+
+    def atom(self) -> _Value:
+        token = self.take()
+        if token.kind == "(":
+            value = self.sum()
+            closing = self.take()
+            if closing.kind != ")":
+                raise _syntax_error(closing, self.work)
+            return value
+        if token.kind not in ("number", "name"):
+            raise _syntax_error(token, self.work)
+        if self.next.kind in ("number", "name", "("):  # before the name is looked up: sin(x) is a call
+            raise _syntax_error(self.next, self.work)
+        return self.work.number(token) if token.kind == "number" else self.work.name(token)
 
 
 def _check_shape(text: str, limits: Limits) -> None:
@@ -180,26 +215,20 @@ def _check_shape(text: str, limits: Limits) -> None:
         raise ExpressionError("found '(' without its ')', expected brackets in pairs", text, opened[-1])
 
 
-def _syntax_error(error: UnexpectedInput, work: _Arithmetic) -> ExpressionError:
-    """What lark could not read, in words."""
+def _syntax_error(token: Token, work: _Arithmetic) -> ExpressionError:
+    """What could not be read, in words: a token that cannot stand where it does."""
     text = work.text
-    if isinstance(error, UnexpectedCharacters):
-        column = error.pos_in_stream or 0
-        character = text[column]
-        hint = _WRITE.get(character, "use numbers, names and + - * / ^ ( )")
-        return ExpressionError(f"found the character {_describe(character)}, {hint}", text, column)
-    token = cast(UnexpectedToken, error).token
-    if token.type == "$END":
+    if token.kind == _END:
         return ExpressionError(f"found the end of the text, {_OPERAND}", text, len(text))
-    column = token.start_pos or 0
+    column = token.start_pos
     before = text[:column].rstrip(BLANKS)
-    if token.type not in ("NAME", "NUMBER", "LPAR") or not before or before[-1] in "+-*/^(":
+    if token.kind not in ("name", "number", "(") or not before or before[-1] in "+-*/^(":
         return ExpressionError(f"found {quoted(token)}, {_OPERAND}", text, column)
     start = len(before) - 1
     while start > 0 and (before[start - 1].isalnum() or before[start - 1] in "_.") and before[-1] != ")":
         start -= 1
     left = before[start:]
-    if token.type == "LPAR" and is_name(left) and left not in work.names:
+    if token.kind == "(" and is_name(left) and left not in work.names:
         call = f"found {quoted(left + '(')}, which looks like a function call"
         return ExpressionError(f"{call}: only + - * / ^ are available, and products are written with *", text, start)
     example = f"{left}*{token}" if len(left) + len(token) < 40 else "x*y"
@@ -244,7 +273,7 @@ class _Arithmetic:
             self.term_cost += 10 * (ring.nvars() // 8)
 
     def number(self, token: Token) -> _Value:
-        start = token.start_pos or 0
+        start = token.start_pos
         value = number_in(self.text, start, start + len(token), self.limits.digits, self.limits)
         self.spend(_times(value.height_bits(), value.height_bits()), start)
         return value
@@ -253,7 +282,7 @@ class _Arithmetic:
         value = self.names.get(token)
         if value is None:
             raise self.unknown(str(token), token.start_pos)
-        return self.checked(value, token.start_pos or 0) if isinstance(value, fmpq) else value
+        return self.checked(value, token.start_pos) if isinstance(value, fmpq) else value
 
     def sum(self, pieces: list[Any]) -> _Value:
         column = pieces[1].start_pos
@@ -317,13 +346,12 @@ class _Arithmetic:
         number = _total(numbers, lambda left, right: self.times_numbers(left, right, column)) if numbers else fmpq(1)
         return number if above is None else _Quotient(self.scaled(above, number, column), below)
 
-    def negated(self, pieces: list[Any]) -> _Value:
-        *signs, value = pieces
+    def negated(self, signs: list[Token], value: _Value) -> _Value:
         minus = sum(sign == "-" for sign in signs) % 2
-        return self.negative(value, signs[0].start_pos) if minus else cast(_Value, value)
+        return self.negative(value, signs[0].start_pos) if minus else value
 
     def power(self, base: _Value, operator: Token, power: _Value) -> _Value:
-        column = operator.start_pos or 0
+        column = operator.start_pos
         exponent = _constant(power)
         if exponent is None:
             raise self.refusal("found an exponent with variables in it, expected an integer", column)

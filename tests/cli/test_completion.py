@@ -17,7 +17,7 @@ from kahanmaps.documents.catalog import names
 from kahanmaps.experiments.registry import task_kinds
 from kahanmaps_cli.main import COMMANDS
 
-HEAVY = ("numpy", "flint", "lark", "rich", "matplotlib")
+HEAVY = ("numpy", "flint", "rich", "matplotlib")
 
 
 def question(line: str) -> dict[str, str]:

@@ -105,7 +105,7 @@ def test_version_does_nothing_else(kahanmaps):
 
 
 def test_the_version_command_names_what_is_computed_with(kahanmaps):
-    expected = {"kahanmaps", "python", "python-flint", "flint", "numpy", "click", "rich", "lark"}
+    expected = {"kahanmaps", "python", "python-flint", "flint", "numpy", "click", "rich"}
     assert set(kahanmaps("version --json").json) == expected
 
 

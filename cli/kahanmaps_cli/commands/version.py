@@ -31,7 +31,7 @@ def command(as_json: bool) -> None:
         "python-flint": version_of("python-flint"),
         "flint": str(getattr(flint, "__FLINT_VERSION__", "unknown")),
     }
-    for package in ("numpy", "click", "rich", "lark"):
+    for package in ("numpy", "click", "rich"):
         try:
             versions[package] = version_of(package)
         except PackageNotFoundError:
