@@ -68,6 +68,8 @@ def _inline_options(parameter: Callable[[F], F]) -> Callable[[F], F]:
         click.option(
             "--rhs", multiple=True, metavar="EXPR", help="Inline system: a right-hand side, or \"x' = x*y; y' = -x\"."
         ),
+        click.option("--image", multiple=True, metavar="EXPR", help="Inline map: a function for each variable."),
+        click.option("--inverse", multiple=True, metavar="EXPR", help="Inline map: a function of the inverse map."),
         parameter,
     )
 
@@ -200,17 +202,29 @@ def eps_of(file: SystemFile, options: Mapping[str, Any]) -> Any:
     return eps if file.map.has_eps else None
 
 
-def load_system(
-    reference: str | None, variables: str | None, rhs: Sequence[str], parameters: Sequence[tuple[str, str]]
-) -> SystemFile:
-    """The system that a command line names: a path, a catalogue name, `-` for standard input, or an inline system."""
+def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile:
+    """The system that a command line names: a path, a catalogue name, `-` for standard input, or an inline system.
+
+    Of the options those of `inline_options` are looked at, as far as they are there.
+    """
     from kahanmaps.documents.files import MAX_FILE_BYTES, parse_system
     from kahanmaps.errors import InputError, reading
 
+    variables, rhs = options.get("variables"), options.get("rhs", ())
+    image, inverse = options.get("image", ()), options.get("inverse", ())
+    parameters: Sequence[tuple[str, str]] = options.get("parameters", ())
     given = dict(parameters)
     if len(given) < len(parameters):
         twice = next(name for k, (name, _) in enumerate(parameters) if name in dict(parameters[:k]))
         raise click.UsageError(f"found -p {twice}=... twice, expected one value for each parameter")
+    if image or inverse:
+        if reference is not None or rhs:
+            other = "--rhs" if rhs else f"a SYSTEM ({reference})"
+            raise click.UsageError(f"give {other} or a map (--image), not both")
+        if variables is None or not image:
+            raise click.UsageError("an inline map needs --vars X,Y,... and one --image EXPR for each variable")
+        section = {"image": _list(image), **({"inverse": _list(inverse)} if inverse else {})}
+        return parse_system(_inline_file(variables, given, "map", section), "inline")
     if variables is not None or rhs:
         if reference is not None:
             raise click.UsageError(f"give a SYSTEM ({reference}) or an inline one (--vars and --rhs), not both")
@@ -219,7 +233,9 @@ def load_system(
                 "an inline system needs both --vars X,Y,... and one --rhs EXPR for each variable, "
                 "or --rhs \"x' = x*y; y' = -x\""
             )
-        return parse_system(_inline_file(variables, rhs, given), "inline")
+        return parse_system(
+            _inline_file(variables, given, "system", {"rhs": _list(rhs) if len(rhs) > 1 else rhs[0].strip()}), "inline"
+        )
     if reference is None:
         raise click.UsageError(
             "missing SYSTEM: a file, a catalogue name ('kahanmaps systems' lists them), - for standard input, "
@@ -261,15 +277,22 @@ def _files_like(path: str) -> str:
     return ""
 
 
-def _inline_file(variables: str | None, rhs: Sequence[str], parameters: Mapping[str, str]) -> str:
+def _list(texts: Sequence[str]) -> list[str]:
+    """The expressions of an option that may be repeated, or have several between semicolons."""
+    return [part.strip() for text in texts for part in text.split(";")]
+
+
+def _inline_file(
+    variables: str | None, parameters: Mapping[str, str], kind: str, section: Mapping[str, str | list[str]]
+) -> str:
     """The system file that an inline system abbreviates, so that the same rules hold for it."""
 
-    def quoted(texts: Sequence[str]) -> str:  # JSON strings are TOML strings
-        return json.dumps([text.strip() for text in texts], ensure_ascii=False)
+    def value(data: Any) -> str:  # JSON strings, and lists of them, are those of TOML
+        return json.dumps(data, ensure_ascii=False)
 
-    lines = [] if variables is None else [f"variables = {quoted(variables.split(','))}"]
-    lines += ["[system]", f"rhs = {quoted(rhs) if len(rhs) > 1 else quoted(rhs)[1:-1]}", "[parameters]"]
-    lines += [f"{quoted([name])[1:-1]} = {quoted([value])[1:-1]}" for name, value in parameters.items()]
+    lines = [] if variables is None else [f"variables = {value([name.strip() for name in variables.split(',')])}"]
+    lines += [f"[{kind}]", *(f"{key} = {value(data)}" for key, data in section.items()), "[parameters]"]
+    lines += [f"{value(name)} = {value(text.strip())}" for name, text in parameters.items()]
     return "\n".join(lines)
 
 

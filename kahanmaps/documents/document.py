@@ -22,6 +22,7 @@ from kahanmaps.errors import InputError, SystemFileError, counted, quoted, sugge
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.maps.bilinear import bilinear_map
+from kahanmaps.maps.composed import composed_map, is_involution
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, why_no_map
 from kahanmaps.maps.kahan import Kahan
@@ -30,7 +31,8 @@ from kahanmaps.sources import SOURCES
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
 
-KINDS = ("system", "hamiltonian", "family", "bilinear", "map")
+KINDS = ("system", "hamiltonian", "family", "bilinear", "map", "composition")
+_MOST_FACTORS = 64  # of a composition, those of its parts counted too
 _LONGEST_NAME = 1000
 _KEYS = {
     "": {"name", "variables", "parameters", *KINDS, "integrals", "density", "catalog"},
@@ -39,6 +41,8 @@ _KEYS = {
     "family": {"A", "H", "signs"},
     "bilinear": {"new", "equations"},
     "map": {"image", "inverse"},
+    "composition": {"of"},
+    "composition.of": {"file", "system", "map", "power", "inverse", "parameters", "involution"},
     "density": {"phi"},
     "catalog": {"title", "sources", "convention", "facts", *STRUCTURED_KEYS},
 }
@@ -77,6 +81,7 @@ class Contents(NamedTuple):
 _EXPECTED = {
     ("system", "rhs"): "a list of polynomials of degree at most 2 in quotes, one for each variable",
     ("bilinear", "equations"): "a list of equations in quotes, linear in the old point and in the new one",
+    ("composition", "of"): 'a list of maps, each with one of file = "...", system = "..." and map = { ... }',
     ("map", "image"): "a list of rational functions in quotes, one for each variable",
     ("hamiltonian", "H"): "a polynomial of degree at most 3 in quotes",
     ("hamiltonian", "J"): '"standard", which is [[0, I], [-I, 0]], or the rows of a skew matrix',
@@ -89,10 +94,20 @@ _EXPECTED = {
 class DocumentReader:
     """One pass over a document: every part is read as far as it can be, mistakes are collected."""
 
-    def __init__(self, document: dict[str, Any], where: str, overrides: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        document: dict[str, Any],
+        where: str,
+        overrides: Mapping[str, Any],
+        other: Callable[[str, str], dict[str, Any]] | None = None,
+    ) -> None:
+        """`other` gives the document that a part of a composition names: by "file" or "system", and its value."""
         self.document = document
         self.where = where
         self.overrides = overrides
+        self.other = other
+        self.inside: tuple[str, ...] = ()  # the names of the parts of compositions that this document is part of
+        self.parts = [0]  # how many were read in all
         self.mistakes: list[tuple[str, str]] = []
         self.parameters: dict[str, fmpq] = {}
         self.unsure = False  # some parameter has no value: what depends on values is not judged
@@ -161,6 +176,8 @@ class DocumentReader:
     def _read_given(self, kind: str, section: Mapping[str, Any]) -> BirationalMap | None:
         if kind == "system":
             return self._read_system(section)
+        if kind == "composition":
+            return self._read_composition(section)
         return self._read_bilinear(section) if kind == "bilinear" else self._read_map(section)
 
     def _mistake(self, key: str, sentence: str) -> None:
@@ -217,7 +234,7 @@ class DocumentReader:
                 A = (self._table("family") or {}).get("A")
                 if isinstance(A, list) and 0 < len(A) <= MAX_DIMENSION:
                     self.variables = default_variables(len(A))
-            else:
+            elif kind != "composition":  # which has those of its first map
                 self._mistake("variables", 'missing, expected a list of names, e.g. ["x", "y"]')
             return
         if not isinstance(given, list) or not given or not all(isinstance(name, str) for name in given):
@@ -384,6 +401,103 @@ class DocumentReader:
         if image is None or self.variables is None or self.unsure or ("inverse" in section and inverse is None):
             return None
         return self._sound(explicit_map, "map", self.variables, image, inverse)
+
+    def _read_composition(self, section: Mapping[str, Any]) -> BirationalMap | None:
+        """The composition; what its parts name is put in their places, so that the document says all by itself."""
+        if self.symbols:
+            raise InputError(
+                f"found the symbols {', '.join(self.symbols)} in a [composition] file, expected numbers: "
+                "write its formulas as [map]"
+            )
+        given = self._required("composition", section, "of")
+        if not isinstance(given, list) or not given:
+            if given is not None:
+                self._mistake("composition.of", f"found {_show(given)}, expected {_EXPECTED['composition', 'of']}")
+            return None
+        parts = [self._part(f"composition.of[{k + 1}]", entry) for k, entry in enumerate(given)]
+        known = [part for part in parts if part is not None]
+        if len(known) < len(parts) or self.unsure:
+            return None
+        if sum(abs(power) for _, power, _ in known) > _MOST_FACTORS:
+            self._mistake("composition.of", f"found more than {_MOST_FACTORS} steps, expected fewer")
+            return None
+        self.document = {**self.document, "composition": {"of": [plain for _, _, plain in known]}}
+        try:
+            return composed_map(*((map_, power) for map_, power, _ in known), variables=self.variables)
+        except InputError as error:
+            self._mistake("composition.of", str(error))
+            return None
+
+    def _part(self, path: str, entry: Any) -> tuple[BirationalMap, int, dict[str, Any]] | None:
+        """A map of a composition, its power, and the entry with the map as a table."""
+        if not isinstance(entry, dict):
+            self._mistake(path, f'found {_show(entry)}, expected a table, e.g. {{ file = "f.toml", power = 2 }}')
+            return None
+        before = len(self.mistakes)
+        for key in entry:
+            if key not in _KEYS["composition.of"]:
+                expected = ", ".join(sorted(_KEYS["composition.of"]))
+                self._mistake(f"{path}.{key}", f"unknown key, expected one of {expected}")
+        named = [key for key in ("file", "system", "map") if key in entry]
+        if len(named) != 1:
+            self._mistake(path, f"found {' and '.join(named) or 'none'} of file, system and map, expected exactly one")
+            return None
+        (key,) = named
+        power, inverse = entry.get("power", 1), entry.get("inverse", False)
+        if type(power) is not int or power == 0:
+            self._mistake(f"{path}.power", f"found {_show(power)}, expected an integer other than 0")
+        for name in ("inverse", "involution"):
+            if not isinstance(entry.get(name, False), bool):
+                self._mistake(f"{path}.{name}", f"found {_show(entry[name])}, expected true or false")
+        parameters: dict[str, fmpq] = {}
+        for name, value in (entry.get("parameters") or {}).items() if isinstance(entry.get("parameters"), dict) else ():
+            text = self._text(f"{path}.parameters.{name}", value)
+            try:
+                parameters[name] = parse_constant(text, self.parameters) if text is not None else fmpq(1)
+            except InputError as error:
+                self._mistake(f"{path}.parameters.{name}", str(error))
+        if len(self.mistakes) > before:
+            return None
+        try:
+            reader = self._other_reader(key, entry[key], parameters)
+            map_ = reader.read().map
+        except InputError as error:
+            self._mistake(f"{path}.{key}", str(error))
+            return None
+        if entry.get("involution") and not is_involution(map_):
+            self._mistake(f"{path}.involution", "found a map whose square is not the identity, expected an involution")
+            return None
+        plain = {name: value for name, value in entry.items() if name not in named}
+        document = {name: data for name, data in reader.document.items() if name != "parameters"}
+        own = entry[key].get("parameters") if key == "map" else reader.document.get("parameters")
+        found = {**document, **({"parameters": own} if own else {})}
+        return map_, -power if inverse else power, {"map": _json_like(found), **plain}
+
+    def _other_reader(self, key: str, value: Any, parameters: Mapping[str, fmpq]) -> DocumentReader:
+        """What reads a part of a composition."""
+        self.parts[0] += 1
+        if self.parts[0] > _MOST_FACTORS:
+            raise InputError(f"found more than {_MOST_FACTORS} maps in one composition, expected fewer")
+        name = value if isinstance(value, str) else "map"
+        if name in self.inside and key == "file":
+            raise InputError(f"found {quoted(name)} as a part of itself")
+        if key == "map":
+            if not isinstance(value, dict):
+                raise InputError(f"found {_show(value)}, expected a table like a system file")
+            # A table knows the parameters of the file that it stands in.
+            outer = {name: format_number(number) for name, number in self.parameters.items()}
+            own = value.get("parameters", {})
+            document = {**value, "parameters": {**outer, **own} if isinstance(own, dict) else own}
+        elif not isinstance(value, str):
+            raise InputError(f"found {_show(value)}, expected a name in quotes")
+        elif self.other is None:
+            raise InputError(f"found {quoted(value)}, expected map = {{ ... }}: files are not looked up here")
+        else:
+            document = self.other(key, value)
+        document = {part: data for part, data in document.items() if part not in ("catalog", "integrals", "density")}
+        reader = DocumentReader(document, name, parameters, self.other)
+        reader.inside, reader.parts = (*self.inside, name), self.parts
+        return reader
 
     def _sound(self, make: Callable[..., ImplicitMap], path: str, *given: Any) -> ImplicitMap | None:
         """The map made of what is given, if it has values, and an inverse where one is given."""

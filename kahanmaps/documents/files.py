@@ -1,15 +1,18 @@
 """System files: a differential equation in TOML, all its mistakes told at once, written so that it reads back equal.
 
-A file has exactly one of [system] (right-hand sides), [hamiltonian] (H and J), [family] (A, H, signs), [bilinear] and
-[map], and may have [parameters], [integrals] and [density]; docs/system-files.md describes them. Numbers are exact:
-decimals are read as decimals, quoted or not.
+A file has exactly one of [system] (right-hand sides), [hamiltonian] (H and J), [family] (A, H, signs), [bilinear],
+[map] and [composition], and may have [parameters], [integrals] and [density]; docs/system-files.md describes them.
+Numbers are exact: decimals are read as decimals, quoted or not.
 """
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +23,7 @@ from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.document import KINDS, DocumentReader
 from kahanmaps.documents.toml_text import to_toml
-from kahanmaps.errors import InputError, SystemFileError, reading
+from kahanmaps.errors import InputError, SystemFileError, quoted, reading
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
@@ -152,13 +155,7 @@ def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -
 
     Raises SystemFileError with every mistake of the file, InputError where it cannot be read.
     """
-    try:
-        with open(path, "rb") as stream:
-            data = stream.read(MAX_FILE_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"cannot read the system file {path}: {error.strerror or error}") from error
-    except ValueError as error:  # a path with a NUL character
-        raise InputError(f"cannot read the system file {str(path)!r}: {error}") from error
+    data = _read(path)
     with reading(path):
         return parse_system(data, str(path), parameters)
 
@@ -172,13 +169,39 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
     kahanmaps.errors.SystemFileError: example: 1 mistake
       system.rhs[1]: found a polynomial of degree 3, expected at most 2
     """
+    base = Path(where).parent
+    return SystemFile(*DocumentReader(_document(text, where), where, parameters or {}, partial(_named, base)).read())
+
+
+def _named(base: Path, key: str, name: str) -> dict[str, Any]:
+    """The document of a part of a composition: a "system" of the catalogue, or a "file" beside the one in hand."""
+    if key == "system":
+        found = resources.files("kahanmaps.documents.catalog").joinpath(f"{name}.toml")
+        if os.sep in name or not found.is_file():
+            raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
+        return _document(found.read_bytes(), name)
+    return _document(_read(base / name), name)
+
+
+def _read(path: str | Path) -> bytes:
+    try:
+        with open(path, "rb") as stream:
+            return stream.read(MAX_FILE_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"cannot read the system file {path}: {error.strerror or error}") from error
+    except ValueError as error:  # a path with a NUL character
+        raise InputError(f"cannot read the system file {str(path)!r}: {error}") from error
+
+
+def _document(text: str | bytes, where: str) -> dict[str, Any]:
+    """The plain data of a text in TOML."""
     if len(text) > MAX_FILE_BYTES:
         raise InputError(f"{where} is larger than {MAX_FILE_BYTES} bytes, the limit for a system file")
     try:
         # Some editors put a byte order mark first.
         decoded = text.decode("utf-8-sig") if isinstance(text, bytes) else text
         # Python's own limit on digits applies to integers written without quotes, before we see them.
-        document = tomllib.loads(decoded, parse_float=str)
+        return tomllib.loads(decoded, parse_float=str)
     except UnicodeDecodeError as error:
         raise SystemFileError(where, [("TOML", f"not UTF-8 text: {error.reason} at byte {error.start}")]) from error
     except tomllib.TOMLDecodeError as error:
@@ -186,7 +209,6 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
     except (RecursionError, ValueError) as error:
         hint = "nested too deeply" if isinstance(error, RecursionError) else "write long numbers in quotes"
         raise SystemFileError(where, [("TOML", f"cannot be read: {hint}")]) from error
-    return SystemFile(*DocumentReader(document, where, parameters or {}).read())
 
 
 def _rows(matrix: fmpq_mat) -> list[list[str]]:

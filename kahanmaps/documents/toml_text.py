@@ -50,7 +50,11 @@ def _toml_key(key: str) -> str:
 
 
 def _toml_value(value: Any) -> str:
-    if isinstance(value, bool) or not isinstance(value, str | int | Sequence):
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(_lines(value))} }}" if value else "{}"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if not isinstance(value, str | int | Sequence):
         return _toml_string(str(value))
     if isinstance(value, str):
         return _toml_string(value)

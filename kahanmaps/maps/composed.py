@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Sequence
 from typing import Any
 
+from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.errors import InputError
+from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
 
 _BUDGET = 20_000_000  # products of terms
 
 
-def composed_map(*maps: tuple[BirationalMap, int] | BirationalMap) -> ImplicitMap:
+def composed_map(
+    *maps: tuple[BirationalMap, int] | BirationalMap, variables: Sequence[str] | None = None
+) -> ImplicitMap:
     """The map that takes one step of each map after the other, all with the same eps.
 
     Args:
         maps: in the order in which they are applied; with a power, (map, power), which may be negative.
+        variables: names for the coordinates, by default those of the first map; the others are matched by position.
 
     Returns:
         The map, exact; its inverse is known if all the maps have one.
 
     Raises:
-        InputError: for maps of different dimensions, for a negative power of a map without inverse, and where the
-            formulas grow too large.
+        InputError: for maps of different dimensions, or with the same variables in another order, for a negative power
+            of a map without inverse, and where the formulas grow too large.
 
     >>> from kahanmaps.maps.kahan import Kahan
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
@@ -41,9 +46,17 @@ def composed_map(*maps: tuple[BirationalMap, int] | BirationalMap) -> ImplicitMa
     ]
     if not steps:
         raise InputError("found no map to compose, expected at least one")
-    variables, names = steps[0][0].variables, steps[0][0].names
-    if any(one.dim != len(variables) for one, _ in steps):
+    first = steps[0][0]
+    if any(one.dim != first.dim for one, _ in steps):
         raise InputError(f"found maps of the dimensions {', '.join(str(one.dim) for one, _ in steps)}, expected one")
+    for one, _ in steps:
+        if set(one.variables) == set(first.variables) and one.variables != first.variables:
+            orders = f"{', '.join(first.variables)} and {', '.join(one.variables)}"
+            raise InputError(f"found the variables in two orders, {orders}, expected one order")
+    variables = first.variables if variables is None else tuple(variables)
+    if len(variables) != first.dim:
+        raise InputError(f"found {len(variables)} variables for maps of dimension {first.dim}, expected as many")
+    names = (*variables, *first.names[first.dim :])
     if any(one.symbols != steps[0][0].symbols for one, _ in steps):
         raise InputError("found maps with different symbols, expected the same for all")
     image = _formulas(names, steps)
@@ -52,6 +65,21 @@ def composed_map(*maps: tuple[BirationalMap, int] | BirationalMap) -> ImplicitMa
     except InputError:
         inverse = None
     return explicit_map(variables, image, inverse)
+
+
+def is_involution(map_: BirationalMap) -> bool:
+    """Whether Phi(Phi(x)) = x, at random points modulo primes: one of them fails by chance with probability < 2^-40."""
+    rng = random.Random(f"involution {seed_for(0, *map_.subject)}")
+    for _ in range(3):
+        field = random_prime_field(rng)
+        x = tuple(field.random(rng) for _ in map_.variables)
+        try:
+            over = map_.at(field.random(rng), field, [field.random(rng) for _ in map_.symbols])
+            if over.step(over.step(x)) != x:
+                return False
+        except (BadPrime, SingularStep):
+            continue
+    return True
 
 
 def _formulas(names: Sequence[str], steps: Sequence[tuple[BirationalMap, int]]) -> list[RationalFunction]:

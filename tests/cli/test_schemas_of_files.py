@@ -26,6 +26,7 @@ def test_a_system_file_has_the_same_keys_for_the_schema_and_for_the_reader() -> 
     parts = schema("system-file")["$defs"]
     found = {"": parts["system_file"], "catalog": parts["catalog_section"]}
     found |= {key: parts["system_file"]["properties"][key] for key in (*document.KINDS, "density")}
+    found["composition.of"] = parts["composition_part"]
     assert {key: set(part["properties"]) for key, part in found.items()} == document._KEYS
 
 

@@ -105,7 +105,7 @@ def test_a_record_of_a_map_without_time_step_does_not_speak_of_one():
     assert check_measure(example("symplectic-euler")).context["convention"] == NO_TIME_STEP
     assert check_measure(example("duffing")).context["convention"] == CONVENTION
     assert check_measure(example("mcmillan")).context["convention"] == NO_EPS
-    assert [check_measure(example(name)).context["time_step"] for name in NAMES] == ["every", None, "every", None]
+    assert [check_measure(example(name)).context["time_step"] for name in NAMES] == ["every", None, "every", None, None]
     both = [check_commute(example("mcmillan"), example(name)).context for name in ("mcmillan", "symplectic-euler")]
     assert [eps_words(context) for context in both] == ["", ", every eps"]
     named = check_measure(example("symplectic-euler"), Settings(eps=fmpq(1, 9))).context

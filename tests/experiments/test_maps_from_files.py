@@ -42,8 +42,8 @@ def test_a_batch_takes_all_kinds_of_map_and_says_of_each_task_that_does_not(tmp_
         for row in store.rows():
             found.setdefault(row.task.kind, []).append((row.record.outcome, row.record.result or {}))
             verdicts.add((row.task.kind, row.record.verdict))
-    assert sorted(result["degrees"][3] for _, result in found["degrees"]) == [8, 9, 19, 19]
-    assert [outcome for outcome, _ in found["singularities"]] == ["ok"] * 4
+    assert sorted(result["degrees"][3] for _, result in found["degrees"]) == [8, 9, 19, 19, 74]
+    assert [outcome for outcome, _ in found["singularities"]] == ["ok"] * 5
     assert {(outcome, result["status"]) for outcome, result in found["orbit"]} == {("ok", "completed")}
     assert {verdict for kind, verdict in verdicts if kind == "check-measure"} == {"proved"}
-    assert [outcome for outcome, _ in found["find-integrals"]] == ["ok"] * 4
+    assert [outcome for outcome, _ in found["find-integrals"]] == ["ok"] * 5

@@ -55,7 +55,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
     if markdown and as_json:
         raise click.UsageError("give --markdown or --json, one of the two")
     symbols, eps = symbols_and_eps(options)
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     with Progress(quiet) as progress:
         found = analyze(
             file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress

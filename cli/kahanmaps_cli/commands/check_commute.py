@@ -40,14 +40,14 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
     """
     from kahanmaps.checks.commute import check_commute
 
-    inline = options["variables"] is not None or options["rhs"]
+    inline = any(options[name] for name in ("variables", "rhs", "image"))
     if inline and system is not None and other is None:
         system, other = None, system  # the inline system is the first, the argument the second
     if system == other == "-":
         raise click.UsageError("found - twice, but standard input holds one system only")
     with Progress(options["quiet"]) as progress:
         settings = settings_from(options, progress)
-        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
-        second = load_system(other, None, (), ()) if other is not None else None
+        file = load_system(system, options)
+        second = load_system(other, {}) if other is not None else None
         report = check_commute(file, second, settings, eps2)
     return print_report(report, options["as_json"], options["verbose"], options["quiet"])

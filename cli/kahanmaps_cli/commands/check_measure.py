@@ -34,7 +34,7 @@ def command(system: str | None, density: str | None, **options: Any) -> int:
 
     with Progress(options["quiet"]) as progress:
         settings = settings_from(options, progress)
-        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        file = load_system(system, options)
         extra = None
         if density is not None:
             extra = parse_rational_function(density, (*file.variables, "eps"), file.parameters)

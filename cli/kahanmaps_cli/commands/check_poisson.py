@@ -30,6 +30,6 @@ def command(system: str | None, **options: Any) -> int:
 
     with Progress(options["quiet"]) as progress:
         settings = settings_from(options, progress)
-        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        file = load_system(system, options)
         report = check_poisson(file, settings)
     return print_report(report, options["as_json"], options["verbose"], options["quiet"])

@@ -51,7 +51,7 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
     """
     from kahanmaps.languages.convert import convert
 
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     if language == "toml":
         if options["parts"] or options["symbolic"] or options["name"]:
             raise click.UsageError("a system file holds the whole system: leave out --what, --symbolic and --name")
@@ -90,7 +90,7 @@ def _command_line(system: str | None, language: str, options: dict[str, Any]) ->
     words = ["kahanmaps", "convert", *([system] if system is not None else [])]
     if options["variables"] is not None:
         words.append(f"--vars={options['variables']}")
-    words += [f"--rhs={text}" for text in options["rhs"]]
+    words += [f"--{key}={text}" for key in ("rhs", "image", "inverse") for text in options[key]]
     for name, value in options["parameters"]:
         words += ["-p", f"{name}={value}"]
     words += ["--to", language]

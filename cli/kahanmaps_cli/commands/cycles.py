@@ -69,7 +69,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if not options["primes"]:
         raise click.UsageError("missing --prime P, or -p P")
     parameters = [pair for pair in options["parameters"] if pair[0]]
-    file = load_system(system, options["variables"], options["rhs"], parameters)
+    file = load_system(system, {**options, "parameters": parameters})
     reversor = None
     if options["reversor"] is not None:
         reversor = _matrix(options["reversor"])

@@ -61,7 +61,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     from kahanmaps.laboratory.degrees import degree_growth
 
     eps = the_eps(options["eps"], options["time_step"], required=False)
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     with Progress(quiet) as progress:
         found = degree_growth(
             file.map,

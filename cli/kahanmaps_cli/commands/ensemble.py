@@ -84,7 +84,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
     _require_sense(system, options)
     kind, prime = options["arithmetic"]
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     integrals = _integrals(options["integrals"], file)
     eps = eps_of(file, options)
     number = fmpq(1) if eps is None else eps

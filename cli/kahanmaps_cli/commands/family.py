@@ -98,9 +98,7 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     from kahanmaps.algebra.text import format_polynomial
     from kahanmaps.family.skew_hamiltonian import chi, diagnosis, format_univariate
 
-    file, member, hidden = _member_or_hidden(
-        load_system(system, options["variables"], options["rhs"], options["parameters"])
-    )
+    file, member, hidden = _member_or_hidden(load_system(system, options))
     data: dict[str, Any] = {
         "command": "family show",
         "version": __version__,
@@ -303,7 +301,7 @@ def _with_signs(member: FamilyMember, signs: str | None) -> FamilyMember:
 def _member(reference: str | None, parameters: Sequence[tuple[str, str]]) -> tuple[SystemFile, FamilyMember]:
     from kahanmaps.errors import InputError
 
-    file = load_system(reference, None, (), parameters)
+    file = load_system(reference, {"parameters": parameters})
     if file.member is None:
         raise InputError(f"{file.name} is of kind [{file.kind}], expected one of kind [family]: A and H")
     return file, file.member

@@ -56,7 +56,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     from kahanmaps.checks.settings import Settings
     from kahanmaps.laboratory.commuting import commuting_systems
 
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     seed, error_bits = options["seed"], options["error_bits"]
     settings = Settings(seed=seed, error_bits=error_bits)
     with Progress(quiet) as progress:

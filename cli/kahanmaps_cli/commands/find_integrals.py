@@ -58,7 +58,7 @@ def command(system: str | None, **options: Any) -> int:
 
     require_one_form(options)
     with Progress(options["quiet"]) as progress:
-        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        file = load_system(system, options)
         symbols, eps = symbols_and_eps(options)
         if options["sets"]:
             if options["darboux"] is not None:

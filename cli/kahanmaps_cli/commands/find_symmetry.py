@@ -43,7 +43,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     from kahanmaps.checks.settings import Settings
     from kahanmaps.laboratory.symmetries import linear_symmetries
 
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     with Progress(quiet) as progress:
         found = linear_symmetries(file.system, seconds=options["seconds"], progress=progress)
     if as_json:

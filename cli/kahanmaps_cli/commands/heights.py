@@ -78,7 +78,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if options["max_digits"] < 1:
         raise InputError(f"found --max-digits {options['max_digits']}, expected at least 1")
     eps = the_eps(options["eps"], options["time_step"], required=False)
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     with Progress(quiet) as progress:
         found = height_survey(
             file.map,

@@ -60,7 +60,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]
     _require_sense(options, steps, transient)
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     eps = eps_of(file, options)
     if options["starts"] is not None:
         starts = read_starts(options["starts"], file.variables, None)

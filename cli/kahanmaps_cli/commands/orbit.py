@@ -112,7 +112,7 @@ def command(
         raise click.UsageError(f"found --max-digits {options['max_digits']}, expected at least 1")
     from kahanmaps.maps.orbits import OrbitEnd
 
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     eps = eps_of(file, options)
     if options["accuracy"] is not None and options["arithmetic"] != ("ball", 0):
         raise click.UsageError("--accuracy is for --arithmetic ball:auto")

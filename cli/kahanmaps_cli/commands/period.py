@@ -56,7 +56,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     kind, prime = options["arithmetic"]
     if kind not in ("exact", "mod"):
         raise click.UsageError(f"found --arithmetic {kind}, expected exact or mod:P: a period is exact")
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     _require_point(file, eps, options["start"], kind, prime)
     structure = _structure(file)
     if isinstance(structure, str):

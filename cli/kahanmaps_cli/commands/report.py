@@ -180,7 +180,7 @@ def _analysis(system: str | None, options: dict[str, Any], progress: Progress, h
     from kahanmaps_cli.search import symbols_and_eps
 
     symbols, eps = symbols_and_eps(options)
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     found = analyze(file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress)
     progress("the page")
     return report_html(found, **how), 3 if found.conclusion.kind == "undecided" else 0
@@ -201,7 +201,7 @@ def _system_or_member(system: str | None, options: dict[str, Any]) -> SystemFile
     is_drawn = any(value is not None and value is not False for value in drawn.values())
     named = system is not None or options["variables"] or options["rhs"]
     if named or not (is_drawn or options["source"] == "verify"):
-        return load_system(system, options["variables"], options["rhs"], options["parameters"])
+        return load_system(system, options)
     if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
         drawn["m"] = 3
     member = draw_member(**drawn, seed=options["seed"])

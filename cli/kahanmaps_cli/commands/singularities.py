@@ -64,7 +64,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     from kahanmaps.laboratory.singularities import default_eps, singularities, symbolic_denominator
 
     eps = the_eps(options["eps"], options["time_step"], required=False)
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     with Progress(quiet) as progress:
         runs = [
             singularities(

@@ -99,7 +99,7 @@ def command(system: str | None, **options: Any) -> int:
             report = verify_universal(3 if drawn["m"] is None else drawn["m"], settings, what)
         else:
             if system is not None:
-                file = load_system(system, None, (), options["parameters"])
+                file = load_system(system, {"parameters": options["parameters"]})
             else:
                 if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
                     drawn["m"] = 3

@@ -56,13 +56,13 @@ def command(system: str | None, other: str | None, **options: Any) -> int:
     if options["eps2"] is not None and other is None:
         raise click.UsageError("--eps2 needs a second system: kahanmaps plot commute SYSTEM OTHER --eps E --eps2 E2")
     with Progress(options["quiet"]) as progress:
-        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        file = load_system(system, options)
         chosen = two_variables("--axes", options["axes"], file.variables)
         if other is None:
             second, captions = None, list[str]()
             pairs = list(pairs_of_member(file))
         else:
-            second = load_system(other, None, (), ())
+            second = load_system(other, {})
             captions = [f"f = {file.name}, g = {second.name}"]
             pairs = [pair_of_systems(file, second, eps, options["eps2"])]
         found = [squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]

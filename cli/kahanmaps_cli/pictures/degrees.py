@@ -71,7 +71,7 @@ def command(systems: tuple[str, ...], **options: Any) -> int:
         raise click.UsageError("give SYSTEMs or an inline one (--vars and --rhs), not both")
     if len(asked) > 1 and options["parameters"]:
         raise click.UsageError("-p is for one system: write several as files, or draw --from records")
-    files = [load_system(name, options["variables"], options["rhs"], options["parameters"]) for name in asked]
+    files = [load_system(name, options) for name in asked]
     with Progress(options["quiet"]) as progress:
         for file in files:
             found = _measured(file, eps, options, progress)

@@ -62,7 +62,7 @@ def command(system: str | None, **options: Any) -> int:
 
     require_output(options)
     eps = the_eps(options["eps"], options["time_step"])
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     survey = _surveyed(file, eps, options)
     style = style_from(options)
     if options["size"] is None and options["output"] == "-" and options["kind"] in (None, "text"):

@@ -65,7 +65,7 @@ def command(system: str | None, **options: Any) -> int:
         curves = curves_of_record(record, options["record"])
         whole, digits = record.get("whole") is not False, record.get("max_digits", digits)
     else:
-        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        file = load_system(system, options)
         survey = _surveyed(file, options)
         curves, whole = height_curves(survey), survey.is_whole
     deliver(draw_heights(curves, style_from(options), scale=options["scale"]), options, file)

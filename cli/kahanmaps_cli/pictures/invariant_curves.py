@@ -61,7 +61,7 @@ def command(**options: Any) -> int:
 
     eps = the_eps(options["eps"], options["time_step"])
     with Progress(options["quiet"]) as progress:
-        file = load_system(options["system"], options["variables"], options["rhs"], options["parameters"])
+        file = load_system(options["system"], options)
         original = two_variables("--original", options["original"], file.variables)
         found = find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
         labels = [f"start {_short(format_point(start))}" for start in options["starts"]]

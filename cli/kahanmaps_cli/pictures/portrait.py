@@ -141,7 +141,7 @@ def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
 
     file = None
     if system is not None or options["variables"] is not None or options["rhs"]:
-        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        file = load_system(system, options)
     elif options["parameters"]:
         raise click.UsageError("-p sets a parameter of the system: name the SYSTEM as well")
     eps = the_eps(options["eps"], options["time_step"], required=False)
@@ -161,7 +161,7 @@ def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
     from kahanmaps_cli.ensemble_starts import drawn, read_starts
 
     eps = the_eps(options["eps"], options["time_step"])
-    file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+    file = load_system(system, options)
     KahanMap(file.system, eps)  # the demands of all commands on eps, in the same words
     starts: Any = None
     if options["start"]:

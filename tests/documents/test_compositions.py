@@ -1,0 +1,113 @@
+"""Maps of other files one after the other: read, written out whole, and refused with all that is wrong."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile, parse_system, read_system
+from kahanmaps.documents.symbols import map_with_symbols
+from kahanmaps.errors import InputError, SystemFileError
+from kahanmaps.maps.kahan import Kahan
+
+FIELD = 'variables = ["x", "y"]\nparameters.a = 2\n[system]\nrhs = ["x*(a - y)", "y*(x - 1)"]\n'
+START, EPS = (fmpq(1, 2), fmpq(1, 3)), "1/10"
+
+
+def written(tmp_path, of, head="", name="word.toml"):
+    (tmp_path / "field.toml").write_text(FIELD)
+    path = tmp_path / name
+    path.write_text(f"{head}\n[composition]\nof = [{of}]\n")
+    return path
+
+
+def test_a_word_in_files_catalogue_and_tables_is_what_its_letters_do(tmp_path):
+    swap = '{ map = { variables = ["x", "y"], map = { image = ["b*y", "x/b"] } }, involution = true }'
+    field = '{ file = "field.toml", inverse = true, parameters = { a = "b + 1" } }'
+    of = f'{field}, {swap}, {{ system = "lotka_volterra", power = 2 }}'
+    file = read_system(written(tmp_path, of, 'parameters.b = "1/2"'))
+    first = Kahan(parse_system(FIELD, parameters={"a": "3/2"}).system).at(EPS).inverse
+    last = load("lotka_volterra").map.at(EPS)
+    x, y = first.step(START)
+    expected = last.step(last.step((y / 2, 2 * x)))
+    assert file.map.at(EPS).step(START) == expected
+    assert file.map.at(EPS).inverse.step(expected) == START
+    assert file.variables == ("x", "y")
+    assert file.map.has_eps
+    assert not file.map.has_time_step
+
+
+def test_the_document_says_all_by_itself_and_keeps_its_parameters(tmp_path):
+    table = '{ map = { variables = ["u", "v"], map = { image = ["b*v", "u"] } } }'
+    of = f'{{ file = "field.toml", parameters = {{ a = "b" }} }}, {table}'
+    file = read_system(written(tmp_path, of, "parameters.b = 5"))
+    (tmp_path / "field.toml").unlink()
+    text = json.dumps(file.document)
+    assert "field.toml" not in text
+    assert "catalog" not in text
+    again = parse_system(file.to_toml(), file.name)
+    assert again == file
+    other = parse_system(file.to_toml(), file.name, {"b": 7})
+    assert other.map.at(EPS).step(START) != file.map.at(EPS).step(START)
+    assert isinstance(other, SystemFile)
+
+
+def test_variables_may_be_named_anew(tmp_path):
+    path = written(tmp_path, '{ file = "field.toml" }', 'variables = ["p", "q"]')
+    assert read_system(path).variables == ("p", "q")
+    with pytest.raises(SystemFileError, match="found 1 variables for maps of dimension 2"):
+        read_system(written(tmp_path, '{ file = "field.toml" }', 'variables = ["p"]'))
+
+
+@pytest.mark.parametrize(
+    ("of", "sentence"),
+    [
+        ("", "found [], expected a list of maps"),
+        ("3", "found 3, expected a table"),
+        ('{ file = "none.toml" }', "No such file"),
+        ('{ file = "word.toml" }', "as a part of itself"),
+        ('{ system = "eul" }', "found the unknown system 'eul'"),
+        ('{ system = "../catalog/euler_top" }', "found the unknown system"),
+        ('{ file = "field.toml", power = 0 }', "expected an integer other than 0"),
+        ('{ file = "field.toml", power = 65 }', "more than 64 steps"),
+        ('{ file = "field.toml", inverse = 1 }', "expected true or false"),
+        ('{ file = "field.toml", turn = 1 }', "unknown key"),
+        ('{ file = "field.toml", system = "riccati" }', "expected exactly one"),
+        ('{ file = "field.toml", involution = true }', "whose square is not the identity"),
+        ('{ file = "field.toml", parameters = { b = 1 } }', "unknown parameter 'b'"),
+        ('{ file = "field.toml", parameters = { a = "1/0" } }', "division by 0"),
+        ('{ file = "field.toml" }, { system = "euler_top" }', "dimensions 2, 3"),
+        ('{ file = "field.toml" }, { map = { variables = ["y", "x"], map = { image = ["x", "y"] } } }', "two orders"),
+        ('{ map = { variables = ["x", "y"], map = { image = ["x^2", "y"] } } }', "at least 2 preimages"),
+        ('{ system = "henon_heiles", power = 4 }', "too large to be multiplied out"),
+    ],
+)
+def test_a_wrong_composition_says_what_is_wrong(tmp_path, of, sentence):
+    with pytest.raises(SystemFileError) as caught:
+        read_system(written(tmp_path, of))
+    assert sentence in str(caught.value)
+
+
+def test_compositions_in_each_other_come_to_an_end(tmp_path):
+    for k in range(12):
+        part = f'{{ file = "c{k + 1}.toml" }}'
+        written(tmp_path, f"{part}, {part}" if k < 11 else '{ file = "field.toml" }', name=f"c{k}.toml")
+    with pytest.raises(SystemFileError, match="more than 64 maps in one composition"):
+        read_system(tmp_path / "c0.toml")
+
+
+def test_symbols_are_for_formulas(tmp_path):
+    file = read_system(written(tmp_path, '{ file = "field.toml", parameters = { a = "b" } }', "parameters.b = 5"))
+    with pytest.raises(InputError, match=r"in a \[composition\] file, expected numbers"):
+        map_with_symbols(file, ["b"])
+
+
+def test_a_map_is_no_involution_by_chance():
+    from kahanmaps.maps.composed import is_involution
+
+    text = 'variables = ["x", "y"]\n[map]\nimage = ["{}", "y"]'
+    assert is_involution(parse_system(text.format("(y^2 + 3)/x")).map)
+    assert not is_involution(parse_system(text.format("(y^2 + 3)/(x + 1)")).map)
