@@ -6,7 +6,7 @@ Strategies draw plain data, so that hypothesis can shrink a failure to something
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -30,6 +30,9 @@ FIELDS: list[Field] = [*EXACT_FIELDS, RR(128)]
 
 # For tests that run once a field: fewer examples each, and GF(2), where most matrices are singular, is tolerated.
 some = settings(max_examples=25, suppress_health_check=[HealthCheck.filter_too_much])
+
+# For cases beside others of the same test that are quick, or that see the same.
+THOROUGH = (pytest.mark.slow, pytest.mark.thorough)
 
 over_all_fields = pytest.mark.parametrize("field", FIELDS, ids=repr)
 over_exact_fields = pytest.mark.parametrize("field", EXACT_FIELDS, ids=repr)
@@ -161,3 +164,8 @@ def fraction(number: fmpq | fmpz | int) -> Fraction:
 
 def _dyadic(mantissa: fmpz, exponent: fmpz) -> fmpq:
     return fmpq(mantissa) * fmpq(2) ** int(exponent)
+
+
+def quick(cases: Iterable[Any], which: Collection[Any]) -> list[Any]:
+    """The cases as parameters of a test; those not among `which` are left to the thorough runs."""
+    return [case if case in which else pytest.param(case, marks=THOROUGH) for case in cases]

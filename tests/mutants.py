@@ -318,7 +318,18 @@ def measure(tests: list[str]) -> None:
     KEPT.mkdir(exist_ok=True)
     environment = {**os.environ, "COVERAGE_FILE": str(KEPT / "coverage"), "PYTHONPATH": str(ROOT / "tests")}
     command = [sys.executable, "-m", "coverage", "run", "--append", "--source=kahanmaps", "-m", "pytest"]
-    command += ["-p", "mutants", "-m", "not slow", "-q", "-n", "0", "--timeout", "900", "--hypothesis-seed=0"]
+    command += [
+        "-p",
+        "mutants",
+        "-m",
+        "not slow or thorough",
+        "-q",
+        "-n",
+        "0",
+        "--timeout",
+        "900",
+        "--hypothesis-seed=0",
+    ]
     subprocess.run([*command, *(tests or TESTS)], cwd=ROOT, env=environment, check=True)
     (KEPT / "measured").write_text(state())
 

@@ -30,6 +30,24 @@ def kahanmaps(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
     return run
 
 
+@pytest.fixture(scope="module")
+def outcomes() -> dict[str, Outcome]:
+    """What `once` has run for the tests of a file."""
+    return {}
+
+
+@pytest.fixture
+def once(kahanmaps: Callable[..., Outcome], outcomes: dict[str, Outcome]) -> Callable[[str], Outcome]:
+    """Run a command that changes nothing; where another test of the file has run it, that outcome is looked at."""
+
+    def run(command: str) -> Outcome:
+        if command not in outcomes:
+            outcomes[command] = kahanmaps(command)
+        return outcomes[command]
+
+    return run
+
+
 @pytest.fixture(scope="session")
 def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A file of kind [family]: m = 2, A with the eigenvalues 1 and -2."""

@@ -155,14 +155,48 @@ def write(name: str) -> None:
 
 NAMES = sorted(path.stem for path in FOLDER.glob("*.json"))
 
+# What takes four fifths of the time is done every day for one system or two of each kind, and else in thorough runs.
+SEARCHES = {"analyze", "check-integrals", "cycles", "degrees", "find-commuting", "find-density", "find-integrals"}
+SEARCHES |= {"find-symmetry", "heights", "singularities", "verify"}
+SEARCHED_EVERY_DAY = {
+    "collapse_at_half",
+    "dim1_quadratic",
+    "euler_top",
+    "harmonic",
+    "henon_heiles",
+    "ishii",
+    "kirchhoff_case",
+    "lagrange_top",
+    "linear_rotation",
+    "lorenz",
+    "lotka_volterra",
+    "member_m1",
+    "member_m2_complex",
+    "member_m3_mixed",
+    "nahm_tetrahedral",
+    "paper_m3_irreducible",
+    "planar_cubic_hamiltonian",
+    "polynomial_map",
+    "riccati",
+    "riccati_pair",
+    "so4_euler_manakov",
+    "three_wave",
+    "two_planar_cubics",
+    "volterra_periodic_5",
+    "weierstrass",
+    "zander_111",
+}
+
 
 def frozen() -> Iterator[Any]:
     """All that is frozen, as parameters of a test."""
     for name in NAMES:
         given = read(name)
         for speed in ("fast", "slow"):
-            marks = [pytest.mark.slow] if speed == "slow" else []
             for line, was in given.get(speed, {}).items():
+                searched = line.split()[0] in SEARCHES and name not in SEARCHED_EVERY_DAY
+                marks = [pytest.mark.slow] * (searched or speed == "slow")
+                marks += [pytest.mark.thorough] * (searched and speed != "slow")
                 yield pytest.param(name, line, ("status", "answer", "error"), marks=marks, id=f"{name}: {line}")
                 if was and "bounds" in was:
                     yield pytest.param(name, line, ("bounds",), marks=marks, id=f"{name}: {line} (bounds)")
@@ -174,6 +208,10 @@ def test_what_the_library_says_is_what_it_said(name: str, line: str, parts: tupl
     was, now = (given.get("fast", {}) | given.get("slow", {}))[line], said(name, line)
     found = list(differences(*({part: each.get(part) for part in parts} for each in (was or {}, now))))
     assert not found, f"kahanmaps {line}, @ = {shlex.join(given['system'])}\n" + "\n".join(found)
+
+
+def test_the_systems_that_are_searched_every_day_are_there():
+    assert set(NAMES) >= SEARCHED_EVERY_DAY
 
 
 def test_a_difference_is_told_with_its_place():
