@@ -20,11 +20,11 @@ assert status == 0, f"exit status {{status}}"
 
 
 def modules_loaded_by(code: str) -> set[str]:
-    """The top-level modules in memory after `code` has run in a fresh interpreter."""
+    """The modules in memory after `code` has run in a fresh interpreter."""
     report = "\nimport json, sys\nprint('\\n' + json.dumps(sorted(sys.modules)), file=sys.stderr)\n"
     done = subprocess.run([sys.executable, "-c", code + report], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
-    return {name.split(".")[0] for name in json.loads(done.stderr.splitlines()[-1])}
+    return set(json.loads(done.stderr.splitlines()[-1]))
 
 
 def test_a_module_that_is_loaded_is_seen():
@@ -41,6 +41,18 @@ def test_an_exact_orbit_does_not_load_numpy():
     loaded = modules_loaded_by(COMMAND.format(arguments=arguments))
     assert loaded & {"numpy", "numba", "matplotlib", "pydantic", "distributed"} == set()
     assert "flint" in loaded
+
+
+def test_a_short_orbit_loads_no_normal_forms():
+    arguments = ["orbit", "lotka_volterra", "--start", "1,2", "--eps", "1/10", "--steps"]
+    heavy = {"kahanmaps.family.hidden", "kahanmaps.maps.rational_jump"}
+    assert modules_loaded_by(COMMAND.format(arguments=[*arguments, "1"])) & heavy == set()
+    member = ["orbit", "paper_m2", "--start", "1,2,3,4", "--eps", "1/10", "--at", "100"]
+    assert heavy <= modules_loaded_by(COMMAND.format(arguments=member))
+
+
+def test_the_list_of_systems_loads_nothing_heavy():
+    assert modules_loaded_by(COMMAND.format(arguments=["systems"])) & HEAVY == set()
 
 
 def test_looking_at_a_database_of_results_loads_no_mathematics(tmp_path):

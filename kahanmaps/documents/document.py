@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
@@ -19,8 +19,6 @@ from kahanmaps.documents.equations import without_left_sides
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.documents.structured_facts import read_structured_facts
 from kahanmaps.errors import InputError, SystemFileError, counted, quoted, suggestion
-from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.cubics import default_variables
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.composed import composed_map, is_involution
 from kahanmaps.maps.explicit import explicit_map
@@ -30,6 +28,9 @@ from kahanmaps.maps.polarised import MAX_DEGREE, polarised_map
 from kahanmaps.sources import SOURCES
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
+
+if TYPE_CHECKING:
+    from kahanmaps.family.associated import FamilyMember
 
 KINDS = ("system", "hamiltonian", "family", "bilinear", "map", "composition")
 _MOST_FACTORS = 64  # of a composition, those of its parts counted too
@@ -233,6 +234,8 @@ class DocumentReader:
             if kind == "family":
                 A = (self._table("family") or {}).get("A")
                 if isinstance(A, list) and 0 < len(A) <= MAX_DIMENSION:
+                    from kahanmaps.family.cubics import default_variables
+
                     self.variables = default_variables(len(A))
             elif kind != "composition":  # which has those of its first map
                 self._mistake("variables", 'missing, expected a list of names, e.g. ["x", "y"]')
@@ -550,6 +553,8 @@ class DocumentReader:
         if A is None or H is None or self.unsure:
             return None
         try:
+            from kahanmaps.family.associated import FamilyMember
+
             return FamilyMember(A, H, tuple(signs) if signs_are_good else ())
         except InputError as error:
             message = str(error)

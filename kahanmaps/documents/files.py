@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_mat
 
@@ -24,13 +24,14 @@ from kahanmaps.displayed import Displayed
 from kahanmaps.documents.document import KINDS, DocumentReader
 from kahanmaps.documents.toml_text import to_toml
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
-from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
+
+if TYPE_CHECKING:
+    from kahanmaps.family.associated import FamilyMember
 
 MAX_FILE_BYTES = 16_000_000
 _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
@@ -122,6 +123,8 @@ class SystemFile(Displayed):
     @classmethod
     def from_member(cls, member: FamilyMember, name: str = "member") -> SystemFile:
         """A member of the commuting family, or the associated system that its signs pick."""
+        from kahanmaps.family.cubics import default_variables
+
         section: dict[str, Any] = {"A": _rows(member.A), "H": format_polynomial(member.H)}
         if any(sign < 0 for sign in member.signs):
             section["signs"] = list(member.signs)

@@ -7,15 +7,17 @@ one all the same if linear algebra finds an A for its Hamiltonian (`hidden`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from flint import fmpq_mat
 
 from kahanmaps.errors import HypothesisError
-from kahanmaps.family.associated import FamilyMember
-from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member, reason_against
-from kahanmaps.family.planar import NormalForm, normal_form
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
+
+if TYPE_CHECKING:
+    from kahanmaps.family.associated import FamilyMember
+    from kahanmaps.family.planar import NormalForm
 
 _MAX_DIMENSION = 32
 
@@ -50,6 +52,9 @@ def structure_of(
     >>> structure_of(system).text
     'a hidden member of the family, chi = (t - 1)*(t - 2)*(t - 3)'
     """
+    from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member, reason_against
+    from kahanmaps.family.planar import normal_form
+
     if system.dim > _MAX_DIMENSION:
         return NoStructure(f"the dimension {system.dim} is above {_MAX_DIMENSION}")
     declared, T = member is not None, None

@@ -8,16 +8,16 @@ passed over, except over Q, where none goes unnoticed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kahanmaps.algebra.fields import QQ, BallField, Field, PrimeField
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
-from kahanmaps.family.structure import Structure
-from kahanmaps.maps import translation
-from kahanmaps.maps.planar_block import PlanarBlock, Triple, same_point
-from kahanmaps.maps.planes_point import PlanesPoint
-from kahanmaps.maps.rational_jump import RationalOrbit, stepped_over
-from kahanmaps.maps.splitting import Splitting
+
+if TYPE_CHECKING:
+    from kahanmaps.family.structure import Structure
+    from kahanmaps.maps.planar_block import PlanarBlock, Triple
+    from kahanmaps.maps.planes_point import PlanesPoint
+    from kahanmaps.maps.rational_jump import RationalOrbit
 
 _CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is walked around
 
@@ -40,6 +40,8 @@ class Jump:
         self.eps = field.convert(eps)
         if field.characteristic == 2:
             raise BadPrime("2 eps = 0 modulo 2, where the coordinates are 2 eps (u, v): take another prime", 2)
+        from kahanmaps.maps.splitting import Splitting
+
         self.splitting = Splitting(structure.form, field, self.eps, structure.T)
         self._rational: tuple[Any, RationalOrbit] | None = None  # the last one, with what it is of
 
@@ -53,6 +55,8 @@ class Jump:
         if n < 0:
             raise InputError(f"found the step {n}, expected 0 or more (for the inverse map, change the sign of eps)")
         if self.field is QQ:
+            from kahanmaps.maps.rational_jump import RationalOrbit
+
             key = (tuple(start), max_bits)
             if self._rational is None or self._rational[0] != key:
                 self._rational = key, RationalOrbit(self.structure, self.eps, start, max_bits)
@@ -68,6 +72,8 @@ class Jump:
             return self.splitting.point(found)
 
     def _in_plane(self, block: PlanarBlock, start: Triple, n: int) -> Triple:
+        from kahanmaps.maps import translation
+
         if block.is_zero or (start[0] == 0 and start[1] == 0):
             return start
         small = isinstance(self.field, PrimeField) and self.field.prime < 5
@@ -82,6 +88,9 @@ class Jump:
 
 def _around_cycle(block: PlanarBlock, start: Triple, n: int) -> Triple:
     """P_n over a small finite field, where orbits soon come back or meet a pole. Raises SingularStep."""
+    from kahanmaps.maps.planar_block import same_point
+    from kahanmaps.maps.rational_jump import stepped_over
+
     point = start
     for k in range(1, n + 1):
         if k > _CYCLE:
@@ -97,6 +106,8 @@ def special_start(structure: Structure, eps: Any, start: Sequence[Any]) -> str:
 
     Special are planes in which the start is at rest, or on a singular level cubic (delta is 0 or 1).
     """
+    from kahanmaps.maps.splitting import Splitting
+
     splitting = Splitting(structure.form, QQ, eps, structure.T)
     for plane, (U, V, W) in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):
         above, below = plane.block.level((U, V, W))

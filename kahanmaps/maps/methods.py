@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.structure import NoStructure, Structure
-from kahanmaps.maps.jump import Jump
-from kahanmaps.maps.splitting import Splitting
 
 METHODS = ("generic", "normal-form", "jump")
 # From here on a jump is faster than steps: over Q, and modulo p, where steps do not pass poles silently.
@@ -75,12 +73,16 @@ def choose_method(
 
 
 def _why_not_over_Q(structure: Structure) -> str:
+    from kahanmaps.maps.splitting import Splitting
+
     degrees = [plane.degree for plane in Splitting(structure.form, QQ, 1, structure.T).planes]
     return "" if max(degrees) == 1 else f"chi does not split over Q (a factor has degree {max(degrees)})"
 
 
 def why_no_reduction(structure: Structure, field: Field, eps: object) -> str:
     """Empty where jumps are possible over the field, otherwise the reason (a bad prime)."""
+    from kahanmaps.maps.jump import Jump
+
     try:
         Jump(structure, eps, field)
     except BadPrime as error:

@@ -12,20 +12,20 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import count
 from threading import get_ident
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ, BallField, Field
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
-from kahanmaps.family.structure import Structure
 from kahanmaps.maps.implicit import MapOver, det_of
 from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.jump import Jump
-from kahanmaps.maps.normal_steps import NormalSteps
 from kahanmaps.maps.planes_point import PlanesPoint
-from kahanmaps.maps.rational_jump import OverBudget
+
+# Normal forms are loaded where they are used: an orbit by single steps, which most are, starts in half the time.
+if TYPE_CHECKING:
+    from kahanmaps.family.structure import Structure
 
 DEFAULT_MAX_DIGITS = 200_000
 LONGEST_INPUT = 10_000  # digits of eps and of the start, unless --max-digits says more
@@ -174,8 +174,12 @@ class Orbit(Displayed):
         """The start and its images; ends, or raises SingularStep, where the map has no value."""
         field = self.map.field
         if self.structure is not None and field is QQ:
+            from kahanmaps.maps.normal_steps import NormalSteps
+
             yield from NormalSteps(self.structure, self.map.eps).points(self.start)
         elif self.structure is not None and isinstance(field, BallField):
+            from kahanmaps.maps.jump import Jump
+
             jump = Jump(self.structure, self.map.eps, field)
             value: Any = self.start
             yield value
@@ -242,6 +246,8 @@ class Iterates:
             require_steps(step)
         self.max_digits = max_digits
         self.end: OrbitEnd | None = None
+        from kahanmaps.maps.jump import Jump
+
         self._jump = Jump(structure, self.map.eps, self.map.field)
         self._interrupted = False
         self._busy_in: int | None = None
@@ -262,6 +268,8 @@ class Iterates:
             self._busy_in = None
 
     def _points(self) -> Iterator[OrbitPoint]:
+        from kahanmaps.maps.rational_jump import OverBudget
+
         done = 0
         max_bits = _bits(self.max_digits)
         for step in self.at:

@@ -29,7 +29,7 @@ from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure
 from kahanmaps.checks.settings import Settings
-from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.catalog import load, names, titles
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.family.draw import draw_generic, draw_with_eigenvalues
@@ -74,6 +74,10 @@ def known_findings(name, eps):
 
 
 # What each file says of itself.
+
+
+def test_titles_and_dimensions_are_those_of_the_systems():
+    assert titles() == {name: (load(name).dim, load(name).catalog["title"]) for name in names()}
 
 
 def test_the_catalogue_has_the_systems_that_the_documentation_speaks_of():

@@ -30,20 +30,20 @@ def command(
       kahanmaps systems euler_top -p a1=2 --toml > my-top.toml
       kahanmaps systems lagrange_top --latex
     """
-    from kahanmaps.documents.catalog import load, names
+    from kahanmaps.documents.catalog import load, names, titles
 
     if as_toml + as_latex + as_json > 1:
         raise click.UsageError("give --toml, --latex or --json, one of the three")
     if name is None:
         if as_toml or as_latex or parameters:
             raise click.UsageError("--toml, --latex and -p need the NAME of a system")
-        rows = [(key, load(key)) for key in names()]
         if as_json:
-            print_json({"command": "systems", "version": __version__, "systems": [_summary(file) for _, file in rows]})
+            systems = [_summary(load(key)) for key in names()]
+            print_json({"command": "systems", "version": __version__, "systems": systems})
             return
-        width = max(len(key) for key, _ in rows)
-        for key, file in rows:
-            tell_entry(f"{key:<{width}}  {file.system.dim:>2}  ", file.catalog.get("title", ""), "bold")
+        width = max(map(len, names()))
+        for key, (dim, title) in titles().items():
+            tell_entry(f"{key:<{width}}  {dim:>2}  ", title, "bold")
         return
     file = load_reference(name, dict(parameters))
     if as_toml:

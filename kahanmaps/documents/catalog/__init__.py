@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import tomllib
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -44,6 +45,20 @@ def names() -> tuple[str, ...]:
     """
     found = (entry.name for entry in resources.files(__name__).iterdir())
     return tuple(sorted(name.removesuffix(_ENDING) for name in found if name.endswith(_ENDING)))
+
+
+def titles() -> dict[str, tuple[int, str]]:
+    """Dimension and title of every system of the catalogue, by name; no arithmetic is loaded for them.
+
+    >>> titles()["lorenz"]
+    (3, 'Lorenz system')
+    """
+    found = {}
+    for name in names():
+        document = tomllib.loads(resources.files(__name__).joinpath(name + _ENDING).read_text("utf-8"))
+        variables = document.get("variables") or document["family"]["A"]
+        found[name] = len(variables), document["catalog"]["title"]
+    return found
 
 
 def load(reference: str | Path, parameters: Mapping[str, Any] | None = None) -> SystemFile:
