@@ -30,9 +30,11 @@ from kahanmaps.checks.preserve import density_identity, jacobi_identity, transfo
 from kahanmaps.checks.settings import Settings
 from kahanmaps.invariants.integrals import ClaimedIntegral, ModifiedHamiltonian
 from kahanmaps.invariants.measures import ClaimedDensity
+from kahanmaps.invariants.poisson import HamiltonianTensor
 from kahanmaps.laboratory import affine_functions
 from kahanmaps.laboratory.degrees import degree_growth
 from kahanmaps.laboratory.densities import find_densities
+from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 ROUNDS = 2
@@ -166,8 +168,10 @@ LIKE_EACH_OTHER = {
         for system, text, eps in product((F, G), ("x", "1/x"), (None, EPS))
     ],
     "maps": [commutativity(f, g, eps, NAMES) for f, g, eps in product((F, G), (F, G), (None, EPS))],
-    "Poisson tensors": [transformation_identity(h, eps) for h, eps in product((H, K), (None, EPS))],
-    "Jacobi": [jacobi_identity(h, eps) for h, eps in product((H, K), (None, EPS))],
+    "Poisson tensors": [
+        transformation_identity(Kahan(h.system), HamiltonianTensor(h), eps) for h, eps in product((H, K), (None, EPS))
+    ],
+    "Jacobi": [jacobi_identity(HamiltonianTensor(h), eps) for h, eps in product((H, K), (None, EPS))],
 }
 
 

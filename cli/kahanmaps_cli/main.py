@@ -41,7 +41,7 @@ SECTIONS = {
         "check-commute": ("check_commute", "Do two Kahan maps commute?"),
         "check-integrals": ("check_integrals", "Are the known or claimed integrals conserved?"),
         "check-measure": ("check_measure", "Is the measure dx/phi invariant?"),
-        "check-poisson": ("check_poisson", "Is the Poisson tensor J - eps^2 f'(x)^2 J invariant?"),
+        "check-poisson": ("check_poisson", "Is J - eps^2 f'(x)^2 J, or a given tensor, invariant?"),
     },
     "Laboratory": {
         "analyze": ("analyze", "What a map preserves, how it grows: all of it, a verdict."),

@@ -21,10 +21,15 @@ from kahanmaps.invariants.measures import (
     jacobian_determinant_sides,
 )
 from kahanmaps.invariants.phase_functions import PhaseFunction
-from kahanmaps.invariants.poisson import jacobi_defects, transformation_sides
+from kahanmaps.invariants.poisson import (
+    GivenTensor,
+    HamiltonianTensor,
+    PoissonTensor,
+    jacobi_defects,
+    transformation_sides,
+)
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan, KahanMap, as_map
-from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -110,66 +115,78 @@ def check_measure(file: SystemFile, settings: Settings | None = None, extra: Rat
     return Report("measure", findings, context, ended_early=settings.cut_short(orbit))
 
 
-def transformation_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> Identity:
-    """dPhi Pi(x) dPhi^T = Pi(x~), multiplied out."""
-    n = hamiltonian.dim
+def transformation_identity(map_: BirationalMap, tensor: PoissonTensor, eps: fmpq | None) -> Identity:
+    """dPhi P(x) dPhi^T = P(x~), multiplied out."""
+    n = map_.dim
 
-    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
-        kahan = KahanMap(hamiltonian.system, eps_value, field)
-        left, right = transformation_sides(kahan, hamiltonian, point, _image(kahan, point))
-        return left.entries(), right.entries()
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
+        local = map_.at(eps_value, field)
+        found = transformation_sides(local, tensor, point, _image(local, point))
+        return None if found is None else (found[0].entries(), found[1].entries())
 
     entries = tuple(f"entry ({i + 1},{j + 1})" for i in range(n) for j in range(n))
-    labels = ("(I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T", "(I - eps f'(x)) Pi(x~) (I - eps f'(x))^T")
-    subject = (hamiltonian.H, hamiltonian.J)
-    return Identity(n, sides, eps, *labels, entries, subject=subject)
+    labels = ("N(x, x~) P(x) N(x, x~)^T", "M(x) P(x~) M(x)^T")
+    if isinstance(map_, Kahan):
+        labels = ("(I + eps f'(x~)) P(x) (I + eps f'(x~))^T", "(I - eps f'(x)) P(x~) (I - eps f'(x))^T")
+    labels = (labels[0].replace("P", tensor.name), labels[1].replace("P", tensor.name))
+    return Identity(n, sides, eps, *labels, entries, subject=(map_.subject, tensor.subject))
 
 
-def jacobi_identity(hamiltonian: CubicHamiltonian, eps: fmpq | None) -> Identity:
-    """The Jacobi identity of Pi for all triples of coordinates."""
-    n = hamiltonian.dim
+def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
+    """The Jacobi identity of a tensor for all triples of coordinates."""
+    n = tensor.dim
 
-    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides:
-        defects = jacobi_defects(hamiltonian, field, eps_value, point)
-        return defects, [field.zero] * len(defects)
+    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
+        defects = jacobi_defects(tensor, field, eps_value, point)
+        return None if defects is None else (defects, [field.zero] * len(defects))
 
     entries = tuple(
         f"triple ({i + 1},{j + 1},{k + 1})" for i in range(n) for j in range(i + 1, n) for k in range(j + 1, n)
     )
-    subject = (hamiltonian.H, hamiltonian.J)
-    return Identity(n, sides, eps, "the cyclic sum", "what it should be", entries, subject=subject)
+    return Identity(n, sides, eps, "the cyclic sum", "what it should be", entries, subject=tensor.subject)
 
 
-def check_poisson(file: SystemFile, settings: Settings | None = None) -> Report:
-    """Is Pi(x) = J - eps^2 f'(x)^2 J a Poisson tensor that the Kahan map preserves?
+def check_poisson(file: SystemFile, settings: Settings | None = None, extra: GivenTensor | None = None) -> Report:
+    """Is `extra`, or without it Pi(x) = J - eps^2 f'(x)^2 J, a Poisson tensor that the map preserves?
 
-    Raises InputError for systems without a Hamiltonian.
+    Raises InputError for systems without a Hamiltonian where no tensor is given, and for a tensor of another dimension.
     """
     settings = settings or Settings()
-    if file.hamiltonian is None:
+    proof, source = None, ""
+    tensor: PoissonTensor
+    if extra is not None:
+        if extra.dim != file.dim:
+            raise InputError(f"found a tensor in dimension {extra.dim}, expected {file.dim} as the map has")
+        for row in extra.rows:
+            for entry in row:
+                file.require_claim("an entry of a tensor", entry)
+        tensor = extra
+    elif file.hamiltonian is not None:
+        tensor = HamiltonianTensor(file.hamiltonian)
+        proof = theorems.poisson_tensor_invariant(file.hamiltonian, file.member)
+        source = "petrera-suris-2016, Theorem 12" if file.member is not None else ""
+    else:
         raise InputError(
             f"{file.name} is of kind [{file.kind}]: Pi(x) = J - eps^2 f'(x)^2 J needs a Hamiltonian system, "
-            "expected a file of kind [hamiltonian] or [family]"
+            "expected a file of kind [hamiltonian] or [family], or a tensor: --tensor FILE"
         )
-    hamiltonian = file.hamiltonian
-    proof = theorems.poisson_tensor_invariant(hamiltonian, file.member)
-    orbit = run_orbit(file.system, settings, (hamiltonian.H, hamiltonian.J), file.member is not None)
-    source = "petrera-suris-2016, Theorem 12" if file.member is not None else ""
+    orbit = run_orbit(file.map, settings, tensor.subject, file.member is not None)
+    name = tensor.name
     law = judge(
-        "the Kahan map is Poisson for Pi",
-        transformation_identity(hamiltonian, settings.eps),
+        f"the {'Kahan ' * isinstance(file.map, Kahan)}map is Poisson for {name}",
+        transformation_identity(file.map, tensor, settings.eps),
         settings,
         proof,
         orbit,
-        formula="dPhi(x) Pi(x) dPhi(x)^T = Pi(x~), Pi(x) = J - eps^2 f'(x)^2 J",
+        formula=f"dPhi(x) {name}(x) dPhi(x)^T = {name}(x~), {tensor.formula}",
         source=source,
     )
     jacobi = judge(
-        "Pi is a Poisson tensor",
-        jacobi_identity(hamiltonian, settings.eps),  # of x alone: an orbit would add nothing
+        f"{name} is a Poisson tensor",
+        jacobi_identity(tensor, settings.eps),  # of x alone: an orbit would add nothing
         settings,
         proof,
-        formula="sum_l Pi_il d_l Pi_jk + cyclic = 0",
+        formula=f"sum_l {name}_il d_l {name}_jk + cyclic = 0",
         source=source,
     )
     context = settings.context([file], orbit=orbit.to_json())

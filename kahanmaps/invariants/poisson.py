@@ -1,19 +1,30 @@
-"""The Poisson tensor Pi(x) = J - eps^2 f'(x)^2 J.
+"""Poisson tensors P(x), and what it is that a map preserves one.
 
-Phi_f is Poisson for Pi when dPhi Pi(x) dPhi^T = Pi(x~); with dPhi = (I - eps f'(x))^{-1} (I + eps f'(x~)) this is
+A map Phi is Poisson for P when dPhi(x) P(x) dPhi(x)^T = P(x~). Where M(x) x~ = r(x) defines it, dPhi = M^{-1} N, and
+the law reads, free of denominators but for those of x~ and P,
 
-    (I + eps f'(x~)) Pi(x) (I + eps f'(x~))^T = (I - eps f'(x)) Pi(x~) (I - eps f'(x))^T,
+    N(x, x~) P(x) N(x, x~)^T = M(x) P(x~) M(x)^T;
 
-free of denominators but for those of x~. Source: petrera-suris-2016, Theorem 12.
+for Kahan maps M = I - eps f'(x) and N = I + eps f'(x~). Two kinds of tensors are known here: those that somebody has
+written down, and Pi(x) = J - eps^2 f'(x)^2 J of Hamiltonian systems. Source: petrera-suris-2016, Theorem 12.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tomllib
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
+from flint import fmpq
+
 from kahanmaps.algebra.fields import Field
-from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient
+from kahanmaps.algebra.text import format_rational_function, parse_rational_function
+from kahanmaps.errors import InputError, quoted
+from kahanmaps.maps.implicit import MapOver
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 
 
@@ -25,32 +36,207 @@ def poisson_tensor(hamiltonian: CubicHamiltonian, field: Field, eps: Any, point:
         return J - jacobian * jacobian * J * (eps * eps)
 
 
+class PoissonTensor(ABC):
+    """A skew matrix of functions of x and eps: a Poisson tensor, if the Jacobi identity holds."""
+
+    dim: int
+    name: str
+    formula: str
+
+    @property
+    @abstractmethod
+    def subject(self) -> tuple[Any, ...]:
+        """All that determines the tensor, as `seed_for` takes it."""
+
+    @abstractmethod
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        """The matrix P(x); None at a pole."""
+
+    @abstractmethod
+    def along(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
+        """The matrix sum_l v_l dP/dx_l for a direction v, where P has a value."""
+
+
+class HamiltonianTensor(PoissonTensor):
+    """Pi(x) = J - eps^2 f'(x)^2 J for f = J grad H."""
+
+    name = "Pi"
+    formula = "Pi(x) = J - eps^2 f'(x)^2 J"
+
+    def __init__(self, hamiltonian: CubicHamiltonian) -> None:
+        self.hamiltonian = hamiltonian
+        self.dim = hamiltonian.dim
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return (self.hamiltonian.H, self.hamiltonian.J)
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        return poisson_tensor(self.hamiltonian, field, eps, point)
+
+    def along(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
+        local = self.hamiltonian.system.over(field)
+        with field.working():
+            first, second = local.jacobian(point), local.hessian_times(direction)
+            return (second * first + first * second) * field.convert_matrix(self.hamiltonian.J) * -(eps * eps)
+
+
+class GivenTensor(PoissonTensor):
+    """A skew matrix of rational functions of the variables and eps (their last variable).
+
+    Raises InputError for a matrix that is not square or not skew.
+
+    >>> GivenTensor.from_text([["0", "x*y"], ["-x*y", "0"]], ["x", "y"]).formula
+    '{x,y} = x*y'
+    >>> GivenTensor.from_text([["0", "x"], ["x", "0"]], ["x", "y"])
+    Traceback (most recent call last):
+    kahanmaps.errors.InputError: found x in row 1, column 2 and x in row 2, column 1, expected a skew matrix
+    """
+
+    name = "P"
+
+    def __init__(self, rows: Sequence[Sequence[RationalFunction]]) -> None:
+        self.dim = len(rows)
+        if any(len(row) != self.dim for row in rows):
+            raise InputError(f"found a matrix with {self.dim} rows that is not square, expected as many columns")
+        for i, row in enumerate(rows):
+            for j, entry in enumerate(row[: i + 1]):
+                other = rows[j][i]
+                if other != RationalFunction(-entry.numerator, entry.denominator):
+                    texts = [format_rational_function(one) for one in (other, entry)]
+                    raise InputError(
+                        f"found {texts[0]} in row {j + 1}, column {i + 1} and {texts[1]} in row {i + 1}, "
+                        f"column {j + 1}, expected a skew matrix"
+                    )
+        self.rows = tuple(tuple(row) for row in rows)
+
+    @classmethod
+    def from_text(
+        cls, rows: Sequence[Sequence[str]], variables: Sequence[str], parameters: Mapping[str, fmpq] | None = None
+    ) -> GivenTensor:
+        """The tensor with entries written as rational functions of the variables, the parameters and eps."""
+        names = (*variables, "eps")
+        if len(rows) != len(variables):
+            raise InputError(f"found a tensor with {len(rows)} rows, expected {len(variables)}, one for each variable")
+        return cls([[parse_rational_function(entry, names, parameters or {}) for entry in row] for row in rows])
+
+    @classmethod
+    def read(cls, path: str | Path, variables: Sequence[str], parameters: Mapping[str, fmpq]) -> GivenTensor:
+        """The tensor in a TOML file: the rows `tensor` of the section [poisson], entries numbers or text.
+
+        Raises InputError for a file that cannot be read or says something else.
+        """
+        try:
+            document = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"), parse_float=str)
+        except (OSError, ValueError, RecursionError) as error:
+            raise InputError(f"cannot read the tensor in {path}: {error}") from error
+        section = document.get("poisson")
+        rows = section.get("tensor") if isinstance(section, dict) else None
+        if not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
+            raise InputError(f'{path}: expected a section [poisson] with tensor = [["0", "x*y"], ["-x*y", "0"]]')
+        for entry in (entry for row in rows for entry in row):
+            if not isinstance(entry, int | str) or isinstance(entry, bool):
+                raise InputError(f"{path}: found {quoted(str(entry))} in the tensor, expected functions in quotes")
+        return cls.from_text([[str(entry) for entry in row] for row in rows], variables, parameters)
+
+    def toml_section(self) -> str:
+        """The tensor as a section [poisson], which `read` reads."""
+        rows = [", ".join(f'"{format_rational_function(entry)}"' for entry in row) for row in self.rows]
+        return "\n".join(["[poisson]", "tensor = [", *(f"  [{row}]," for row in rows), "]", ""])
+
+    @property
+    def brackets(self) -> dict[tuple[str, str], RationalFunction]:
+        """The brackets {x_i, x_j} = P_ij for i < j that are not 0."""
+        names = self.rows[0][0].names
+        return {
+            (names[i], names[j]): self.rows[i][j]
+            for i in range(self.dim)
+            for j in range(i + 1, self.dim)
+            if not self.rows[i][j].numerator.is_zero()
+        }
+
+    @property
+    def formula(self) -> str:  # type: ignore[override]
+        """The brackets that are not 0."""
+        found = [f"{{{a},{b}}} = {format_rational_function(entry)}" for (a, b), entry in self.brackets.items()]
+        return ", ".join(found) or "P = 0"
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return ("given tensor", self.rows)
+
+    def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
+        with field.working():
+            place = (*point, field.convert(eps))
+            above = {pair: entry.value(field, place) for pair, entry in self._above.items()}
+            return None if None in above.values() else self._matrix(field, above)
+
+    def along(self, field: Field, eps: Any, point: Sequence[Any], direction: Sequence[Any]) -> Any:
+        with field.working():
+            place = (*point, field.convert(eps))
+
+            def slope(parts: Sequence[Any]) -> Any:
+                return sum(
+                    (v * evaluate(part, field, place) for v, part in zip(direction, parts, strict=False)), field.zero
+                )
+
+            above = {}
+            for pair, entry in self._above.items():
+                numerator, denominator = self._slopes[pair]
+                N, D = evaluate(entry.numerator, field, place), evaluate(entry.denominator, field, place)
+                above[pair] = slope(numerator) / D
+                if not entry.is_polynomial:
+                    above[pair] = above[pair] - N * slope(denominator) / (D * D)
+            return self._matrix(field, above)
+
+    @cached_property
+    def _above(self) -> dict[tuple[int, int], RationalFunction]:
+        return {
+            (i, j): entry
+            for i, row in enumerate(self.rows)
+            for j, entry in enumerate(row)
+            if i < j and not entry.numerator.is_zero()
+        }
+
+    @cached_property
+    def _slopes(self) -> dict[tuple[int, int], tuple[Any, Any]]:
+        return {pair: (gradient(f.numerator), gradient(f.denominator)) for pair, f in self._above.items()}
+
+    def _matrix(self, field: Field, above: Mapping[tuple[int, int], Any]) -> Any:
+        n, zero = self.dim, field.zero
+        entries = [
+            above[i, j] if (i, j) in above else -above[j, i] if (j, i) in above else zero
+            for i in range(n)
+            for j in range(n)
+        ]
+        return field.matrix(n, n, entries)
+
+
 def transformation_sides(
-    kahan: KahanMap, hamiltonian: CubicHamiltonian, point: Sequence[Any], image: Sequence[Any]
-) -> tuple[Any, Any]:
-    """Both sides of the transformation law above, at x = `point` and x~ = `image`."""
-    field, eps = kahan.field, kahan.eps
-    forward, backward = kahan.inverse.denominator_matrix(image), kahan.denominator_matrix(point)
+    map_: MapOver, tensor: PoissonTensor, point: Sequence[Any], image: Sequence[Any]
+) -> tuple[Any, Any] | None:
+    """Both sides of the transformation law above, at x = `point` and x~ = `image`; None at a pole of the tensor."""
+    field, eps = map_.field, map_.eps
+    here, there = tensor.value(field, eps, point), tensor.value(field, eps, image)
+    if here is None or there is None:
+        return None
+    forward, backward = map_.numerator_matrix(point, image), map_.denominator_matrix(point)
     with field.working():
-        left = forward * poisson_tensor(hamiltonian, field, eps, point) * forward.transpose()
-        right = backward * poisson_tensor(hamiltonian, field, eps, image) * backward.transpose()
-        return left, right
+        return forward * here * forward.transpose(), backward * there * backward.transpose()
 
 
-def jacobi_defects(hamiltonian: CubicHamiltonian, field: Field, eps: Any, point: Sequence[Any]) -> list[Any]:
-    """sum over l of Pi_il d_l Pi_jk + cyclic in i, j, k, for all i < j < k: zero when Pi is a Poisson tensor."""
-    n = hamiltonian.dim
-    local = hamiltonian.system.over(field)
+def jacobi_defects(tensor: PoissonTensor, field: Field, eps: Any, point: Sequence[Any]) -> list[Any] | None:
+    """sum over l of P_il d_l P_jk + cyclic in i, j, k, for all i < j < k: zero when P is a Poisson tensor.
+
+    None at a pole.
+    """
+    n = tensor.dim
+    P = tensor.value(field, eps, point)
+    if P is None:
+        return None
     with field.working():
-        jacobian = local.jacobian(point)
-        J = field.convert_matrix(hamiltonian.J)
-        square = -(eps * eps)
-        Pi = poisson_tensor(hamiltonian, field, eps, point)
-        # along[i][j, k] = sum_l Pi_il d_l Pi_jk, the derivative of Pi_jk along row i of Pi.
-        along = []
-        for i in range(n):
-            second = local.hessian_times([Pi[i, l] for l in range(n)])
-            along.append((second * jacobian + jacobian * second) * J * square)
+        # along[i][j, k] = sum_l P_il d_l P_jk, the derivative of P_jk along row i of P.
+        along = [tensor.along(field, eps, point, [P[i, l] for l in range(n)]) for i in range(n)]
         return [
             along[i][j, k] + along[j][k, i] + along[k][i, j]
             for i in range(n)

@@ -2,7 +2,8 @@
 
 phi = det(I - eps f') is proved for every cubic Hamiltonian and every constant skew J; claimed densities are decided.
 Pi is proved for generic members of the family and in dimension 2, decided where A has repeated roots, and refuted for a
-generic Hamiltonian in dimension 4. Witnesses are computed a second time, det dPhi and dPhi from dual numbers.
+generic Hamiltonian in dimension 4. Tensors that are given are decided, for maps of every kind. Witnesses are computed a
+second time, det dPhi and dPhi from dual numbers.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.invariants import poisson
+from kahanmaps.invariants.poisson import GivenTensor
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -418,6 +420,65 @@ def test_a_step_of_half_the_length_contradicts_the_theorems(check, member, monke
     monkeypatch.setattr(KahanMap, "step", half_step)
     with pytest.raises(Contradiction, match="defining equation of the Kahan map"):
         check(SystemFile.from_member(member), QUICK)
+
+
+# Given tensors
+
+
+LYNESS = """variables = ["x", "y"]
+[map]
+image = ["y", "(2 + y)/x"]
+inverse = ["(2 + x)/y", "x"]
+"""
+NESTED = """variables = ["x", "y", "z", "w"]
+[system]
+rhs = ["x*(y + z + w)", "y*(-x + z + w)", "z*(-x - y + w)", "w*(-x - y - z)"]
+"""
+LINE = "variables = ['x', 'y']\n[map]\nimage = ['x + 1', 'y + x^2']\ninverse = ['x - 1', 'y - (x - 1)^2']\n"
+
+
+def log_canonical(names, a):
+    """The tensor {x_i, x_j} = a_ij x_i x_j."""
+    rows = [[f"({a[i][j]})*{p}*{q}" for j, q in enumerate(names)] for i, p in enumerate(names)]
+    return GivenTensor.from_text(rows, names)
+
+
+PLANAR = [[0, 1], [-1, 0]]
+SIGNS = [[(j > i) - (j < i) for j in range(4)] for i in range(4)]
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "law"),
+    [
+        (LYNESS, log_canonical("xy", PLANAR), SUPPORTED),
+        (LYNESS, GivenTensor.from_text([["0", "x"], ["-x", "0"]], "xy"), REFUTED),
+        (NESTED, log_canonical("xyzw", SIGNS), SUPPORTED),
+        (NESTED, log_canonical("xyzw", [[2 * e if {i, j} == {0, 1} else e for j, e in enumerate(row)]
+                                        for i, row in enumerate(SIGNS)]), REFUTED),
+        (LINE, GivenTensor.from_text([["0", "1"], ["-1", "0"]], "xy"), SUPPORTED),  # det dPhi = 1
+        (LINE, GivenTensor.from_text([["0", "1/(x^2 - y)"], ["-1/(x^2 - y)", "0"]], "xy"), REFUTED),
+    ],
+)  # fmt: skip
+def test_a_given_tensor_is_tried_on_any_map(text, given, law):
+    assert verdicts(check_poisson(parse_system(text), QUICK, given)) == [law, SUPPORTED]
+
+
+def test_a_tensor_with_denominators_is_differentiated():
+    # P = (x, y, z)/|x|^2 as {x,y} = z/r^2 and so on: rot P is orthogonal to P
+    r = "x^2 + y^2 + z^2"
+    rows = [["0", f"z/({r})", f"-y/({r})"], [f"-z/({r})", "0", f"x/({r})"], [f"y/({r})", f"-x/({r})", "0"]]
+    assert check_poisson(file_of(LORENZ), QUICK, GivenTensor.from_text(rows, "xyz")).findings[1].verdict is SUPPORTED
+    rows = [["0", "1/y", "0"], ["-1/y", "0", "1/(x - z)"], ["0", "1/(z - x)", "0"]]
+    found = check_poisson(file_of(LORENZ), QUICK, GivenTensor.from_text(rows, "xyz")).findings[1]
+    assert found.verdict is REFUTED
+    # sum_l P_1l d_l P_23 + P_2l d_l P_31 + P_3l d_l P_12, of which only P_32 d_2 P_12 is not 0
+    x, y, z = exact(*found.witness.point)
+    assert exact(*found.witness.left) == (1 / ((x - z) * y**2),)
+
+
+def test_a_tensor_of_another_dimension_is_wrong_use():
+    with pytest.raises(InputError, match="found a tensor in dimension 2, expected 3"):
+        check_poisson(file_of(LORENZ), QUICK, log_canonical("xy", PLANAR))
 
 
 def wrong_sign(hamiltonian, field, eps, point):

@@ -279,6 +279,32 @@ def test_both_laws_of_a_poisson_map_are_checked(kahanmaps, pair):
     assert [claim["verdict"] for claim in report["claims"]] == ["proved", "proved"]
 
 
+def test_a_tensor_may_be_given_in_a_file(kahanmaps, tmp_path):
+    path = tmp_path / "p.toml"
+    for entry, status in (("x*y", 0), ("x*y^2", 1)):
+        path.write_text(f'[poisson]\ntensor = [[0, "{entry}"], ["-{entry}", 0]]\n')
+        assert kahanmaps("check-poisson lotka_volterra --json --tensor", path).status == status
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "expected a section [poisson] with tensor ="),
+        ("[poisson]\ntensor = [[0, true], [1, 0]]", "found 'True' in the tensor"),
+        ("[poisson]\ntensor = [[0, 1], [1, 0]]", "expected a skew matrix"),
+        ("[poisson]\ntensor = [[0, 1], [1]]", "is not square"),
+        ("[poisson]\ntensor = [[0]]", "with 1 rows, expected 2"),
+        ("[poisson", "cannot read the tensor"),
+    ],
+)
+def test_a_file_that_holds_no_tensor_is_wrong_use(kahanmaps, tmp_path, text, message):
+    path = tmp_path / "p.toml"
+    path.write_text(text)
+    outcome = kahanmaps("check-poisson lotka_volterra --tensor", path)
+    assert outcome.status == 2
+    assert message in outcome.err
+
+
 # For people
 
 

@@ -264,6 +264,7 @@ def test_a_check_whose_orbit_nobody_asked_for_may_cut_it_short(kahanmaps):
         ("check-measure lorenz --density x-x", "found the density 0"),
         ("check-measure lorenz --density q", "found the unknown name 'q'"),
         ("check-poisson euler_top", "needs a Hamiltonian system"),
+        ("check-poisson euler_top --tensor nowhere.toml", "cannot read the tensor in nowhere.toml"),
         # the family
         ("family new", "missing --m M"),
         ("family new --m 0", "found m = 0, expected 1 <= m <= 16"),
