@@ -53,6 +53,7 @@ from kahanmaps.family.structure import structure_of as structure_of
 from kahanmaps.invariants.heights import HeightGrowth as HeightGrowth
 from kahanmaps.invariants.heights import height as height
 from kahanmaps.invariants.heights import height_growth as height_growth
+from kahanmaps.invariants.poisson import GivenTensor as GivenTensor
 from kahanmaps.laboratory.affine_functions import affine_darboux as affine_darboux
 from kahanmaps.laboratory.affine_functions import affine_integrals as affine_integrals
 from kahanmaps.laboratory.analysis import Analysis as Analysis
@@ -76,6 +77,8 @@ from kahanmaps.laboratory.hirota_kimura import orbit_profile as orbit_profile
 from kahanmaps.laboratory.integrals import IntegralSearch as IntegralSearch
 from kahanmaps.laboratory.integrals import find_integrals as find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory as Laboratory
+from kahanmaps.laboratory.poisson_tensors import PoissonSearch as PoissonSearch
+from kahanmaps.laboratory.poisson_tensors import find_poisson as find_poisson
 from kahanmaps.laboratory.recurrences import Recurrence as Recurrence
 from kahanmaps.laboratory.recurrences import find_recurrence as find_recurrence
 from kahanmaps.laboratory.singularities import SingularityRun as SingularityRun

@@ -26,6 +26,7 @@ LEAST = {
     "heights": "harmonic --steps 20 --seconds 1",
     "find-integrals": "harmonic --seconds 1",
     "find-density": "harmonic --seconds 1",
+    "find-poisson": "harmonic --seconds 1",
     "find-symmetry": "harmonic --seconds 1",
     "find-commuting": "harmonic --seconds 1",
     "singularities": "harmonic --seconds 1",

@@ -49,6 +49,7 @@ SECTIONS = {
         "heights": ("heights", "How fast the heights of exact orbits grow."),
         "find-integrals": ("find_integrals", "Integrals in closed form, with their proofs."),
         "find-density": ("find_density", "Invariant measures dx/phi with phi polynomial."),
+        "find-poisson": ("find_poisson", "Poisson tensors with polynomial entries."),
         "find-symmetry": ("find_symmetry", "Linear symmetries and reversing symmetries of the map."),
         "find-commuting": ("find_commuting", "All quadratic systems whose maps commute with this one."),
         "singularities": ("singularities", "Are the singularities confined, and after how many steps?"),

@@ -119,9 +119,10 @@ def transformation_identity(map_: BirationalMap, tensor: PoissonTensor, eps: fmp
     """dPhi P(x) dPhi^T = P(x~), multiplied out."""
     n = map_.dim
 
-    def sides(field: Field, point: tuple[Any, ...], eps_value: Any) -> Sides | None:
-        local = map_.at(eps_value, field)
-        found = transformation_sides(local, tensor, point, _image(local, point))
+    def sides(field: Field, place: tuple[Any, ...], eps_value: Any) -> Sides | None:
+        point, values = place[:n], place[n:]
+        local = map_.at(eps_value, field, values)
+        found = transformation_sides(local, tensor, point, _image(local, point), values)
         return None if found is None else (found[0].entries(), found[1].entries())
 
     entries = tuple(f"entry ({i + 1},{j + 1})" for i in range(n) for j in range(n))
@@ -129,7 +130,8 @@ def transformation_identity(map_: BirationalMap, tensor: PoissonTensor, eps: fmp
     if isinstance(map_, Kahan):
         labels = ("(I + eps f'(x~)) P(x) (I + eps f'(x~))^T", "(I - eps f'(x)) P(x~) (I - eps f'(x))^T")
     labels = (labels[0].replace("P", tensor.name), labels[1].replace("P", tensor.name))
-    return Identity(n, sides, eps, *labels, entries, subject=(map_.subject, tensor.subject))
+    subject, dim = (map_.subject, tensor.subject), n + len(map_.symbols)
+    return Identity(dim, sides, eps, *labels, entries, has_eps=map_.has_eps or tensor.has_eps, subject=subject)
 
 
 def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
@@ -143,7 +145,8 @@ def jacobi_identity(tensor: PoissonTensor, eps: fmpq | None) -> Identity:
     entries = tuple(
         f"triple ({i + 1},{j + 1},{k + 1})" for i in range(n) for j in range(i + 1, n) for k in range(j + 1, n)
     )
-    return Identity(n, sides, eps, "the cyclic sum", "what it should be", entries, subject=tensor.subject)
+    labels, dim = ("the cyclic sum", "what it should be"), n + len(tensor.symbols)
+    return Identity(dim, sides, eps, *labels, entries, has_eps=tensor.has_eps, subject=tensor.subject)
 
 
 def check_poisson(file: SystemFile, settings: Settings | None = None, extra: GivenTensor | None = None) -> Report:

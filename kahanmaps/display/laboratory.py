@@ -21,6 +21,7 @@ from kahanmaps.laboratory.densities import DensitySearch
 from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures
 from kahanmaps.laboratory.height_survey import HeightSurvey
 from kahanmaps.laboratory.integrals import IntegralSearch
+from kahanmaps.laboratory.poisson_tensors import PoissonSearch
 from kahanmaps.laboratory.singularities import SingularityRun
 from kahanmaps.laboratory.symmetries import Symmetries
 
@@ -75,6 +76,19 @@ def densities_html(search: DensitySearch) -> str:
     notes = _notes([_rest(search.densities, _FORMULAS), search.note, search.reason])
     more = eps_sentence(search.eps)
     return markup.titled(f"densities of {_name(search.file)}", inside + notes, more)
+
+
+@html_form.register
+def poisson_html(search: PoissonSearch) -> str:
+    """The tensors by their brackets, and what is known of each."""
+    rows = []
+    for one in search.tensors[:_FORMULAS]:
+        brackets = list(one.tensor.brackets.items())[:_ROWS]
+        lines = [formula(entry, f"{{{a},{b}}}", CHARACTERS) for (a, b), entry in brackets]
+        rows.append(("<br/>".join(lines), markup.verdict(one.verdict), _text(one.statement)))
+    inside = markup.table(["brackets", "verdict", ""], rows) if rows else ""
+    inside += _notes([_rest(search.tensors, _FORMULAS), search.note, search.reason])
+    return markup.titled(f"Poisson tensors of {_name(search.file)}", inside, eps_sentence(search.eps))
 
 
 @html_form.register

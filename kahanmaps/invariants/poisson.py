@@ -42,6 +42,8 @@ class PoissonTensor(ABC):
     dim: int
     name: str
     formula: str
+    has_eps: bool = True
+    symbols: tuple[str, ...] = ()  # of which it depends as well: their values stand behind those of the variables
 
     @property
     @abstractmethod
@@ -82,7 +84,7 @@ class HamiltonianTensor(PoissonTensor):
 
 
 class GivenTensor(PoissonTensor):
-    """A skew matrix of rational functions of the variables and eps (their last variable).
+    """A skew matrix of rational functions of the variables, perhaps symbols, and eps (their last variable).
 
     Raises InputError for a matrix that is not square or not skew.
 
@@ -109,6 +111,12 @@ class GivenTensor(PoissonTensor):
                         f"column {j + 1}, expected a skew matrix"
                     )
         self.rows = tuple(tuple(row) for row in rows)
+        self.symbols = rows[0][0].names[self.dim : -1] if rows else ()
+        self.has_eps = any(
+            "eps" not in set(f.numerator.unused_gens()) & set(f.denominator.unused_gens())
+            for row in self.rows
+            for f in row
+        )
 
     @classmethod
     def from_text(
@@ -213,11 +221,14 @@ class GivenTensor(PoissonTensor):
 
 
 def transformation_sides(
-    map_: MapOver, tensor: PoissonTensor, point: Sequence[Any], image: Sequence[Any]
+    map_: MapOver, tensor: PoissonTensor, point: Sequence[Any], image: Sequence[Any], values: Sequence[Any] = ()
 ) -> tuple[Any, Any] | None:
-    """Both sides of the transformation law above, at x = `point` and x~ = `image`; None at a pole of the tensor."""
+    """Both sides of the transformation law above, at x = `point` and x~ = `image`; None at a pole of the tensor.
+
+    `values` are those of the symbols.
+    """
     field, eps = map_.field, map_.eps
-    here, there = tensor.value(field, eps, point), tensor.value(field, eps, image)
+    here, there = (tensor.value(field, eps, (*place, *values)) for place in (point, image))
     if here is None or there is None:
         return None
     forward, backward = map_.numerator_matrix(point, image), map_.denominator_matrix(point)

@@ -68,6 +68,10 @@ CASES = [
     "find-integrals lotka_volterra --darboux 1 --json -q",
     "find-density weierstrass --json -q",
     "find-density lorenz --max-degree 1 --json -q",  # none
+    "find-poisson weierstrass --json -q",
+    "find-poisson euler_top --degree 3 --json -q",  # several, and Casimirs
+    "find-poisson lorenz --degree 1 --json -q",  # none
+    "find-poisson lotka_volterra --degree 3 --denominator x --json -q",
     "find-symmetry weierstrass --json -q",
     "find-symmetry harmonic --json -q",  # one-parameter groups
     "find-commuting {pair} --json -q",
@@ -190,6 +194,7 @@ SPOILT = [
     "find-integrals weierstrass --json -q",
     "find-integrals euler_top --monomials x1^2,x2^2,1 --json -q",
     "find-density weierstrass --json -q",
+    "find-poisson weierstrass --json -q",
     "find-symmetry weierstrass --json -q",
     "find-commuting {pair} --json -q",
     "singularities weierstrass --json -q",

@@ -1,0 +1,59 @@
+"""kahanmaps find-poisson."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from kahanmaps_cli.options import load_system, system_options
+from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.search import print_search, require_one_form, search_options, symbols_and_eps
+from kahanmaps_cli.terminal import tell
+
+
+@click.command("find-poisson")
+@system_options
+@click.option(
+    "--degree", type=click.IntRange(0, 20), metavar="D", default=2, show_default=True, help="Largest degree of entries."
+)
+@click.option("--denominator", metavar="EXPR", help="A function that all entries are divided by, e.g. a density.")
+@search_options("poisson")
+def command(system: str | None, **options: Any) -> int:
+    """Poisson tensors of SYSTEM: skew P(x), its entries polynomials, that the map preserves, dPhi P dPhi^T = P(x~).
+
+    \b
+      kahanmaps find-poisson lotka_volterra
+      kahanmaps find-poisson euler_top --degree 3
+      kahanmaps find-poisson weierstrass --symbolic g2 --toml
+
+    A basis of all of them is told, by brackets {x_i, x_j} = P_ij; with its rank, the Jacobi identity, the Casimirs and
+    the involution of the integrals that are found. Without --eps the formulas contain eps (the time step is 2 eps).
+
+    Exit status: 0 found, 2 wrong use, 3 none up to the degree that was tried.
+    """
+    from kahanmaps.algebra.text import parse_rational_function
+    from kahanmaps.laboratory.poisson_tensors import find_poisson
+
+    require_one_form(options)
+    with Progress(options["quiet"]) as progress:
+        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        symbols, eps = symbols_and_eps(options)
+        denominator = None
+        if options["denominator"] is not None:
+            denominator = parse_rational_function(options["denominator"], (*file.variables, "eps"), file.parameters)
+        found = find_poisson(
+            file,
+            options["degree"],
+            symbols=symbols,
+            eps=eps,
+            denominator=denominator,
+            seconds=options["seconds"],
+            seed=options["seed"],
+            progress=progress,
+        )
+    print_search("find-poisson", found, options, [(one.name, one, f"{one.statement}; ") for one in found.tensors])
+    if not any((options["as_json"], options["as_toml"], options["as_latex"])):
+        for integral in found.integrals:
+            tell(f"{integral.name}\t{integral.verdict}\t{integral.short_text}")
+    return 0 if found.tensors else 3

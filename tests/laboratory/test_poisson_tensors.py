@@ -1,0 +1,162 @@
+"""Poisson tensors that a map preserves, found: those of the literature, with their Casimirs, and no others."""
+
+from __future__ import annotations
+
+import pytest
+from flint import fmpq, fmpq_mat
+from helpers import random_point
+from search_helpers import random_system, system
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.poisson_tensors import find_poisson
+
+PROVED, REFUTED = Verdict.PROVED, Verdict.REFUTED
+
+
+def a_map(variables, image, inverse, **parameters):
+    lines = [f"variables = {variables.split()}", "[parameters]", *(f'{k} = "{v}"' for k, v in parameters.items())]
+    return parse_system("\n".join([*lines, "[map]", f"image = {image}", f"inverse = {inverse}"]))
+
+
+LYNESS = a_map("x y", ["y", "(a + y)/x"], ["(a + x)/y", "x"], a="2/3")
+# x_{n+4} x_n = x_{n+3} x_{n+1} + x_{n+2}^2 and x_{n+5} x_n = x_{n+4} x_{n+1} + x_{n+3} x_{n+2}
+SOMOS_4 = a_map("x y z w", ["y", "z", "w", "(y*w + z^2)/x"], ["(x*z + y^2)/w", "x", "y", "z"])
+SOMOS_5 = a_map("x y z w v", ["y", "z", "w", "v", "(v*y + w*z)/x"], ["(x*w + y*z)/v", "x", "y", "z", "w"])
+HENON = a_map("x y", ["y + 1 - 2*x^2", "x/3"], ["3*y", "x - 1 + 18*y^2"])  # det dPhi = -1/3
+
+
+def nested(n):
+    """x_i' = x_i (sum of x_j for j > i - sum of x_j for j < i)."""
+    names = [f"x{i}" for i in range(n)]
+    rhs = [f"{x}*(0{''.join('+' + y for y in names[i + 1 :])}{''.join('-' + y for y in names[:i])})"
+           for i, x in enumerate(names)]  # fmt: skip
+    return system(" ".join(names), *rhs)
+
+
+def brackets(found):
+    return [one.text for one in found.tensors]
+
+
+def holds_exactly(file, one, eps):
+    """dPhi P dPhi^T = P(x~) at rational points, computed here."""
+    kahan = file.map.at(eps)
+    for seed in (1, 2):
+        x = random_point(file.dim, seed)
+        slope, image = kahan.jacobian(x), kahan.step(x)
+        here, there = (one.tensor.value(QQ, kahan.eps, point) for point in (x, image))
+        if slope * here * slope.transpose() != there:
+            return False
+    return True
+
+
+@pytest.mark.parametrize(
+    ("file", "rank", "log_canonical"),
+    [
+        (load("lotka_volterra"), 2, [[0, 1], [-1, 0]]),
+        (LYNESS, 2, [[0, 1], [-1, 0]]),
+        # Gekhtman, Shapiro and Vainshtein; Hone and Fordy: the bracket of the cluster algebra, of rank 2
+        (SOMOS_4, 2, [[0, 1, 2, 3], [-1, 0, 1, 2], [-2, -1, 0, 1], [-3, -2, -1, 0]]),
+        (SOMOS_5, 2, [[j - i for j in range(5)] for i in range(5)]),
+        (nested(4), 4, [[(j > i) - (j < i) for j in range(4)] for i in range(4)]),
+        (nested(5), 4, [[(j > i) - (j < i) for j in range(5)] for i in range(5)]),
+    ],
+)
+def test_log_canonical_brackets_of_the_literature(file, rank, log_canonical):
+    found = find_poisson(file, integrals=())
+    names = file.variables
+    terms = [
+        f"{{{p},{q}}} = {'' if log_canonical[i][j] == 1 else f'{log_canonical[i][j]}*'}{p}*{q}"
+        for i, p in enumerate(names)
+        for j, q in enumerate(names)
+        if i < j
+    ]
+    assert ", ".join(terms) in brackets(found)
+    one = found.tensors[brackets(found).index(", ".join(terms))]
+    law = Verdict.SUPPORTED if file.dim == 5 and file.is_quadratic else PROVED  # too large to be multiplied out
+    assert (one.verdict, one.jacobi, one.rank) == (law, PROVED, rank)
+    assert holds_exactly(file, one, "1/10")
+
+
+def test_integrals_and_casimirs_of_the_euler_top():
+    # rank 2 in dimension 3: each tensor has one Casimir, a function of the two integrals
+    found = find_poisson(load("euler_top"), 3)
+    assert [(one.rank, one.verdict, one.jacobi, one.involution) for one in found.tensors] == [(2, *[PROVED] * 3)] * 3
+    assert [one.casimirs for one in found.tensors] == [("I1",), ("I2",), ()]
+    assert all(one.is_liouville_integrable for one in found.tensors)
+    assert found.pencil is PROVED  # tri-Hamiltonian
+    assert all(holds_exactly(load("euler_top"), one, "-2/3") for one in found.tensors)
+
+
+def test_invariant_bivectors_that_are_no_poisson_tensors_are_told_as_such():
+    found = find_poisson(nested(4))
+    assert [one.jacobi for one in found.tensors] == [PROVED, REFUTED, REFUTED, PROVED]
+    assert [one.involution for one in found.tensors] == [REFUTED] * 4
+    assert found.pencil is None
+    assert "the Jacobi identity fails" in found.tensors[1].statement
+
+
+def test_the_tensor_of_the_paper_is_among_those_of_its_member():
+    # Pi = J - eps^2 f'^2 J has degree 2: at eps = 0 it is J, which the two tensors span there
+    file = load("paper_m2")
+    found = find_poisson(file, eps="1/5")
+    kahan, x = file.map.at("1/5"), random_point(4, 3)
+    slope = kahan.vector_field_jacobian(x)
+    J = file.hamiltonian.J
+    Pi = J - slope * slope * J * fmpq(1, 25)
+    values = [one.tensor.value(QQ, kahan.eps, x) for one in found.tensors]
+    assert len(values) == 2
+    assert fmpq_mat([value.entries() for value in (*values, Pi)]).rank() == 2
+
+
+def test_formulas_with_symbols_are_those_with_numbers():
+    general = find_poisson(load("weierstrass"), symbols=["g2"])
+    assert brackets(general) == ["{x,y} = 12*x*eps^2 - 1"]
+    general = find_poisson(LYNESS, symbols=["a"])
+    assert (brackets(general), general.tensors[0].verdict) == (["{x,y} = x*y"], PROVED)
+
+
+def test_a_denominator_divides_all_entries():
+    # for Lotka and Volterra {x,y} = x y alone: over x the numerator has degree 3
+    over = parse_rational_function("x*(1 + eps)", ["x", "y", "eps"])
+    assert brackets(find_poisson(load("lotka_volterra"), 2, denominator=over, integrals=())) == []
+    found = find_poisson(load("lotka_volterra"), 3, denominator=over, integrals=())
+    assert [(one.text, one.verdict) for one in found.tensors] == [("{x,y} = x*y/(eps + 1)", PROVED)]
+
+
+@pytest.mark.parametrize(
+    ("file", "degree"),
+    [
+        (HENON, 6),  # volume shrinks by 1/3 everywhere
+        (random_system(2, 0), 4),
+        (random_system(3, 1), 3),
+        (load("lorenz"), 2),
+        (load("henon_heiles"), 2),  # the map is not symplectic for any such structure
+    ],
+)
+def test_maps_without_structure_have_none(file, degree):
+    found = find_poisson(file, degree)
+    assert (found.tensors, found.degree, found.toml_section()) == ((), degree, "")
+    assert found.reason == f"no tensor of degree at most {degree} is preserved (measured modulo a prime)"
+
+
+def test_degrees_with_too_many_unknowns_are_left_out_and_told():
+    found = find_poisson(load("paper_m3"), 4, integrals=(), seconds=1)
+    assert found.degree == 3
+    assert "degrees above 3 were not tried" in found.reason
+
+
+def test_a_tensor_for_one_eps_is_told_as_such():
+    found = find_poisson(load("weierstrass"), eps="1/3")
+    assert brackets(found) == ["{x,y} = 4*x - 3"]
+    assert found.toml_section().startswith("# for eps = 1/3 only")
+
+
+@pytest.mark.parametrize("wrong", [{"degree": -1}, {"seconds": 0}, {"eps": 0}, {"symbols": ["q"]}])
+def test_wrong_use_is_refused(wrong):
+    with pytest.raises(InputError):
+        find_poisson(load("weierstrass"), **wrong)
