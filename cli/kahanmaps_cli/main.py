@@ -48,7 +48,7 @@ SECTIONS = {
         "degrees": ("degrees", "Degrees of the iterates, recurrence, dynamical degree."),
         "heights": ("heights", "How fast the heights of exact orbits grow."),
         "find-integrals": ("find_integrals", "Integrals in closed form, with their proofs."),
-        "find-density": ("find_density", "Invariant measures dx/phi with phi polynomial."),
+        "find-density": ("find_density", "Invariant measures dx/phi, phi in closed form."),
         "find-poisson": ("find_poisson", "Poisson tensors with polynomial entries."),
         "find-symmetry": ("find_symmetry", "Linear symmetries and reversing symmetries of the map."),
         "find-commuting": ("find_commuting", "All quadratic systems whose maps commute with this one."),

@@ -37,6 +37,16 @@ def degree(polynomial: fmpq_mpoly) -> int:
     return -1 if polynomial.is_zero() else int(polynomial.total_degree())
 
 
+def degree_in(polynomial: fmpq_mpoly, count: int) -> int:
+    """The total degree in the first `count` variables; 0 for the zero polynomial.
+
+    >>> x, a = ring(["x", "a"]).gens()
+    >>> degree_in(a**3*x**2 + a**7, 1)
+    2
+    """
+    return max((sum(int(e) for e in monomial[:count]) for monomial in polynomial.monoms()), default=0)
+
+
 def is_homogeneous(polynomial: fmpq_mpoly, of_degree: int) -> bool:
     """Whether every monomial has total degree `of_degree` (true for the zero polynomial)."""
     return all(sum(monomial) == of_degree for monomial in polynomial.monoms())

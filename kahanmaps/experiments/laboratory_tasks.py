@@ -95,7 +95,7 @@ def density(
     seed: int = 0,
     report: bool = False,
 ) -> Result:
-    """The densities phi of least degree, or 1/phi, for which the measure dx/phi is invariant."""
+    """The densities phi of least degree, or a product of powers, for which the measure dx/phi is invariant."""
     from kahanmaps.laboratory.densities import find_densities
 
     found = find_densities(system, symbols=symbolic or (), eps=eps, max_degree=max_degree, seconds=seconds, seed=seed)

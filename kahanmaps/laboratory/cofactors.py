@@ -21,7 +21,7 @@ from typing import Any
 from flint import fmpq, fmpq_mpoly, fmpz
 
 from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField, FunctionMatrix
-from kahanmaps.algebra.polynomials import evaluate, ring
+from kahanmaps.algebra.polynomials import degree_in, evaluate, ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
@@ -103,19 +103,14 @@ def jacobian_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
         D = None
     if D is None:
         return (Cofactor("det dPhi", n, None),)
-    degree_of_map = max(_degree_in(part, n) for entry in image for part in (entry.above, entry.below))
+    degree_of_map = max(degree_in(part, n) for entry in image for part in (entry.above, entry.below))
     found = []
     for kind, polynomials in (("factor", [J.above]), ("pole", [J.below, D])):
         factors = {str(factor): factor for polynomial in polynomials for factor, _ in polynomial.factor()[1]}
         for factor in factors.values():
-            if weight := -(-_degree_in(factor, n) // max(1, degree_of_map)):
+            if weight := -(-degree_in(factor, n) // max(1, degree_of_map)):
                 found.append(Cofactor(format_polynomial(factor), weight, factor, kind))
     return tuple(sorted(found, key=lambda one: (one.weight, one.kind, one.name)))
-
-
-def _degree_in(polynomial: fmpq_mpoly, n: int) -> int:
-    """The degree in the first n variables."""
-    return max((sum(int(e) for e in monomial[:n]) for monomial in polynomial.monoms()), default=0)
 
 
 def determinant_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
@@ -127,7 +122,7 @@ def determinant_factors(map_: BirationalMap) -> tuple[Cofactor, ...]:
     found = []
     origin: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
     for factor, _ in D.factor()[1]:
-        weight = _degree_in(factor, n)
+        weight = degree_in(factor, n)
         if weight == 0:
             continue  # a number that depends on eps
         # D is 1 at eps = 0, so that every factor is a number there: divide by it, and cofactors become 1 at eps = 0.

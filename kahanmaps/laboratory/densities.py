@@ -1,7 +1,8 @@
-"""Invariant measures dx/phi of a map with a polynomial phi, or its reciprocal, in closed form.
+"""Invariant measures dx/phi of a map with a polynomial phi, or a product of powers of polynomials, in closed form.
 
 dx/phi is invariant if phi(x~) = det dPhi(x) phi(x): phi is a discrete Darboux polynomial with the cofactor det dPhi.
-All of them up to a degree are one null space modulo a prime. Source: celledoni-2019.
+All of them up to a degree are one null space modulo a prime. Products of powers of known polynomials, of any degree,
+are found by their exponents (products.py). Source: celledoni-2019.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from functools import reduce
 from math import comb
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly, fmpz
+from flint import fmpq, fmpz
 
 from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, primitive_part
+from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import Displayed, latex
@@ -36,6 +37,7 @@ from kahanmaps.laboratory.identities import verdict_on
 from kahanmaps.laboratory.integrals import closing_note, toml_comment
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
+from kahanmaps.laboratory.products import candidates, products_of
 
 _MAX_UNKNOWNS = 1000
 _MAX_DEGREE = 12
@@ -45,16 +47,17 @@ _ONCE = CofactorProduct((1,), 1)
 
 @dataclass(frozen=True)
 class FoundDensity:
-    """A density phi(x, eps): the measure dx/phi is invariant, with the verdict on that."""
+    """A density phi(x, eps): the measure dx/phi is invariant, with the verdict on that; `product` is phi in factors."""
 
     function: RationalFunction
     verdict: Verdict
     evidence: Evidence
+    product: str = ""
 
     @property
     def text(self) -> str:
         """The formula of phi."""
-        return format_rational_function(self.function)
+        return self.product or format_rational_function(self.function)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -110,7 +113,7 @@ def find_densities(
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DensitySearch:
-    """The polynomials phi of the least degree for which the map preserves dx/phi; failing these, 1/phi.
+    """The polynomials phi of the least degree for which the map preserves dx/phi; failing these, a product of powers.
 
     Args:
         file: the map; a differential equation stands for its Kahan map.
@@ -163,24 +166,49 @@ def _search(
     dim = laboratory.map.dim
     theorem = _theorem(laboratory)
     if theorem is not None:
-        of_theorem = _degree_in(theorem.function.numerator, dim)
+        of_theorem = degree_in(theorem.function.numerator, dim)
         if max_degree is None or of_theorem <= max_degree:
             return [theorem], of_theorem, ""
+    progress("densities that are products")
+    product, of_product = _product(laboratory, max_degree)
     top = max_degree if max_degree is not None else _MAX_DEGREE
     top = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0)
-    for degree in range(top + 1):
-        if time.monotonic() > deadline:
+    # With a product in hand only lower degrees are worth a part of the time, and the others of its own degree.
+    until = deadline if product is None else time.monotonic() + (deadline - time.monotonic()) / 3
+    for degree in range(top + 1 if product is None else min(top, of_product) + 1):
+        if time.monotonic() > until:
+            if product is not None:
+                break
             return [], degree - 1, f"the time was over at degree {degree}"
         progress(f"densities of degree {degree}")
         try:
-            for inverse in (False, True):
-                first, second = (_space(map_, degree, inverse) for map_ in laboratory.maps)
-                if first.basis and len(first.basis) == len(second.basis):
-                    found, reason = _formulas(laboratory, first, degree, inverse, deadline)
+            first, second = (_space(map_, degree) for map_ in laboratory.maps)
+            if first.basis and len(first.basis) == len(second.basis):
+                found, reason = _formulas(laboratory, first, degree, deadline)
+                if found or product is None:
                     return found, degree, reason
         except NoPoint as error:
             return [], degree - 1, str(error)
-    return [], top, f"no polynomial of degree at most {top}, and no reciprocal of one, is a density"
+    if product is not None:
+        return [product], of_product, ""
+    return [], top, f"no polynomial of degree at most {top}, and no product of powers of known ones, is a density"
+
+
+def _product(laboratory: Laboratory, max_degree: int | None) -> tuple[FoundDensity | None, int]:
+    """A density that is a product of powers of known polynomials, with its degree; None where there is none."""
+    dim = laboratory.map.dim
+    try:
+        found = products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density
+    except NoPoint:
+        return None, 0
+    phi = None if found is None else found.function
+    if found is None or phi is None:
+        return None, 0
+    degree = max(degree_in(part, dim) for part in (phi.numerator, phi.denominator))
+    if max_degree is not None and degree > max_degree:
+        return None, 0
+    verdict, evidence = verdict_on(laboratory.map, phi, laboratory.eps, laboratory.seed, is_density=True)
+    return (FoundDensity(phi, verdict, evidence, found.text) if verdict.holds else None), degree
 
 
 def _theorem(laboratory: Laboratory) -> FoundDensity | None:
@@ -205,11 +233,6 @@ def _theorem(laboratory: Laboratory) -> FoundDensity | None:
     return FoundDensity(RationalFunction(phi, phi.context().constant(1)), Verdict.PROVED, evidence)
 
 
-def _degree_in(polynomial: fmpq_mpoly, n: int) -> int:
-    """The degree in the first n variables."""
-    return max((sum(int(e) for e in monomial[:n]) for monomial in polynomial.monoms()), default=0)
-
-
 def _period(laboratory: Laboratory) -> int | None:
     """The number of points of orbits that close soon, on all maps; None where they do not."""
     try:
@@ -220,24 +243,20 @@ def _period(laboratory: Laboratory) -> int | None:
     return None if periods or period == _CLOSES_WITHIN else period
 
 
-def _space(map_: ModularMap, degree: int, inverse: bool) -> DarbouxSpace:
-    """The P of degree at most `degree` with P(x~) = det dPhi P(x), or with the reciprocal of det dPhi."""
-    sample = Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree))
-    if inverse:
-        sample = Sample(map_, sample.pairs, [[(below, above) for above, below in sample.sides[0]]])
-    return cofactor_space(sample, _ONCE, degree)
+def _space(map_: ModularMap, degree: int) -> DarbouxSpace:
+    """The P of degree at most `degree` with P(x~) = det dPhi P(x)."""
+    return cofactor_space(Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree)), _ONCE, degree)
 
 
 def _formulas(
-    laboratory: Laboratory, model: DarbouxSpace, degree: int, inverse: bool, deadline: float
+    laboratory: Laboratory, model: DarbouxSpace, degree: int, deadline: float
 ) -> tuple[list[FoundDensity], str]:
-    forms = laboratory.formulas([model], lambda map_: [_space(map_, degree, inverse)], deadline)
+    forms = laboratory.formulas([model], lambda map_: [_space(map_, degree)], deadline)
     if forms.bases is None:
         return [], f"there is a density of degree {degree} modulo primes, but no closed form: {forms.reason}"
     found = []
     for P in forms.bases[0]:
-        one = P.context().constant(1)
-        phi = RationalFunction(one, P) if inverse else RationalFunction(P, one)
+        phi = RationalFunction(P, P.context().constant(1))
         verdict, evidence = verdict_on(laboratory.map, phi, laboratory.eps, laboratory.seed, is_density=True)
         if verdict.holds:
             found.append(FoundDensity(phi, verdict, evidence))

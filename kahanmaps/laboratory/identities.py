@@ -31,6 +31,7 @@ def verdict_on(
     seed: int = 0,
     *,
     is_density: bool,
+    factor: RationalFunction | None = None,
 ) -> tuple[Verdict, Evidence]:
     """Whether I(x~) = I(x); of a density phi whether phi(x~) = det dPhi(x) phi(x), which says that dx/phi is invariant.
 
@@ -42,6 +43,7 @@ def verdict_on(
         eps: the paper's epsilon, an exact number (the time step is 2 eps), or None for every eps.
         seed: of the random points.
         is_density: whether the function is a phi.
+        factor: c, a function of the same names, for I(x~) = c I(x) or c phi; None for 1.
 
     Returns:
         The verdict with its evidence: proved by expansion, supported or refuted at random points modulo primes, or
@@ -63,7 +65,7 @@ def verdict_on(
     'proved'
     """
     map_ = as_map(given)
-    identity = _identity(map_, function, eps, is_density)
+    identity = _identity(map_, function, eps, is_density, factor)
     return judged(identity, seed, expands=map_.dim <= MAX_DIMENSION)
 
 
@@ -74,7 +76,13 @@ def judged(identity: Identity, seed: int, *, expands: bool = True) -> tuple[Verd
     return found.verdict, found.evidence
 
 
-def _identity(map_: BirationalMap, function: RationalFunction, eps: fmpq | None, is_density: bool) -> Identity:
+def _identity(
+    map_: BirationalMap,
+    function: RationalFunction,
+    eps: fmpq | None,
+    is_density: bool,
+    factor: RationalFunction | None,
+) -> Identity:
     """P(x~) Q(x) = P(x) Q(x~) for P/Q, of a density times the determinants: in x, the symbols and eps."""
     n = map_.dim
 
@@ -89,6 +97,9 @@ def _identity(map_: BirationalMap, function: RationalFunction, eps: fmpq | None,
         if field.is_zero(Q) or field.is_zero(Q_there):
             return None
         left, right = P_there * Q, P * Q_there
+        if factor is not None:
+            left = left * evaluate(factor.denominator, field, here)
+            right = right * evaluate(factor.numerator, field, here)
         if is_density:
             above, below = jacobian_determinant_sides(over, point, image)
             if field.is_zero(above):
@@ -101,5 +112,5 @@ def _identity(map_: BirationalMap, function: RationalFunction, eps: fmpq | None,
     values = " and ".join([*step, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
     told = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
     scope = f"for {values}{told}" if values else told.removeprefix(", ").strip()
-    subject = (map_.symbols, map_.subject, function, is_density)
+    subject = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))
     return Identity(n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, subject=subject)

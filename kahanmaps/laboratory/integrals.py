@@ -34,6 +34,7 @@ from kahanmaps.laboratory.identities import verdict_on
 from kahanmaps.laboratory.inherited import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
+from kahanmaps.laboratory.products import candidates, products_of
 from kahanmaps.laboratory.search import AFFINE, Found, classes, may_be_conjugate, repeat, search
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -52,11 +53,12 @@ class FoundIntegral:
     origin: str
     verdict: Verdict
     evidence: Evidence
+    product: str = ""  # the formula in factors, where it is known so
 
     @property
     def text(self) -> str:
         """The formula."""
-        return format_rational_function(self.function)
+        return self.product or format_rational_function(self.function)
 
     @property
     def short_text(self) -> str:
@@ -78,13 +80,37 @@ class FoundIntegral:
 
 
 @dataclass(frozen=True)
+class TimedIntegral:
+    """An integral c^-n I(x) that depends on time, x being the n-th point of an orbit: I(x~) = c I(x), c a number."""
+
+    name: str
+    integral: FoundIntegral
+    factor: RationalFunction
+
+    @property
+    def text(self) -> str:
+        """The formula."""
+        I = self.integral.text
+        return f"({format_rational_function(self.factor)})^-n*{I if I.isidentifier() else f'({I})'}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            **attributes(self, "name"),
+            "integral": self.integral.text,
+            "factor": format_rational_function(self.factor),
+            **attributes(self.integral, "verdict", "evidence"),
+        }
+
+
+@dataclass(frozen=True)
 class IntegralSearch(Displayed):
     """What `find_integrals` found.
 
-    `integrals` are functionally independent; `profile` is what relations along orbits show (measured); `by_theorems` is
-    how many independent integrals the Kahan map has by the theorems of inherited.py, and `theorems` says which (with
-    symbols: at random values). `reason` says what is missing and why, empty where nothing is. `eps` is None for every
-    eps.
+    `integrals` are functionally independent, also together with those that depend on time, `in_time`. `profile` is what
+    relations along orbits show (measured); `by_theorems` is how many independent integrals the Kahan map has by the
+    theorems of inherited.py, and `theorems` says which (with symbols: at random values). `reason` says what is missing
+    and why, empty where nothing is. `eps` is None for every eps.
     """
 
     file: SystemFile
@@ -97,6 +123,7 @@ class IntegralSearch(Displayed):
     seed: int
     by_theorems: int
     theorems: str
+    in_time: tuple[TimedIntegral, ...] = ()
 
     @property
     def note(self) -> str:
@@ -128,8 +155,10 @@ class IntegralSearch(Displayed):
             return f"there is no integral (measured, {tried})" if self.is_exact else f"none shows in {tried} (measured)"
         parts = [f"{self.by_theorems} by theorems: {self.theorems}"] if self.by_theorems else []
         if self.profile.nullities:
-            shown = "no more" if self.codimension == self.by_theorems else str(self.codimension)
-            parts.append(f"measured: {tried} show {shown}")
+            shown = max(self.profile.codimension, self.profile.with_known, self.by_theorems)
+            parts.append(f"measured: {tried} show {'no more' if shown == self.by_theorems else shown}")
+            if len(self.integrals) > shown:
+                parts.append(f"{len(self.integrals)} have formulas")
         at_least = "" if self.is_exact else "at least "
         return f"in all {at_least}{self.codimension} independent ({'; '.join(parts)})"
 
@@ -143,6 +172,7 @@ class IntegralSearch(Displayed):
         return {
             **attributes(self, "integrals"),
             "found": len(self.integrals),
+            **attributes(self, "in_time"),
             **attributes(self, "codimension", codimension_is_exact="is_exact"),
             **attributes(self, "by_theorems", relations="profile"),
             **attributes(self, "note", "reason", "primes"),
@@ -236,6 +266,7 @@ def find_integrals(
         }
         inherited = [systems[map_.values] for map_ in laboratory.maps]
     by_theorems = 0
+    in_time: list[TimedIntegral] = []
 
     def gradients(map_: ModularMap, x: Point) -> list[list[int]]:
         return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
@@ -243,7 +274,7 @@ def find_integrals(
     def result(integrals: Sequence[FoundIntegral], profile: Profile, reason: str) -> IntegralSearch:
         values = f", at random values of {', '.join(laboratory.symbols)}" if laboratory.symbols else ""
         theorems = inherited[0].text + values if inherited else ""
-        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems)
+        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems, tuple(in_time))
         return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found)
 
     empty = Profile(file.dim, (), (), None, True, False)
@@ -263,6 +294,9 @@ def find_integrals(
     integrals = _independent(laboratory, formulas, progress)
     if inherited and not laboratory.symbols:
         integrals = _by_theorems(laboratory, inherited[0], integrals, deadline)
+    if len(integrals) < file.dim - 1:
+        progress("products of powers of known polynomials")
+        integrals, in_time = _products(laboratory, cofactors, integrals, progress)
     done = result(integrals, profile, "")
     missing = done.codimension - len(integrals)
     if missing <= 0:
@@ -373,14 +407,60 @@ def _ratio(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
     return RationalFunction(P, Q)
 
 
-def _independent(
-    laboratory: Laboratory, formulas: Sequence[tuple[RationalFunction, str]], progress: Callable[[str], None]
-) -> list[FoundIntegral]:
-    """The integrals that do not depend on those before them, with their verdicts; none that was refuted."""
-    found: list[FoundIntegral] = []
-    rows: list[list[int]] = []
+def _products(
+    laboratory: Laboratory,
+    cofactors: Sequence[Cofactor],
+    integrals: Sequence[FoundIntegral],
+    progress: Callable[[str], None],
+) -> tuple[list[FoundIntegral], list[TimedIntegral]]:
+    """The integrals and those among products of powers that do not depend on them; and such that depend on time."""
+    origin = "product of powers of known polynomials"
+    try:
+        products = products_of(laboratory, candidates(laboratory, cofactors))
+    except NoPoint:
+        return list(integrals), []
+    written = [(function, one) for one in products.integrals if (function := one.function) is not None]
+    text = {id(function): one.text for function, one in written}
+    found = _independent(laboratory, [(function, origin) for function, _ in written], progress, integrals)
+    found = [replace(one, product=text.get(id(one.function), one.product)) for one in found]
+    in_time: list[TimedIntegral] = []
     map_ = laboratory.maps[0]
     point = map_.random_point()
+    rows = [_gradient(map_, one.function, point) for one in found]
+    for product in products.in_time:
+        function = product.function
+        if function is None or len(found) + len(in_time) >= laboratory.map.dim:
+            continue
+        row = _gradient(map_, function, point)
+        if rank([*rows, row], map_.prime) == len(rows):
+            continue
+        verdict, evidence = verdict_on(
+            laboratory.map,
+            function,
+            laboratory.eps,
+            laboratory.seed,
+            is_density=False,
+            factor=product.constant,
+        )
+        if verdict.holds:
+            rows.append(row)
+            name = f"T{len(in_time) + 1}"
+            one = FoundIntegral(name, function, origin, verdict, evidence, product.text)
+            in_time.append(TimedIntegral(name, one, product.constant))
+    return found, in_time
+
+
+def _independent(
+    laboratory: Laboratory,
+    formulas: Sequence[tuple[RationalFunction, str]],
+    progress: Callable[[str], None],
+    known: Sequence[FoundIntegral] = (),
+) -> list[FoundIntegral]:
+    """The known integrals and those that do not depend on them and each other, with verdicts; none that was refuted."""
+    map_ = laboratory.maps[0]
+    point = map_.random_point()
+    found = list(known)
+    rows = [_gradient(map_, one.function, point) for one in known]
 
     # By size, then by monomials: the order must not depend on the primes.
     def size(P: fmpq_mpoly) -> tuple[int, int, list[list[int]]]:

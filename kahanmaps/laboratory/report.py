@@ -124,6 +124,12 @@ def _integral_lines(found: Findings) -> list[Statement]:
     if search is None:
         return []
     lines = [Statement(str(one.verdict), f"{one.name} = {one.short_text}  [{one.origin}]") for one in search.integrals]
+    lines += [
+        Statement(
+            str(one.integral.verdict), f"{one.name} = {one.text} at the n-th point, an integral that depends on n"
+        )
+        for one in search.in_time
+    ]
     profile = search.profile
     if search.by_theorems:
         number = counted(search.by_theorems, "independent integral")

@@ -86,7 +86,10 @@ def test_latex(kahanmaps):
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("lorenz --max-degree 3", "no polynomial of degree at most 3, and no reciprocal of one, is a density"),
+        (
+            "lorenz --max-degree 3",
+            "no polynomial of degree at most 3, and no product of powers of known ones, is a density",
+        ),
         (f"{RAMP} --eps 1", "at eps = 1 the map has no value anywhere"),
         ("--vars x,y --rhs=-x --rhs=-y --eps 1", "at eps = 1 the map is not invertible"),
     ],

@@ -443,7 +443,11 @@ def test_what_is_said_of_the_numbers_in_relations(integrals, functions, notes):
         for k, (ours, theirs) in enumerate(zip(integrals, functions, strict=True))
     ]
     search = SimpleNamespace(
-        integrals=(), by_theorems=0, profile=SimpleNamespace(nullities=(1,), period=2, agree=True), reason=""
+        integrals=(),
+        in_time=(),
+        by_theorems=0,
+        profile=SimpleNamespace(nullities=(1,), period=2, agree=True),
+        reason="",
     )
     _, *lines = report._integral_lines(SimpleNamespace(integrals=search, relations=relations, structure=None))
     assert [line.text for line in lines] == ["along orbits R0", "along orbits R1", *notes]

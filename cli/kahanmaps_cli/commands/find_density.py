@@ -16,12 +16,15 @@ from kahanmaps_cli.search import print_search, require_one_form, search_options,
 @click.option("--max-degree", type=click.IntRange(0, 20), metavar="D", help="Largest degree of phi.")
 @search_options("density")
 def command(system: str | None, **options: Any) -> int:
-    """Densities of SYSTEM: polynomials phi of the least degree, or 1/phi, for which the measure dx/phi is invariant.
+    """Densities of SYSTEM: phi with dx/phi invariant, polynomials of the least degree or products of powers.
 
     \b
       kahanmaps find-density lotka_volterra
       kahanmaps find-density euler_top --symbolic a1,a2,a3
       kahanmaps find-density nahm_tetrahedral --toml
+
+    Products of powers of known polynomials are of any degree, exponents of either sign. What is found is verified as
+    an identity.
 
     Exit status: 0 found, 2 wrong use, 3 none up to the degree that was tried.
     """

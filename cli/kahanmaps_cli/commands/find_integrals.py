@@ -81,6 +81,9 @@ def command(system: str | None, **options: Any) -> int:
         )
     named = [(one.name, one, f"{one.origin}: ") for one in found.integrals]
     print_search("find-integrals", found, options, named, _count(found))
+    if not any((options["as_json"], options["as_toml"], options["as_latex"])):
+        for one in found.in_time:
+            tell(f"{one.name}\t{one.integral.verdict}\t{formula(one.text)}\n\tof the n-th point: depends on time")
     return 3 if found.reason else 0
 
 

@@ -1,0 +1,213 @@
+"""Integrals and densities that are products of powers: those of the literature at degrees that no search reaches."""
+
+from __future__ import annotations
+
+import random
+from functools import reduce
+
+import pytest
+from flint import fmpq, fmpz_mat, nmod_poly
+from search_helpers import random_system, system, value_of
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
+from kahanmaps.laboratory.densities import find_densities
+from kahanmaps.laboratory.identities import verdict_on
+from kahanmaps.laboratory.integrals import find_integrals
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.products import candidates, coprime_base, multiplicative_relations, products_of, relations
+
+P = 2**61 - 1
+
+
+def volterra(matrix):
+    """x_i' = x_i sum_j a_ij x_j."""
+    names = [f"x{i + 1}" for i in range(len(matrix))]
+    rhs = [f"{x}*({'+'.join(f'({a})*{y}' for a, y in zip(row, names, strict=True))})"
+           for x, row in zip(names, matrix, strict=True)]  # fmt: skip
+    return system(" ".join(names), *rhs)
+
+
+def nested(n):
+    """a_ij = 1 above the diagonal and -1 below it."""
+    return volterra([[(j > i) - (j < i) for j in range(n)] for i in range(n)])
+
+
+def circular(n, k):
+    """a_ij = 1 for 0 < j - i < n - k and -1 for j - i >= n - k, skew."""
+    return volterra([[0 if i == j else (1 if abs(j - i) < n - k else -1) * (1 if j > i else -1) for j in range(n)]
+                     for i in range(n)])  # fmt: skip
+
+
+def tree(n, edges, seed):
+    """Rows of the matrix differ along an edge (i, k) by a x_i + b x_k, so that this is a Darboux polynomial."""
+    rng = random.Random(seed)
+    rows = {0: [rng.randint(-3, 3) for _ in range(n)]}
+    for i, k in edges:
+        rows[k] = list(rows[i])
+        rows[k][i] += rng.choice([1, 2, 3, -1, -2])
+        rows[k][k] += rng.choice([1, 2, 3, -1, -2])
+    return volterra([rows[i] for i in range(n)])
+
+
+def a_map(variables, image, inverse):
+    return parse_system(f"variables = {variables.split()}\n[map]\nimage = {image}\ninverse = {inverse}\n")
+
+
+def found_in(file, symbols=(), eps=None):
+    laboratory = Laboratory(file, symbols, eps)
+    return products_of(laboratory, candidates(laboratory, laboratory.cofactors()))
+
+
+def is_density(file, phi, eps):
+    """phi(x~) = det dPhi(x) phi(x) at a rational point, over Q."""
+    kahan, names = file.map.at(eps), file.variables
+    x = kahan.point([f"{2 * k + 3}/{k + 2}" for k in range(file.dim)])
+    det = kahan.jacobian(x).det()
+    after, before = (value_of(phi, names, place, kahan.eps) for place in (kahan.step(x), x))
+    return fmpq(after.numerator, after.denominator) == det * fmpq(before.numerator, before.denominator)
+
+
+@pytest.mark.parametrize(
+    ("file", "phi"),
+    [
+        (nested(7), "x2^2*x4^2*x6^2"),
+        (nested(8), None),  # x1 x2 ... x8, and that times integrals
+        (tree(3, [(0, 1), (1, 2)], "path3"), None),
+        (tree(5, [(0, 1), (1, 2), (2, 3), (3, 4)], "path"), None),
+        (tree(6, [(0, 1), (0, 2), (0, 3), (3, 4), (3, 5)], "two stars"), None),
+        (load("volterra_periodic_5"), None),
+    ],
+)
+def test_the_measures_of_lotka_volterra_systems(file, phi):
+    one = found_in(file).density
+    assert phi is None or one.text == phi
+    assert is_density(file, one.text, "1/10")
+    assert is_density(file, one.text, "-3/7")
+    assert verdict_on(file.map, one.function, None, is_density=True)[0].holds
+
+
+def test_a_density_of_a_high_degree_is_found_where_polynomials_are_too_many():
+    found = find_densities(nested(7))
+    assert [(one.text, one.verdict, found.degree) for one in found.densities] == [
+        ("x2^2*x4^2*x6^2", Verdict.SUPPORTED, 6)
+    ]
+    assert "phi = " in found.toml_section()
+    assert find_densities(nested(7), max_degree=5, seconds=5).densities == ()  # not where a smaller one was asked for
+
+
+def test_a_density_need_not_be_a_product_of_darboux_polynomials():
+    lyness = a_map("x y", ["y", "(2 + y)/x"], ["(2 + x)/y", "x"])
+    one = found_in(lyness).density
+    assert [(str(g), k) for g, k in one.factors] == [("x", 1), ("y", 1)]
+    assert is_density(lyness, one.text, 1)
+
+
+def test_a_product_over_the_determinant_is_the_third_integral_of_a_circular_system():
+    # beside the sum of all x and the modified Hamiltonian
+    file = circular(7, 3)
+    found = find_integrals(file, seconds=20)
+    assert len(found.integrals) == found.codimension == 3
+    last = found.integrals[-1]
+    assert last.text.startswith("x1*x2*x3*x4*x5*x6*x7/(")
+    assert last.origin == "product of powers of known polynomials"
+    kahan = file.map.at("1/10")
+    x = kahan.point([1, 2, -3, "1/2", 5, -1, "2/3"])
+    before, after = (last.function.value(kahan.field, (*place, kahan.eps)) for place in (x, kahan.step(x)))
+    assert before == after != 0
+    assert before == reduce(lambda a, b: a * b, x) / -kahan.determinant(x)
+
+
+def test_numbers_other_than_1_make_integrals_that_depend_on_time():
+    file = system("x y z", "x", "-y", "-2*z")
+    found = find_integrals(file, seconds=5)
+    assert [one.text for one in found.integrals] == ["x*y"]
+    assert [one.text for one in found.in_time] == [
+        "((-eps - 1)/(eps - 1))^-n*x",
+        "((-2*eps + 1)/(2*eps + 1))^-n*z",
+    ]
+    assert {one.integral.verdict for one in found.in_time} == {Verdict.PROVED}
+    kahan = file.map.at("1/5")
+    x = kahan.point([3, 1, 7])
+    assert kahan.step(x)[2] == fmpq(1 - fmpq(2, 5)) / (1 + fmpq(2, 5)) * x[2]
+    wrong = parse_rational_function("2", ["x", "y", "z", "eps"])
+    I = found.in_time[0].integral.function
+    assert verdict_on(file.map, I, None, is_density=False, factor=wrong)[0] is Verdict.REFUTED
+
+
+def test_a_sign_is_taken_away_by_a_square():
+    found = found_in(a_map("x y", ["-x", "y + x^2"], ["-x", "y - x^2"]))
+    assert [one.text for one in found.integrals] == ["x^2"]
+    assert [(one.text, str(one.constant.numerator)) for one in found.in_time] == [("x", "-1")]
+    assert found.density is not None  # det dPhi = -1: x
+    assert found.density.text == "x"
+
+
+def test_numbers_may_depend_on_symbols():
+    file = system("x y z", "a*x", "-a*y + x*y", "-z*x", a="2/3")
+    [one] = [one for one in found_in(file, ["a"]).in_time if one.text == "x"]
+    assert str(one.constant.numerator / one.constant.denominator.leading_coefficient()) in ("a*eps + 1", "-a*eps - 1")
+
+
+def test_for_a_given_eps_the_factors_are_those_at_that_eps():
+    found = found_in(load("weierstrass"), eps="1/3")
+    assert found.density.text == "4*x - 3"
+
+
+@pytest.mark.parametrize("file", [random_system(2, 0), random_system(3, 1), load("henon_heiles")])
+def test_maps_without_structure_have_no_products(file):
+    found = found_in(file)
+    assert (found.integrals, found.in_time) == ((), ())
+    assert found.density is None or file.name == "henon_heiles"  # whose density is det(I - eps f')
+
+
+# Lattices
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_relations_are_all_relations(seed):
+    rng = random.Random(seed)
+    rows = [[rng.randint(-3, 3) for _ in range(3)] for _ in range(6)]
+    found = relations(rows)
+    assert len(found) == 6 - fmpz_mat(rows).rank()
+    for k in found:
+        assert [sum(a * row[j] for a, row in zip(k, rows, strict=True)) for j in range(3)] == [0] * 3
+    # and they span all integer vectors in their span: the elementary divisors are 1
+    diagonal = fmpz_mat(found).snf()
+    assert all(diagonal[i, i] == 1 for i in range(len(found)))
+
+
+def test_relations_of_nothing():
+    assert relations([]) == []
+    assert relations([[1], [0]]) == [[0, 1]]
+
+
+def test_numbers_that_are_products_of_each_other():
+    functions = [parse_rational_function(text, ["a"]) for text in ("12", "18", "2/3", "a/5", "-a", "25")]
+    found = multiplicative_relations(functions)
+    assert len(found) == 6 - 4  # 2, 3, 5, a
+    for k in found:
+        values = [f.value(QQ, [fmpq(7)]) ** e for f, e in zip(functions, k, strict=True)]
+        assert reduce(lambda a, b: a * b, values) == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_coprime_base_makes_the_polynomials_again(seed):
+    rng = random.Random(seed)
+    primes = [nmod_poly([rng.randrange(P), *([rng.randrange(P)] * (d - 1)), 1], P) for d in (1, 1, 2, 3)]
+    given = [reduce(lambda a, b: a * b, (q ** rng.randint(0, 3) for q in primes)) for _ in range(4)]
+    base = coprime_base(given)
+    for i, a in enumerate(base):
+        assert a.degree() > 0
+        assert all(a.gcd(b).degree() == 0 for b in base[:i])
+    for one in given:
+        for b in base:
+            while True:
+                quotient, rest = divmod(one, b)
+                if not rest.is_zero():
+                    break
+                one = quotient
+        assert one.degree() == 0
