@@ -37,7 +37,7 @@ def command(system: str | None, **options: Any) -> int:
 
     require_one_form(options)
     with Progress(options["quiet"]) as progress:
-        file = load_system(system, options["variables"], options["rhs"], options["parameters"])
+        file = load_system(system, options)
         symbols, eps = symbols_and_eps(options)
         denominator = None
         if options["denominator"] is not None:
