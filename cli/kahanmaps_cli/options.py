@@ -234,7 +234,8 @@ def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile
                 "or --rhs \"x' = x*y; y' = -x\""
             )
         return parse_system(
-            _inline_file(variables, given, "system", {"rhs": _list(rhs) if len(rhs) > 1 else rhs[0].strip()}), "inline"
+            _inline_file(variables, given, "system", {"rhs": list(rhs) if "=" not in rhs[0] else "; ".join(rhs)}),
+            "inline",
         )
     if reference is None:
         raise click.UsageError(
