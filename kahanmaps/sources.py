@@ -32,6 +32,40 @@ SOURCES: dict[str, str] = {
         "E. Celledoni, R. I. McLachlan, D. I. McLaren, B. Owren, G. R. W. Quispel. Discretization of polynomial vector "
         "fields by polarization. Proc. R. Soc. A 471 (2015), 20150390. arXiv:1506.03855"
     ),
+    "mcmillan-1971": (
+        "E. M. McMillan. A problem in the stability of periodic systems. In: Topics in modern physics, a tribute to "
+        "E. U. Condon, Colorado Associated University Press, 1971, 219-244"
+    ),
+    "lyness-1945": "R. C. Lyness. Cycles. Math. Gazette 29 (1945), 231-233",
+    "qrt-1988": (
+        "G. R. W. Quispel, J. A. G. Roberts, C. J. Thompson. Integrable mappings and soliton equations. "
+        "Phys. Lett. A 126 (1988), 419-421"
+    ),
+    "hietarinta-viallet-1998": (
+        "J. Hietarinta, C.-M. Viallet. Singularity confinement and chaos in discrete systems. Phys. Rev. Lett. 81 "
+        "(1998), 325-328. arXiv:solv-int/9711014"
+    ),
+    "grammaticos-ramani-2004": (
+        "B. Grammaticos, A. Ramani. Discrete Painleve equations: a review. Lecture Notes in Phys. 644 (2004), 245-321"
+    ),
+    "hone-2005": (
+        "A. N. W. Hone. Elliptic curves and quadratic recurrence sequences. Bull. London Math. Soc. 37 (2005), 161-171"
+    ),
+    "hone-2007": (
+        "A. N. W. Hone. Sigma function solution of the initial value problem for Somos 5 sequences. Trans. Amer. Math. "
+        "Soc. 359 (2007), 5019-5034"
+    ),
+    "cima-gasull-manosa-2007": (
+        "A. Cima, A. Gasull, V. Manosa. Dynamics of the third order Lyness' difference equation. J. Difference Equ. "
+        "Appl. 13 (2007), 855-884"
+    ),
+    "kassotakis-joshi-2010": (
+        "P. Kassotakis, N. Joshi. Integrable non-QRT mappings of the plane. Lett. Math. Phys. 91 (2010), 71-81. "
+        "arXiv:0906.2815"
+    ),
+    "hairer-lubich-wanner-2006": (
+        "E. Hairer, C. Lubich, G. Wanner. Geometric numerical integration. 2nd edition, Springer, 2006"
+    ),
     "hirota-kimura-2000": (
         "R. Hirota, K. Kimura. Discretization of the Euler top. J. Phys. Soc. Japan 69 (2000), 627-630"
     ),

@@ -7,7 +7,6 @@ Numbers are exact: decimals are read as decimals, quoted or not.
 
 from __future__ import annotations
 
-import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -179,10 +178,11 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
 def _named(base: Path, key: str, name: str) -> dict[str, Any]:
     """The document of a part of a composition: a "system" of the catalogue, or a "file" beside the one in hand."""
     if key == "system":
-        found = resources.files("kahanmaps.documents.catalog").joinpath(f"{name}.toml")
-        if os.sep in name or not found.is_file():
-            raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
-        return _document(found.read_bytes(), name)
+        folder = resources.files("kahanmaps.documents").joinpath("catalog")
+        for found in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
+            if name.isidentifier() and found.is_file():
+                return _document(found.read_bytes(), name)
+        raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
     return _document(_read(base / name), name)
 
 

@@ -29,8 +29,8 @@ from flint import fmpq, fmpq_mpoly, fmpz
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.matrices import det, solve
-from kahanmaps.algebra.polynomials import digits_of, evaluate, names_of, ring
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.polynomials import RationalFunction, digits_of, evaluate, names_of, ring
+from kahanmaps.algebra.text import format_polynomial, format_rational_function
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
@@ -408,10 +408,20 @@ class ImplicitMap(BirationalMap):
         )
 
     def written(self) -> dict[str, list[str]]:
-        return {"equations": str(self).split("\n")}
+        return {"equations": [f"{format_polynomial(equation)} = 0" for equation in self.equations]}
+
+    @cached_property
+    def image(self) -> tuple[RationalFunction, ...] | None:
+        """The coordinates of x~ as functions of the names, where M is diagonal; else None."""
+        if any(not entry.is_zero() for i, row in enumerate(self.rows) for j, entry in enumerate(row[:-1]) if i != j):
+            return None
+        return tuple(RationalFunction(-row[-1], row[i]) for i, row in enumerate(self.rows))
 
     def __str__(self) -> str:
-        return "\n".join(f"{format_polynomial(equation)} = 0" for equation in self.equations)
+        if self.image is None:
+            return "\n".join(self.written()["equations"])
+        named = zip(self.variables, self.image, strict=True)
+        return "\n".join(f"{name}~ = {format_rational_function(function)}" for name, function in named)
 
     @cached_property
     def digits(self) -> int:

@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from schema_helpers import mistakes
 
 from kahanmaps.documents import catalog
 from kahanmaps.documents.files import parse_system
@@ -18,13 +19,24 @@ over_names = pytest.mark.parametrize("name", catalog.names())
 
 def test_every_system_has_a_line(kahanmaps):
     listed = {line.split()[0]: int(line.split()[1]) for line in kahanmaps("systems").out.splitlines()}
-    assert listed == {name: catalog.load(name).system.dim for name in catalog.names()}
+    assert listed == {name: catalog.load(name).dim for name in (*catalog.names(), *catalog.map_names())}
 
 
 def test_the_list_for_scripts_has_the_same_systems(kahanmaps):
     systems = kahanmaps("systems --json").json["systems"]
-    assert [system["name"] for system in systems] == list(catalog.names())
+    assert [system["name"] for system in systems] == [*catalog.names(), *catalog.map_names()]
     assert all(set(system) == {"name", "dim", "kind", "title", "parameters"} for system in systems)
+
+
+@pytest.mark.parametrize("name", catalog.map_names())
+def test_a_map_is_shown_as_text_latex_and_data(kahanmaps, name):
+    shown = kahanmaps(f"systems {name}").out
+    assert "~ = " in shown or "_new" in shown
+    assert r"\begin{aligned}" in kahanmaps(f"systems {name} --latex").out
+    record = kahanmaps(f"systems {name} --json").json
+    assert mistakes("systems", record) == []
+    assert "rhs" not in record
+    assert parse_system(kahanmaps(f"systems {name} --toml").out, name) == catalog.load(name)
 
 
 # One system

@@ -29,7 +29,7 @@ from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure
 from kahanmaps.checks.settings import Settings
-from kahanmaps.documents.catalog import load, names, titles
+from kahanmaps.documents.catalog import load, map_names, names, titles
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.family.draw import draw_generic, draw_with_eigenvalues
@@ -77,7 +77,8 @@ def known_findings(name, eps):
 
 
 def test_titles_and_dimensions_are_those_of_the_systems():
-    assert titles() == {name: (load(name).dim, load(name).catalog["title"]) for name in names()}
+    everything = (*names(), *map_names())
+    assert titles() == {name: (load(name).dim, load(name).catalog["title"]) for name in everything}
 
 
 def test_the_catalogue_has_the_systems_that_the_documentation_speaks_of():

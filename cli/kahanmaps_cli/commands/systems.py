@@ -30,7 +30,7 @@ def command(
       kahanmaps systems euler_top -p a1=2 --toml > my-top.toml
       kahanmaps systems lagrange_top --latex
     """
-    from kahanmaps.documents.catalog import load, names, titles
+    from kahanmaps.documents.catalog import load, titles
 
     if as_toml + as_latex + as_json > 1:
         raise click.UsageError("give --toml, --latex or --json, one of the three")
@@ -38,11 +38,12 @@ def command(
         if as_toml or as_latex or parameters:
             raise click.UsageError("--toml, --latex and -p need the NAME of a system")
         if as_json:
-            systems = [_summary(load(key)) for key in names()]
+            systems = [_summary(load(key)) for key in titles()]
             print_json({"command": "systems", "version": __version__, "systems": systems})
             return
-        width = max(map(len, names()))
-        for key, (dim, title) in titles().items():
+        found = titles()
+        width = max(map(len, found))
+        for key, (dim, title) in found.items():
             tell_entry(f"{key:<{width}}  {dim:>2}  ", title, "bold")
         return
     file = load_reference(name, dict(parameters))
@@ -68,7 +69,7 @@ def command(
 def _summary(file: Any) -> dict[str, Any]:
     return {
         "name": file.name,
-        "dim": file.system.dim,
+        "dim": file.dim,
         "kind": file.kind,
         "title": file.catalog.get("title", ""),
         "parameters": {name: str(value) for name, value in file.parameters.items()},
@@ -76,12 +77,12 @@ def _summary(file: Any) -> dict[str, Any]:
 
 
 def _equations(file: Any) -> dict[str, Any]:
-    from kahanmaps.algebra.text import format_polynomial, format_rational_function
+    from kahanmaps.algebra.text import format_rational_function
     from kahanmaps.sources import source
 
     return {
         "variables": list(file.variables),
-        "rhs": [format_polynomial(polynomial) for polynomial in file.system.rhs],
+        **file.map.written(),
         "integrals": {name: format_rational_function(function) for name, function in file.integrals.items()},
         "density": format_rational_function(file.density) if file.density is not None else None,
         "facts": list(file.catalog.get("facts", [])),
@@ -123,11 +124,17 @@ def _known_lines(file: Any) -> list[str]:
 
 
 def _latex(file: Any) -> str:
-    """The system as displayed formulas."""
+    """The system or map as displayed formulas."""
     from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
 
-    names = [latex_name(name) for name in file.variables]
-    rows = [rf"\dot{{{x}}} &= {latex_polynomial(f)}" for x, f in zip(names, file.system.rhs, strict=True)]
+    if file.is_quadratic:
+        names = [latex_name(name) for name in file.variables]
+        rows = [rf"\dot{{{x}}} &= {latex_polynomial(f)}" for x, f in zip(names, file.system.rhs, strict=True)]
+    elif (image := getattr(file.map, "image", None)) is not None:
+        names = [latex_name(name) for name in file.variables]
+        rows = [rf"\tilde{{{x}}} &= {latex_rational_function(f)}" for x, f in zip(names, image, strict=True)]
+    else:
+        rows = [f"{latex_polynomial(equation)} &= 0" for equation in file.map.equations]
     lines = [r"\[", r"\left\{", r"\begin{aligned}", " \\\\\n".join(rows), r"\end{aligned}", r"\right.", r"\]"]
     formulas = [("H", latex_polynomial(file.hamiltonian.H))] if file.hamiltonian is not None else []
     for name, integral in file.integrals.items():
@@ -151,8 +158,8 @@ def _show(file: Any) -> None:
     tell(f"{file.name}: {file.catalog.get('title', '')}" if file.catalog.get("title") else file.name)
     for name, value in file.parameters.items():
         tell(f"  {name} = {value}")
-    for name, text in zip(facts["variables"], facts["rhs"], strict=True):
-        tell(f"{name}' = {_formula(text)}")
+    for line in str(file.map).split("\n"):
+        tell(_formula(line))
     if file.hamiltonian is not None:
         tell(f"H = {_formula(format_polynomial(file.hamiltonian.H))}")
     for name, text in facts["integrals"].items():

@@ -1,4 +1,4 @@
-"""The page of the catalogue: every system with its equations, what is known of it, and from where."""
+"""The page of the catalogue: every system and map with its equations, what is known of it, and from where."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from kahanmaps.display.latex import latex_name, latex_number, latex_polynomial, latex_rational_function
-from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.structured_facts import relations
+from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps_docs.literature import KEY, link
 from kahanmaps_docs.markdown import code, plain, table
 
@@ -16,19 +17,23 @@ LONGEST_FORMULA = 900  # characters of LaTeX; longer ones are said to be long, a
 
 
 def catalogue() -> str:
-    """A table of all systems, then a section for each."""
-    files = [load(name) for name in names()]
+    """A table of all systems and then of all maps, and a section for each."""
+    systems, maps = ([load(name) for name in found] for found in (names(), map_names()))
+    tables = [_table("system", systems), "Maps that are not Kahan's:\n", _table("map", maps)]
+    return "\n".join([*tables, *(section(file) for file in (*systems, *maps))])
+
+
+def _table(head: str, files: list[SystemFile]) -> str:
     rows = [
         [
             f"[{plain(f.name)}](#system-{f.name})",
-            str(f.system.dim),
+            str(f.dim),
             plain(f.catalog["title"]),
             f.catalog.get("verdict", ""),
         ]
         for f in files
     ]
-    head = ["system", "dim", "", "verdict"]
-    return "\n".join([table(head, rows), *(section(file) for file in files)])
+    return table([head, "dim", "", "verdict"], rows)
 
 
 def section(file: SystemFile) -> str:
@@ -36,7 +41,7 @@ def section(file: SystemFile) -> str:
     known = file.catalog
     pieces = [
         f"(system-{file.name})=\n## {plain(file.name)}\n",
-        f"{plain(known['title'])}, dimension {file.system.dim}.",
+        f"{plain(known['title'])}, dimension {file.dim}.",
     ]
     if file.parameters:
         values = ", ".join(f"${latex_name(name)} = {latex_number(value)}$" for name, value in file.parameters.items())
@@ -51,8 +56,14 @@ def section(file: SystemFile) -> str:
 
 def formulas(file: SystemFile) -> list[str]:
     """The equations, H, integrals and density in LaTeX."""
-    sides = zip(file.variables, file.system.rhs, strict=True)
-    rows = [rf"{latex_name(x)}^\prime &= {latex_polynomial(f)}" for x, f in sides]
+    if file.is_quadratic:
+        sides = zip(file.variables, file.system.rhs, strict=True)
+        rows = [rf"{latex_name(x)}^\prime &= {latex_polynomial(f)}" for x, f in sides]
+    elif isinstance(file.map, ImplicitMap) and file.map.image is not None:
+        images = zip(file.variables, file.map.image, strict=True)
+        rows = [rf"\tilde {latex_name(x)} &= {latex_rational_function(f)}" for x, f in images]
+    else:
+        rows = [rf"{latex_polynomial(equation)} &= 0" for equation in getattr(file.map, "equations", ())]
     found = [r"\begin{aligned}" + r" \\ ".join(rows) + r"\end{aligned}"]
     if file.hamiltonian is not None:
         found.append(f"H = {latex_polynomial(file.hamiltonian.H)}")

@@ -1,5 +1,7 @@
 """The catalogue: named systems, one TOML file each in this folder, with equations, known facts and sources.
 
+The folder maps has the same for maps that are not Kahan's; `load` knows both.
+
 >>> names()[:3]
 ('clebsch_first_flow', 'dressing_chain_3', 'euler_top')
 >>> top = load("euler_top", {"a1": 1, "a2": 2, "a3": "-3/2"})
@@ -31,6 +33,8 @@ from typing import TYPE_CHECKING, Any
 from kahanmaps.errors import InputError, quoted
 
 if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
+
     from kahanmaps.documents.files import SystemFile
 
 _ENDING = ".toml"
@@ -43,21 +47,48 @@ def names() -> tuple[str, ...]:
     >>> "lorenz" in names()
     True
     """
-    found = (entry.name for entry in resources.files(__name__).iterdir())
+    return _names_in(resources.files(__name__))
+
+
+def map_names() -> tuple[str, ...]:
+    """The names of all maps of the catalogue that are not Kahan's, in alphabetical order.
+
+    >>> "lyness" in map_names()
+    True
+    """
+    return _names_in(resources.files(__name__).joinpath("maps"))
+
+
+def _names_in(folder: Traversable) -> tuple[str, ...]:
+    found = (entry.name for entry in folder.iterdir())
     return tuple(sorted(name.removesuffix(_ENDING) for name in found if name.endswith(_ENDING)))
 
 
+def text_of(name: str) -> bytes:
+    """The file of a system or map of the catalogue. Raises KeyError for other names."""
+    folder = resources.files(__name__)
+    if name in map_names():
+        return folder.joinpath("maps", name + _ENDING).read_bytes()
+    if name not in names():
+        raise KeyError(name)
+    return folder.joinpath(name + _ENDING).read_bytes()
+
+
 def titles() -> dict[str, tuple[int, str]]:
-    """Dimension and title of every system of the catalogue, by name; no arithmetic is loaded for them.
+    """Dimension and title of everything in the catalogue, by name, maps last; no arithmetic is loaded for them.
 
     >>> titles()["lorenz"]
     (3, 'Lorenz system')
     """
     found = {}
-    for name in names():
-        document = tomllib.loads(resources.files(__name__).joinpath(name + _ENDING).read_text("utf-8"))
-        variables = document.get("variables") or document["family"]["A"]
-        found[name] = len(variables), document["catalog"]["title"]
+    for name in (*names(), *map_names()):
+        document = tomllib.loads(text_of(name).decode())
+        if "composition" in document:
+            variables = document["composition"]["of"][0]["map"]["variables"]
+        else:
+            variables = document.get("variables") or document["family"]["A"]
+        copies = 2 if document.get("system", {}).get("discretization") == "polarised" else 1
+        found[name] = copies * len(variables), document["catalog"]["title"]
     return found
 
 
@@ -87,9 +118,8 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None) -> 
     from kahanmaps.documents.files import parse_system, read_system
 
     if not isinstance(reference, Path):
-        if reference in names():
-            data = resources.files(__name__).joinpath(reference + _ENDING).read_bytes()
-            return parse_system(data, reference, parameters)
+        if reference in (*names(), *map_names()):
+            return parse_system(text_of(reference), reference, parameters)
         if not _is_path(reference):
             raise _unknown(reference)
     return read_system(reference, parameters)
@@ -113,7 +143,7 @@ def _unknown(name: str) -> InputError:
 def _close_names(name: str) -> list[str]:
     """Up to three names that look alike or contain what was written, e.g. "volterra"."""
     wanted = name.lower().replace("-", "_").replace(" ", "_")
-    known = names()
+    known = (*names(), *map_names())
     alike = difflib.get_close_matches(wanted, known, 3)
     longer = [other for other in known if len(wanted) > 2 and wanted in other and other not in alike]
     return [*alike, *longer][:3]

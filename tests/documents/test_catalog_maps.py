@@ -1,0 +1,117 @@
+"""The maps of the catalogue that are not Kahan's: what their files state is proved or measured again."""
+
+from __future__ import annotations
+
+import pytest
+
+from kahanmaps.checks.conserve import check_integrals
+from kahanmaps.checks.preserve import check_measure
+from kahanmaps.documents.catalog import load, map_names, names, titles
+from kahanmaps.documents.files import parse_system
+from kahanmaps.documents.structured_facts import relations
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.degrees import degree_growth
+from kahanmaps.laboratory.hirota_kimura import hirota_kimura_basis
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.maps.inverse import inverse_rows
+
+every_map = pytest.mark.parametrize("name", map_names())
+FILES = {name: load(name) for name in map_names()}
+SLOW_TO_ANALYSE = {"qrt_asymmetric", "duffing_polarised", "hietarinta_viallet"}
+
+
+def test_there_are_a_dozen_and_none_is_named_like_a_system():
+    assert len(map_names()) >= 12
+    assert not set(map_names()) & set(names())
+    assert list(titles()) == [*names(), *map_names()]
+    assert {name: titles()[name][0] for name in map_names()} == {name: file.dim for name, file in FILES.items()}
+
+
+@every_map
+def test_a_file_has_a_title_sources_and_facts_and_reads_back_equal(name):
+    file = FILES[name]
+    assert set(file.catalog) >= {"title", "sources", "facts", "degrees", "verdict"}
+    assert parse_system(file.to_toml(), name) == file
+    assert not file.is_quadratic
+
+
+@every_map
+def test_what_is_claimed_to_be_preserved_is_proved(name):
+    file = FILES[name]
+    if file.integrals:
+        assert {str(finding.verdict) for finding in check_integrals(file).findings} == {"proved"}
+    if file.density is not None:
+        assert {str(finding.verdict) for finding in check_measure(file).findings} == {"proved"}
+
+
+@pytest.mark.parametrize("name", [name for name in map_names() if FILES[name].parameters])
+def test_claims_hold_for_other_parameters_and_not_for_another_map(name):
+    file = load(name, {key: value + 4 for key, value in FILES[name].parameters.items()})
+    assert check_integrals(file).holds if file.integrals else check_measure(file).holds
+    if file.integrals and "composition" not in file.document:
+        text = file.to_toml().replace('image = ["y"', 'image = ["y + 1/7"').replace('inverse = ["', 'inverse_ = ["')
+        altered = "\n".join(line for line in text.splitlines() if not line.startswith("inverse_"))
+        assert not check_integrals(parse_system(altered)).holds
+
+
+@every_map
+def test_the_degrees_are_those_that_are_stated(name):
+    known = FILES[name].catalog
+    found = degree_growth(FILES[name].map, None, max_terms=len(known["degrees"]), seconds=60)
+    assert list(found.degrees[1:]) == known["degrees"]
+
+
+@pytest.mark.parametrize("name", [name for name in map_names() if "growth" in FILES[name].catalog])
+@pytest.mark.slow
+def test_the_growth_is_the_one_that_is_stated(name):
+    known = FILES[name].catalog
+    found = degree_growth(FILES[name].map, None, seconds=20, max_degree=20_000)
+    assert str(found.growth if not found.looks_exponential else "exponential") == known["growth"]
+    if "dynamical_degree" in known:
+        assert known["dynamical_degree"].replace("x", "t") in found.growth_text.replace("root of ", "") or (
+            known["dynamical_degree"] == "x - 2" and "dynamical degree 2" in found.growth_text
+        )
+
+
+@every_map
+def test_the_dimensions_of_the_relations_are_those_that_are_stated(name):
+    file = FILES[name]
+    maps = Laboratory(file).maps
+    for stated in relations(file.catalog, file.variables):
+        functions = list(map(str, stated.functions))
+        assert hirota_kimura_basis(maps, stated.functions, functions).dimension == stated.dimension
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW_TO_ANALYSE else n for n in map_names()]
+)
+def test_the_analysis_that_is_told_nothing_finds_the_verdict(name):
+    known = FILES[name].catalog
+    found = analyze(FILES[name], seconds=8)
+    assert found.conclusion.kind == known["verdict"]
+    assert found.integral_count == known.get("codimension", found.integral_count)
+
+
+def test_five_steps_of_lyness_and_eight_of_todd_close_for_a_1():
+    for name, period in (("lyness", 5), ("todd", 8)):
+        laboratory = Laboratory(load(name, {"a": 1}))
+        assert {len(map_.orbit(20)) for map_ in laboratory.maps} == {period}
+        assert {len(map_.orbit(20)) for map_ in Laboratory(load(name)).maps} == {20}
+
+
+@pytest.mark.parametrize("name", [name for name in map_names() if "inverse" in FILES[name].document.get("map", {})])
+def test_elimination_finds_the_inverse_that_is_written_down(name):
+    map_ = FILES[name].map
+    found = inverse_rows(map_.rows)
+    assert [(row[k], row[-1]) for k, row in enumerate(found)] == [
+        (row[k] / row[k].leading_coefficient(), row[-1] / row[k].leading_coefficient())
+        for k, row in enumerate(_lowest(map_.backward))
+    ]
+
+
+def _lowest(rows):
+    found = []
+    for k, row in enumerate(rows):
+        common = row[k].gcd(row[-1])
+        found.append([entry / common for entry in row])
+    return found
