@@ -2,9 +2,9 @@
 
 In normal form blocks know nothing of each other, so each takes 256 steps with 256 lanes at a time, in vector registers
 and the innermost cache; up to 4 lanes go one by one instead, four blocks together, which hides the time that a single
-chain of operations takes. In both cases the steps are only watched for anything unusual, and what is unusual is taken
-again from a saved state, lane by lane and with all tests. The generic elimination runs over 128 lanes, exchanging rows
-in those that want it.
+chain of operations takes. In both cases the steps are only watched for anything unusual, and lanes that met it are
+taken again from a saved state, one by one and with all tests. The generic elimination runs over 128 lanes, exchanging
+rows in those that want it.
 
 Operations and their order are those of float_steps.py, which are compiled here: results are the same to the last bit.
 Without fastmath nothing is contracted or reordered. Kernels release the interpreter lock and are started by Python
@@ -19,7 +19,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -38,12 +38,49 @@ _SHARES = 8
 
 NEAR = float_steps.NEAR
 NEAR_SQUARED = float_steps.NEAR_SQUARED
-CLEAR = float_steps.CLEAR
 MUCH = float_steps.MUCH
 LARGEST = float_steps.LARGEST
 RUNNING = float_steps.RUNNING
 OVERFLOW = float_steps.OVERFLOW
 SINGULAR = float_steps.SINGULAR
+
+
+class Blocks(NamedTuple):
+    """Of PlanarBlocks what a step needs."""
+
+    kinds: Any
+    coefficients: Any
+    reals: int
+    kappa: Any
+
+
+class Span(NamedTuple):
+    """Steps from the index `first`: recorded are multiples of `every`, at those of `sampled` integrals are sampled."""
+
+    first: int
+    steps: int
+    every: int
+    sampled: int
+
+
+class PlanarRoom(NamedTuple):
+    """What a kernel in normal form works in: states, those before a piece, and which lanes are fine (1) or not (0)."""
+
+    buffer: FloatArray
+    saved: FloatArray
+    fine: FloatArray
+
+
+class GenericRoom(NamedTuple):
+    """What the elimination works in: points and images, matrices, and a number a lane three times."""
+
+    x: FloatArray
+    right: FloatArray
+    M: FloatArray
+    scale: FloatArray
+    inverse: FloatArray
+    fine: FloatArray
+
 
 _inner = numba.njit(error_model="numpy", nogil=True)
 
@@ -61,126 +98,63 @@ def _eight(k: Any) -> Any:
     return (k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7])
 
 
-def _sweeps_canonical(formula: Any) -> tuple[Any, Any]:
-    """Steps of one block in many lanes: whether none was unusual; and the same telling in which lanes."""
+def _real_sweep(formula: Any) -> Any:
+    """Steps of one real block in many lanes; `fine` becomes 0 in those where one is unusual."""
 
     @_inner
-    def swept(U: Any, V: Any, k: Any, width: int, count: int) -> bool:
-        good = True
-        for _ in range(count):
-            for i in range(width):
-                U[i], V[i], w, _g = formula(U[i], V[i], k)
-                good &= abs(w) > CLEAR
-        return good
-
-    @_inner
-    def flagged(U: Any, V: Any, k: Any, width: int, count: int, fine: Any) -> None:
-        for _ in range(count):
-            for i in range(width):
-                U[i], V[i], w, _g = formula(U[i], V[i], k)
-                if not abs(w) > CLEAR:
-                    fine[i] = 0.0
-
-    return swept, flagged
-
-
-def _sweeps_real(formula: Any) -> tuple[Any, Any]:
-    @_inner
-    def swept(U: Any, V: Any, k: Any, width: int, count: int) -> bool:
-        good = True
-        for _ in range(count):
-            for i in range(width):
-                U[i], V[i], w, g = formula(U[i], V[i], k)
-                good &= abs(w) > NEAR + NEAR * abs(g)
-        return good
-
-    @_inner
-    def flagged(U: Any, V: Any, k: Any, width: int, count: int, fine: Any) -> None:
+    def swept(U: Any, V: Any, k: Any, width: int, count: int, fine: Any) -> None:
         for _ in range(count):
             for i in range(width):
                 U[i], V[i], w, g = formula(U[i], V[i], k)
                 if not abs(w) > NEAR + NEAR * abs(g):
                     fine[i] = 0.0
 
-    return swept, flagged
+    return swept
 
 
-def _sweeps_complex(formula: Any) -> tuple[Any, Any]:
+def _complex_sweep(formula: Any) -> Any:
     @_inner
-    def swept(Ur: Any, Ui: Any, Vr: Any, Vi: Any, k: Any, width: int, count: int) -> bool:
-        good = True
-        for _ in range(count):
-            for i in range(width):
-                Ur[i], Ui[i], Vr[i], Vi[i], w, g = formula(Ur[i], Ui[i], Vr[i], Vi[i], k)
-                good &= w > NEAR_SQUARED + NEAR_SQUARED * g
-        return good
-
-    @_inner
-    def flagged(Ur: Any, Ui: Any, Vr: Any, Vi: Any, k: Any, width: int, count: int, fine: Any) -> None:
+    def swept(Ur: Any, Ui: Any, Vr: Any, Vi: Any, k: Any, width: int, count: int, fine: Any) -> None:
         for _ in range(count):
             for i in range(width):
                 Ur[i], Ui[i], Vr[i], Vi[i], w, g = formula(Ur[i], Ui[i], Vr[i], Vi[i], k)
                 if not w > NEAR_SQUARED + NEAR_SQUARED * g:
                     fine[i] = 0.0
 
-    return swept, flagged
+    return swept
 
 
 # A formula handed to a compiled function as an argument would keep the machine code from being stored.
-_sweep_real_lines, _flag_real_lines = _sweeps_canonical(real_lines)
-_sweep_real_cubes, _flag_real_cubes = _sweeps_canonical(real_cubes)
-_sweep_real_general, _flag_real_general = _sweeps_real(real_general)
-_sweep_complex_lines, _flag_complex_lines = _sweeps_complex(complex_lines)
-_sweep_complex_general, _flag_complex_general = _sweeps_complex(complex_general)
+_sweep_real_lines, _sweep_real_cubes = _real_sweep(real_lines), _real_sweep(real_cubes)
+_sweep_real_general = _real_sweep(real_general)
+_sweep_complex_lines, _sweep_complex_general = _complex_sweep(complex_lines), _complex_sweep(complex_general)
 
 
 @_inner
-def _many(z: Any, kinds: Any, coefficients: Any, reals: int, width: int, count: int) -> bool:
-    good = True
-    for r in range(len(kinds)):
-        k = _eight(coefficients[r])
-        if r < reals:
+def _many(z: Any, blocks: Blocks, width: int, count: int, fine: Any) -> None:
+    for r in range(len(blocks.kinds)):
+        kind, k = blocks.kinds[r], _eight(blocks.coefficients[r])
+        if r < blocks.reals:
             U, V = z[2 * r], z[2 * r + 1]
-            if kinds[r] == LINES:
-                good &= _sweep_real_lines(U, V, k, width, count)
-            elif kinds[r] == CUBES:
-                good &= _sweep_real_cubes(U, V, k, width, count)
+            if kind == LINES:
+                _sweep_real_lines(U, V, k, width, count, fine)
+            elif kind == CUBES:
+                _sweep_real_cubes(U, V, k, width, count, fine)
             else:
-                good &= _sweep_real_general(U, V, k, width, count)
+                _sweep_real_general(U, V, k, width, count, fine)
         else:
-            at = 4 * r - 2 * reals
-            if kinds[r] == LINES:
-                good &= _sweep_complex_lines(z[at], z[at + 1], z[at + 2], z[at + 3], k, width, count)
+            at = 4 * r - 2 * blocks.reals
+            if kind == LINES:
+                _sweep_complex_lines(z[at], z[at + 1], z[at + 2], z[at + 3], k, width, count, fine)
             else:
-                good &= _sweep_complex_general(z[at], z[at + 1], z[at + 2], z[at + 3], k, width, count)
-    return good
+                _sweep_complex_general(z[at], z[at + 1], z[at + 2], z[at + 3], k, width, count, fine)
 
 
 @_inner
-def _many_flagged(z: Any, kinds: Any, coefficients: Any, reals: int, width: int, count: int, fine: Any) -> None:
-    for r in range(len(kinds)):
-        k = _eight(coefficients[r])
-        if r < reals:
-            U, V = z[2 * r], z[2 * r + 1]
-            if kinds[r] == LINES:
-                _flag_real_lines(U, V, k, width, count, fine)
-            elif kinds[r] == CUBES:
-                _flag_real_cubes(U, V, k, width, count, fine)
-            else:
-                _flag_real_general(U, V, k, width, count, fine)
-        else:
-            at = 4 * r - 2 * reals
-            if kinds[r] == LINES:
-                _flag_complex_lines(z[at], z[at + 1], z[at + 2], z[at + 3], k, width, count, fine)
-            else:
-                _flag_complex_general(z[at], z[at + 1], z[at + 2], z[at + 3], k, width, count, fine)
-
-
-@_inner
-def _block(coefficients: Any, z: Any, lane: int, r: int, reals: int) -> Any:
+def _block(z: Any, lane: int, blocks: Blocks, r: int) -> Any:
     """a, b, c, d and the state of real block r, or of one that stands still where there are fewer."""
-    if r < reals:
-        return _eight(coefficients[r]), z[2 * r, lane], z[2 * r + 1, lane]
+    if r < blocks.reals:
+        return _eight(blocks.coefficients[r]), z[2 * r, lane], z[2 * r + 1, lane]
     return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0
 
 
@@ -188,11 +162,11 @@ def _fours(formula: Any) -> Any:
     """Real blocks r, ..., r + 3 of one lane together."""
 
     @_inner
-    def four(z: Any, lane: int, coefficients: Any, reals: int, r: int, count: int) -> bool:
-        k0, U0, V0 = _block(coefficients, z, lane, r, reals)
-        k1, U1, V1 = _block(coefficients, z, lane, r + 1, reals)
-        k2, U2, V2 = _block(coefficients, z, lane, r + 2, reals)
-        k3, U3, V3 = _block(coefficients, z, lane, r + 3, reals)
+    def four(z: Any, lane: int, blocks: Blocks, r: int, count: int) -> bool:
+        k0, U0, V0 = _block(z, lane, blocks, r)
+        k1, U1, V1 = _block(z, lane, blocks, r + 1)
+        k2, U2, V2 = _block(z, lane, blocks, r + 2)
+        k3, U3, V3 = _block(z, lane, blocks, r + 3)
         good = True
         for _ in range(count):
             U0, V0, w0, g0 = formula(U0, V0, k0)
@@ -202,11 +176,11 @@ def _fours(formula: Any) -> Any:
             good &= (abs(w0) > NEAR + NEAR * abs(g0)) & (abs(w1) > NEAR + NEAR * abs(g1))
             good &= (abs(w2) > NEAR + NEAR * abs(g2)) & (abs(w3) > NEAR + NEAR * abs(g3))
         z[2 * r, lane], z[2 * r + 1, lane] = U0, V0
-        if r + 1 < reals:
+        if r + 1 < blocks.reals:
             z[2 * r + 2, lane], z[2 * r + 3, lane] = U1, V1
-        if r + 2 < reals:
+        if r + 2 < blocks.reals:
             z[2 * r + 4, lane], z[2 * r + 5, lane] = U2, V2
-        if r + 3 < reals:
+        if r + 3 < blocks.reals:
             z[2 * r + 6, lane], z[2 * r + 7, lane] = U3, V3
         return good
 
@@ -236,48 +210,37 @@ def _two(z: Any, lane: int, special: bool, k: Any, l: Any, at: int, also: int, c
 
 
 @_inner
-def _single(z: Any, lane: int, kinds: Any, coefficients: Any, reals: int, count: int) -> bool:
+def _single(z: Any, lane: int, blocks: Blocks, count: int) -> bool:
+    kinds, reals = blocks.kinds, blocks.reals
     good = True
     for r in range(0, reals, 4):
         kind, last = kinds[r], min(r + 4, reals)
         for s in range(r + 1, last):
             kind = kind if kinds[s] == kind else GENERAL  # whose formula gives the numbers of the others
         if kind == LINES:
-            good &= _four_lines(z, lane, coefficients, reals, r, count)
+            good &= _four_lines(z, lane, blocks, r, count)
         elif kind == CUBES:
-            good &= _four_cubes(z, lane, coefficients, reals, r, count)
+            good &= _four_cubes(z, lane, blocks, r, count)
         else:
-            good &= _four_general(z, lane, coefficients, reals, r, count)
+            good &= _four_general(z, lane, blocks, r, count)
     r = reals
     while r < len(kinds):
         s = r + 1 if r + 1 < len(kinds) and kinds[r + 1] == kinds[r] else r
-        k, l = _eight(coefficients[r]), _eight(coefficients[s])
+        k, l = _eight(blocks.coefficients[r]), _eight(blocks.coefficients[s])
         good &= _two(z, lane, kinds[r] == LINES, k, l, 4 * r - 2 * reals, 4 * s - 2 * reals, count)
         r = s + 1
     return good
 
 
 @_inner
-def _careful(
-    z: Any,
-    lane: int,
-    kinds: Any,
-    coefficients: Any,
-    reals: int,
-    index: int,
-    count: int,
-    status: Any,
-    failed_at: Any,
-    near: Any,
-    near_at: Any,
-    at_lane: int,
-) -> None:
-    """float_steps.walk for one lane in normal form."""
+def _careful(z: Any, lane: int, blocks: Blocks, index: int, count: int, lanes: Lanes, at_lane: int) -> None:
+    """float_steps.walk for one lane in normal form: column `lane` of z is that of `at_lane` in `lanes`."""
+    kinds, reals = blocks.kinds, blocks.reals
     rows = z.shape[0]
     for step in range(index, index + count):
         failed, close = RUNNING, 0
         for r in range(len(kinds)):
-            k = _eight(coefficients[r])
+            k = _eight(blocks.coefficients[r])
             if r < reals:
                 U, V, w, g = real_general(z[2 * r, lane], z[2 * r + 1, lane], k)
                 z[2 * r, lane], z[2 * r + 1, lane] = U, V
@@ -304,26 +267,25 @@ def _careful(
                 if not np.isfinite(z[j, lane]):
                     failed = OVERFLOW
         if failed != RUNNING:
-            status[at_lane] = failed
-            failed_at[at_lane] = step + 1
+            lanes.status[at_lane] = failed
+            lanes.failed_at[at_lane] = step + 1
             for j in range(rows):
                 z[j, lane] = 0.0
             return
         if close:
-            if near[at_lane] == 0:
-                near_at[at_lane] = step
-            near[at_lane] += close
+            if lanes.near[at_lane] == 0:
+                lanes.near_at[at_lane] = step
+            lanes.near[at_lane] += close
 
 
 @_inner
-def _sample(
-    z: Any, width: int, at_lane: int, coefficients: Any, reals: int, kappa: Any, base: Any, largest: Any, alive: Any
-) -> None:
+def _sample(z: Any, width: int, at_lane: int, blocks: Blocks, lanes: Lanes, alive: Any) -> None:
     """float_steps.sample; lanes that have ended are not alive."""
-    for r in range(len(coefficients)):
-        k, kappa_r, kappa_i = _eight(coefficients[r]), kappa[r, 0], kappa[r, 1]
-        base_r, base_i = base[r, 0, at_lane : at_lane + width], base[r, 1, at_lane : at_lane + width]
-        top = largest[r, at_lane : at_lane + width]
+    reals = blocks.reals
+    for r in range(len(blocks.kinds)):
+        k, kappa_r, kappa_i = _eight(blocks.coefficients[r]), blocks.kappa[r, 0], blocks.kappa[r, 1]
+        base_r, base_i = lanes.base[r, 0, at_lane : at_lane + width], lanes.base[r, 1, at_lane : at_lane + width]
+        top = lanes.largest[r, at_lane : at_lane + width]
         if r < reals:
             U, V = z[2 * r], z[2 * r + 1]
             for i in range(width):
@@ -351,14 +313,13 @@ def _copied(source: Any, target: Any, width: int) -> None:
 
 
 @_inner
-def _sound(z: Any, before: Any, width: int) -> bool:
-    """Whether all lanes are finite and none has fallen to 0; see float_numpy._sound."""
-    good = True
+def _sound(z: Any, before: Any, width: int, fine: Any) -> None:
+    """`fine` becomes 0 in lanes that are not finite or have fallen to 0; see float_numpy._sound."""
     for j in range(len(z)):
         row, old = z[j], before[j]
         for i in range(width):
-            good &= (abs(row[i]) <= LARGEST) & ((row[i] != 0.0) | (old[i] == 0.0))
-    return good
+            if not ((abs(row[i]) <= LARGEST) & ((row[i] != 0.0) | (old[i] == 0.0))):
+                fine[i] = 0.0
 
 
 def _stamp() -> int:
@@ -368,88 +329,47 @@ def _stamp() -> int:
 
 def _planar_kernel(stamp: int) -> Any:
     def planar_advance(
-        z: Any,
-        lo: int,
-        hi: int,
-        kinds: Any,
-        coefficients: Any,
-        reals: int,
-        kappa: Any,
-        first: int,
-        steps: int,
-        every: int,
-        sampled: int,
-        record: Any,
-        status: Any,
-        failed_at: Any,
-        near: Any,
-        near_at: Any,
-        base: Any,
-        largest: Any,
-        buffer: Any,
-        saved: Any,
-        fine: Any,
+        lanes: Lanes, lo: int, hi: int, blocks: Blocks, span: Span, record: Any, room: PlanarRoom
     ) -> int:
-        rows = z.shape[0]
+        z, buffer, saved, fine = lanes.z, room.buffer, room.saved, room.fine
+        rows, every, sampled, last = z.shape[0], span.every, span.sampled, span.first + span.steps
         for at in range(lo, hi, _WIDTH):
             width = min(_WIDTH, hi - at)
             for j in range(rows):
                 for i in range(width):
                     buffer[j, i] = z[j, at + i]
-            index, row = first, 0
-            while index < first + steps:
-                end = min(first + steps, index + _PIECE)
+            index, row = span.first, 0
+            while index < last:
+                end = min(last, index + _PIECE)
                 if every:
                     end = min(end, index - index % every + every)
                 if sampled:
                     end = min(end, index - index % sampled + sampled)
                 count = end - index
                 _copied(buffer, saved, width)
-                if width <= _FEW:
-                    good = True
-                    for i in range(width):
-                        good &= _single(buffer, i, kinds, coefficients, reals, count)
-                else:
-                    good = _many(buffer, kinds, coefficients, reals, width, count)
-                good &= _sound(buffer, saved, width)
-                if not good:
-                    for i in range(width):
-                        fine[i] = 1.0
-                    _copied(saved, buffer, width)
-                    _many_flagged(buffer, kinds, coefficients, reals, width, count, fine)
-                    for i in range(width):
+                for i in range(width):
+                    fine[i] = 1.0
+                    if width <= _FEW and not _single(buffer, i, blocks, count):
+                        fine[i] = 0.0
+                if width > _FEW:
+                    _many(buffer, blocks, width, count, fine)
+                _sound(buffer, saved, width, fine)
+                for i in range(width):
+                    if fine[i] == 0.0:
                         for j in range(rows):
-                            x = buffer[j, i]
-                            if not ((abs(x) <= LARGEST) & ((x != 0.0) | (saved[j, i] == 0.0))):
-                                fine[i] = 0.0
-                        if fine[i] == 0.0:
-                            for j in range(rows):
-                                buffer[j, i] = saved[j, i]
-                            _careful(
-                                buffer,
-                                i,
-                                kinds,
-                                coefficients,
-                                reals,
-                                index,
-                                count,
-                                status,
-                                failed_at,
-                                near,
-                                near_at,
-                                at + i,
-                            )
+                            buffer[j, i] = saved[j, i]
+                        _careful(buffer, i, blocks, index, count, lanes, at + i)
                 index = end
                 if every and index % every == 0:
                     for i in range(width):
-                        running = status[at + i] == RUNNING
+                        running = lanes.status[at + i] == RUNNING
                         for j in range(rows):
                             record[row, j, at + i] = buffer[j, i] if running else np.nan
                     row += 1
                 if sampled and index % sampled == 0:
                     for i in range(width):
-                        fine[i] = 1.0 if status[at + i] == RUNNING else 0.0
-                    _sample(buffer, width, at, coefficients, reals, kappa, base, largest, fine)
+                        fine[i] = 1.0 if lanes.status[at + i] == RUNNING else 0.0
+                    _sample(buffer, width, at, blocks, lanes, fine)
             for j in range(rows):
                 for i in range(width):
                     z[j, at + i] = buffer[j, i]
@@ -459,18 +379,10 @@ def _planar_kernel(stamp: int) -> Any:
 
 
 @_inner
-def _alone(
-    x: Any,
-    constants: Any,
-    first: Any,
-    columns: Any,
-    factors: Any,
-    products: Any,
-    M: Any,
-    right: Any,
-    sizes: Any,
-) -> Any:
+def _alone(x: Any, equation: GenericEquation, M: Any, right: Any, sizes: Any) -> Any:
     """float_steps.PythonGeneric.step: the image of x into `right`; its status, and whether it was near-singular."""
+    constants, first, columns = equation.constants, equation.first, equation.columns
+    factors, products = equation.factors, equation.products
     n = len(constants)
     near = 0
     scale = 1.0
@@ -522,19 +434,7 @@ def _alone(
 
 
 @_inner
-def _together(
-    x: Any,
-    constants: Any,
-    first: Any,
-    columns: Any,
-    factors: Any,
-    products: Any,
-    M: Any,
-    right: Any,
-    scale: Any,
-    inverse: Any,
-    fine: Any,
-) -> bool:
+def _together(x: Any, right: Any, equation: GenericEquation, room: GenericRoom) -> bool:
     """One step of all lanes: images into `right`; `fine` is 0 where something is unusual.
 
     M has n rows of n + 1 entries, the last one the right-hand side. Loops over the lanes do several operations, which
@@ -542,6 +442,9 @@ def _together(
     compiler would have to test too many pairs of them for overlap. For the same reason the number of lanes is a
     constant.
     """
+    constants, first, columns = equation.constants, equation.first, equation.columns
+    factors, products = equation.factors, equation.products
+    M, scale, inverse, fine = room.M, room.scale, room.inverse, room.fine
     n = len(constants)
     for l in range(_GENERIC_WIDTH):
         scale[l] = 1.0
@@ -641,33 +544,14 @@ def _together(
 
 def _generic_kernel(stamp: int) -> Any:
     def generic_advance(
-        z: Any,
-        lo: int,
-        hi: int,
-        constants: Any,
-        terms: Any,
-        columns: Any,
-        factors: Any,
-        products: Any,
-        first: int,
-        steps: int,
-        every: int,
-        record: Any,
-        status: Any,
-        failed_at: Any,
-        near: Any,
-        near_at: Any,
-        x: Any,
-        M: Any,
-        right: Any,
-        scale: Any,
-        inverse: Any,
-        fine: Any,
+        lanes: Lanes, lo: int, hi: int, equation: GenericEquation, span: Span, record: Any, room: GenericRoom
     ) -> int:
+        z, x, right, fine = lanes.z, room.x, room.right, room.fine
+        status, every = lanes.status, span.every
         n = z.shape[0]
         wide = len(fine)
         few = wide == 1
-        x_alone = np.zeros(n + len(products))
+        x_alone = np.zeros(n + len(equation.products))
         M_alone = np.zeros((n, n))
         right_alone = np.zeros(n)
         sizes = np.ones(n)
@@ -677,12 +561,12 @@ def _generic_kernel(stamp: int) -> Any:
                 for i in range(wide):
                     x[j, i] = z[j, at + i] if i < width else z[j, at]  # lanes that nobody looks at
             row = 0
-            for index in range(first, first + steps):
+            for index in range(span.first, span.first + span.steps):
                 good = False
                 if few:
                     fine[0] = 0.0
                 else:
-                    good = _together(x, constants, terms, columns, factors, products, M, right, scale, inverse, fine)
+                    good = _together(x, right, equation, room)
                 if not good:
                     for i in range(width):
                         if fine[i] != 0.0:
@@ -691,16 +575,14 @@ def _generic_kernel(stamp: int) -> Any:
                         if status[at + i] == RUNNING:
                             for j in range(n):
                                 x_alone[j] = x[j, i]
-                            failed, close = _alone(
-                                x_alone, constants, terms, columns, factors, products, M_alone, right_alone, sizes
-                            )
+                            failed, close = _alone(x_alone, equation, M_alone, right_alone, sizes)
                             if failed != RUNNING:
                                 status[at + i] = failed
-                                failed_at[at + i] = index + 1
+                                lanes.failed_at[at + i] = index + 1
                             elif close:
-                                if near[at + i] == 0:
-                                    near_at[at + i] = index
-                                near[at + i] += close
+                                if lanes.near[at + i] == 0:
+                                    lanes.near_at[at + i] = index
+                                lanes.near[at + i] += close
                         for j in range(n):
                             right[j, i] = right_alone[j] if status[at + i] == RUNNING else 0.0
                 x, right = right, x
@@ -761,32 +643,14 @@ class PlanarNumba:
         self, lanes: Lanes, first: int, steps: int, every: int, sampled: int, record: FloatArray | None
     ) -> None:
         """Take all lanes `steps` steps from the index `first`; see float_numpy.PlanarNumpy."""
-        blocks = self.blocks
+        given = self.blocks
+        blocks = Blocks(given.kinds, given.coefficients, given.reals, given.kappa)
+        span = Span(first, steps, every if record is not None else 0, sampled)
 
         def run(lo: int, hi: int) -> None:
-            planar_advance(
-                lanes.z,
-                lo,
-                hi,
-                blocks.kinds,
-                blocks.coefficients,
-                blocks.reals,
-                blocks.kappa,
-                first,
-                steps,
-                every if record is not None else 0,
-                sampled,
-                _NOTHING if record is None else record,
-                lanes.status,
-                lanes.failed_at,
-                lanes.near,
-                lanes.near_at,
-                lanes.base,
-                lanes.largest,
-                _aligned(len(lanes.z), _WIDTH),
-                _aligned(len(lanes.z), _WIDTH),
-                _aligned(1, _WIDTH)[0],
-            )
+            rows = len(lanes.z)
+            room = PlanarRoom(_aligned(rows, _WIDTH), _aligned(rows, _WIDTH), _aligned(1, _WIDTH)[0])
+            planar_advance(lanes, lo, hi, blocks, span, _NOTHING if record is None else record, room)
 
         _spread(run, lanes.z.shape[1], self.threads, _WIDTH)
 
@@ -803,35 +667,20 @@ class GenericNumba:
     ) -> None:
         """Take all lanes `steps` steps from the index `first`; see float_numpy.GenericNumpy."""
         equation = self.equation
-
-        n = equation.rows
+        n, more = equation.rows, len(equation.products)
+        span = Span(first, steps, every if record is not None else 0, sampled)
 
         def run(lo: int, hi: int) -> None:
             wide = 1 if hi - lo <= 2 * _FEW else _GENERIC_WIDTH
-            generic_advance(
-                lanes.z,
-                lo,
-                hi,
-                equation.constants,
-                equation.first,
-                equation.columns,
-                equation.factors,
-                equation.products,
-                first,
-                steps,
-                every if record is not None else 0,
-                _NOTHING if record is None else record,
-                lanes.status,
-                lanes.failed_at,
-                lanes.near,
-                lanes.near_at,
-                _aligned(n + len(equation.products), wide),
+            room = GenericRoom(
+                _aligned(n + more, wide),
+                _aligned(n + more, wide),
                 _aligned(n * (n + 1), wide),
-                _aligned(n + len(equation.products), wide),
                 _aligned(1, wide)[0],
                 _aligned(1, wide)[0],
                 _aligned(1, wide)[0],
             )
+            generic_advance(lanes, lo, hi, equation, span, _NOTHING if record is None else record, room)
 
         _spread(run, lanes.z.shape[1], self.threads, _GENERIC_WIDTH)
 

@@ -24,10 +24,9 @@ number.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from flint import fmpq
@@ -169,8 +168,7 @@ def complex_integral(Ur: Any, Ui: Any, Vr: Any, Vi: Any, k: Any, kappa_r: Any, k
 # What the kernels are given, and what they keep.
 
 
-@dataclass(frozen=True, eq=False)
-class GenericEquation:
+class GenericEquation(NamedTuple):
     """The equation M(x) x~ = r(x) in doubles, with the terms that are there; r is the last column of (M | r).
 
     Entry (i, j) is `constants[i, j]` plus the sum of `factors[t] y[columns[t]]` over
@@ -244,8 +242,7 @@ def _nearest(number: fmpq) -> float:
         raise InputError("eps times a coefficient leaves the range of machine floats: use exact arithmetic") from error
 
 
-@dataclass(eq=False)
-class Lanes:
+class Lanes(NamedTuple):
     """The states of n orbits side by side, one a column, and what happened to each.
 
     `z` has the shape (rows, n). `failed_at` is the index of the first iterate that does not exist, `near` the number of

@@ -512,7 +512,7 @@ def test_a_complex_step_is_that_of_the_formulas(name):
 @pytest.mark.parametrize(("reals", "others"), [(r, k) for r in range(6) for k in range(4) if r + k])
 def test_compiled_loops_over_the_blocks_of_a_lane_do_what_they_do_uncompiled(reals, others):
     pytest.importorskip("numba")
-    from kahanmaps.maps.float_numba import _single
+    from kahanmaps.maps.float_numba import Blocks, _single
 
     rng = np.random.default_rng(reals + 10 * others)
     kinds = np.array([LINES, CUBES, GENERAL, LINES, LINES][:reals] + [GENERAL, LINES, LINES][:others], dtype=np.int64)
@@ -521,9 +521,8 @@ def test_compiled_loops_over_the_blocks_of_a_lane_do_what_they_do_uncompiled(rea
     )
     z = rng.uniform(-0.3, 0.3, (2 * reals + 4 * others, 2))
     compiled, plain, before = z.copy(), z.copy(), z.copy()
-    assert _single(compiled, 1, kinds, coefficients, reals, 3) == _single.py_func(
-        plain, 1, kinds, coefficients, reals, 3
-    )
+    blocks = Blocks(kinds, coefficients, reals, np.zeros((len(kinds), 2)))
+    assert _single(compiled, 1, blocks, 3) == _single.py_func(plain, 1, blocks, 3)
     assert compiled == pytest.approx(plain, rel=1e-15)
     assert np.array_equal(plain[:, 0], before[:, 0])
     assert (plain[:, 1] != before[:, 1]).all()
