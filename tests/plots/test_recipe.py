@@ -54,3 +54,11 @@ def test_a_picture_cut_short_is_refused(tmp_path, cut):
     path.write_bytes(picture_bytes(a_figure(), "png", STYLE, RECIPES["plain"])[:cut])
     with pytest.raises(InputError, match="no recipe"):
         read_recipe(str(path))
+
+
+@pytest.mark.parametrize("word", ["AAAA", "AAA", "eyJhIjogMX0="])
+def test_a_damaged_recipe_is_told(tmp_path, word):
+    path = tmp_path / "x.pdf"
+    path.write_bytes(b"%PDF-1.4 (kahanmaps:" + word.encode() + b")")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_recipe(str(path))
