@@ -1,15 +1,11 @@
-"""The manual page, made of the commands themselves: the same text for the same commands, whatever the terminal."""
+"""The manual page: what --help says of every command, as it stands, and what holds for all of them."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
-from inspect import cleandoc
 from textwrap import wrap
 
 import click
-
-from kahanmaps_cli.colour_option import is_colour_option
 
 _SYSTEM = (
     "SYSTEM is a file (docs/system-files.md describes the format), a name of the catalogue, - for standard input, or "
@@ -38,11 +34,12 @@ _FILES = {
     "*.db": "The results of a batch.",
     "*.jsonl, *.csv, *.npz, *.npy": "Orbits.",
 }
+_WIDTH = 72
 
 
 def manual_page(group: click.Group, sections: dict[str, list[str]], version: str) -> str:
-    """The page in the man macros of roff; `sections` are the headings and the commands below them."""
-    context = click.Context(group, info_name="kahanmaps")
+    """The page in the man macros of roff, whatever the terminal; `sections` are the headings and their commands."""
+    context = click.Context(group, info_name="kahanmaps", terminal_width=_WIDTH, max_content_width=_WIDTH)
     lines = [
         '.\\" Made by: kahanmaps manual',
         f'.TH KAHANMAPS 1 "" "kahanmaps {version}" "User Commands"',
@@ -54,88 +51,37 @@ def manual_page(group: click.Group, sections: dict[str, list[str]], version: str
         ".I command",
         ".RI [ arguments ]",
         ".SH DESCRIPTION",
-        *_text(group.help or ""),
+        *_as_it_stands(group.get_help(context)),
         ".PP",
         *_filled(_SYSTEM),
-        ".SS Options",
-        *_options(group, context),
     ]
     for heading, names in sections.items():
         lines.append(f".SH {_escaped(heading.upper())}")
         for name in names:
-            command = group.get_command(context, name)
-            if command is not None:
-                lines += _command(command, f"kahanmaps {name}", context)
+            lines += _command(group, name, context)
     lines += [".SH EXIT STATUS", *_list(_STATUS), ".SH ENVIRONMENT", *_list(_ENVIRONMENT), ".SH FILES", *_list(_FILES)]
     return "\n".join(lines) + "\n"
 
 
-def _command(command: click.Command, words: str, context: click.Context) -> Iterator[str]:
-    yield f".SS {_escaped(words)}"
-    own = click.Context(command, info_name=words, parent=context)
-    arguments = [parameter for parameter in command.params if isinstance(parameter, click.Argument)]
-    usage = [words, "[options]", *(_argument(argument) for argument in arguments)]
-    below = []
+def _command(group: click.Group, name: str, context: click.Context) -> Iterator[str]:
+    command = group.get_command(context, name)
+    if command is None:
+        return
+    own = click.Context(command, info_name=name, parent=context)
+    yield f".SS {_escaped(own.command_path)}"
+    yield from _as_it_stands(command.get_help(own))
     if isinstance(command, click.Group):
-        below = [command.get_command(own, name) for name in command.list_commands(own)]
-    yield _escaped(" ".join([*usage, "command ..."] if below else usage))
-    yield ".PP"
-    yield from _text(command.help or "")
-    yield from _options(command, own)
-    for other in below:
-        if other is not None:
-            yield from _command(other, f"{words} {other.name}", own)
+        for other in command.list_commands(own):
+            yield from _command(command, other, own)
 
 
-def _argument(argument: click.Argument) -> str:
-    name = (argument.metavar or str(argument.name)).upper() + ("..." if argument.nargs == -1 else "")
-    return name if argument.required else f"[{name}]"
-
-
-def _options(command: click.Command, context: click.Context) -> Iterator[str]:
-    for option in command.params:
-        if not isinstance(option, click.Option) or option.hidden:
-            continue
-        if context.parent is not None and is_colour_option(option):  # told once, at the top
-            continue
-        names = option.opts[:1] if getattr(option, "old_names", False) else sorted(option.opts, key=len)
-        metavar = "" if option.is_flag or option.count else _metavar(option)
-        yield ".TP"
-        yield f"\\fB{_escaped(', '.join(names))}\\fR" + (f" \\fI{_escaped(metavar)}\\fR" if metavar else "")
-        default = ""
-        if option.show_default and option.default is not None:
-            default = f" [default: {option.default}]"
-        elif option.required:
-            default = " [required]"
-        yield from _filled(f"{option.help or ''}{default}")
-
-
-def _metavar(option: click.Option) -> str:
-    if option.metavar:
-        return option.metavar
-    if isinstance(option.type, click.Choice):
-        return "|".join(map(str, option.type.choices))
-    return option.type.name.upper()
+def _as_it_stands(text: str) -> list[str]:
+    return [".EX", *(_escaped(line.rstrip()) for line in text.splitlines()), ".EE"]
 
 
 def _list(entries: dict[str, str]) -> Iterator[str]:
     for term, text in entries.items():
         yield from (".TP", f".B {_escaped(term)}", *_filled(text))
-
-
-def _text(text: str) -> Iterator[str]:
-    """Paragraphs, and as they stand those that follow the mark for click.
-
-    Python 3.13 takes the common indentation from docstrings, the versions before do not: `cleandoc` makes them equal.
-    """
-    for k, paragraph in enumerate(re.split(r"\n\s*\n", cleandoc(text))):
-        if k:
-            yield ".PP"
-        lines = paragraph.split("\n")
-        if lines[0].strip() == "\b":
-            yield from (".EX", *(_escaped(line) for line in lines[1:]), ".EE")
-        else:
-            yield from _filled(" ".join(line.strip() for line in lines))
 
 
 def _filled(text: str) -> list[str]:
