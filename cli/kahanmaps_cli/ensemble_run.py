@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from kahanmaps.errors import InputError
 from kahanmaps_cli.numbers import json_float, json_number, short_float
@@ -41,11 +40,13 @@ def structure_for(file: SystemFile, wish: str | None) -> Structure | NoStructure
     return structure
 
 
-class Run(ABC):
-    """What both kinds of ensembles have in common: `counts`, `failures`, `moved` and `near` are for people and JSON."""
+def _kernel(wish: str | None, work: int) -> str | None:
+    return "numpy" if wish is None and work < _WORTH_COMPILING else wish
 
-    kernel: str
-    method: str
+
+class _Walk:
+    """How far a run has come; what it tells is `counts`, `failures`, `moved` and `near`, for people and JSON."""
+
     reached = 0
     records = 0
     interrupted = False
@@ -54,38 +55,8 @@ class Run(ABC):
         """Ask to end after the portion in hand."""
         self.interrupted = True
 
-    @abstractmethod
-    def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
-        """Take the steps; with `output` the starts and multiples of `every` go to that .npy file."""
 
-    @property
-    @abstractmethod
-    def shape(self) -> tuple[int, int]:
-        """Orbits and dimension."""
-
-    @property
-    @abstractmethod
-    def counts(self) -> dict[str, int]:
-        """How many orbits are how."""
-
-    @abstractmethod
-    def failures(self) -> Iterator[dict[str, Any]]:
-        """Orbits that ended early, in order."""
-
-    @abstractmethod
-    def moved(self) -> list[dict[str, Any]]:
-        """What became of the integrals."""
-
-    @abstractmethod
-    def moved_lines(self) -> list[str]:
-        """The same for people."""
-
-    def near(self) -> dict[str, Any] | None:
-        """Near-singular steps, None in exact arithmetic."""
-        return None
-
-
-class FloatRun(Run):
+class FloatRun(_Walk):
     """In machine numbers."""
 
     def __init__(
@@ -100,9 +71,6 @@ class FloatRun(Run):
     ) -> None:
         from kahanmaps.maps.fast import FloatEnsemble, float_function, to_float
 
-        kernel = options["kernel"]
-        if kernel is None and len(starts) * steps < _WORTH_COMPILING:
-            kernel = "numpy"
         value = to_float(eps)  # backward too: the inverse conserves what the map conserves
 
         def of_point(function: RationalFunction) -> Callable[[Sequence[float]], float | None]:
@@ -116,7 +84,7 @@ class FloatRun(Run):
             starts,
             backward=options["backward"],
             form=form,
-            kernel=kernel,
+            kernel=_kernel(options["kernel"], len(starts) * steps),
             threads=options["threads"],
             integrals={name: of_point(function) for name, function in integrals.items()},
         )
@@ -129,9 +97,12 @@ class FloatRun(Run):
 
     @property
     def shape(self) -> tuple[int, int]:
+        """Orbits and dimension."""
         return self.ensemble.n, self.ensemble.system.dim
 
     def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
+        """Take the steps; with `output` the starts and multiples of `every` go to that .npy file."""
+
         def progress(step: int) -> None:
             told(step)
             if self.interrupted:
@@ -212,7 +183,7 @@ class FloatRun(Run):
         return lines
 
 
-class ModularRun(Run):
+class ModularRun(_Walk):
     """Modulo a prime, where an integral either holds or does not."""
 
     def __init__(
@@ -227,9 +198,6 @@ class ModularRun(Run):
     ) -> None:
         from kahanmaps.maps.modular import ModularEnsemble
 
-        kernel = options["kernel"]
-        if kernel is None and len(starts) * steps < _WORTH_COMPILING:
-            kernel = "numpy"
         self.file = file
         self.eps = eps
         self.backward: bool = options["backward"]
@@ -239,7 +207,7 @@ class ModularRun(Run):
             starts,
             options["arithmetic"][1],
             form=form,
-            kernel=kernel,
+            kernel=_kernel(options["kernel"], len(starts) * steps),
             threads=options["threads"] or 1,
             backward=options["backward"],
         )
@@ -321,3 +289,9 @@ class ModularRun(Run):
             first = f", the first of them orbit {record['orbit']}" if record["changed"] else ""
             lines.append(f"{record['name']}\tchanged in {record['changed']} of {record['orbits']} orbits{first}")
         return lines
+
+    def near(self) -> None:
+        """Residues are exact: no step is nearly singular."""
+
+
+Run: TypeAlias = FloatRun | ModularRun
