@@ -106,7 +106,7 @@ def _label(name: str) -> str:
 def _quotient(left: str, function: RationalFunction) -> list[tuple[str, str]]:
     """left = P/Q in one row where it is short; else P and Q have rows of their own, without fractions as well."""
     whole = latex_rational_function(function)
-    if len(whole) <= 2 * _LINE or function.is_polynomial:
+    if len(whole) <= _LINE or function.is_polynomial:
         return [(left, whole)]
     above, below = map(latex_polynomial, above_and_below(function))
     P, Q = f"P_{{{left}}}", f"Q_{{{left}}}"
@@ -124,23 +124,10 @@ def _aligned(rows: Sequence[tuple[str, str]]) -> str:
 
 
 def _pieces(text: str) -> list[str]:
-    """A sum cut into lines; only between terms, which no brace encloses."""
-    if len(text) <= _LINE or not _is_sum(text):
-        return [text]
-    lines, current = [], ""
-    for term in re.split(r" (?=[+-] )", text):
-        if current and len(current) + len(term) > _LINE:
-            lines.append(current)
-            current = ""
-        current = f"{current} {term}" if current else term
-    return [*lines, current]
-
-
-def _is_sum(text: str) -> bool:
-    """Whether no + or - between terms stands inside braces."""
-    depth = 0
-    for k, character in enumerate(text):
-        depth += {"{": 1, "}": -1}.get(character, 0)
-        if depth and text[k : k + 3] in (" + ", " - "):
-            return False
-    return True
+    """A text cut into lines where it is long, between terms: what is long is a sum, and no brace encloses its terms."""
+    lines = [""]
+    for term in re.split(r" (?=[+-] )", text) if len(text) > _LINE else [text]:
+        if lines[-1] and len(lines[-1]) + len(term) > _LINE:
+            lines.append("")
+        lines[-1] += f" {term}" if lines[-1] else term
+    return lines
