@@ -22,7 +22,14 @@ def test_every_output_belongs_to_an_example():
     assert {path.stem for path in EXAMPLES.glob("*.out")} == {path.stem for path in SCRIPTS}
 
 
-@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+# The cluster and the whole paper have quicker tests of their own.
+LONG = {"08_the_paper", "10_cluster_batch"}
+
+
+@pytest.mark.parametrize(
+    "script",
+    [pytest.param(path, marks=[pytest.mark.slow] * (path.stem in LONG), id=path.stem) for path in SCRIPTS],
+)
 def test_an_example_prints_what_stands_beside_it(script, tmp_path):
     done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

@@ -16,12 +16,12 @@ STUDY = Path(__file__).parent.parent / "examples" / "members"
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The results of the first few members."""
+    """The results of the first members."""
     text = (STUDY / "study.toml").read_text()
-    text, count = re.subn(r'"0\.\.\d+"', '"0..2"', text)
+    text, count = re.subn(r'"0\.\.\d+"', '"0..0"', text)
     assert count == 5
     db = tmp_path_factory.mktemp("study") / "study.db"
-    records = list(km.run(text, db, jobs=2))
+    records = list(km.run(text, db))
     assert {record.outcome for record in records} == {"ok"}
     return db
 
@@ -53,7 +53,7 @@ def test_what_was_learned_comes_out_of_the_first_members_too(small: Path):
     done = subprocess.run([sys.executable, STUDY / "learned.py", small], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
-    assert lines[:3] == [f"m = {m}: dimension {4 * m} of the space of cubics, for 6 of 6 members" for m in (2, 3, 4)]
+    assert lines[:3] == [f"m = {m}: dimension {4 * m} of the space of cubics, for 2 of 2 members" for m in (2, 3, 4)]
     committed = (STUDY / "learned.out").read_text().splitlines()
     kinds = [re.sub(r"[-\d.e]+", "#", line) for line in lines if not line.startswith(" ")]
     assert kinds[3:5] == [re.sub(r"[-\d.e]+", "#", line) for line in committed if not line.startswith(" ")][3:5]

@@ -13,6 +13,7 @@ import threading
 
 import pytest
 from flint import fmpq, fmpq_mpoly, fmpz
+from helpers import THOROUGH, quick
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -505,14 +506,19 @@ HOSTILE = {
     "large coefficients": "(9^900*x + 7^900*y + 5^900*z + 3)^30",
     "many powers": "+".join(["(x + y + z + 1)^20"] * 10_000),
     "NUL": "x + \0",
-    "a bad end": "x+" * 99_990 + "$",
-    "a missing end": "x+" * 99_990,
-    "signs without end": "-" * 199_999,
+    "a bad end": "x+" * 9_990 + "$",
+    "a missing end": "x+" * 9_990,
+    "signs without end": "-" * 19_999,
 }
 
 
-@pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
-def test_a_hostile_text_is_refused(text: str) -> None:
+# These take half a second each, for nobody knows at the beginning how large it will get.
+GROWING = {"squares of large sums", "growing denominators", "growing common denominator", "product of digits"}
+
+
+@pytest.mark.parametrize("name", quick(HOSTILE, HOSTILE.keys() - GROWING))
+def test_a_hostile_text_is_refused(name: str) -> None:
+    text = HOSTILE[name]
     error = refusal(text)
     assert error.text == text
     assert len(str(error)) < 400
@@ -549,16 +555,17 @@ def test_every_limit_has_two_sides(limits: Limits, good: str, bad: str) -> None:
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("x+" * 99_999 + "x", 100_000 * x),
+        ("x+" * 9_999 + "x", 10_000 * x),
+        pytest.param("x+" * 99_999 + "x", 100_000 * x, marks=THOROUGH),
         pytest.param("-" * 199_999 + "x", -x, marks=pytest.mark.slow),
-        ("1^" * 99_999 + "1", x**0),
+        pytest.param("1^" * 99_999 + "1", x**0, marks=THOROUGH),
         pytest.param("x" + "*1" * 99_999, x, marks=pytest.mark.slow),
         pytest.param("x" + "/1" * 99_999, x, marks=pytest.mark.slow),
-        ("+".join(["x/2"] * 40_000), 20_000 * x),
+        ("+".join(["x/2"] * 4_000), 2_000 * x),
         ("(" * 100 + "x" + ")" * 100, x),
         ("(x + y + 1)^64", (x + y + 1) ** 64),
     ],
-    ids=["sum", "signs", "tower of ones", "product", "quotient", "halves", "brackets", "power"],
+    ids=["sum", "long sum", "signs", "tower of ones", "product", "quotient", "halves", "brackets", "power"],
 )
 def test_a_long_text_within_the_limits_is_read(text: str, value: fmpq_mpoly) -> None:
     assert parse_polynomial(text, NAMES) == value

@@ -609,7 +609,7 @@ def test_a_listener_that_is_no_scheduler_is_told_in_a_sentence():
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with pytest.raises(InputError, match="no dask scheduler answers"):
-            ClusterWorkers(address, str, connect_seconds=1.0)
+            ClusterWorkers(address, str, connect_seconds=0.3)
 
 
 @pytest.mark.parametrize(
@@ -624,7 +624,7 @@ def test_a_listener_that_is_no_scheduler_is_told_in_a_sentence():
 )
 def test_an_address_that_cannot_be_one_is_told_in_a_sentence(address, sentence):
     with pytest.raises(InputError, match=sentence):
-        ClusterWorkers(address, str, connect_seconds=1.0)
+        ClusterWorkers(address, str, connect_seconds=0.3)
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"address": '])

@@ -236,9 +236,9 @@ with Store.open(path) as store:
         store.add([Record(job.task.key, Outcome.OK, {"value": "1/3" * 300})])
         print(job.task.key, flush=True)
 """
-    planned(path, *range(20_000))
+    planned(path, *range(10_000))
     acknowledged: set[str] = set()
-    for _ in range(4):
+    for _ in range(3):
         with start(script, path, journal) as process:
             assert process.stdout is not None
             acknowledged.add(process.stdout.readline().strip())
@@ -251,7 +251,7 @@ with Store.open(path) as store:
             assert acknowledged <= {row.record.key for row in store.rows() if row.record}
         with Store.open(path) as store:  # and the lock is free
             # At most the one result for which the process was killed before it could say so, for each kill.
-            assert 0 <= 20_000 - store.count_pending() - len(acknowledged) <= 4
+            assert 0 <= 10_000 - store.count_pending() - len(acknowledged) <= 4
         check_pages(path)
     assert len(acknowledged) > 8
 

@@ -333,7 +333,7 @@ def to_csv(count, sink):
     write_csv(lambda: stream_of_rows(count), sink)
 
 
-@pytest.mark.parametrize("count", [10_000, pytest.param(100_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [4_000, pytest.param(100_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("write", "extra_lines"), [(to_jsonl, 2), (to_csv, 1)])
 def test_many_rows_are_never_held_together(write, extra_lines, count):
     write(1, Sink())  # what is loaded late does not count

@@ -16,6 +16,7 @@ from types import SimpleNamespace
 
 import pytest
 from flint import fmpq, fmpq_poly
+from helpers import quick
 from hypothesis import example, given
 from hypothesis import strategies as st
 from planar_helpers import SPLIT, over_members, side_by_side, structure_and_system
@@ -134,16 +135,16 @@ def test_integer_points_of_orbits_are_in_lowest_terms(name):
     [
         ("m = 2", 2, "normal-form"),
         ("m = 2", 7, "normal-form"),
-        ("m = 2", 30, "jump"),
+        ("m = 2", 20, "jump"),
         ("m = 2, sqrt 2", 2, "generic"),
-        ("m = 2, sqrt 2", 30, "jump"),
+        ("m = 2, sqrt 2", 20, "jump"),
     ],
 )
 def test_heights_at_some_steps_are_those_of_all_steps(name, every, method):
     structure, system = structure_and_system(name)
-    every_step = growth(system, START[:4], 60).heights
-    found = growth(system, START[:4], 60, structure=structure, every=every)
-    assert found.steps == tuple(range(0, 61, every))
+    every_step = growth(system, START[:4], 40).heights
+    found = growth(system, START[:4], 40, structure=structure, every=every)
+    assert found.steps == tuple(range(0, 41, every))
     assert found.heights == every_step[::every]
     assert found.method == method
 
@@ -332,7 +333,9 @@ def constant_at(gamma: fmpq, doublings: int = 8) -> Fraction:
     return Fraction(3 * height([x]), 2 * 4**doublings)  # the height of x belongs to the divisor 2 (O)
 
 
-@pytest.mark.parametrize("name", ["m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 3, another J"])
+@pytest.mark.parametrize(
+    "name", quick(["m = 1", "m = 2", "m = 3", "m = 3, fractions", "m = 3, another J"], ["m = 1", "m = 2"])
+)
 def test_the_constant_of_a_member_is_the_sum_of_the_canonical_heights_of_its_planes(name):
     structure, system = structure_and_system(name)
     start = [fmpq(1, 2), fmpq(1, 3), fmpq(-1, 5), fmpq(2, 7), fmpq(3, 4), fmpq(-2, 3)][: system.dim]
