@@ -49,6 +49,7 @@ def test_the_committed_results_are_those_of_all_tasks():
         assert sum(int(line.split("|")[column]) for line in table[2:]) == sizes()[name]
 
 
+@pytest.mark.slow
 def test_what_was_learned_comes_out_of_the_first_members_too(small: Path):
     done = subprocess.run([sys.executable, STUDY / "learned.py", small], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
@@ -59,6 +60,7 @@ def test_what_was_learned_comes_out_of_the_first_members_too(small: Path):
     assert kinds[3:5] == [re.sub(r"[-\d.e]+", "#", line) for line in committed if not line.startswith(" ")][3:5]
 
 
+@pytest.mark.slow
 def test_the_dimension_is_4m_for_every_member(small: Path):
     with km.Store.open(small, readonly=True) as store:
         for row in store.rows(["space"]):

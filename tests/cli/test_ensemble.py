@@ -355,8 +355,7 @@ def test_a_full_disk_gives_3_and_names_the_file(kahanmaps, tmp_path, arithmetic)
 # Interrupts
 
 
-@pytest.mark.parametrize("arithmetic", ["float", "mod:10007"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+@pytest.mark.parametrize(("number", "arithmetic"), [(signal.SIGINT, "float"), (signal.SIGTERM, "mod:10007")])
 def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path, number, arithmetic):
     path = tmp_path / "x.npy"
     words = f"{TOP} --steps {10**9} --arithmetic {arithmetic} --random 5 --every 100 -o {path} --json"

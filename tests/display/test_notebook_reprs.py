@@ -295,8 +295,8 @@ def test_integrals_are_shown_as_formulas(top):
 
 
 def test_many_commuting_systems_are_counted_not_all_shown():
-    found = km.commuting_systems(km.draw_with_eigenvalues([1, 2, 3, 4], seed=1).chosen.system, seconds=10)
-    assert len(found.solutions) > 8
+    found = km.commuting_systems(km.draw_with_eigenvalues([1, 2, 3], seed=1).chosen.system, seconds=10)
+    assert len(found.solutions) > 5
     assert f"… and {len(found.solutions) - 5} more" in text_of(found)
 
 

@@ -155,10 +155,8 @@ def write(name: str) -> None:
 
 NAMES = sorted(path.stem for path in FOLDER.glob("*.json"))
 
-# What takes four fifths of the time is done every day for one system or two of each kind, and else in thorough runs.
-SEARCHES = {"analyze", "check-integrals", "cycles", "degrees", "find-commuting", "find-density", "find-integrals"}
-SEARCHES |= {"find-symmetry", "heights", "singularities", "verify"}
-SEARCHED_EVERY_DAY = {
+# One system or two of each kind; the others are for thorough runs.
+EVERY_DAY = {
     "collapse_at_half",
     "dim1_quadratic",
     "euler_top",
@@ -194,9 +192,8 @@ def frozen() -> Iterator[Any]:
         given = read(name)
         for speed in ("fast", "slow"):
             for line, was in given.get(speed, {}).items():
-                searched = line.split()[0] in SEARCHES and name not in SEARCHED_EVERY_DAY
-                marks = [pytest.mark.slow] * (searched or speed == "slow")
-                marks += [pytest.mark.thorough] * (searched and speed != "slow")
+                seldom = speed == "fast" and name not in EVERY_DAY
+                marks = [pytest.mark.slow] * (seldom or speed == "slow") + [pytest.mark.thorough] * seldom
                 yield pytest.param(name, line, ("status", "answer", "error"), marks=marks, id=f"{name}: {line}")
                 if was and "bounds" in was:
                     yield pytest.param(name, line, ("bounds",), marks=marks, id=f"{name}: {line} (bounds)")
@@ -210,8 +207,8 @@ def test_what_the_library_says_is_what_it_said(name: str, line: str, parts: tupl
     assert not found, f"kahanmaps {line}, @ = {shlex.join(given['system'])}\n" + "\n".join(found)
 
 
-def test_the_systems_that_are_searched_every_day_are_there():
-    assert set(NAMES) >= SEARCHED_EVERY_DAY
+def test_the_systems_of_every_day_are_there():
+    assert set(NAMES) >= EVERY_DAY
 
 
 def test_a_difference_is_told_with_its_place():

@@ -7,6 +7,7 @@ import time
 from functools import cache
 
 import pytest
+from helpers import quick
 from search_helpers import system, values_on_orbits
 
 from kahanmaps.checks.claims import Verdict
@@ -29,7 +30,7 @@ def found_with(symbols, seed):
     return [one.text for one in found.integrals], {one.verdict for one in found.integrals}, found.reason
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", quick([1, 2, 3], [1]))
 def test_two_alike_pencils_give_the_same_formulas_for_every_seed(seed):
     texts, verdicts, reason = found_with("a3 b3", seed)
     assert (texts, reason) == (found_with("a3 b3", 0)[0], "")

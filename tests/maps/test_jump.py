@@ -11,7 +11,7 @@ import random
 
 import pytest
 from flint import arb, fmpq, fmpq_poly
-from helpers import encloses, random_point
+from helpers import encloses, quick, random_point
 from planar_helpers import (
     STARTS,
     before,
@@ -66,7 +66,7 @@ def jumped(found, start, n):
 # Over prime fields.
 
 
-@pytest.mark.parametrize("prime", [3, 5, 7, 11, 101, 10007, 2**61 - 1, 2**89 - 1])
+@pytest.mark.parametrize("prime", quick([3, 5, 7, 11, 101, 10007, 2**61 - 1, 2**89 - 1], [3, 11, 2**61 - 1]))
 @over_members
 def test_modulo_a_prime_it_is_the_point_of_the_orbit(name, prime):
     structure, system = structure_and_system(name)
@@ -99,7 +99,7 @@ def test_modulo_two_it_is_the_point_of_the_orbit_or_refused(name):
     assert [jumped(found, start, n) for n in range(len(points))] == points
 
 
-@pytest.mark.parametrize("prime", [5, 7, 31, 10007, 2**61 - 1, 2**89 - 1])
+@pytest.mark.parametrize("prime", quick([5, 7, 31, 10007, 2**61 - 1, 2**89 - 1], [5, 2**89 - 1]))
 @pytest.mark.parametrize("name", ["m = 2", "m = 3, another J", "m = 2, sqrt 2", "m = 3, a cubic field"])
 def test_modulo_a_prime_huge_iterates_compose(name, prime):
     structure, system = structure_and_system(name)
@@ -121,7 +121,7 @@ def test_modulo_a_prime_huge_iterates_compose(name, prime):
     assert passed > 0 or prime < 31  # small orbits meet their poles at once
 
 
-@pytest.mark.parametrize(("name", "prime"), [("m = 1", 43), ("m = 1", 61), ("m = 2", 31), ("m = 2, sqrt 2", 31)])
+@pytest.mark.parametrize(("name", "prime"), [("m = 1", 43), ("m = 2", 31)])
 def test_after_the_period_the_start_is_back(name, prime):
     structure, system = structure_and_system(name)
     found, rng, seen = Jump(structure, "3/13", GF(prime)), random.Random(prime), 0
@@ -214,7 +214,7 @@ def test_the_same_modulo_a_large_prime(names):
     assert [coordinates(found.value(start, n)) for n in range(41)] == points
 
 
-@pytest.mark.parametrize("n", [60, 100])
+@pytest.mark.parametrize("n", quick([60, 100], [60]))
 def test_far_iterates_over_q_are_those_modulo_a_prime(n):
     structure, system = structure_and_system("m = 3")
     start, field = random_point(system.dim, 2), GF(2**89 - 1)
