@@ -54,6 +54,10 @@ class FoundDensity:
     evidence: Evidence
     product: str = ""
 
+    def degree(self, dim: int) -> int:
+        """The larger of the degrees of numerator and denominator in the variables."""
+        return max(degree_in(part, dim) for part in (self.function.numerator, self.function.denominator))
+
     @property
     def text(self) -> str:
         """The formula of phi."""
@@ -70,7 +74,8 @@ class DensitySearch(Displayed):
 
     `densities` span all phi of the least degree that has some, or are det(I - eps f') of a Hamiltonian system, which
     need not be of least degree; `degree` is the largest that was tried, and `reason` says why the search ended without
-    a density. `eps` is None for every eps; `period` is the number of points of orbits that close.
+    a density. `eps` is None for every eps; `period` is the number of points of orbits that close. `turning` is a phi
+    with phi(x~) = -det dPhi(x) phi(x): the map turns dx/phi into -dx/phi, and |dx/phi| is invariant.
     """
 
     file: SystemFile
@@ -82,11 +87,16 @@ class DensitySearch(Displayed):
     primes: tuple[int, ...]
     seed: int
     period: int | None = None
+    turning: FoundDensity | None = None
 
     @property
     def note(self) -> str:
-        """That orbits close, and for which eps; empty where they do not."""
-        return closing_note(self.period, self.eps, self.file.map)
+        """That orbits close, and for which eps; of which phi the sign changes; empty where there is nothing to say."""
+        closes = closing_note(self.period, self.eps, self.file.map)
+        if self.turning is None:
+            return closes
+        turns = f"|dx/phi| is invariant for phi = {self.turning.text}: phi(x~) = -det dPhi(x) phi(x)"
+        return "; ".join(filter(None, (f"{turns} ({self.turning.verdict})", closes)))
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -143,9 +153,17 @@ def find_densities(
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")
     laboratory = Laboratory(file, symbols, eps, seed)
     densities, tried, reason, period = list[FoundDensity](), -1, laboratory.defect, None
+    product = turning = None
     if not reason:
         period = _period(laboratory)
-        densities, tried, reason = _search(laboratory, max_degree, time.monotonic() + seconds, progress)
+        deadline = time.monotonic() + seconds
+        theorem, dim = _theorem(laboratory), laboratory.map.dim
+        if theorem is not None and (max_degree is None or theorem.degree(dim) <= max_degree):
+            densities, tried = [theorem], theorem.degree(dim)
+        else:
+            progress("densities that are products")
+            product, turning = _products(laboratory, max_degree)
+            densities, tried, reason = _search(laboratory, product, max_degree, deadline, progress)
     return DensitySearch(
         file,
         laboratory.symbols,
@@ -156,21 +174,20 @@ def find_densities(
         laboratory.primes,
         seed,
         period,
+        turning,
     )
 
 
 def _search(
-    laboratory: Laboratory, max_degree: int | None, deadline: float, progress: Callable[[str], None]
+    laboratory: Laboratory,
+    product: FoundDensity | None,
+    max_degree: int | None,
+    deadline: float,
+    progress: Callable[[str], None],
 ) -> tuple[list[FoundDensity], int, str]:
-    """Densities, the largest degree that was tried, and why there are none."""
+    """Densities, the largest degree that was tried, and why there are none; the product where none is simpler."""
     dim = laboratory.map.dim
-    theorem = _theorem(laboratory)
-    if theorem is not None:
-        of_theorem = degree_in(theorem.function.numerator, dim)
-        if max_degree is None or of_theorem <= max_degree:
-            return [theorem], of_theorem, ""
-    progress("densities that are products")
-    product, of_product = _product(laboratory, max_degree)
+    of_product = 0 if product is None else product.degree(dim)
     top = max_degree if max_degree is not None else _MAX_DEGREE
     top = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0)
     # With a product in hand only lower degrees are worth a part of the time, and the others of its own degree.
@@ -194,21 +211,22 @@ def _search(
     return [], top, f"no polynomial of degree at most {top}, and no product of powers of known ones, is a density"
 
 
-def _product(laboratory: Laboratory, max_degree: int | None) -> tuple[FoundDensity | None, int]:
-    """A density that is a product of powers of known polynomials, with its degree; None where there is none."""
-    dim = laboratory.map.dim
+def _products(laboratory: Laboratory, max_degree: int | None) -> tuple[FoundDensity | None, FoundDensity | None]:
+    """A density that is a product of powers of known polynomials, or one that changes its sign, as far as there are."""
     try:
         found = products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density
     except NoPoint:
-        return None, 0
+        return None, None
     phi = None if found is None else found.function
     if found is None or phi is None:
-        return None, 0
-    degree = max(degree_in(part, dim) for part in (phi.numerator, phi.denominator))
-    if max_degree is not None and degree > max_degree:
-        return None, 0
-    verdict, evidence = verdict_on(laboratory.map, phi, laboratory.eps, laboratory.seed, is_density=True)
-    return (FoundDensity(phi, verdict, evidence, found.text) if verdict.holds else None), degree
+        return None, None
+    verdict, evidence = verdict_on(
+        laboratory.map, phi, laboratory.eps, laboratory.seed, is_density=True, factor=found.constant
+    )
+    one = FoundDensity(phi, verdict, evidence, found.text)
+    if not verdict.holds or (max_degree is not None and one.degree(laboratory.map.dim) > max_degree):
+        return None, None
+    return (one, None) if found.constant.numerator == found.constant.denominator else (None, one)
 
 
 def _theorem(laboratory: Laboratory) -> FoundDensity | None:

@@ -53,7 +53,7 @@ class Product:
     """The product I of powers g^k of the `factors`, a function of (variables, symbols, eps); there may be none.
 
     `constant` is the number c with I(x~) = c I(x), a function of the symbols and eps: 1 for an integral. For a density
-    it is that in phi(x~) = c det dPhi(x) phi(x), 1 as well.
+    it is that in phi(x~) = c det dPhi(x) phi(x), 1 or -1.
     """
 
     factors: tuple[tuple[fmpq_mpoly, int], ...]
@@ -89,7 +89,10 @@ class Product:
 
 @dataclass(frozen=True)
 class Products:
-    """What `products_of` found: integrals, a density (None without one), and what depends on time."""
+    """What `products_of` found: integrals, a density (None without one), and what depends on time.
+
+    Where there is no density, one that changes its sign takes its place: then |dx/phi| is invariant.
+    """
 
     integrals: tuple[Product, ...]
     density: Product | None
@@ -320,17 +323,28 @@ def _sorted_by_constant(
     one = RationalFunction(context.constant(1), context.constant(1))
     values = _constants(laboratory, polynomials, vectors)
     known = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
-    combinations = multiplicative_relations([c for _, c in known])
-    exact = _reduced([_combined(a, [v for v, _ in known]) for a in combinations], weights)
+    minus = RationalFunction(context.constant(-1), context.constant(1))
+
+    def with_constant_1(more: list[RationalFunction]) -> list[list[int]]:
+        """The vectors whose constant is 1 or, up to such factors, one of those given: a basis."""
+        combinations = multiplicative_relations([*(c for _, c in known), *more])
+        vectors = [_combined(a[: len(known)], [v for v, _ in known]) for a in combinations if any(a[: len(known)])]
+        return _reduced(vectors, weights)
+
+    exact = with_constant_1([])
     integrals = [_upright(v, degrees) for v in exact if v[0] == 0]
 
     def product(vector: Sequence[int], constant: RationalFunction) -> Product:
         return Product(tuple((g, k) for g, k in zip(polynomials, vector[1:], strict=True) if k), constant)
 
-    density = next((v if v[0] == -1 else [-e for e in v] for v in exact if abs(v[0]) == 1), None)
+    density = None
+    for constant, choice in ((one, exact), (minus, with_constant_1([minus]))):
+        vector = next((v if v[0] == -1 else [-e for e in v] for v in choice if abs(v[0]) == 1), None)
+        if vector is not None and density is None:
+            density = product(_most_polynomial(vector, integrals, degrees), constant)
     return Products(
         tuple(product(v, one) for v in integrals),
-        None if density is None else product(_most_polynomial(density, integrals, degrees), one),
+        density,
         tuple(product(v, c) for v, c in known if v[0] == 0 and c != one),
     )
 

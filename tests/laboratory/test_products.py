@@ -138,6 +138,18 @@ def test_numbers_other_than_1_make_integrals_that_depend_on_time():
     assert verdict_on(file.map, I, None, is_density=False, factor=wrong)[0] is Verdict.REFUTED
 
 
+def test_a_map_that_turns_space_over_has_a_measure_without_a_sign():
+    # x_{n+3} x_n = 3 + x_{n+1} + x_{n+2}: det dPhi = -(3 + y + z)/x^2, while xyz is multiplied by (3 + y + z)/x^2
+    todd = a_map("x y z", ["y", "z", "(3 + y + z)/x"], ["(3 + x + y)/z", "x", "y"])
+    found = find_densities(todd)
+    assert (found.turning.text, found.turning.verdict) == ("x*y*z", Verdict.PROVED)
+    assert found.note == "|dx/phi| is invariant for phi = x*y*z: phi(x~) = -det dPhi(x) phi(x) (proved)"
+    kahan = todd.map.at(1)
+    x = kahan.point([1, 2, 5])
+    assert reduce(lambda a, b: a * b, kahan.step(x)) == -kahan.jacobian(x).det() * 10
+    assert find_densities(load("lotka_volterra")).turning is None
+
+
 def test_a_sign_is_taken_away_by_a_square():
     found = found_in(a_map("x y", ["-x", "y + x^2"], ["-x", "y - x^2"]))
     assert [one.text for one in found.integrals] == ["x^2"]
