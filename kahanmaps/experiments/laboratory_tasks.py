@@ -111,6 +111,34 @@ def density(
     }
 
 
+@task("find-poisson")
+def poisson(
+    system: SystemFile,
+    eps: Any = None,
+    symbolic: list[str] | None = None,
+    max_degree: int = 2,
+    seconds: int = 30,
+    seed: int = 0,
+    report: bool = False,
+) -> Result:
+    """The Poisson tensors with polynomial entries: how many, their ranks, Casimirs among the integrals."""
+    from kahanmaps.laboratory.poisson_tensors import find_poisson
+
+    found = find_poisson(system, max_degree, symbols=symbolic or (), eps=eps, seconds=seconds, seed=seed)
+    return {
+        "verdict": _weakest(one.verdict for one in found.tensors),
+        "status": "found" if found.tensors else "none" if found.reason.startswith("no tensor") else "open",
+        "tensors": len(found.tensors),
+        "degree_tried": None if found.degree < 0 else found.degree,
+        "formulas": [one.text for one in found.tensors],
+        "ranks": [one.rank for one in found.tensors],
+        "jacobi": [str(one.jacobi) for one in found.tensors],
+        "casimirs": [list(one.casimirs) for one in found.tensors],
+        "reason": found.reason,
+        **whole_report(found, report),
+    }
+
+
 @task("find-symmetry")
 def symmetry(system: SystemFile, seconds: int = 30, report: bool = False) -> Result:
     """Affine symmetries and reversing symmetries, for every eps: how many, and what generates them."""

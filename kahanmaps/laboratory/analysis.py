@@ -26,6 +26,7 @@ from kahanmaps.laboratory.hamiltonian_structure import constant_structures
 from kahanmaps.laboratory.height_survey import height_survey
 from kahanmaps.laboratory.integrals import find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.poisson_tensors import find_poisson
 from kahanmaps.laboratory.report import Conclusion, Statement, conclude, sections
 from kahanmaps.laboratory.singularities import (
     WRITTEN_DIMENSION,
@@ -41,6 +42,7 @@ from kahanmaps.laboratory.symmetries import linear_symmetries
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
 _MOST_SECONDS = 150.0
 _MAX_DEGREE = 200_000
+_TENSORS = {3: 3, 4: 2}  # degrees of Poisson tensors by dimension; in the plane they are densities
 
 
 class Analysis(Findings, Displayed):
@@ -85,7 +87,7 @@ class Analysis(Findings, Displayed):
             ],
             **attributes(self, "integrals"),
             "hirota_kimura": [relation.text for relation in self.relations],
-            **attributes(self, "densities", "degrees", "heights"),
+            **attributes(self, "densities", "poisson", "degrees", "heights"),
             "singularities": runs,
             **attributes(self, "symmetries", "commuting"),
             "family": self.structure.text if isinstance(self.structure, Structure) else None,
@@ -183,6 +185,20 @@ def analyze(
             bare, symbols=symbols, eps=found.eps, seconds=share(0.25), seed=seed, progress=told("densities")
         )
 
+    def poisson() -> None:
+        if dim in _TENSORS:
+            known = found.integrals.integrals if found.integrals is not None else ()
+            found.poisson = find_poisson(
+                bare,
+                _TENSORS[dim],
+                symbols=symbols,
+                eps=found.eps,
+                integrals=known,
+                seconds=share(0.1),
+                seed=seed,
+                progress=told("Poisson tensors"),
+            )
+
     def heights() -> None:
         found.heights = height_survey(
             map_, found.eps, starts=2, max_digits=5_000, seconds=share(0.08), seed=seed, progress=told("heights")
@@ -210,6 +226,7 @@ def analyze(
         ("degrees", degrees),
         ("integrals", integrals),
         ("densities", densities),
+        ("Poisson tensors", poisson),
         ("symmetries", symmetries),
         ("commuting systems", commuting),
         ("heights", heights),

@@ -14,6 +14,7 @@ from kahanmaps.laboratory.densities import DensitySearch
 from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures
 from kahanmaps.laboratory.height_survey import HeightSurvey
 from kahanmaps.laboratory.integrals import IntegralSearch
+from kahanmaps.laboratory.poisson_tensors import PoissonSearch
 from kahanmaps.laboratory.singularities import SingularityRun
 from kahanmaps.laboratory.sparse_relations import SparseRelation
 from kahanmaps.laboratory.symmetries import Symmetries
@@ -31,6 +32,7 @@ class Findings:
     integrals: IntegralSearch | None = None
     relations: tuple[SparseRelation, ...] = ()
     densities: DensitySearch | None = None
+    poisson: PoissonSearch | None = None
     degrees: DegreeGrowth | None = None
     heights: HeightSurvey | None = None
     singularities: list[SingularityRun] = field(default_factory=list)

@@ -27,12 +27,14 @@ from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient, 
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.checks.expand import MAX_DIMENSION
 from kahanmaps.checks.preserve import jacobi_identity, transformation_identity
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InputError, KahanmapsError
-from kahanmaps.invariants.poisson import GivenTensor, PoissonTensor
+from kahanmaps.errors import InputError, KahanmapsError, counted
+from kahanmaps.invariants.poisson import GivenTensor
 from kahanmaps.laboratory.closed_forms import closed_forms
+from kahanmaps.laboratory.cofactors import CofactorProduct, Sample, cofactor_space, points_needed
 from kahanmaps.laboratory.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.identities import judged
 from kahanmaps.laboratory.integrals import FoundIntegral, find_integrals, toml_comment
@@ -43,11 +45,13 @@ from kahanmaps.laboratory.modular_points import (
     exponents_up_to,
     monomial_values,
     null_space,
+    product_of,
     rank,
 )
 
 _MAX_UNKNOWNS = 2000
 _SPARE = 8
+_SHOWN = 2000  # characters of the brackets of one tensor
 _LARGEST_PENCIL = 8  # so many tensors whose combinations are put to the Jacobi identity
 
 Exponents = tuple[int, ...]
@@ -76,6 +80,13 @@ class FoundTensor:
     def text(self) -> str:
         """The brackets that are not 0."""
         return self.tensor.formula
+
+    @property
+    def short_text(self) -> str:
+        """The brackets, or how many there are where they would fill pages."""
+        if len(self.text) <= _SHOWN:
+            return self.text
+        return f"{counted(len(self.tensor.brackets), 'bracket')} that find-poisson writes out"
 
     @property
     def is_liouville_integrable(self) -> bool:
@@ -124,7 +135,9 @@ class FoundTensor:
 
 @dataclass(frozen=True)
 class PoissonSearch(Displayed):
-    """What `find_poisson` found: a basis of all tensors up to `degree`, and why the search ended where it found none.
+    """What `find_poisson` found: tensors up to `degree`, and why the search ended where it found none.
+
+    They span all of these, together with products of polynomial integrals and tensors of lower degrees.
 
     `pencil` is the verdict on all combinations of several tensors being Poisson tensors, None where that was not asked.
     """
@@ -193,7 +206,8 @@ def find_poisson(
         progress: is told what is being tried.
 
     Returns:
-        A `PoissonSearch`; formulas are exact, proved or supported. Finding none up to a degree is measured.
+        A `PoissonSearch`; formulas are exact, proved or supported. What products of polynomial integrals and other
+        tensors span is left out. Finding none up to a degree is measured.
 
     Raises:
         InputError: for unknown symbols, eps = 0, a negative degree, less than no time.
@@ -224,13 +238,14 @@ def find_poisson(
             integrals = _integrals(laboratory, symbols, deadline, seed)
         for name, tensor in named:
             progress(f"verifying {name}")
-            one = _judged(laboratory, name, tensor, integrals or ())
+            one = _judged(laboratory, name, tensor, integrals or (), deadline)
             if one is None:
                 reason = "a tensor that was found modulo primes did not pass as an identity"
             else:
                 found.append(one)
         if 1 < len(found) <= _LARGEST_PENCIL and all(one.jacobi.holds for one in found):
-            pencil = _judged_jacobi(laboratory, _pencil([one.tensor for one in found]))[0]
+            identity = jacobi_identity(_pencil([one.tensor for one in found]), laboratory.eps)
+            pencil = _verdict(laboratory, identity, deadline)[0]
     if degree < asked:
         cut = f"degrees above {degree} were not tried: such tensors have too many coefficients"
         reason = f"{reason}; {cut}" if reason else cut
@@ -274,7 +289,29 @@ def _tensors(
     )
     if forms.bases is None:
         return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {forms.reason}"
-    return [_tensor_of(P, len(variables), laboratory.map.names, denominator) for P in forms.bases[0]], ""
+    shown = [forms.bases[0][k] for k in _not_multiples(laboratory.maps[0], model, degree)]
+    return [_tensor_of(P, len(variables), laboratory.map.names, denominator) for P in shown], ""
+
+
+def _not_multiples(map_: ModularMap, space: DarbouxSpace, degree: int) -> list[int]:
+    """Which elements of the basis are not spanned by those before them and by products of an integral and a tensor."""
+    n, prime = map_.dim, map_.prime
+    integrals = cofactor_space(Sample.of(map_, [], points_needed(n, degree)), CofactorProduct((), 0), degree)
+    places = {exponent: k for k, exponent in enumerate(exponents_up_to(2 * n, degree))}
+    rows: list[list[int]] = []
+    for integral in integrals.basis:
+        if any(integral[1:]):
+            wide = [0] * len(places)
+            for exponent, c in zip(exponents_up_to(n, degree), integral, strict=True):
+                wide[places[(*exponent, *[0] * n)]] = c
+            rows += [P for v in space.basis if (P := product_of(wide, v, 2 * n, degree + 2, prime)) is not None]
+    found, dimension = [], rank(rows, prime)
+    for k, vector in enumerate(space.basis):
+        rows.append(vector)
+        if rank(rows, prime) > dimension:
+            found.append(k)
+            dimension += 1
+    return found
 
 
 def _directions(variables: Sequence[str]) -> list[str]:
@@ -373,34 +410,36 @@ def _factor(map_: ModularMap, denominator: RationalFunction | None, x: Sequence[
 
 
 def _judged(
-    laboratory: Laboratory, name: str, tensor: GivenTensor, integrals: Sequence[FoundIntegral]
+    laboratory: Laboratory, name: str, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
 ) -> FoundTensor | None:
     """The tensor with its verdicts; None where it is refuted."""
-    law = transformation_identity(laboratory.map, tensor, laboratory.eps)
-    verdict, evidence = judged(law, laboratory.seed)
+    eps = laboratory.eps
+    verdict, evidence = _verdict(laboratory, transformation_identity(laboratory.map, tensor, eps), deadline)
     if not verdict.holds:
         return None
-    jacobi, jacobi_evidence = _judged_jacobi(laboratory, tensor)
+    jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, eps), deadline)
     map_ = laboratory.maps[0]
     field = GF(map_.prime)
-    x = tuple(field.convert(c) for c in (*map_.random_point(), *map_.values))
-    P = tensor.value(field, field.convert(map_.eps), x)
+    x, at = tuple(field.convert(c) for c in (*map_.random_point(), *map_.values)), field.convert(map_.eps)
+    P = tensor.value(field, at, x)
     casimirs = []
     for one in integrals:
-        slopes = field.column(_slopes(one.function, field, (*x, field.convert(map_.eps)), tensor.dim))
+        slopes = field.column(_slopes(one.function, field, (*x, at), tensor.dim))
         is_killed = all(entry == 0 for entry in (P * slopes).entries())
-        if is_killed and _judged_brackets(laboratory, tensor, [one], None).holds:
+        if is_killed and _verdict(laboratory, _brackets(laboratory, tensor, [one], True), deadline)[0].holds:
             casimirs.append(one.name)
-    involution = _judged_brackets(laboratory, tensor, integrals, integrals) if integrals else None
-    return FoundTensor(
-        name, tensor, verdict, evidence, jacobi, jacobi_evidence,
-        rank([[int(entry) for entry in row] for row in P.tolist()], map_.prime),
-        tuple(casimirs), involution, len(integrals),
-    )  # fmt: skip
+    involution = None
+    if integrals:
+        involution = _verdict(laboratory, _brackets(laboratory, tensor, integrals, False), deadline)[0]
+    rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], map_.prime)
+    found = (verdict, evidence, jacobi, jacobi_evidence, rank_of_P, tuple(casimirs), involution, len(integrals))
+    return FoundTensor(name, tensor, *found)
 
 
-def _judged_jacobi(laboratory: Laboratory, tensor: PoissonTensor) -> tuple[Verdict, Evidence]:
-    return judged(jacobi_identity(tensor, laboratory.eps), laboratory.seed)
+def _verdict(laboratory: Laboratory, identity: Identity, deadline: float) -> tuple[Verdict, Evidence]:
+    """The verdict on an identity, which is not multiplied out in many dimensions or when the time is over."""
+    expands = laboratory.map.dim <= MAX_DIMENSION and time.monotonic() < deadline
+    return judged(identity, laboratory.seed, expands=expands)
 
 
 def _slopes(function: RationalFunction, field: Field, place: Sequence[Any], n: int) -> list[Any]:
@@ -410,35 +449,30 @@ def _slopes(function: RationalFunction, field: Field, place: Sequence[Any], n: i
     return [evaluate(a, field, place) * D - evaluate(b, field, place) * N for a, b in zip(upper, lower, strict=True)]
 
 
-def _judged_brackets(
-    laboratory: Laboratory,
-    tensor: GivenTensor,
-    integrals: Sequence[FoundIntegral],
-    others: Sequence[FoundIntegral] | None,
-) -> Verdict:
-    """Whether all brackets of two integrals vanish; without others, those with all variables: Casimirs."""
+def _brackets(
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], of_variables: bool
+) -> Identity:
+    """That all brackets of two integrals vanish or, `of_variables`, those of an integral and a variable."""
     n = tensor.dim
 
     def sides(field: Field, place: tuple[Any, ...], eps: Any) -> Sides | None:
         P = tensor.value(field, eps, place)
         if P is None:
             return None
-        at = (*place, eps)
         with field.working():
-            columns = [field.column(_slopes(one.function, field, at, n)) for one in integrals]
+            columns = [field.column(_slopes(one.function, field, (*place, eps), n)) for one in integrals]
             found: list[Any] = []
             for k, column in enumerate(columns):
                 moved = P * column
-                if others is None:
+                if of_variables:
                     found += moved.entries()
                 else:
                     found += [(columns[j].transpose() * moved)[0, 0] for j in range(k)]
         return found, [field.zero] * len(found)
 
-    subject = ("brackets", tensor.subject, [one.function for one in integrals], others is None)
+    subject = ("brackets", tensor.subject, [one.function for one in integrals], of_variables)
     has_eps = laboratory.map.has_eps or tensor.has_eps
-    identity = Identity(n + len(laboratory.symbols), sides, laboratory.eps, has_eps=has_eps, subject=subject)
-    return judged(identity, laboratory.seed)[0]
+    return Identity(n + len(laboratory.symbols), sides, laboratory.eps, has_eps=has_eps, subject=subject)
 
 
 def _pencil(tensors: Sequence[GivenTensor]) -> GivenTensor:

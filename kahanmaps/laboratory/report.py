@@ -110,6 +110,7 @@ def sections(found: Findings) -> list[tuple[str, list[Statement]]]:
     return [
         ("integrals", _integral_lines(found)),
         ("measure", _measure_lines(found)),
+        ("Poisson tensors", _poisson_lines(found)),
         ("growth", _growth_lines(found)),
         ("singularities", _singularity_lines(found)),
         ("symmetry", _symmetry_lines(found)),
@@ -174,6 +175,14 @@ def _measure_lines(found: Findings) -> list[Statement]:
     if not search.densities:
         lines.append(Statement(MEASURED if "no polynomial" in search.reason else UNDECIDED, search.reason))
     return lines
+
+
+def _poisson_lines(found: Findings) -> list[Statement]:
+    search = found.poisson
+    if search is None:
+        return []
+    lines = [Statement(str(one.verdict), f"{one.name}: {one.short_text}; {one.statement}") for one in search.tensors]
+    return [*lines, *([Statement(NOTE, search.note)] if search.note else [])]
 
 
 def _growth_lines(found: Findings) -> list[Statement]:

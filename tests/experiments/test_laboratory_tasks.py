@@ -30,6 +30,7 @@ from kahanmaps.laboratory.commuting import commuting_systems
 from kahanmaps.laboratory.cycle_laws import compare
 from kahanmaps.laboratory.cycles import cycle_census
 from kahanmaps.laboratory.degrees import degree_growth
+from kahanmaps.laboratory.poisson_tensors import find_poisson
 from kahanmaps.laboratory.reversors import find_reversor
 from kahanmaps.laboratory.singularities import singularities
 from kahanmaps.laboratory.symmetries import linear_symmetries
@@ -37,8 +38,8 @@ from kahanmaps.maps.float_ensemble import starts_in_box
 from kahanmaps.maps.float_lyapunov import lyapunov_exponents
 
 TASKS = (
-    "degrees", "find-integrals", "find-density", "find-symmetry", "find-commuting", "analyze", "singularities",
-    "cycles", "lyapunov",
+    "degrees", "find-integrals", "find-density", "find-poisson", "find-symmetry", "find-commuting", "analyze",
+    "singularities", "cycles", "lyapunov",
 )  # fmt: skip
 NEEDED: dict[str, dict[str, Any]] = {"cycles": {"prime": 31}, "lyapunov": {"eps": "1/10", "steps": 40}}
 SURVEY = Path(__file__).parents[2] / "examples" / "growth_survey.toml"
@@ -91,6 +92,7 @@ def test_the_whole_report_is_kept_if_asked_for(name):
         "degrees": lambda: degree_growth(RIVALS.system),
         "find-integrals": lambda: integrals.find_integrals(RIVALS),
         "find-density": lambda: densities.find_densities(RIVALS),
+        "find-poisson": lambda: find_poisson(RIVALS),
         "find-symmetry": lambda: linear_symmetries(RIVALS.system),
         "find-commuting": lambda: commuting_systems(RIVALS.system),
         "analyze": lambda: analyze(RIVALS),

@@ -19,8 +19,8 @@ from kahanmaps.experiments.registry import ENVIRONMENT, MEMBER, SYSTEM, task, ta
 
 LIBRARY = (
     "check-commute", "check-integrals", "check-measure", "check-poisson", "verify", "verify-universal", "family-space",
-    "orbit", "ensemble", "heights", "period", "degrees", "find-integrals", "find-density", "find-symmetry",
-    "find-commuting", "analyze", "singularities", "cycles", "lyapunov",
+    "orbit", "ensemble", "heights", "period", "degrees", "find-integrals", "find-density", "find-poisson",
+    "find-symmetry", "find-commuting", "analyze", "singularities", "cycles", "lyapunov",
 )  # fmt: skip
 DOCUMENTATION = Path(__file__).parents[2] / "docs" / "batch.md"
 

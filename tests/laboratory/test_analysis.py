@@ -28,6 +28,7 @@ PARTS = (
     "degrees",
     "integrals",
     "densities",
+    "Poisson tensors",
     "symmetries",
     "commuting systems",
     "heights",
@@ -482,3 +483,14 @@ def test_what_is_said_of_singularities(runs, expected):
     ]
     lines = report._singularity_lines(SimpleNamespace(singularities=found, file=load("euler_top")))
     assert [(str(line.status), line.text) for line in lines] == expected
+
+
+def test_poisson_tensors_are_told_in_dimensions_three_and_four():
+    found = analyze(load("euler_top"), seconds=30)
+    lines = dict(found.sections)["Poisson tensors"]
+    assert [line.status for line in lines] == ["proved"] * 3 + ["note"]
+    assert lines[0].text.startswith("P1: {x1,x3} = 2*x1^2*x2*eps^2 + x2")
+    assert found.to_json()["poisson"]["pencil"] == "proved"
+    planar = analyze(load("nahm_tetrahedral"))
+    assert planar.poisson is None
+    assert "Poisson tensors" not in dict(planar.sections)

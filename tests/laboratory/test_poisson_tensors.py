@@ -100,6 +100,19 @@ def test_invariant_bivectors_that_are_no_poisson_tensors_are_told_as_such():
     assert "the Jacobi identity fails" in found.tensors[1].statement
 
 
+def test_a_rotation_has_a_constant_and_a_lie_poisson_bracket():
+    # x' = w x x: the Cayley transform of a rotation, in SO(3)
+    found = find_poisson(system("x y z", "2*z - 3*y", "3*x - z", "y - 2*x"), 1)
+    assert brackets(found)[:2] == ["{x,y} = 3, {x,z} = -2, {y,z} = 1", "{x,y} = z, {x,z} = -y, {y,z} = x"]
+    assert [one.casimirs for one in found.tensors[:2]] == [("I1",), ("I2",)]  # w.x and |x|^2
+
+
+def test_products_of_integrals_and_tensors_are_left_out():
+    file = a_map("x y z", ["x", "y + x", "z + y"], ["x", "y - x", "z - y + x"])
+    assert brackets(find_poisson(file, 1, integrals=())) == brackets(find_poisson(file, 3, integrals=()))
+    assert "{y,z} = 1" in brackets(find_poisson(file, 1, integrals=()))  # and x times it, and x^2
+
+
 def test_the_tensor_of_the_paper_is_among_those_of_its_member():
     # Pi = J - eps^2 f'^2 J has degree 2: at eps = 0 it is J, which the two tensors span there
     file = load("paper_m2")

@@ -27,8 +27,9 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-poisson euler_top --degree 3
       kahanmaps find-poisson weierstrass --symbolic g2 --toml
 
-    A basis of all of them is told, by brackets {x_i, x_j} = P_ij; with its rank, the Jacobi identity, the Casimirs and
-    the involution of the integrals that are found. Without --eps the formulas contain eps (the time step is 2 eps).
+    They are told by brackets {x_i, x_j} = P_ij, with rank, the Jacobi identity, the Casimirs and the involution of the
+    integrals that are found; products of polynomial integrals and others are left out. Without --eps the formulas
+    contain eps (the time step is 2 eps).
 
     Exit status: 0 found, 2 wrong use, 3 none up to the degree that was tried.
     """
