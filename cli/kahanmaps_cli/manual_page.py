@@ -39,7 +39,8 @@ _WIDTH = 72
 
 def manual_page(group: click.Group, sections: dict[str, list[str]], version: str) -> str:
     """The page in the man macros of roff, whatever the terminal; `sections` are the headings and their commands."""
-    context = click.Context(group, info_name="kahanmaps", terminal_width=_WIDTH, max_content_width=_WIDTH)
+    settings = {**group.context_settings, "terminal_width": _WIDTH, "max_content_width": _WIDTH}
+    context = click.Context(group, info_name="kahanmaps", **settings)
     lines = [
         '.\\" Made by: kahanmaps manual',
         f'.TH KAHANMAPS 1 "" "kahanmaps {version}" "User Commands"',
