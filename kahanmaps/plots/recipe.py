@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 from base64 import b64decode, b64encode
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +53,9 @@ def read_recipe(path: str) -> Recipe:
     if word is None:
         raise InputError(f"{path}: found no recipe in it, expected a picture that kahanmaps wrote")
     try:
-        return Recipe(**json.loads(b64decode(word[1])))
+        recipe = Recipe(**json.loads(b64decode(word[1])))
+        if not all(isinstance(text, str) for text in astuple(recipe)):
+            raise ValueError("a part is no text")
+        return recipe
     except (ValueError, TypeError) as error:
         raise InputError(f"{path}: found a recipe that cannot be read ({error}): the picture is damaged") from error

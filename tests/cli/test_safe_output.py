@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from cli_helpers import shell, terminal
 
+from kahanmaps.plots.recipe import Recipe, read_recipe
 from kahanmaps_cli.progress import as_typed, say
 
 FREE = "T\\u001b[31m\\u009b2J\\u202e\\n<script>t</script>\\r=cmd() | `x` <img src=x onerror=y>"
@@ -149,7 +150,10 @@ def test_the_recipe_of_a_picture_of_somebody_else_moves_no_terminal(option, fold
     monkeypatch.chdir(folder)
     assert kahanmaps("plot drift", ORBIT, "-o theirs.svg -q").status == 3  # an integral drifts
     picture = Path("theirs.svg")
-    picture.write_text(picture.read_text().replace("kahanmaps plot", "kahanmaps \u202e plot").replace("x1^3", "\u202e"))
+    recipe = read_recipe("theirs.svg")
+    hostile = Recipe(recipe.command.replace("plot", "\u202e plot"), recipe.system.replace("x1^3", "\u202e"))
+    words = [one.metadata("svg")["Keywords"] for one in (recipe, hostile)]
+    picture.write_text(picture.read_text().replace(*words))
     outcome = kahanmaps("plot recipe theirs.svg", option)
     assert outcome.status == 0
     assert r"\u202e" in outcome.out

@@ -384,7 +384,9 @@ def test_a_map_whose_parts_do_not_fit_is_refused():
 
 def test_new_points_have_names_of_their_own():
     map_ = explicit_map(["x", "x_new"], [parse_rational_function(t, ["x", "x_new", "eps"]) for t in ("x_new", "x")])
-    assert str(map_) == "-x_new + x_new_ = 0\n-x + x_new_new_ = 0"
+    assert map_.written() == {"equations": ["-x_new + x_new_ = 0", "-x + x_new_new_ = 0"]}
+    assert str(map_) == "x~ = x_new\nx_new~ = x"
+    assert str(MAPS["bilinear"]).endswith(" = 0")
 
 
 def test_eps_zero_is_refused_and_a_prime_that_makes_it_zero_is_bad():
