@@ -202,6 +202,11 @@ def eps_of(file: SystemFile, options: Mapping[str, Any]) -> Any:
     return eps if file.map.has_eps else None
 
 
+def is_inline(options: Mapping[str, Any]) -> bool:
+    """Whether a system or map stands on the line itself."""
+    return any(options.get(name) for name in ("variables", "rhs", "image", "inverse"))
+
+
 def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile:
     """The system that a command line names: a path, a catalogue name, `-` for standard input, or an inline system.
 

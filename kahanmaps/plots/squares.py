@@ -16,7 +16,8 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.documents.files import SystemFile, matched
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.hidden import hidden_hamiltonian, hidden_member
-from kahanmaps.maps.kahan import Kahan, KahanMap
+from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -29,13 +30,13 @@ Lattice = tuple[tuple[Point | None, ...], ...]  # [i][j], None where a map has n
 
 @dataclass(frozen=True)
 class Pair:
-    """Two systems whose maps are compared, the second scaled where it has another step.
+    """Two maps that are compared, systems standing for theirs; the second is scaled where it has another step.
 
     `names` are short texts, `note` says how variables are matched, where that needs a word.
     """
 
-    f: QuadraticSystem
-    g: QuadraticSystem
+    f: QuadraticSystem | BirationalMap
+    g: QuadraticSystem | BirationalMap
     names: tuple[str, str]
     note: str = ""
 
@@ -100,11 +101,11 @@ def squares(
     """
     if not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
-    phi_f, phi_g = KahanMap(pair.f, eps), KahanMap(pair.g, eps)
+    phi_f, phi_g = as_map(pair.f).at(eps), as_map(pair.g).at(eps)
     x = phi_f.point(start)
     missing: list[str] = []
 
-    def orbit(phi: KahanMap, first: Point | None, told: str) -> list[Point | None]:
+    def orbit(phi: MapOver, first: Point | None, told: str) -> list[Point | None]:
         found = [first]
         for k in range(steps):
             progress(f"{told}, step {k + 1} of {steps}")
@@ -147,16 +148,19 @@ def pairs_of_member(file: SystemFile) -> tuple[Pair, Pair]:
 
 def pair_of_systems(file: SystemFile, other: SystemFile, eps: Any, eps2: Any = None) -> Pair:
     """Two systems of one dimension; with `eps2` the second has this step: it is scaled by eps2/eps."""
-    map_, note = matched(file, other)
-    g = map_.system if isinstance(map_, Kahan) else other.system  # which raises
+    g: QuadraticSystem | BirationalMap
+    g, note = matched(file, other)
     if eps2 is not None:
+        if not other.is_quadratic or not isinstance(g, Kahan):
+            raise InputError(f"found eps2 with {other.map.kind}, expected a quadratic vector field, which it scales")
+        g = g.system
         if rational(eps2) == 0:
             raise InputError("found eps2 = 0, expected another number: at eps = 0 the Kahan map is the identity")
         g = g.scaled(rational(eps2) / rational(eps))
-    return Pair(file.system, g, ("f", "g"), note)
+    return Pair(file.map, g, ("f", "g"), note)
 
 
-def _image(phi: KahanMap, point: Point | None, missing: list[str], told: str) -> Point | None:
+def _image(phi: MapOver, point: Point | None, missing: list[str], told: str) -> Point | None:
     if point is None:
         return None
     try:

@@ -15,6 +15,7 @@ from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.float_ensemble import FloatEnsemble
 from kahanmaps.maps.float_numbers import FloatArray, to_floats
+from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.orbits import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -44,7 +45,7 @@ class Trajectories:
 
 
 def ensemble_for(
-    system: QuadraticSystem,
+    given: QuadraticSystem | BirationalMap,
     eps: Any,
     starts: FloatArray,
     steps: int,
@@ -53,9 +54,9 @@ def ensemble_for(
     form: NormalForm | None = None,
 ) -> FloatEnsemble:
     """The ensemble that walks these starts (n, dim), by the kernel that is done first; eps is half the time step."""
-    work = len(starts) * steps * (1 + system.dim**3 // 8)
+    work = len(starts) * steps * (1 + given.dim**3 // 8)
     kernel = "numpy" if work < _LITTLE_WORK and steps < _FEW_STEPS else None
-    return FloatEnsemble(system, eps, starts, backward=backward, form=form, kernel=kernel)
+    return FloatEnsemble(given, eps, starts, backward=backward, form=form, kernel=kernel)
 
 
 def walked(ensemble: FloatEnsemble, steps: int, progress: Callable[[int], None] | None = None) -> Trajectories:

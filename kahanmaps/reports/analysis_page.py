@@ -55,7 +55,10 @@ def _verdict(found: Analysis) -> Section:
 
 def system_html(file: SystemFile) -> str:
     """Equations, parameters, the Hamiltonian and claims of a system."""
-    pieces = [f"<p>{equations_html(file.system, CHARACTERS, _EQUATIONS)}</p>"]
+    if file.is_quadratic:
+        pieces = [f"<p>{equations_html(file.system, CHARACTERS, _EQUATIONS)}</p>"]
+    else:
+        pieces = [f"<pre>{markup.escape(markup.shortened(str(file.map), CHARACTERS))}</pre>"]
     if file.parameters:
         values = ", ".join(f"{name} = {format_number(value)}" for name, value in file.parameters.items())
         pieces.append(f"<p>with {text(values)}</p>")

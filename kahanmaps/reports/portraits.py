@@ -11,6 +11,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.errors import counted
+from kahanmaps.maps.float_ensemble import starts_in_box
 from kahanmaps.plots.automatic_starts import automatic_starts
 from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
 from kahanmaps.plots.draw_portrait import draw_portrait
@@ -29,18 +30,22 @@ if TYPE_CHECKING:
 _EPS = fmpq(1, 20)  # where a page is for every eps
 _STEPS = 600
 _ORBITS = 3
+_MANY = 16
 _CURVE_STEPS = 300
 
 
 def portrait_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
-    """Sixteen orbits in the plane of the first two variables (in dimension 1 against the step)."""
+    """Sixteen orbits in the plane of the first two variables (in dimension 1 against the step).
+
+    They start around the fixed points of a vector field, and at random where there is none.
+    """
     at = _EPS if eps is None else rational(eps)
     remarks: list[str] = []
-    axes = file.variables[:2] if file.system.dim > 1 else ("step", file.variables[0])
+    axes = file.variables[:2] if file.dim > 1 else ("step", file.variables[0])
 
     def drawing(style: Style) -> Figure:
-        starts = automatic_starts(file.system, at)
-        found = walked(ensemble_for(file.system, at, starts, _STEPS), _STEPS)
+        starts = automatic_starts(file.system, at) if file.is_quadratic else starts_in_box(_MANY, file.dim, 2.0, 0)
+        found = walked(ensemble_for(file.map, at, starts, _STEPS), _STEPS)
         functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
         shown = portrait_of(found, functions)
         remarks.extend(
@@ -50,8 +55,10 @@ def portrait_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
             remarks.append(f"{shown.left_out} of {found.points[..., 0].size} points lie outside the window.")
         return draw_portrait(shown, style)
 
-    sentence = f"eps = {format_number(at)}, time step {format_number(2 * at)}, {_STEPS} steps in machine numbers"
-    caption = f"Orbits of the Kahan map in {' and '.join(axes)}: {sentence}."
+    step = f", time step {format_number(2 * at)}" if file.map.has_time_step else ""
+    sentence = f"eps = {format_number(at)}{step}, " if file.map.has_eps else ""
+    sentence += f"{_STEPS} steps in machine numbers"
+    caption = f"Orbits of {'the Kahan map' if file.is_quadratic else 'the map'} in {' and '.join(axes)}: {sentence}."
     return pictures.draw(
         "portrait", caption, f"Portrait of orbits in {' and '.join(axes)}, {sentence}", drawing, remarks
     )

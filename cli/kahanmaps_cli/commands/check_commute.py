@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps_cli.complete import complete_system
-from kahanmaps_cli.options import check_options, inline_options, load_system, settings_from, system_argument
+from kahanmaps_cli.options import check_options, inline_options, is_inline, load_system, settings_from, system_argument
 from kahanmaps_cli.params import ExactNumber
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
@@ -40,7 +40,7 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
     """
     from kahanmaps.checks.commute import check_commute
 
-    inline = any(options[name] for name in ("variables", "rhs", "image"))
+    inline = is_inline(options)
     if inline and system is not None and other is None:
         system, other = None, system  # the inline system is the first, the argument the second
     if system == other == "-":

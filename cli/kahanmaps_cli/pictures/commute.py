@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli.options import eps_options, inline_options, load_system, the_eps
+from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_system
 from kahanmaps_cli.params import ExactNumber, PointText
 from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
 from kahanmaps_cli.pictures.variables import two_variables
@@ -44,12 +44,12 @@ def command(system: str | None, other: str | None, **options: Any) -> int:
     Exit status: 0 done, 2 wrong use, 3 some points are missing (a map has no value there, or numbers are too long).
     """
     require_output(options)
+    from flint import fmpq
+
     from kahanmaps.plots.draw_squares import draw_squares
     from kahanmaps.plots.squares import pair_of_systems, pairs_of_member, squares
 
-    eps = the_eps(options["eps"], options["time_step"])
-    inline = options["variables"] is not None or options["rhs"]
-    if inline and system is not None and other is None:
+    if is_inline(options) and system is not None and other is None:
         system, other = None, system  # the inline system is the first, the argument the second
     if system == other == "-":
         raise click.UsageError("found - twice, but standard input holds one system only")
@@ -57,12 +57,14 @@ def command(system: str | None, other: str | None, **options: Any) -> int:
         raise click.UsageError("--eps2 needs a second system: kahanmaps plot commute SYSTEM OTHER --eps E --eps2 E2")
     with Progress(options["quiet"]) as progress:
         file = load_system(system, options)
+        second = None if other is None else load_system(other, {})
+        eps = eps_of(file if second is None or file.map.has_eps else second, options)
+        eps = fmpq(1) if eps is None else eps
         chosen = two_variables("--axes", options["axes"], file.variables)
-        if other is None:
-            second, captions = None, list[str]()
+        if second is None:
+            captions = list[str]()
             pairs = list(pairs_of_member(file))
         else:
-            second = load_system(other, {})
             captions = [f"f = {file.name}, g = {second.name}"]
             pairs = [pair_of_systems(file, second, eps, options["eps2"])]
         found = [squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]

@@ -10,6 +10,7 @@ import click
 from kahanmaps_cli.options import (
     eps_options,
     inline_options,
+    is_inline,
     load_system,
     seconds_option,
     seed_option,
@@ -63,12 +64,12 @@ def command(systems: tuple[str, ...], **options: Any) -> int:
     for path in options["records"]:
         _from_record(path, growths)
     eps = the_eps(options["eps"], options["time_step"], required=False)
-    inline = bool(options["variables"] or options["rhs"])
+    inline = is_inline(options)
     asked: list[str | None] = list(systems)
     if inline or not (asked or growths):
         asked.append(None)
     if inline and len(asked) > 1:
-        raise click.UsageError("give SYSTEMs or an inline one (--vars and --rhs), not both")
+        raise click.UsageError("give SYSTEMs or an inline one, not both")
     if len(asked) > 1 and options["parameters"]:
         raise click.UsageError("-p is for one system: write several as files, or draw --from records")
     files = [load_system(name, options) for name in asked]
@@ -90,7 +91,7 @@ def _measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Pro
     from kahanmaps.laboratory.degrees import degree_growth
 
     return degree_growth(
-        file.system,
+        file.map,
         eps,
         seconds=options["seconds"],
         max_terms=options["terms"],

@@ -9,7 +9,9 @@ import click
 
 from kahanmaps_cli.options import (
     backward_option,
+    eps_of,
     eps_options,
+    is_inline,
     load_system,
     random_starts_options,
     system_options,
@@ -140,7 +142,7 @@ def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
     from kahanmaps.errors import InputError, printable
 
     file = None
-    if system is not None or options["variables"] is not None or options["rhs"]:
+    if system is not None or is_inline(options):
         file = load_system(system, options)
     elif options["parameters"]:
         raise click.UsageError("-p sets a parameter of the system: name the SYSTEM as well")
@@ -156,30 +158,31 @@ def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
 
 
 def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
+    from flint import fmpq
+
     from kahanmaps.maps.float_numbers import to_floats
-    from kahanmaps.maps.kahan import KahanMap
     from kahanmaps_cli.ensemble_starts import drawn, read_starts
 
-    eps = the_eps(options["eps"], options["time_step"])
     file = load_system(system, options)
-    KahanMap(file.system, eps)  # the demands of all commands on eps, in the same words
+    eps = eps_of(file, options)
+    file.map.at(fmpq(1) if eps is None else eps)  # the demands of all commands on eps, in the same words
     starts: Any = None
     if options["start"]:
-        wrong = next((x for x in options["start"] if len(x) != file.system.dim), None)
+        wrong = next((x for x in options["start"] if len(x) != file.dim), None)
         if wrong is not None:
             raise click.UsageError(
-                f"found a start with {len(wrong)} coordinates, expected {file.system.dim}: {', '.join(file.variables)}"
+                f"found a start with {len(wrong)} coordinates, expected {file.dim}: {', '.join(file.variables)}"
             )
-        starts = to_floats([entry for x in options["start"] for entry in x]).reshape(-1, file.system.dim)
+        starts = to_floats([entry for x in options["start"] for entry in x]).reshape(-1, file.dim)
     elif options["starts"] is not None:
         starts = read_starts(options["starts"], file.variables, None)
     elif options["count"] is not None:
         box = 1 if options["box"] is None else options["box"]
-        starts = drawn(options["count"], file.system.dim, box, options["seed"] or 0, None)
+        starts = drawn(options["count"], file.dim, box, options["seed"] or 0, None)
     steps = options["steps"]
     if steps is None:
         # in one variable the map is a fraction: all there is to be seen happens at the beginning, drawn over the step
-        few = _STEPS if file.system.dim > 1 else _STEPS_ON_A_LINE
+        few = _STEPS if file.dim > 1 else _STEPS_ON_A_LINE
         steps = _DENSITY_STEPS if options["density"] else few
     return Orbits.to_walk(file, eps, starts, steps, backward=options["backward"], axes=options["axes"])
 

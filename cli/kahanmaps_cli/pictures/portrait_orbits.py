@@ -58,6 +58,9 @@ class Orbits:
         cls, file: SystemFile, eps: Any, starts: Any, steps: int, *, backward: bool, axes: str | None
     ) -> Orbits:
         """Orbits that are to be walked, from `starts` or where those are None from chosen ones."""
+        from flint import fmpq
+
+        from kahanmaps.errors import InputError
         from kahanmaps.family.structure import NoStructure
         from kahanmaps.plots.automatic_starts import automatic_starts
         from kahanmaps.plots.trajectories import ensemble_for
@@ -67,11 +70,16 @@ class Orbits:
         if chosen:
             named = [text.strip() for text in (axes or "").split(",")]
             plane = [file.variables.index(text) for text in named if text in file.variables]
-            plane = [*plane, *(k for k in range(file.system.dim) if k not in plane)][:2]
+            plane = [*plane, *(k for k in range(file.dim) if k not in plane)][:2]
+            if not file.is_quadratic:
+                raise InputError(
+                    f"found no starts for {file.map.kind}, expected --start X, --starts FILE or --random N: they are "
+                    "chosen around the fixed points of a vector field only"
+                )
             starts = automatic_starts(file.system, eps, plane, backward=backward)
         structure = structure_for(file, None)
         form = None if isinstance(structure, NoStructure) else structure.form
-        ensemble = ensemble_for(file.system, eps, starts, steps, backward=backward, form=form)
+        ensemble = ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
         return cls(
             file.name,
             file.variables,
@@ -234,7 +242,9 @@ class Orbits:
     def told(self) -> Iterator[str]:
         """What is drawn, and what became of it."""
         orbits = counted(len(self.starts), "orbit")
-        eps = "" if self.eps is None else f", eps = {self.eps} (time step 2 eps = {2 * self.eps})"
+        eps = "" if self.eps is None else f", eps = {self.eps}"
+        if self.eps is not None and (self.file is None or self.file.map.has_time_step):
+            eps += f" (time step 2 eps = {2 * self.eps})"
         if self.stored is not None:
             yield f"{self.name}: {orbits} of {counted(len(self.stored.points), 'point')}{eps}"
         else:
