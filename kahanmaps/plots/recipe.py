@@ -17,7 +17,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.version import __version__
 
 _MAX_BYTES = 1 << 28
-_WORD = re.compile(rb"kahanmaps:([A-Za-z0-9+/=]+)[^A-Za-z0-9+/=]")
+_WORD = re.compile(rb"kahanmaps:([A-Za-z0-9+/=]+)\.")
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Recipe:
 
     def metadata(self, kind: str) -> dict[str, Any]:
         """The recipe in the words of matplotlib's metadata for pdf, svg or png; no dates."""
-        word = "kahanmaps:" + b64encode(json.dumps(asdict(self)).encode()).decode() if self.command else ""
+        word = f"kahanmaps:{b64encode(json.dumps(asdict(self)).encode()).decode()}." if self.command else ""
         keys = {
             "pdf": ("Creator", "Subject", "Keywords", "CreationDate"),
             "svg": ("Creator", "Description", "Keywords", "Date"),

@@ -34,6 +34,15 @@ def test_the_recipe_comes_out_as_it_went_in(tmp_path, kind, recipe):
     assert read_recipe(path) == recipe
 
 
+@pytest.mark.parametrize("length", range(60))
+def test_what_stands_behind_the_recipe_is_no_part_of_it(tmp_path, length):
+    """In PNG a checksum follows, which may begin with any letters."""
+    recipe = Recipe("kahanmaps plot " + "x" * length)
+    path = tmp_path / "x.png"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + recipe.metadata("png")["Comment"].encode() + b"Ab1/")
+    assert read_recipe(str(path)) == recipe
+
+
 @pytest.mark.parametrize("kind", FORMATS)
 def test_a_picture_of_somebody_else_has_no_recipe(tmp_path, kind):
     path = tmp_path / f"picture.{kind}"
@@ -59,6 +68,6 @@ def test_a_picture_cut_short_is_refused(tmp_path, cut):
 @pytest.mark.parametrize("word", ["AAAA", "AAA", "eyJhIjogMX0="])
 def test_a_damaged_recipe_is_told(tmp_path, word):
     path = tmp_path / "x.pdf"
-    path.write_bytes(b"%PDF-1.4 (kahanmaps:" + word.encode() + b")")
+    path.write_bytes(b"%PDF-1.4 (kahanmaps:" + word.encode() + b".)")
     with pytest.raises(InputError, match="cannot be read"):
         read_recipe(str(path))
