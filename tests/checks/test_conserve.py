@@ -31,7 +31,7 @@ from check_helpers import (
     verify_witness,
 )
 from flint import fmpq, fmpq_mat, fmpq_poly
-from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA
+from helpers import EULER_TOP, LORENZ, LOTKA_VOLTERRA, THOROUGH
 from hypothesis import given, settings
 
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
@@ -249,7 +249,10 @@ FAMILY = {
     "m=3, eigenvalue twice": (draw_with_eigenvalues([1, 1, 2], seed=3), 2),
     "m=4": (draw_with_eigenvalues([1, -2, 3, 5], seed=3), 8),
 }
-over_family = pytest.mark.parametrize(("member", "classes"), FAMILY.values(), ids=FAMILY.keys())
+over_family = pytest.mark.parametrize(
+    ("member", "classes"),
+    [pytest.param(*FAMILY[name], id=name, marks=THOROUGH if name == "m=4" else ()) for name in FAMILY],
+)
 
 
 @over_family

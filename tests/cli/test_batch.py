@@ -21,6 +21,7 @@ from pathlib import Path
 
 import pytest
 from cli_helpers import COMMAND, Outcome, environment, shell, terminal
+from helpers import quick
 
 import kahanmaps as km
 
@@ -436,7 +437,7 @@ def _stored() -> int:
         return 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", quick([signal.SIGINT, signal.SIGTERM], [signal.SIGINT]))
 def test_ctrl_c_ends_the_tasks_in_flight_and_says_how_to_continue(batch, start, number: signal.Signals):
     Path("study.toml").write_text(PAUSE)
     process = start("study.toml", "-j", "2")
@@ -507,7 +508,7 @@ def test_a_database_that_is_taken_away_ends_the_batch_with_status_3_and_a_senten
     assert batch("run", PAUSE, "-q").status == 0  # what had been done is still there
 
 
-@pytest.mark.parametrize("blocks", [0, 1, 2, 40])
+@pytest.mark.parametrize("blocks", quick([0, 1, 2, 40], [0, 40]))
 def test_a_full_disk_ends_a_batch_with_status_3_and_what_was_stored_before(batch, tmp_path: Path, blocks: int):
     """What is planned does not fit, or the file itself, or its lock; ulimit counts in units of 1024 bytes."""
     Path("study.toml").write_text(SPACE.replace('"0..2"', '"0..999"'))
@@ -557,6 +558,7 @@ def test_an_empty_batch_database_has_an_empty_status(batch, kahanmaps: Callable[
     assert batch("status --db empty.db").rows[1][:4] == ["space", "6", "0", "6"]
 
 
+@pytest.mark.slow
 def test_the_documented_shell_examples_run(tmp_path: Path):
     (tmp_path / "study.toml").write_text(SPACE)
     script = """

@@ -20,6 +20,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from helpers import quick
 
 from kahanmaps.errors import InputError
 from kahanmaps.experiments import cluster
@@ -492,7 +493,7 @@ def test_words_about_missing_workers_come_ever_more_rarely_and_from_the_start_ag
     workers.close()
 
 
-@pytest.mark.parametrize("is_busy", [True, False])
+@pytest.mark.parametrize("is_busy", quick([True, False], [True]))
 def test_a_scheduler_that_is_killed_is_told_at_once_and_holds_nobody_up(own, is_busy):
     own.worker(nanny=False)
     workers = own.workers()

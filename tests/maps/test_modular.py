@@ -11,7 +11,7 @@ import random
 import numpy as np
 import pytest
 from flint import fmpq_poly
-from helpers import EULER_TOP, FORCED_PLANE, HENON_HEILES, LORENZ, LOTKA_VOLTERRA
+from helpers import EULER_TOP, FORCED_PLANE, HENON_HEILES, LORENZ, LOTKA_VOLTERRA, quick
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.errors import BadPrime, InputError
@@ -66,7 +66,10 @@ def random_starts(rng, prime, dim, count):
 
 
 @over_kernels
-@pytest.mark.parametrize("prime", [3, 5, 7, 31, 101, 65_537, 2**31 - 1, 2**31 + 11, 2**60 + 33, MERSENNE])
+@pytest.mark.parametrize(
+    "prime",
+    quick([3, 5, 7, 31, 101, 65_537, 2**31 - 1, 2**31 + 11, 2**60 + 33, MERSENNE], [3, 31, 2**31 + 11, MERSENNE]),
+)
 @pytest.mark.parametrize("name", MEMBERS)
 def test_orbits_of_members_are_the_exact_ones_and_end_where_those_end(name, prime, kernel):
     system, form, rng = MEMBERS[name].chosen.system, FORMS[name], random.Random(prime)

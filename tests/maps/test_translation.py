@@ -189,8 +189,10 @@ def test_over_a_number_field_it_is_the_point_that_steps_lead_to(chi):
             assert same_point(found(block, start, n), points[n])
 
 
-@pytest.mark.parametrize("field", [RR(200), CC(200)], ids=repr)
-@pytest.mark.parametrize("name", ["three real roots, irrational", "one real root, irrational", "one rational root"])
+@pytest.mark.parametrize(
+    ("field", "name"),
+    [(RR(200), "three real roots, irrational"), (CC(200), "one real root, irrational"), (RR(200), "one rational root")],
+)
 def test_balls_enclose_the_exact_point_and_stay_narrow(name, field):
     block, start = rational(name)
     expected = by_gcds(integer_block(*STARTS[name]), 120)

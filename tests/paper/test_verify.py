@@ -33,7 +33,13 @@ from kahanmaps.paper.registry import Kind, claims
 from kahanmaps.paper.verify import verify, verify_universal
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
-SLOW = {*LARGE_SPECTRA, *(name for name in SPECTRA if name.startswith("m=4")), "m=3, partly split", "m=3, complex"}
+SLOW = {
+    *LARGE_SPECTRA,
+    *(name for name in SPECTRA if name.startswith("m=4")),
+    "m=3, partly split",
+    "m=3, complex",
+    "m=3, irreducible",
+}
 over_members = pytest.mark.parametrize(
     "name",
     [
