@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import io
 import json
 import os
 import pty
@@ -10,10 +11,16 @@ import struct
 import subprocess
 import sys
 import termios
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from threading import Thread
 from typing import Any
+from unittest.mock import patch
+
+from kahanmaps_cli.main import main
 
 COMMAND = [sys.executable, "-m", "kahanmaps_cli.main"]
 
@@ -65,21 +72,35 @@ def shell(script: str, folder: Path, stdin: bytes = b"", **more: str) -> Outcome
 
 
 def terminal(*arguments: str, columns: int = 80, **more: str) -> Outcome:
-    """Run a command with a terminal of that width as its standard output; standard error is not one."""
+    """Run a command, in this process, with a terminal of that width as its standard output, not standard error."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-    env = environment(TERM="xterm-256color", **more)
-    process = subprocess.Popen([*COMMAND, *arguments], stdin=theirs, stdout=theirs, stderr=subprocess.PIPE, env=env)
-    os.close(theirs)
-    pieces = []
-    while True:
-        try:
-            piece = os.read(ours, 65536)
-        except OSError:  # what Linux says when the other end is closed
-            break
-        if not piece:
-            break
-        pieces.append(piece)
-    os.close(ours)
-    err = process.communicate()[1]
-    return Outcome(process.returncode, b"".join(pieces).decode().replace("\r\n", "\n"), err.decode())
+    pieces: list[bytes] = []
+    reader = Thread(target=lambda: pieces.extend(until_closed(ours)))
+    reader.start()
+    err = io.TextIOWrapper(io.BytesIO(), "utf-8")
+    kept = [os.dup(number) for number in (0, 1)]
+    try:
+        for number in (0, 1):  # the size of a terminal is asked of the descriptor
+            os.dup2(theirs, number)
+        with (
+            open(theirs, "w", encoding="utf-8") as out,
+            patch.dict(os.environ, environment(TERM="xterm-256color", **more), clear=True),
+            patch.multiple(sys, stdout=out, stderr=err),
+        ):
+            status = main(list(arguments))
+    finally:
+        for number, stream in enumerate(kept):
+            os.dup2(stream, number)
+            os.close(stream)
+        reader.join()
+        os.close(ours)
+    err.flush()
+    return Outcome(status, b"".join(pieces).decode().replace("\r\n", "\n"), err.buffer.getvalue().decode())
+
+
+def until_closed(terminal: int) -> Iterator[bytes]:
+    """What is written to the other end of a terminal, piece by piece."""
+    with suppress(OSError):  # what Linux says when the other end is closed
+        while piece := os.read(terminal, 65536):
+            yield piece

@@ -36,7 +36,7 @@ PAUSE = """
 [experiments.pause]
 task = "pause"
 options = { steps = 30 }
-axes = { seed = "0..199" }
+axes = { seed = "0..99" }
 """
 FAULT = """
 [experiments.fault]
@@ -132,7 +132,7 @@ def test_the_command_that_continues_is_about_the_same_experiments(batch):
 
 
 def test_refuted_claims_are_results_like_others(batch):
-    done = batch("run", PAUSE.replace("199", "5").replace("30", "1"), "-q")
+    done = batch("run", PAUSE.replace("0..99", "0..5").replace("30", "1"), "-q")
     assert done.status == 0
     assert done.rows[0][4:6] == ["proved", "refuted"]
     assert done.rows[1][4:6] == ["4", "2"]
@@ -447,8 +447,8 @@ def test_ctrl_c_ends_the_tasks_in_flight_and_says_how_to_continue(batch, start, 
     assert "interrupted: " in err
     assert "to continue: kahanmaps batch run study.toml --db study.db" in err
     row = out.splitlines()[1].split("\t")
-    assert int(row[1]) == 200
-    assert 0 < int(row[2]) < 200
+    assert int(row[1]) == 100
+    assert 0 < int(row[2]) < 100
     assert batch("run", PAUSE, "-q").status == 0
 
 
@@ -479,7 +479,7 @@ def test_the_end_of_a_run_says_how_many_tasks_were_lost_and_how_to_continue(batc
 
 
 def test_a_second_ctrl_c_is_immediate(batch):
-    Path("study.toml").write_text(PAUSE.replace("steps = 30", "steps = 60000").replace('"0..199"', '"0..3"'))
+    Path("study.toml").write_text(PAUSE.replace("steps = 30", "steps = 60000").replace('"0..99"', '"0..3"'))
     process = subprocess.Popen(
         [*COMMAND, "batch", "run", "study.toml", "-j", "2"], stderr=subprocess.PIPE, text=True, env=environment()
     )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import pty
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
-from cli_helpers import shell, terminal
+from cli_helpers import COMMAND, environment, shell, terminal, until_closed
 
 import kahanmaps_cli
 from kahanmaps_cli.terminal import COLOURS
@@ -79,6 +82,20 @@ def test_a_terminal_gets_colours():
     out = terminal(*CHECK.split()).out
     assert GREEN in out
     assert RED in out
+
+
+def test_a_process_of_its_own_says_to_a_terminal_what_the_tests_of_terminals_see():
+    ours, theirs = pty.openpty()
+    env = environment(TERM="xterm-256color", COLUMNS="80")
+    words = [*COMMAND, "check-integrals", "euler_top"]
+    with subprocess.Popen(words, stdin=theirs, stdout=theirs, stderr=subprocess.PIPE, env=env) as process:
+        os.close(theirs)
+        said = b"".join(until_closed(ours)).decode().replace("\r\n", "\n")
+        assert process.stderr is not None
+        assert process.stderr.read() == b""
+    os.close(ours)
+    assert (process.returncode, said) == (0, terminal("check-integrals", "euler_top").out)
+    assert GREEN in said
 
 
 def test_a_dumb_terminal_gets_none(kahanmaps, monkeypatch):
