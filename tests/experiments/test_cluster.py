@@ -445,7 +445,7 @@ def test_workers_may_come_later_and_are_waited_for_aloud(own, monkeypatch):
     try:
         (job,) = jobs_of(1)
         workers.submit(job)
-        assert workers.wait(0.8) == []
+        assert workers.wait(1.5) == []
         assert said == [f"waiting for workers: the scheduler at {own.file} has none"]
         own.worker(threads=3, nanny=False)
         assert len(done(workers, [])) == 1
