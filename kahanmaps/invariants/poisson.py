@@ -184,9 +184,8 @@ class GivenTensor(PoissonTensor):
             place = (*point, field.convert(eps))
 
             def slope(parts: Sequence[Any]) -> Any:
-                return sum(
-                    (v * evaluate(part, field, place) for v, part in zip(direction, parts, strict=False)), field.zero
-                )
+                terms = [v * evaluate(P, field, place) for v, P in zip(direction, parts, strict=False) if len(P)]
+                return sum(terms[1:], terms[0]) if terms else field.zero
 
             above = {}
             for pair, entry in self._above.items():

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations
 from math import comb
@@ -50,8 +50,10 @@ from kahanmaps.laboratory.modular_points import (
 )
 
 _MAX_UNKNOWNS = 2000
+_MOST_LOGARITHMIC = 16  # the largest dimension in which all monomials of degree 4 in x and d are listed
 _SPARE = 8
 _SHOWN = 2000  # characters of the brackets of one tensor
+_MOST_INTEGRALS = 12  # of these all subsets are tried
 _LARGEST_PENCIL = 8  # so many tensors whose combinations are put to the Jacobi identity
 
 Exponents = tuple[int, ...]
@@ -61,8 +63,9 @@ Exponents = tuple[int, ...]
 class FoundTensor:
     """A tensor that the map preserves, with the verdict on that, and on the Jacobi identity (`jacobi`).
 
-    `rank` is that at random points. `casimirs` and `involution` are about the integrals that are known: the names of
-    those whose gradient the tensor kills, and the verdict on all of them being in involution, None without integrals.
+    `rank` is that at random points. Of the integrals that are known, `casimirs` names those whose gradient the tensor
+    kills, and `in_involution` as many as there are in involution with each other, `involution` being the verdict on
+    that, None without any.
     """
 
     name: str
@@ -73,8 +76,8 @@ class FoundTensor:
     jacobi_evidence: Evidence
     rank: int
     casimirs: tuple[str, ...] = ()
+    in_involution: tuple[str, ...] = ()
     involution: Verdict | None = None
-    integrals: int = 0
 
     @property
     def text(self) -> str:
@@ -90,8 +93,8 @@ class FoundTensor:
 
     @property
     def is_liouville_integrable(self) -> bool:
-        """Whether the known integrals are in involution and as many as the theorem of Liouville asks for."""
-        enough = self.integrals >= self.tensor.dim - self.rank // 2
+        """Whether as many integrals are known to be in involution as the theorem of Liouville asks for."""
+        enough = len(self.in_involution) >= self.tensor.dim - self.rank // 2
         return enough and self.involution is not None and bool(self.involution.holds) and bool(self.jacobi.holds)
 
     @property
@@ -101,15 +104,14 @@ class FoundTensor:
         if self.jacobi.holds:
             parts.append(f"a Poisson tensor ({self.jacobi})")
         else:
-            parts.append("not a Poisson tensor: the Jacobi identity fails")
+            parts.append("no Poisson tensor: the Jacobi identity fails")
         if self.casimirs:
             parts.append(f"{'a Casimir' if len(self.casimirs) == 1 else 'Casimirs'}: {', '.join(self.casimirs)}")
-        if self.involution is not None and self.integrals > 1:
-            said = f"in involution ({self.involution})" if self.involution.holds else "not in involution"
-            parts.append(f"the {self.integrals} integrals that are known are {said}")
+        if self.involution is not None and self.involution.holds and len(self.in_involution) > 1:
+            parts.append(f"{', '.join(self.in_involution)} in involution ({self.involution})")
         if self.is_liouville_integrable:
             parts.append("Liouville integrable")
-        return ", ".join(parts)
+        return "; ".join(parts)
 
     @property
     def latex(self) -> str:
@@ -128,7 +130,7 @@ class FoundTensor:
             "latex": self.latex,
             **attributes(self, "rank", "verdict", "evidence"),
             "jacobi": {"verdict": str(self.jacobi), "evidence": self.jacobi_evidence.to_json()},
-            **attributes(self, "casimirs", "involution"),
+            **attributes(self, "casimirs", "in_involution", "involution"),
             "liouville_integrable": self.is_liouville_integrable,
         }
 
@@ -227,28 +229,34 @@ def find_poisson(
         degree -= 1
     found: list[FoundTensor] = []
     pencil, reason = None, laboratory.defect
+    cut = f"degrees above {degree} were not tried" if degree < asked else ""
     if pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree, reason = -1, f"a tensor in dimension {dim} has too many entries"
     if not reason:
         progress(f"tensors of degree up to {degree}")
         forms, reason = _tensors(laboratory, degree, denominator, deadline)
-        named = [(f"P{k}" if len(forms) > 1 else "P", tensor) for k, tensor in enumerate(forms, 1)]
-        if named and integrals is None:
+        if not forms and degree < 2 <= asked and dim <= _MOST_LOGARITHMIC and denominator is None:
+            cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
+            forms, _ = _tensors(laboratory, 2, None, deadline, log_canonical(dim))
+        if forms and integrals is None:
             progress("integrals, for their brackets")
             integrals = _integrals(laboratory, symbols, deadline, seed)
-        for name, tensor in named:
-            progress(f"verifying {name}")
-            one = _judged(laboratory, name, tensor, integrals or (), deadline)
+        for k, tensor in enumerate(forms, 1):
+            progress(f"verifying tensor {k} of {len(forms)}")
+            one = _judged(laboratory, tensor, integrals or (), deadline)
             if one is None:
                 reason = "a tensor that was found modulo primes did not pass as an identity"
             else:
                 found.append(one)
+        # Poisson tensors first, those of a high rank before others.
+        found.sort(key=lambda one: (not one.jacobi.holds, -one.rank))
+        found = [replace(one, name=f"P{k}" if len(found) > 1 else "P") for k, one in enumerate(found, 1)]
         if 1 < len(found) <= _LARGEST_PENCIL and all(one.jacobi.holds for one in found):
             identity = jacobi_identity(_pencil([one.tensor for one in found]), laboratory.eps)
             pencil = _verdict(laboratory, identity, deadline)[0]
-    if degree < asked:
-        cut = f"degrees above {degree} were not tried: such tensors have too many coefficients"
-        reason = f"{reason}; {cut}" if reason else cut
+    if cut:
+        cut = f"{cut}: such tensors have too many coefficients"
+        reason = f"{reason}; {cut}" if reason and not found else cut
     return PoissonSearch(
         file, laboratory.symbols, laboratory.eps, tuple(found), tuple(integrals or ()), degree, denominator, pencil,
         reason, laboratory.primes, seed,
@@ -265,11 +273,15 @@ def _integrals(laboratory: Laboratory, symbols: Sequence[str], deadline: float, 
 
 
 def _tensors(
-    laboratory: Laboratory, degree: int, denominator: RationalFunction | None, deadline: float
+    laboratory: Laboratory,
+    degree: int,
+    denominator: RationalFunction | None,
+    deadline: float,
+    monomials: frozenset[Exponents] | None = None,
 ) -> tuple[list[GivenTensor], str]:
-    """A basis of the tensors over the denominator in closed form, and a reason where there is none."""
+    """A basis of the tensors over the denominator in closed form, of these monomials, or a reason why there is none."""
     try:
-        model, other = (tensor_space(map_, degree, denominator) for map_ in laboratory.maps)
+        model, other = (tensor_space(map_, degree, denominator, monomials) for map_ in laboratory.maps)
     except NoPoint as error:
         return [], str(error)
     if not model.basis:
@@ -291,6 +303,12 @@ def _tensors(
         return [], f"there is a tensor of degree {degree} modulo primes, but no closed form: {forms.reason}"
     shown = [forms.bases[0][k] for k in _not_multiples(laboratory.maps[0], model, degree)]
     return [_tensor_of(P, len(variables), laboratory.map.names, denominator) for P in shown], ""
+
+
+def log_canonical(dim: int) -> frozenset[Exponents]:
+    """The monomials x_i x_j d_i d_j, of which brackets {x_i, x_j} = c_ij x_i x_j consist."""
+    pairs = (tuple(int(k in pair) for k in range(dim)) for pair in combinations(range(dim), 2))
+    return frozenset((*pair, *pair) for pair in pairs)
 
 
 def _not_multiples(map_: ModularMap, space: DarbouxSpace, degree: int) -> list[int]:
@@ -410,11 +428,13 @@ def _factor(map_: ModularMap, denominator: RationalFunction | None, x: Sequence[
 
 
 def _judged(
-    laboratory: Laboratory, name: str, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
+    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], deadline: float
 ) -> FoundTensor | None:
     """The tensor with its verdicts; None where it is refuted."""
     eps = laboratory.eps
-    verdict, evidence = _verdict(laboratory, transformation_identity(laboratory.map, tensor, eps), deadline)
+    law = transformation_identity(laboratory.map, tensor, eps)
+    # In many dimensions the law is too long to be multiplied out: nothing is spent on it.
+    verdict, evidence = _verdict(laboratory, law, deadline if tensor.dim <= MAX_DIMENSION else 0.0)
     if not verdict.holds:
         return None
     jacobi, jacobi_evidence = _verdict(laboratory, jacobi_identity(tensor, eps), deadline)
@@ -422,24 +442,37 @@ def _judged(
     field = GF(map_.prime)
     x, at = tuple(field.convert(c) for c in (*map_.random_point(), *map_.values)), field.convert(map_.eps)
     P = tensor.value(field, at, x)
+    rows = [_slopes(one.function, field, (*x, at), tensor.dim) for one in integrals]
     casimirs = []
-    for one in integrals:
-        slopes = field.column(_slopes(one.function, field, (*x, at), tensor.dim))
-        is_killed = all(entry == 0 for entry in (P * slopes).entries())
+    for one, row in zip(integrals, rows, strict=True):
+        is_killed = all(entry == 0 for entry in (P * field.column(row)).entries())
         if is_killed and _verdict(laboratory, _brackets(laboratory, tensor, [one], True), deadline)[0].holds:
             casimirs.append(one.name)
+    chosen = [integrals[k] for k in _in_involution(field, P, rows)]
     involution = None
-    if integrals:
-        involution = _verdict(laboratory, _brackets(laboratory, tensor, integrals, False), deadline)[0]
+    if chosen:
+        involution = _verdict(laboratory, _brackets(laboratory, tensor, chosen, False), deadline)[0]
     rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], map_.prime)
-    found = (verdict, evidence, jacobi, jacobi_evidence, rank_of_P, tuple(casimirs), involution, len(integrals))
-    return FoundTensor(name, tensor, *found)
+    names = tuple(one.name for one in chosen)
+    found = (verdict, evidence, jacobi, jacobi_evidence, rank_of_P, tuple(casimirs), names, involution)
+    return FoundTensor("P", tensor, *found)
+
+
+def _in_involution(field: Field, P: Any, rows: Sequence[Sequence[Any]]) -> tuple[int, ...]:
+    """The most of the gradients `rows` whose brackets with each other are 0 at the point, the first such choice."""
+    moved = [(P * field.column(row)).entries() for row in rows]
+    vanish = [[sum((a * b for a, b in zip(row, v, strict=True)), field.zero) == 0 for v in moved] for row in rows]
+    most = range(min(len(rows), _MOST_INTEGRALS))
+    for size in range(len(most), 0, -1):
+        for choice in combinations(most, size):
+            if all(vanish[i][j] for i, j in combinations(choice, 2)):
+                return choice
+    return ()
 
 
 def _verdict(laboratory: Laboratory, identity: Identity, deadline: float) -> tuple[Verdict, Evidence]:
-    """The verdict on an identity, which is not multiplied out in many dimensions or when the time is over."""
-    expands = laboratory.map.dim <= MAX_DIMENSION and time.monotonic() < deadline
-    return judged(identity, laboratory.seed, expands=expands)
+    """The verdict on an identity, which is not multiplied out when the time is over."""
+    return judged(identity, laboratory.seed, expands=time.monotonic() < deadline)
 
 
 def _slopes(function: RationalFunction, field: Field, place: Sequence[Any], n: int) -> list[Any]:

@@ -15,7 +15,7 @@ def test_tensors_with_what_is_known_of_them(kahanmaps):
     lines = outcome.out.splitlines()
     assert lines[0] == "find-poisson: inline, every eps (the time step is 2 eps)"
     [law] = [k for k, line in enumerate(lines) if line.endswith("{x,y} = x*y, {x,z} = x*z, {y,z} = y*z")]
-    assert lines[law + 1].startswith("\trank 2, a Poisson tensor (proved)")
+    assert lines[law + 1].startswith("\trank 2; a Poisson tensor (proved)")
 
 
 @pytest.mark.parametrize("options", ["", "--eps 1/3", "--degree 3 --denominator x"])
