@@ -25,7 +25,9 @@ def convert(
     symbols: Sequence[str] = (),
     command: str = "",
 ) -> str:
-    """A system, its Kahan map and what is known of it as a file that another program runs as it stands, exactly.
+    """A map and what is known of it as a file that another program runs as it stands, exactly.
+
+    A system stands for its Kahan map.
 
     Args:
         file: the system; its parameters are written as the numbers that the file gives.
@@ -65,7 +67,8 @@ def convert(
 def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
     """The parts in the order of `PARTS`. Raises InputError for one that is unknown or cannot be written."""
     if what is None:
-        return ["system", "map", *(part for part in ("integrals", "density") if part not in formulas.missing)]
+        first = ["system", "map"] if formulas.rhs else ["map"]
+        return [*first, *(part for part in ("integrals", "density") if part not in formulas.missing)]
     if isinstance(what, str):
         raise InputError(f"found the text {what[:40]!r}, expected a list of parts such as ['system', 'map']")
     asked = list(what)
@@ -74,6 +77,9 @@ def _parts(what: Iterable[str] | None, formulas: Formulas) -> list[str]:
             raise InputError(f"found the part {str(part)[:40]!r}, expected one of {', '.join(PARTS)}")
     if not asked:
         raise InputError(f"found no part, expected some of {', '.join(PARTS)}")
+    if not formulas.rhs and (fields := [part for part in ("system", "jacobian") if part in asked]):
+        expected = "map, map-formulas, inverse, integrals or density"
+        raise InputError(f"found the part {fields[0]} of {formulas.map.kind}, expected {expected}")
     for part in formulas.missing:
         if part in asked:
             raise InputError(formulas.missing[part])

@@ -16,8 +16,11 @@ from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.documents.symbols import with_symbols
+from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
+from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
+from kahanmaps.maps.inverse import inverse_rows
+from kahanmaps.maps.kahan import Kahan
 
 # The closed form of the map, all components together, before common factors are removed.
 MAX_TERMS = 4_000
@@ -28,12 +31,12 @@ MAX_DIMENSION_OF_FORMULAS = 8
 class Formulas:
     """The formulas of a system file, its parameters numbers or, those in `symbols`, symbols.
 
-    `names` are the variables, then the symbols; `rhs` and `H` are in these names, all else in these names and eps.
+    `names` are the variables, then the symbols; `rhs` and `H` are in these names, all else in these names and eps. Of a
+    map that is not Kahan's there is no `rhs`.
     """
 
     file: SystemFile
-    variables: tuple[str, ...]
-    symbols: tuple[str, ...]
+    map: BirationalMap
     rhs: tuple[fmpq_mpoly, ...]
     integrals: Mapping[str, RationalFunction]
     density: RationalFunction | None
@@ -43,11 +46,12 @@ class Formulas:
     def of(cls, file: SystemFile, kept: Sequence[str] = ()) -> Formulas:
         """The formulas of a file; the parameters `kept` are left as symbols. Raises InputError where that cannot be."""
         hamiltonian = file.hamiltonian
+        map_ = map_with_symbols(file, kept)
+        rhs = map_.system.rhs if file.is_quadratic and isinstance(map_, Kahan) else ()
         if not kept:
             H = None if hamiltonian is None else hamiltonian.H
-            return cls(file, file.variables, (), file.system.rhs, file.integrals, file.density, H)
-        parametric = with_symbols(file, kept)
-        symbols, names = parametric.symbols, (*parametric.variables, *parametric.symbols)
+            return cls(file, map_, rhs, file.integrals, file.density, H)
+        symbols, names = map_.symbols, map_.names[:-1]
         constants = {name: value for name, value in file.parameters.items() if name not in symbols}
         document = file.document
 
@@ -59,7 +63,17 @@ class Formulas:
             H = parse_polynomial(str(document["hamiltonian"]["H"]), names, constants)
         integrals = {name: claim(text) for name, text in document.get("integrals", {}).items()}
         density = claim(document["density"]["phi"]) if "density" in document else None
-        return cls(file, parametric.variables, symbols, parametric.rhs, integrals, density, H)
+        return cls(file, map_, rhs, integrals, density, H)
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """The names of the coordinates."""
+        return self.map.variables
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """The parameters that are left as symbols."""
+        return self.map.symbols
 
     @property
     def dim(self) -> int:
@@ -86,15 +100,8 @@ class Formulas:
 
     @cached_property
     def equation(self) -> list[list[fmpq_mpoly]]:
-        """The rows of (M | r), where M x~ = r is the Kahan map: M = I - eps f'(x), r = M x + 2 eps f(x)."""
-        context = ring((*self.names, "eps"))
-        *images, eps = context.gens()
-        rows = []
-        for i, (polynomial, slopes) in enumerate(zip(self.rhs, self.jacobian, strict=True)):
-            row = [int(i == j) - eps * slope.compose(*images, ctx=context) for j, slope in enumerate(slopes)]
-            product = sum((entry * x for entry, x in zip(row, images, strict=False)), context.constant(0))
-            rows.append([*row, product + 2 * eps * polynomial.compose(*images, ctx=context)])
-        return rows
+        """The rows of (M | r), where M x~ = r is the map: M = I - eps f'(x), r = M x + 2 eps f(x) for Kahan's."""
+        return [[*row[:-1], -row[-1]] for row in self.map.rows]
 
     @cached_property
     def forms(self) -> dict[str, fmpq_mat]:
@@ -141,8 +148,13 @@ class Formulas:
             )
         return found
 
+    def inverse_form(self) -> list[RationalFunction]:
+        """The components of the inverse of a map that is not Kahan's. Raises InputError where it is not found."""
+        rows = self.map.inverse_rows if isinstance(self.map, ImplicitMap) else inverse_rows(self.map.rows)
+        return self._solved([[*row[:-1], -row[-1]] for row in rows])
+
     def closed_form(self) -> list[RationalFunction]:
-        """The components of the Kahan map as rational functions of the names and eps, in lowest terms, exact.
+        """The components of the map as rational functions of the names and eps, in lowest terms, exact.
 
         Raises InputError where they are too large, which is found out on the way: in a second, unless numbers are long.
 
@@ -151,6 +163,9 @@ class Formulas:
         >>> [format_rational_function(component) for component in Formulas.of(load("harmonic")).closed_form()]
         ['(-x*eps^2 + 2*y*eps + x)/(eps^2 + 1)', '(-y*eps^2 - 2*x*eps + y)/(eps^2 + 1)']
         """
+        return self._solved(self.equation)
+
+    def _solved(self, equation: list[list[fmpq_mpoly]]) -> list[RationalFunction]:
         if self.dim > MAX_DIMENSION_OF_FORMULAS:
             raise _too_large(f"dimension {self.dim}, expected at most {MAX_DIMENSION_OF_FORMULAS}")
 
@@ -161,7 +176,7 @@ class Formulas:
             return product
 
         # (M | r) annihilates (x~, -1), hence the vector of its maximal minors, the last of which is -+det M.
-        *above, below = kernel_minors(self.equation, times)
+        *above, below = kernel_minors(equation, times)
         found = []
         for minor in above:
             common = minor.gcd(below)

@@ -26,10 +26,13 @@ def write_latex(formulas: Formulas, parts: Sequence[str], command: str) -> str:
     comment = "\n".join(f"% {line}" for line in header(formulas, command))
     columns = f"\\setcounter{{MaxMatrixCols}}{{{formulas.dim}}}\n" if formulas.dim > 10 else ""
     body = "\n\n".join(displays)
+    step = ""
+    if formulas.map.has_time_step:
+        step = "\\noindent $\\varepsilon$ is half the time step: the time step is $2 \\varepsilon$.\n\n"
     return (
         f"{comment}\n\\documentclass{{article}}\n\\usepackage{{amsmath}}\n\\allowdisplaybreaks\n{columns}"
         "\\begin{document}\n\n"
-        "\\noindent $\\varepsilon$ is half the time step: the time step is $2 \\varepsilon$.\n\n"
+        f"{step}"
         f"{body}\n\n\\end{{document}}\n"
     )
 
@@ -41,6 +44,10 @@ def _display(part: str, formulas: Formulas) -> list[str]:
             for name, polynomial in zip(formulas.variables, formulas.rhs, strict=True)
         ]
         return ["The system $\\dot{\\mathbf x} = f(\\mathbf x)$:\n" + _aligned(rows)]
+    if part == "map" and not formulas.rhs:
+        return ["The map:\n" + _aligned(_equations(formulas))]
+    if part == "inverse" and not formulas.rhs:
+        return ["Its inverse:\n" + _aligned(_components(formulas, formulas.inverse_form()))]
     if part == "map":
         point = ", ".join(latex_name(name) for name in formulas.variables)
         matrix = " \\\\\n".join(" & ".join(latex_polynomial(entry) for entry in row) for row in formulas.jacobian)
@@ -56,10 +63,8 @@ def _display(part: str, formulas: Formulas) -> list[str]:
         derivative = rf"(I - \varepsilon f'({_X}))^{{-1}} (I + \varepsilon f'({_Y}))"
         return ["Its Jacobi matrix:\n" + _aligned([(rf"\frac{{\partial {_Y}}}{{\partial {_X}}}", derivative)])]
     if part == "map-formulas":
-        rows = []
-        for name, function in zip(formulas.variables, formulas.closed_form(), strict=True):
-            rows += _quotient(rf"\widetilde{{{latex_name(name)}}}", function)
-        return ["The Kahan map as rational functions:\n" + _aligned(rows)]
+        what = "Kahan map" if formulas.rhs else "map"
+        return [f"The {what} as rational functions:\n" + _aligned(_components(formulas, formulas.closed_form()))]
     if part == "density":
         if formulas.density is None:
             rows = [(r"\varphi", rf"\det(I - \varepsilon f'({_X}))")]
@@ -67,6 +72,27 @@ def _display(part: str, formulas: Formulas) -> list[str]:
             rows = _quotient(r"\varphi", formulas.density)
         return ["The invariant measure $\\mathrm{d}\\mathbf x/\\varphi$:\n" + _aligned(rows)]
     return ["Integrals of the map:\n" + _aligned(_integrals(formulas))]
+
+
+def _components(formulas: Formulas, functions: Sequence[RationalFunction]) -> list[tuple[str, str]]:
+    rows: list[tuple[str, str]] = []
+    for name, function in zip(formulas.variables, functions, strict=True):
+        rows += _quotient(rf"\widetilde{{{latex_name(name)}}}", function)
+    return rows
+
+
+def _equations(formulas: Formulas) -> list[tuple[str, str]]:
+    """A map that is not Kahan's: its components, or the rows of M x~ = r."""
+    rows: list[tuple[str, str]] = []
+    for row in formulas.equation:
+        entries = [(entry, name) for entry, name in zip(row, formulas.variables, strict=False) if not entry.is_zero()]
+        if len(entries) == 1:
+            ((below, name),) = entries
+            rows += _quotient(rf"\widetilde{{{latex_name(name)}}}", RationalFunction(row[-1], below))
+        else:
+            left = " + ".join(rf"({latex_polynomial(e)}) \widetilde{{{latex_name(name)}}}" for e, name in entries)
+            rows.append((left, latex_polynomial(row[-1])))
+    return rows
 
 
 def _integrals(formulas: Formulas) -> list[tuple[str, str]]:

@@ -42,13 +42,16 @@ def header(formulas: Formulas, command: str, width: int = 100) -> list[str]:
     file = formulas.file
     title = file.catalog.get("title", "")
     lines = [f"{file.name}: {title}" if title else file.name]
-    if len(formulas.rhs) <= 12:
+    if not formulas.rhs:
+        lines += [f"  {line if len(line) <= width else line[: width - 4] + ' ...'}" for line in map_lines(formulas)]
+    elif len(formulas.rhs) <= 12:
         texts = [format_polynomial(polynomial) for polynomial in formulas.rhs]
         lines += [
             f"  {name}' = {text if len(text) <= width else text[: width - 4] + ' ...'}"
             for name, text in zip(formulas.variables, texts, strict=True)
         ]
-    lines.append("eps is half the time step: the time step is 2 eps.")
+    if formulas.map.has_time_step:
+        lines.append("eps is half the time step: the time step is 2 eps.")
     numbers = [f"{name} = {value}" for name, value in file.parameters.items() if name not in formulas.symbols]
     if numbers:
         lines.append(f"Parameters: {', '.join(numbers)}")
@@ -68,6 +71,11 @@ def header(formulas: Formulas, command: str, width: int = 100) -> list[str]:
     return [re.sub("coding(?=[:=])", "coding ", line) if k < 2 else line for k, line in enumerate(wrapped)]
 
 
+def map_lines(formulas: Formulas) -> list[str]:
+    """A map that is not Kahan's, line by line; at most twelve."""
+    return str(formulas.map).split("\n")[:12]
+
+
 class _Writer:
     """One file: names are chosen first, then functions are written in the order of their needs."""
 
@@ -78,7 +86,10 @@ class _Writer:
         fixed = "vector_field kahan_matrix kahan_vector kahan_map kahan_inverse kahan_jacobian kahan_map_formula"
         fixed += " modified_hamiltonian density"
         # Of functions: what they are -> how they are called.
-        self.names = {key: self._new_name(key) for key in fixed.split()}
+        called = {key: key for key in fixed.split()}
+        if not formulas.rhs:
+            called = {key: key.replace("kahan_map", "map_step").replace("kahan", "map") for key in called}
+        self.names = {key: self._new_name(name) for key, name in called.items()}
         self.names |= {f"integral {name}": self._new_name("integral", name) for name in formulas.integrals}
         self.names |= {name: self._new_name("integral", name) for name in formulas.forms}
         self.words = {"n": str(formulas.dim), "map": self.names["kahan_map"]}
@@ -118,15 +129,20 @@ class _Writer:
     def _map(self) -> None:
         rows = [[self._expression(entry) for entry in row[:-1]] for row in self.formulas.equation]
         body = fill(self.language.table(rows), self.words)
-        self._function("kahan_matrix", "M = I - eps f'(x)", _MATRIX, body, {"point": self.formulas.variables})
+        told = ["M", "r", "The map x -> x~, where M x~ = r"]
+        if self.formulas.rhs:
+            told = ["M = I - eps f'(x)", "r = M x + 2 eps f(x)"]
+            told.append("The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r")
+        self._function("kahan_matrix", told[0], _MATRIX, body, {"point": self.formulas.variables})
         right = [row[-1] for row in self.formulas.equation]
-        self._formulas("kahan_vector", "r = M x + 2 eps f(x)", right)
+        self._formulas("kahan_vector", told[1], right)
         body = self._solve(self.language.solve, self._call("kahan_vector", "point", "eps"))
-        self._function(
-            "kahan_map", "The Kahan map: x~ = x + 2 eps (I - eps f'(x))^(-1) f(x), or M x~ = r", _VECTOR, body
-        )
+        self._function("kahan_map", told[2], _VECTOR, body)
 
     def _inverse(self) -> None:
+        if not self.formulas.rhs:
+            self._formulas("kahan_inverse", "The inverse of the map", self.formulas.inverse_form())
+            return
         self._map()
         body = self._call("kahan_map", "point", "-eps")
         self._function("kahan_inverse", "Its inverse, which is the map with -eps", _VECTOR, body)
@@ -139,7 +155,7 @@ class _Writer:
         self._function("kahan_jacobian", words, _MATRIX, body)
 
     def _map_formulas(self) -> None:
-        words = "The Kahan map as rational functions of x and eps"
+        words = f"The {'Kahan map' if self.formulas.rhs else 'map'} as rational functions of x and eps"
         self._formulas("kahan_map_formula", words, self.formulas.closed_form())
 
     def _integrals(self) -> None:

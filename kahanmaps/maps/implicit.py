@@ -327,10 +327,12 @@ class BirationalMap(DisplayedAsFormula, ABC):
         `values` are those of the symbols, elements of the field.
         """
 
+    rows: tuple[tuple[fmpq_mpoly, ...], ...]  # of (M | -r), polynomials in the `names`
+
     @property
-    @abstractmethod
     def matrix(self) -> list[list[fmpq_mpoly]]:
         """The entries of M, polynomials in the `names`."""
+        return [list(row[:-1]) for row in self.rows]
 
     @abstractmethod
     def written(self) -> dict[str, list[str]]:
@@ -378,10 +380,6 @@ class ImplicitMap(BirationalMap):
     @property
     def subject(self) -> tuple[Any, ...]:
         return (self.variables, *(entry for row in self.rows for entry in row))
-
-    @property
-    def matrix(self) -> list[list[fmpq_mpoly]]:
-        return [list(row[:-1]) for row in self.rows]
 
     @cached_property
     def inverse_rows(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:

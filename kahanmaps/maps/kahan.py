@@ -20,7 +20,7 @@ from typing import Any
 from flint import fmpq_mpoly
 
 from kahanmaps.algebra.fields import QQ, Field
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.maps.implicit import BirationalMap, Equation, MapOver, nonzero_eps
@@ -113,20 +113,24 @@ class KahanMap(DisplayedAsFormula, KahanMapOver):
     (1, 1/3)
     """
 
-    def __init__(self, system: QuadraticSystem, eps: Any, field: Field = QQ, values: Sequence[Any] = ()) -> None:
+    def __init__(
+        self, system: QuadraticSystem, eps: Any, field: Field = QQ, values: Sequence[Any] = (), inside: Any = None
+    ) -> None:
+        """`inside` is put in for eps in the coefficients where that is not the step: for inverse maps."""
         self.system, self.values = system, tuple(values)
         self.variables = system.variables
         element = nonzero_eps(eps, field)
+        self._inside = element if inside is None else inside
         rest = iter(self.values)
         super().__init__(
-            system.over(field, [element if name == "eps" else next(rest) for name in system.symbols]), element
+            system.over(field, [self._inside if name == "eps" else next(rest) for name in system.symbols]), element
         )
 
     @cached_property
     def inverse(self) -> KahanMap:
-        """The inverse map, Phi(., -eps)."""
+        """The inverse map, Phi(., -eps) for the same vector field, whatever eps is in its coefficients."""
         with self.field.working():
-            return KahanMap(self.system, -self.eps, self.field, self.values)
+            return KahanMap(self.system, -self.eps, self.field, self.values, self._inside)
 
     def __repr__(self) -> str:
         return f"KahanMap({', '.join(self.system.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
@@ -166,11 +170,18 @@ class Kahan(BirationalMap):
             self._last = last = KahanMap(self.system, eps, over, values)
         return last
 
-    @property
-    def matrix(self) -> list[list[fmpq_mpoly]]:
-        eps = ring(self.names).gens()[-1]
-        rows = self.system.jacobian(self.names)
-        return [[int(i == j) - eps * entry for j, entry in enumerate(row)] for i, row in enumerate(rows)]
+    @cached_property
+    def rows(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:  # type: ignore[override]  # nobody writes it
+        """Those of (I - eps f'(x) | -r), r = (I - eps f'(x)) x + 2 eps f(x), polynomials in the `names`."""
+        context = ring(self.names)
+        *x, eps = context.gens()
+        places = [context.gen(self.names.index(name)) for name in names_of(self.system.rhs[0])]
+        rows = []
+        for i, (slopes, f) in enumerate(zip(self.system.jacobian(self.names), self.system.rhs, strict=True)):
+            row = [int(i == j) - eps * slope for j, slope in enumerate(slopes)]
+            product = sum((entry * y for entry, y in zip(row, x, strict=False)), context.constant(0))
+            rows.append((*row, -product - 2 * eps * f.compose(*places, ctx=context)))
+        return tuple(rows)
 
     def written(self) -> dict[str, list[str]]:
         return {"rhs": [format_polynomial(polynomial) for polynomial in self.system.rhs]}

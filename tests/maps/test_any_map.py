@@ -46,10 +46,12 @@ def cubic(*rhs, degree=3):
 MAPS = {
     "kahan": Kahan(LOTKA_VOLTERRA),
     "adjusted": read_system(EXAMPLES / "rescaled-top.toml").map,
+    # odd in eps, so that the inverse is not the map at -eps
+    "odd": parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x*y + eps*x^2", "y^2 - eps"]').map,
     "bilinear": read_system(EXAMPLES / "symplectic-euler.toml").map,
     "polarised": read_system(EXAMPLES / "duffing.toml").map,
     "explicit": read_system(EXAMPLES / "mcmillan.toml").map,
-    "quartic": cubic("y^4 - x", "x*y + eps^2", degree=4),
+    "quartic": cubic("y^4 - x", "x*y + eps", degree=4),
     "henon": parse_system('variables = ["x", "y"]\n[map]\nimage = ["y", "x + eps*y^2"]').map,
 }
 SQUARES = explicit_map(["x", "y"], [parse_rational_function(f"{name}^2", ["x", "y", "eps"]) for name in "xy"])

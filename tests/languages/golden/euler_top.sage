@@ -18,7 +18,7 @@
 
 def top_kahan_solve(M, b):
     if M.is_singular():
-        raise ZeroDivisionError("det(I - eps f'(x)) = 0: the Kahan map has no value here")
+        raise ZeroDivisionError("det M = 0: the map has no value here")
     return M.solve_right(b)
 
 # x' = f(x)

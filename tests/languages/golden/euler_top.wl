@@ -25,7 +25,7 @@ ClearAll[topVectorField,
         topDensity];
 
 topKahanSolve[m_, b_] := If[Det[m] === 0,
-  Print["det(I - eps f'(x)) = 0: the Kahan map has no value here"]; Abort[],
+  Print["det M = 0: the map has no value here"]; Abort[],
   LinearSolve[m, b]
 ];
 

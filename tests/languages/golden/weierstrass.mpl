@@ -10,7 +10,7 @@
 # For example: kahan_map([1, 2], 1/10);
 
 kahan_solve := proc(M, b)
-  if LinearAlgebra:-Determinant(M) = 0 then error "det(I - eps f'(x)) = 0: the Kahan map has no value here" end if;
+  if LinearAlgebra:-Determinant(M) = 0 then error "det M = 0: the map has no value here" end if;
   LinearAlgebra:-LinearSolve(M, b);
 end proc:
 

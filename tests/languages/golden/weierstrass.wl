@@ -22,7 +22,7 @@ ClearAll[vectorField,
         density];
 
 kahanSolve[m_, b_] := If[Det[m] === 0,
-  Print["det(I - eps f'(x)) = 0: the Kahan map has no value here"]; Abort[],
+  Print["det M = 0: the map has no value here"]; Abort[],
   LinearSolve[m, b]
 ];
 
