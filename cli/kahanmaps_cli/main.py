@@ -88,6 +88,9 @@ What does the Kahan map of a system preserve, and is it integrable?
     kahanmaps analyze --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)'
     kahanmaps systems euler_top --toml > my-top.toml
 
+  any other birational map:
+    kahanmaps analyze --vars x,y --image 'y; (3 + y)/x'
+
   the theorem of the paper, on a random member of its commuting family:
     kahanmaps family new --m 3 --seed 7 -o pair.toml
     kahanmaps check-commute pair.toml

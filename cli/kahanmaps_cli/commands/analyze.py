@@ -33,14 +33,16 @@ if TYPE_CHECKING:
 @click.option("--markdown", is_flag=True, help="The report in Markdown.")
 @output_options
 def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **options: Any) -> int:
-    """What the Kahan map of SYSTEM preserves, and how it grows: one report, and a verdict in words.
+    """What the map of SYSTEM preserves, and how it grows: one report, and a verdict in words.
 
     \b
       kahanmaps analyze euler_top --symbolic a1,a2,a3
       kahanmaps analyze henon_heiles -p c=-6 --seconds 30
       kahanmaps analyze my-system.toml --markdown > report.md
       kahanmaps analyze --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
+      kahanmaps analyze --vars x,y --image 'y; -x + y + 7/y^2'
 
+    SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md).
     Integrals and densities in closed form with their proofs, Hirota-Kimura relations, degrees of the iterates and
     their recurrence, heights, symmetries, commuting systems, singularity confinement, and whether the system belongs
     to the commuting family. Claims in the file are not read. Without --eps everything is for every eps.

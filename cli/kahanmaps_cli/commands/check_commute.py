@@ -20,7 +20,7 @@ from kahanmaps_cli.render import print_report
 @click.option("--eps2", type=ExactNumber(), metavar="E", help="Another eps for the second map (needs --eps).")
 @check_options
 def command(system: str | None, other: str | None, eps2: Any, **options: Any) -> int:
-    """Do the Kahan maps of SYSTEM and OTHER commute?
+    """Do the maps of SYSTEM and OTHER commute?
 
     \b
       kahanmaps check-commute paper_m3        # its associated maps, pairwise

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @integral_option("A claimed integral: a rational function of the variables and eps.")
 @check_options
 def command(system: str | None, integrals: tuple[tuple[str, str], ...], **options: Any) -> int:
-    """Are the integrals of SYSTEM conserved by its Kahan map?
+    """Are the integrals of SYSTEM conserved by its map?
 
     \b
       kahanmaps check-integrals paper_m3

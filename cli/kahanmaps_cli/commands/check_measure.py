@@ -16,7 +16,7 @@ from kahanmaps_cli.render import print_report
 @click.option("--density", metavar="EXPR", help="A claimed density phi: a rational function of the variables and eps.")
 @check_options
 def command(system: str | None, density: str | None, **options: Any) -> int:
-    """Is the measure dx/phi invariant under the Kahan map of SYSTEM?
+    """Is the measure dx/phi invariant under the map of SYSTEM?
 
     \b
       kahanmaps check-measure paper_m3

@@ -37,7 +37,7 @@ _LANGUAGES = ("latex", "sympy", "pari", "maple", "mathematica", "sage", "julia",
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
 @quiet_option
 def command(system: str | None, language: str, output: str | None, quiet: bool, **options: Any) -> None:
-    """Write SYSTEM, its Kahan map and what is known of it for another program.
+    """Write SYSTEM, its map and what is known of it for another program.
 
     \b
       kahanmaps convert euler_top --to pari

@@ -39,7 +39,7 @@ _LENGTHS_SHOWN = 12
 @seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """The orbits of the Kahan map on projective space over a finite field, and how long its cycles are.
+    """The orbits of the map of SYSTEM on projective space over a finite field, and how long its cycles are.
 
     \b
       kahanmaps cycles weierstrass -p 101

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 @seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Degrees of the iterates of the Kahan map of SYSTEM, their recurrence and the dynamical degree.
+    """Degrees of the iterates of the map of SYSTEM, their recurrence and the dynamical degree.
 
     \b
       kahanmaps degrees euler_top

@@ -58,7 +58,7 @@ _MAX_BITS = 61
 @click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
-    """Many orbits of the Kahan map of SYSTEM at once: how many go through, and how well integrals are kept.
+    """Many orbits of the map of SYSTEM at once: how many go through, and how well integrals are kept.
 
     \b
       kahanmaps ensemble paper_m2 --random 1000 --box 1/2 --seed 1 \\

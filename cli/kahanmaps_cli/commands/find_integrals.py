@@ -39,7 +39,7 @@ from kahanmaps_cli.terminal import tell
 @click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
 @search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
-    """Integrals of the Kahan map of SYSTEM in closed form: how many, formulas P/Q, and their proofs.
+    """Integrals of the map of SYSTEM in closed form: how many, formulas P/Q, and their proofs.
 
     \b
       kahanmaps find-integrals euler_top --symbolic a1,a2,a3

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 @seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """How fast the heights of exact orbits of the Kahan map of SYSTEM grow, from several starts.
+    """How fast the heights of exact orbits of the map of SYSTEM grow, from several starts.
 
     \b
       kahanmaps heights weierstrass

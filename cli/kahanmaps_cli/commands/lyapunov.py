@@ -38,7 +38,7 @@ _DEFAULT_STARTS = 16
 @seconds_option(60.0, "Time for all steps.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Lyapunov exponents of float orbits of the Kahan map of SYSTEM, by the exact tangent map.
+    """Lyapunov exponents of float orbits of the map of SYSTEM, by the exact tangent map.
 
     \b
       kahanmaps lyapunov lorenz --eps 1/400 --box 5 --steps 20000

@@ -74,7 +74,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 def command(
     system: str | None, form: str | None, output: str | None, verbose: bool, quiet: bool, **options: Any
 ) -> int:
-    """Iterate the Kahan map of SYSTEM from a start.
+    """Iterate the map of SYSTEM from a start; a vector field stands for its Kahan map.
 
     \b
       kahanmaps orbit lotka_volterra --start 1,2 --eps 1/10 --steps 5
@@ -86,9 +86,10 @@ def command(
           --at 10,1000000 --arithmetic ball:auto --accuracy 30
       kahanmaps orbit --vars x,y,z --rhs y*z --rhs=-2*z*x --rhs x*y \\
           --start 1,1/2,1/3 --eps 1/10 --steps 5 --integral y^2+2*x^2
+      kahanmaps orbit --vars x,y --image 'y; (3 + y)/x' --start 1,2 --steps 5
 
     SYSTEM is a file, a name of the catalogue, or - for standard input. Numbers are exact: integers, p/q, decimals.
-    A file may hold another map than Kahan's; one that does not depend on eps needs none.
+    A map may be another than Kahan's; one that does not depend on eps needs none.
     Ctrl-C ends after the step in flight and leaves a valid file; a second and third one end at once.
 
     Members of the commuting family are stepped in their normal form, and --at reaches an iterate directly, by

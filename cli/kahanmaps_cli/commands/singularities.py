@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 @seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Are the singularities of the Kahan map of SYSTEM confined, and after how many steps?
+    """Are the singularities of the map of SYSTEM confined, and after how many steps?
 
     \b
       kahanmaps singularities euler_top

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 @click.option("--scale", type=click.Choice(["linear", "log", "loglog"]), help="Chosen by itself unless given.")
 @picture_options
 def command(systems: tuple[str, ...], **options: Any) -> int:
-    """Degrees of the iterates of Kahan maps, with the recurrence they satisfy.
+    """Degrees of the iterates of maps, with the recurrence they satisfy.
 
     \b
       kahanmaps plot degrees euler_top

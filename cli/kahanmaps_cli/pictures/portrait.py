@@ -75,7 +75,7 @@ _WALKING = ("start", "starts", "count", "box", "seed", "steps", "backward", "eul
 @click.option("--equal", is_flag=True, help="The same unit of length along both axes.")
 @picture_options
 def command(system: str | None, **options: Any) -> int:
-    """The phase portrait of SYSTEM: float orbits of its Kahan map, projected.
+    """The phase portrait of SYSTEM: float orbits of its map, projected.
 
     \b
       kahanmaps plot portrait lotka_volterra --eps 1/20
