@@ -14,7 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
 from itertools import combinations
 from math import comb
 from typing import Any
@@ -23,7 +23,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.polynomials import RationalFunction, evaluate, gradient, ring
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, gradient, ring
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
@@ -48,6 +48,7 @@ from kahanmaps.laboratory.modular_points import (
     product_of,
     rank,
 )
+from kahanmaps.laboratory.products import candidates, products_of
 
 _MAX_UNKNOWNS = 2000
 _MOST_LOGARITHMIC = 16  # the largest dimension in which all monomials of degree 4 in x and d are listed
@@ -201,7 +202,8 @@ def find_poisson(
         degree: of the entries in the variables, or of their numerators.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
         eps: an exact number, or None for formulas that contain eps (the time step is 2 eps, where there is one).
-        denominator: a function of the variables and eps by which the entries are divided.
+        denominator: a function of the variables and eps by which the entries are divided; None: where there are no
+            tensors without one, the factors of a density that is a product are tried, if that is little work.
         integrals: those whose brackets are asked for; None: they are searched, if there is a tensor.
         seconds: the time that the search may take, about.
         seed: of everything random.
@@ -225,6 +227,11 @@ def find_poisson(
     deadline = time.monotonic() + seconds
     dim, asked = file.dim, degree
     pairs = dim * (dim - 1) // 2
+    if denominator is not None:
+        context = ring(laboratory.map.names)
+        gens = (*context.gens()[:dim], context.gens()[-1])
+        parts = (part.compose(*gens, ctx=context) for part in (denominator.numerator, denominator.denominator))
+        denominator = RationalFunction(*parts)
     while degree > 0 and pairs * comb(dim + degree, dim) > _MAX_UNKNOWNS:
         degree -= 1
     found: list[FoundTensor] = []
@@ -238,6 +245,9 @@ def find_poisson(
         if not forms and degree < 2 <= asked and dim <= _MOST_LOGARITHMIC and denominator is None:
             cut = f"degrees above {degree} were tried for brackets c_ij x_i x_j only"
             forms, _ = _tensors(laboratory, 2, None, deadline, log_canonical(dim))
+        if not forms and denominator is None:
+            forms, denominator, more = _over_a_density(laboratory, degree, deadline)
+            reason = "" if forms else reason + more
         if forms and integrals is None:
             progress("integrals, for their brackets")
             integrals = _integrals(laboratory, symbols, deadline, seed)
@@ -305,6 +315,30 @@ def _tensors(
     return [_tensor_of(P, len(variables), laboratory.map.names, denominator) for P in shown], ""
 
 
+def _over_a_density(
+    laboratory: Laboratory, degree: int, deadline: float
+) -> tuple[list[GivenTensor], RationalFunction | None, str]:
+    """Tensors whose denominator has the factors of a known density, each once, numerators as much higher in degree.
+
+    With that denominator, and what to add to the reason where there are none.
+    """
+    dim = laboratory.map.dim
+    try:
+        density = products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density
+    except NoPoint:
+        return [], None, ""
+    factors = [g for g, _ in density.factors] if density is not None else []
+    higher = degree + sum(degree_in(g, dim) for g in factors)
+    if not factors or dim * (dim - 1) // 2 * comb(dim + higher, dim) > _MAX_UNKNOWNS // 2:
+        return [], None, ""
+    psi = reduce(lambda a, b: a * b, factors)
+    over = RationalFunction(psi, psi.context().constant(1))
+    forms, _ = _tensors(laboratory, higher, over, deadline)
+    if forms:
+        return forms, over, ""
+    return [], None, f", and none of degree at most {higher} over {format_rational_function(over)}"
+
+
 def log_canonical(dim: int) -> frozenset[Exponents]:
     """The monomials x_i x_j d_i d_j, of which brackets {x_i, x_j} = c_ij x_i x_j consist."""
     pairs = (tuple(int(k in pair) for k in range(dim)) for pair in combinations(range(dim), 2))
@@ -349,9 +383,7 @@ def _tensor_of(bivector: fmpq_mpoly, n: int, names: Sequence[str], denominator: 
         entries.setdefault(pair, {})[(*monomial[:n], *monomial[2 * n :])] = coefficient
     above, below = context.constant(1), context.constant(1)
     if denominator is not None:
-        gens = (*context.gens()[:n], context.gens()[-1])
-        below = denominator.numerator.compose(*gens, ctx=context)
-        above = denominator.denominator.compose(*gens, ctx=context)
+        below, above = denominator.numerator, denominator.denominator
 
     def entry(i: int, j: int) -> RationalFunction:
         P = context.from_dict(entries.get((min(i, j), max(i, j)), {})) * above
@@ -421,7 +453,7 @@ def _factor(map_: ModularMap, denominator: RationalFunction | None, x: Sequence[
     if denominator is None:
         return 1
     field = GF(map_.prime)
-    value = denominator.value(field, [field.convert(c) for c in (*x, map_.eps)])
+    value = denominator.value(field, [field.convert(c) for c in (*x, *map_.values, map_.eps)])
     if value is None:
         raise NoPoint("the denominator has no value at a random point modulo a prime")
     return int(value)
