@@ -442,91 +442,13 @@ def _together(x: Any, right: Any, equation: GenericEquation, room: GenericRoom) 
     compiler would have to test too many pairs of them for overlap. For the same reason the number of lanes is a
     constant.
     """
-    constants, first, columns = equation.constants, equation.first, equation.columns
-    factors, products = equation.factors, equation.products
-    M, scale, inverse, fine = room.M, room.scale, room.inverse, room.fine
-    n = len(constants)
+    n = len(equation.constants)
+    _fill(x, equation, room.M, room.scale)
     for l in range(_GENERIC_WIDTH):
-        scale[l] = 1.0
-        fine[l] = 1.0
-    for t in range(len(products)):
-        target, A, B = x[n + t], x[products[t, 0]], x[products[t, 1]]
-        for l in range(_GENERIC_WIDTH):
-            target[l] = A[l] * B[l]
-    for i in range(n):
-        for j in range(n + 1):
-            entry = M[i * (n + 1) + j]
-            t, end = first[i * (n + 1) + j], first[i * (n + 1) + j + 1]
-            constant = constants[i, j]
-            if end - t >= 3:
-                a, b, c = factors[t], factors[t + 1], factors[t + 2]
-                A, B, C = x[columns[t]], x[columns[t + 1]], x[columns[t + 2]]
-                for l in range(_GENERIC_WIDTH):
-                    entry[l] = ((constant + a * A[l]) + b * B[l]) + c * C[l]
-                t += 3
-            else:
-                for l in range(_GENERIC_WIDTH):
-                    entry[l] = constant
-            while end - t > 3:
-                a, b, c = factors[t], factors[t + 1], factors[t + 2]
-                A, B, C = x[columns[t]], x[columns[t + 1]], x[columns[t + 2]]
-                for l in range(_GENERIC_WIDTH):
-                    entry[l] = ((entry[l] + a * A[l]) + b * B[l]) + c * C[l]
-                t += 3
-            if end - t == 3 and j < n:
-                a, b, c = factors[t], factors[t + 1], factors[t + 2]
-                A, B, C = x[columns[t]], x[columns[t + 1]], x[columns[t + 2]]
-                for l in range(_GENERIC_WIDTH):
-                    total = ((entry[l] + a * A[l]) + b * B[l]) + c * C[l]
-                    entry[l] = total
-                    scale[l] = abs(total) if abs(total) > scale[l] else scale[l]
-                continue
-            while t < end:
-                a = factors[t]
-                A = x[columns[t]]
-                for l in range(_GENERIC_WIDTH):
-                    entry[l] += a * A[l]
-                t += 1
-            if j < n:
-                for l in range(_GENERIC_WIDTH):
-                    scale[l] = abs(entry[l]) if abs(entry[l]) > scale[l] else scale[l]
+        room.fine[l] = 1.0
     for p in range(n):
-        pivot = M[p * (n + 1) + p]
-        for i in range(p + 1, n):
-            below = M[i * (n + 1) + p]
-            wanted = False
-            for l in range(_GENERIC_WIDTH):
-                wanted |= abs(below[l]) > MUCH * abs(pivot[l])
-            if wanted:
-                for l in range(_GENERIC_WIDTH):
-                    inverse[l] = 1.0 if abs(below[l]) > MUCH * abs(pivot[l]) else 0.0
-                for j in range(p, n + 1):
-                    upper, entry = M[p * (n + 1) + j], M[i * (n + 1) + j]
-                    for l in range(_GENERIC_WIDTH):
-                        one, other = upper[l], entry[l]
-                        upper[l] = other if inverse[l] != 0.0 else one
-                        entry[l] = one if inverse[l] != 0.0 else other
-        for l in range(_GENERIC_WIDTH):
-            size = abs(pivot[l])
-            fine[l] = fine[l] if (size > NEAR * scale[l]) & (size <= LARGEST) else 0.0
-            inverse[l] = 1.0 / pivot[l]
-        for i in range(p + 1, n):
-            factor = M[i * (n + 1) + p]
-            for l in range(_GENERIC_WIDTH):
-                factor[l] = factor[l] * inverse[l]
-            j = p + 1
-            while j + 1 <= n:
-                entry, upper = M[i * (n + 1) + j], M[p * (n + 1) + j]
-                other, above = M[i * (n + 1) + j + 1], M[p * (n + 1) + j + 1]
-                for l in range(_GENERIC_WIDTH):
-                    entry[l] -= factor[l] * upper[l]
-                    other[l] -= factor[l] * above[l]
-                j += 2
-            while j <= n:
-                entry, upper = M[i * (n + 1) + j], M[p * (n + 1) + j]
-                for l in range(_GENERIC_WIDTH):
-                    entry[l] -= factor[l] * upper[l]
-                j += 1
+        _eliminate(room.M, p, n, room.scale, room.inverse, room.fine)
+    M, fine, good = room.M, room.fine, True
     for j in range(n - 1, -1, -1):
         value, target, pivot = M[j * (n + 1) + n], right[j], M[j * (n + 1) + j]
         for l in range(_GENERIC_WIDTH):
@@ -536,10 +458,90 @@ def _together(x: Any, right: Any, equation: GenericEquation, room: GenericRoom) 
             entry, upper = M[i * (n + 1) + n], M[i * (n + 1) + j]
             for l in range(_GENERIC_WIDTH):
                 entry[l] -= upper[l] * target[l]
-    good = True
     for l in range(_GENERIC_WIDTH):
         good &= fine[l] != 0.0
     return good
+
+
+@_inner
+def _fill(x: Any, equation: GenericEquation, M: Any, scale: Any) -> None:
+    """The matrices at x, and for each lane the largest of 1 and their entries."""
+    first, columns, factors, products = equation.first, equation.columns, equation.factors, equation.products
+    n = len(equation.constants)
+    for l in range(_GENERIC_WIDTH):
+        scale[l] = 1.0
+    for t in range(len(products)):
+        target, A, B = x[n + t], x[products[t, 0]], x[products[t, 1]]
+        for l in range(_GENERIC_WIDTH):
+            target[l] = A[l] * B[l]
+    for i in range(n):
+        for j in range(n + 1):
+            entry, constant = M[i * (n + 1) + j], equation.constants[i, j]
+            t, end = first[i * (n + 1) + j], first[i * (n + 1) + j + 1]
+            if end - t >= 3:
+                a, b, c = factors[t], factors[t + 1], factors[t + 2]
+                A, B, C = x[columns[t]], x[columns[t + 1]], x[columns[t + 2]]
+                for l in range(_GENERIC_WIDTH):
+                    entry[l] = ((constant + a * A[l]) + b * B[l]) + c * C[l]
+                t += 3
+            else:
+                for l in range(_GENERIC_WIDTH):
+                    entry[l] = constant
+            while end - t >= 3:
+                a, b, c = factors[t], factors[t + 1], factors[t + 2]
+                A, B, C = x[columns[t]], x[columns[t + 1]], x[columns[t + 2]]
+                for l in range(_GENERIC_WIDTH):
+                    entry[l] = ((entry[l] + a * A[l]) + b * B[l]) + c * C[l]
+                t += 3
+            while t < end:
+                a, A = factors[t], x[columns[t]]
+                for l in range(_GENERIC_WIDTH):
+                    entry[l] += a * A[l]
+                t += 1
+            if j < n:
+                for l in range(_GENERIC_WIDTH):
+                    scale[l] = abs(entry[l]) if abs(entry[l]) > scale[l] else scale[l]
+
+
+@_inner
+def _eliminate(M: Any, p: int, n: int, scale: Any, inverse: Any, fine: Any) -> None:
+    """Column p out of the rows below row p, which is exchanged with others in the lanes that want it."""
+    pivot = M[p * (n + 1) + p]
+    for i in range(p + 1, n):
+        below = M[i * (n + 1) + p]
+        wanted = False
+        for l in range(_GENERIC_WIDTH):
+            wanted |= abs(below[l]) > MUCH * abs(pivot[l])
+        if wanted:
+            for l in range(_GENERIC_WIDTH):
+                inverse[l] = 1.0 if abs(below[l]) > MUCH * abs(pivot[l]) else 0.0
+            for j in range(p, n + 1):
+                upper, entry = M[p * (n + 1) + j], M[i * (n + 1) + j]
+                for l in range(_GENERIC_WIDTH):
+                    one, other = upper[l], entry[l]
+                    upper[l] = other if inverse[l] != 0.0 else one
+                    entry[l] = one if inverse[l] != 0.0 else other
+    for l in range(_GENERIC_WIDTH):
+        size = abs(pivot[l])
+        fine[l] = fine[l] if (size > NEAR * scale[l]) & (size <= LARGEST) else 0.0
+        inverse[l] = 1.0 / pivot[l]
+    for i in range(p + 1, n):
+        factor = M[i * (n + 1) + p]
+        for l in range(_GENERIC_WIDTH):
+            factor[l] = factor[l] * inverse[l]
+        j = p + 1
+        while j + 1 <= n:
+            entry, upper = M[i * (n + 1) + j], M[p * (n + 1) + j]
+            other, above = M[i * (n + 1) + j + 1], M[p * (n + 1) + j + 1]
+            for l in range(_GENERIC_WIDTH):
+                entry[l] -= factor[l] * upper[l]
+                other[l] -= factor[l] * above[l]
+            j += 2
+        while j <= n:
+            entry, upper = M[i * (n + 1) + j], M[p * (n + 1) + j]
+            for l in range(_GENERIC_WIDTH):
+                entry[l] -= factor[l] * upper[l]
+            j += 1
 
 
 def _generic_kernel(stamp: int) -> Any:
