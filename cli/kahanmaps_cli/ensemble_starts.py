@@ -75,37 +75,27 @@ def read_starts(path: str, variables: Sequence[str], prime: int | None) -> NDArr
 
 
 def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | None) -> NDArray[Any]:
-    """The array of a .npy file; no more memory is taken than there are bytes, and nothing is ever unpickled."""
+    """The array of a .npy file; nothing is ever unpickled."""
     import numpy as np
 
-    stream = io.BytesIO(data)
+    if len(data) > MAX_NPY_BYTES:
+        raise InputError(f"{where}: found more than {MAX_NPY_BYTES} bytes, expected fewer")
     try:
-        version = np.lib.format.read_magic(stream)
-        if version not in ((1, 0), (2, 0)):
-            raise ValueError(f"version {version[0]}.{version[1]}")
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, fortran, dtype = read(stream)
-    except Exception as error:  # it is read like Python, and may go wrong like Python: in its tokens, its depth, ...
-        raise InputError(f"{where}: found a .npy file with a header that cannot be read: {_first(error)}") from None
+        rows = np.load(io.BytesIO(data), allow_pickle=False)
+    except Exception as error:  # its head is read like Python, and may go wrong like Python: in its tokens, its depth
+        raise InputError(f"{where}: found a .npy file that cannot be read: {_first(error)}") from None
+    dtype, shape, dim = rows.dtype, rows.shape, len(variables)
     if dtype.kind not in ("iu" if prime is not None else "fiu"):
         hint = ": modulo P starts are integers, or text" if prime is not None and dtype.kind == "f" else ""
         wanted = "integers" if prime is not None else "real numbers"
         raise InputError(f"{where}: found an array of {_kind(dtype)}, expected {wanted}{hint}")
-    dim = len(variables)
-    if any(isinstance(length, bool) for length in shape) or len(shape) != 2 or shape[1] != dim or shape[0] < 1:
+    if len(shape) != 2 or shape[1] != dim or shape[0] < 1:
         raise InputError(
-            f"{where}: found an array of shape {_shape(shape)}, expected (n, {dim}): one row for each start, with "
-            f"columns {', '.join(variables)}"
+            f"{where}: found an array of shape {shape}, expected (n, {dim}): one row for each start, with columns "
+            f"{', '.join(variables)}"
         )
-    if len(data) > MAX_NPY_BYTES or shape[0] * dim > MAX_NUMBERS:
-        raise InputError(f"{where}: found an array of shape {_shape(shape)}, expected at most {MAX_NUMBERS} numbers")
-    there = len(data) - stream.tell()
-    if there < shape[0] * dim * dtype.itemsize:
-        raise InputError(
-            f"{where}: found {there} bytes of numbers, expected {shape[0] * dim * dtype.itemsize}: it was cut"
-        )
-    flat = np.frombuffer(data, dtype=dtype, count=shape[0] * dim, offset=stream.tell())
-    rows = flat.reshape(shape, order="F" if fortran else "C")
+    if rows.size > MAX_NUMBERS:
+        raise InputError(f"{where}: found an array of shape {shape}, expected at most {MAX_NUMBERS} numbers")
     if prime is not None:
         unsigned = np.issubdtype(dtype, np.unsignedinteger)
         residues: NDArray[Any] = rows.astype(np.uint64 if unsigned else np.int64) % (
@@ -221,15 +211,8 @@ def _to_residue(prime: int) -> Convert:
 
 
 def _kind(dtype: Any) -> str:
-    if dtype.hasobject:
-        return "Python objects"
     kinds = {"f": "machine floats", "c": "complex numbers", "b": "truth values", "U": "text", "S": "text"}
     return kinds.get(dtype.kind, f"the type {str(dtype)[:40]}")
-
-
-def _shape(shape: Sequence[int]) -> str:
-    text = str(tuple(shape))
-    return text if len(text) <= 60 else text[:60] + "..."
 
 
 def _first(error: Exception) -> str:
