@@ -85,7 +85,7 @@ What does the Kahan map of a system preserve, and is it integrable?
     kahanmaps analyze euler_top
 
   a system of your own, on the line, or in a file like the one written here:
-    kahanmaps analyze --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)'
+    kahanmaps analyze --rhs "x' = x*(1-y); y' = y*(x-1)"
     kahanmaps systems euler_top --toml > my-top.toml
 
   any other birational map:

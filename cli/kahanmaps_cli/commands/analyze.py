@@ -39,7 +39,7 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
       kahanmaps analyze euler_top --symbolic a1,a2,a3
       kahanmaps analyze henon_heiles -p c=-6 --seconds 30
       kahanmaps analyze my-system.toml --markdown > report.md
-      kahanmaps analyze --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
+      kahanmaps analyze --rhs "x' = x*(1-y); y' = y*(x-1)" --json
       kahanmaps analyze --vars x,y --image 'y; -x + y + 7/y^2'
 
     SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md).

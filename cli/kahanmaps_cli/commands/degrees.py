@@ -46,7 +46,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps degrees euler_top
       kahanmaps degrees lotka_volterra --seconds 20 --json
       kahanmaps degrees weierstrass --eps 1/10 --terms 60
-      kahanmaps degrees --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)'
+      kahanmaps degrees --rhs "x' = x*(1-y); y' = y*(x-1)"
 
     The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 63 bits, two of
     each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
