@@ -146,17 +146,10 @@ class Stepping:
         count, _, n = record.shape
         if self.blocks is None:
             return np.ascontiguousarray(record.transpose(0, 2, 1))
-        if n == 1:
+        if n == 1:  # numbers side by side are multiplied fastest
             record = np.ascontiguousarray(record[:, :, 0].T)[None]
-        x = np.empty((record.shape[0], record.shape[2], self.dim))
-        if self.compiled:
-            from kahanmaps.maps.float_numba import points
-
-            points(self.blocks.out, record, x, 0, record.shape[2])
-        else:
-            for row in range(len(record)):
-                x[row] = _product(self.blocks.out, record[row]).T
-        return x.reshape(count, n, self.dim)
+        x = _product(self.blocks.out, record)
+        return np.ascontiguousarray(x.transpose(0, 2, 1)).reshape(count, n, self.dim)
 
     def piece(self, n: int) -> int:
         """How many steps of n lanes take about a tenth of a second."""
@@ -440,9 +433,9 @@ def _points(starts: Any, system: QuadraticSystem | BirationalMap) -> FloatArray:
 
 
 def _product(matrix: FloatArray, columns: FloatArray) -> FloatArray:
-    """matrix columns, every sum from left to right: BLAS orders them by the shape of the arrays."""
+    """matrix columns (..., rows, n), every sum from left to right: BLAS orders them by the shape of the arrays."""
     with np.errstate(all="ignore"):  # what leaves the range of doubles is a status, not a warning
-        total: FloatArray = matrix[:, :1] * columns[0]
-        for j in range(1, len(columns)):
-            total += matrix[:, j, None] * columns[j]
+        total: FloatArray = matrix[:, :1] * columns[..., :1, :]
+        for j in range(1, matrix.shape[1]):
+            total += matrix[:, j, None] * columns[..., j : j + 1, :]
     return total

@@ -603,33 +603,10 @@ def _generic_kernel(stamp: int) -> Any:
     return generic_advance
 
 
-def _points_kernel(stamp: int) -> Any:
-    def points(out: Any, record: Any, x: Any, lo: int, hi: int) -> int:
-        """x = out z for every record (rows, n); x has the shape (count, n, dim)."""
-        rows = record.shape[1]
-        total = np.zeros((out.shape[0], _WIDTH))
-        for row in range(record.shape[0]):
-            for at in range(lo, hi, _WIDTH):
-                width = min(_WIDTH, hi - at)
-                for i in range(out.shape[0]):
-                    for l in range(width):
-                        total[i, l] = out[i, 0] * record[row, 0, at + l]
-                    for j in range(1, rows):
-                        for l in range(width):
-                            total[i, l] += out[i, j] * record[row, j, at + l]
-                for l in range(width):
-                    for i in range(out.shape[0]):
-                        x[row, at + l, i] = total[i, l]
-        return stamp
-
-    return points
-
-
 _STAMP = _stamp()
 _kernel = partial(compiled, error_model="numpy", nogil=True)
 planar_advance = _kernel(_planar_kernel(_STAMP))
 generic_advance = _kernel(_generic_kernel(_STAMP))
-points = _kernel(_points_kernel(_STAMP))
 
 _NOTHING = np.empty((0, 0, 0))
 
