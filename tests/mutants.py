@@ -5,9 +5,9 @@
 A mutant is one change to one line: another operator, a sign or `not` or transpose dropped, a number one larger or
 smaller, a comparison turned round or moved by its boundary, and for or, indices swapped, a guard that never closes. It
 is written into a copy of the project in a temporary folder, and the tests that execute the line run there: those of its
-own folder first, quick ones first. One that fails, or takes far too long, has seen the change. Which test executes what
-is measured once, which takes a quarter of an hour, and kept in .mutants: it is done again where the code has changed,
-and for new tests by --measure tests/NEW.py.
+own folder first, quick ones first, no slow ones but those marked thorough. One that fails, or takes far too long, has
+seen the change. Which test executes what is measured once, which takes a quarter of an hour, and kept in .mutants: it
+is done again where the code has changed, and for new tests by --measure tests/NEW.py.
 
 Lines are drawn first, then one of the changes to each. Changes that no test can see, for they change nothing that is
 promised, are listed with their reasons in tests/mutants.toml. The exit status is 1 if tests see fewer than 95 of 100 of

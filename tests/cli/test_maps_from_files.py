@@ -56,7 +56,7 @@ def test_backward_steps_find_the_inverse(kahanmaps, tmp_path):
 @pytest.mark.parametrize(
     ("command", "schema"),
     [
-        ("analyze --seconds 3", "analyze"),
+        ("analyze --seconds 1", "analyze"),
         ("find-integrals --seconds 5 --max-degree 4", "find-integrals"),
         ("find-integrals --darboux 2", "darboux-polynomials"),
         ("find-integrals --monomials 'q,p,1'", "hirota-kimura"),

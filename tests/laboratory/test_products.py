@@ -96,7 +96,7 @@ def test_a_density_of_a_high_degree_is_found_where_polynomials_are_too_many():
         ("x2^2*x4^2*x6^2", Verdict.SUPPORTED, 6)
     ]
     assert "phi = " in found.toml_section()
-    assert find_densities(nested(7), max_degree=5, seconds=5).densities == ()  # not where a smaller one was asked for
+    assert find_densities(nested(7), max_degree=5, seconds=1).densities == ()  # not where a smaller one was asked for
 
 
 def test_a_density_need_not_be_a_product_of_darboux_polynomials():
@@ -106,6 +106,8 @@ def test_a_density_need_not_be_a_product_of_darboux_polynomials():
     assert is_density(lyness, one.text, 1)
 
 
+@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_product_over_the_determinant_is_the_third_integral_of_a_circular_system():
     # beside the sum of all x and the modified Hamiltonian
     file = circular(7, 3)
