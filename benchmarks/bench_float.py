@@ -23,9 +23,9 @@ import numpy as np
 from flint import fmpq
 
 from kahanmaps import draw_with_eigenvalues, normal_form
-from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit
-from kahanmaps.maps.float_blocks import planar_blocks
-from kahanmaps.maps.float_ensemble import has_numba
+from kahanmaps.maps.floats.blocks import planar_blocks
+from kahanmaps.maps.floats.ensemble import has_numba
+from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
 
 EPS = fmpq(1, 10)
 LANES = 100_000

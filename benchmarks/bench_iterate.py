@@ -18,9 +18,9 @@ from flint import fmpz, nmod, nmod_mat
 from work import Absent, Row, Work, require_equal, row, run_gp, say, table, timed, work
 
 from kahanmaps.algebra.fields import GF, QQ, RR
-from kahanmaps.maps.jump import Jump
-from kahanmaps.maps.normal_steps import NormalSteps
-from kahanmaps.maps.planes_point import PlanesPoint
+from kahanmaps.maps.normal_form.iterate import Jump
+from kahanmaps.maps.normal_form.planes_point import PlanesPoint
+from kahanmaps.maps.normal_form.steps import NormalSteps
 
 OVER_Q, MODULO, BALLS = "The n-th iterate over Q", "The n-th iterate over GF(2^61 - 1)", "The n-th iterate in balls"
 PRIME = 2**61 - 1

@@ -8,7 +8,7 @@ import numpy as np
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError
-from kahanmaps.maps.float_numbers import FloatArray, exact, to_float, to_floats
+from kahanmaps.maps.floats.doubles import FloatArray, exact, to_float, to_floats
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

@@ -277,8 +277,8 @@ class Coverage:
         wanted = self._lines(mutant, lines)
         contexts = {c for line in wanted for c in lines.get(line, [])} - {""}
         if _is_compiled(mutant.path):  # its lines are seen only where a test runs them uncompiled
-            own = "float" if "float" in mutant.path else "modular"
-            lines = self.data.contexts_by_lineno(str(ROOT / f"kahanmaps/maps/{own}_numba.py"))
+            own = "floats" if "floats" in mutant.path else "residues"
+            lines = self.data.contexts_by_lineno(str(ROOT / f"kahanmaps/maps/{own}/numba_kernel.py"))
             contexts |= {c for line in lines for c in lines[line]} - {""}
         tests = set()
         for context in contexts:

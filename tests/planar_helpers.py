@@ -17,7 +17,7 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.structure import Structure, structure_of
-from kahanmaps.maps.planar_integers import IntegerBlock
+from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -26,14 +26,14 @@ FLOORS = [
 NEVER_IN_THE_LIBRARY = {"click", "rich", "kahanmaps_cli"}
 NEVER_WHILE_LOADING = {"matplotlib", "numba", "distributed"}
 NUMPY_WHILE_LOADING = (
-    "kahanmaps/maps/fast.py",
-    "kahanmaps/maps/float_",
-    "kahanmaps/maps/modular",
+    "kahanmaps/maps/floats/fast.py",
+    "kahanmaps/maps/floats/",
+    "kahanmaps/maps/residues/",
     "kahanmaps/plots/",
 )
 # A file of compiled kernels may import numba at its top, which keeps the machine code on disk valid and the kernels
 # ordinary functions, if nobody imports the file while being loaded.
-KERNELS = ("kahanmaps/maps/float_numba.py", "kahanmaps/maps/kept_code.py")
+KERNELS = ("kahanmaps/maps/floats/numba_kernel.py", "kahanmaps/maps/kept_code.py")
 
 
 def python_files() -> list[Path]:
@@ -171,13 +171,17 @@ WRONG = [
     (MAPS, "import numpy as np", "imports numpy while it is loaded"),
     ("kahanmaps/maps/fast_too.py", "import numpy as np", "imports numpy while it is loaded"),
     ("cli/kahanmaps_cli/render.py", "from numpy import array", "imports numpy while it is loaded"),
-    ("kahanmaps/maps/fast.py", "try:\n    import numba\nexcept ImportError:\n    pass", "imports numba while"),
-    ("kahanmaps/maps/float_ensemble.py", "from kahanmaps.maps.float_numba import Span", "float_numba.Span while"),
-    ("kahanmaps/maps/float_numpy.py", "import numba", "imports numba while"),
-    ("kahanmaps/maps/float_numba.py", "import matplotlib", "imports matplotlib while"),
+    ("kahanmaps/maps/floats/fast.py", "try:\n    import numba\nexcept ImportError:\n    pass", "imports numba while"),
+    (
+        "kahanmaps/maps/floats/ensemble.py",
+        "from kahanmaps.maps.floats.numba_kernel import Span",
+        "numba_kernel.Span while",
+    ),
+    ("kahanmaps/maps/floats/numpy_kernel.py", "import numba", "imports numba while"),
+    ("kahanmaps/maps/floats/numba_kernel.py", "import matplotlib", "imports matplotlib while"),
     ("kahanmaps/plots/figures.py", "from matplotlib.figure import Figure", "imports matplotlib while"),
     ("kahanmaps/experiments/run.py", "class A:\n    import distributed", "imports distributed while"),
-    ("kahanmaps/maps/fast.py", "if TYPE_CHECKING:\n    pass\nelse:\n    import numba", "imports numba while"),
+    ("kahanmaps/maps/floats/fast.py", "if TYPE_CHECKING:\n    pass\nelse:\n    import numba", "imports numba while"),
 ]
 
 
@@ -199,9 +203,9 @@ RIGHT = [
     ("kahanmaps/maps/orbits.py", "from kahanmaps.displayed import Displayed"),
     ("kahanmaps/family/planar.py", "from kahanmaps.systems.quadratic import QuadraticSystem"),
     ("kahanmaps/experiments/store.py", "from kahanmaps import __version__"),
-    ("kahanmaps/maps/fast.py", "import numpy as np"),
-    ("kahanmaps/maps/float_numba.py", "import numba\nimport numpy as np"),
-    ("kahanmaps/maps/float_ensemble.py", "def f():\n    from kahanmaps.maps.float_numba import Span"),
+    ("kahanmaps/maps/floats/fast.py", "import numpy as np"),
+    ("kahanmaps/maps/floats/numba_kernel.py", "import numba\nimport numpy as np"),
+    ("kahanmaps/maps/floats/ensemble.py", "def f():\n    from kahanmaps.maps.floats.numba_kernel import Span"),
     ("kahanmaps/plots/figures.py", "import numpy as np\ndef f():\n    from matplotlib.figure import Figure"),
     ("kahanmaps/__init__.py", "from kahanmaps.plots import draw"),
     ("cli/kahanmaps_cli/main.py", "import click\nimport kahanmaps\nfrom kahanmaps.plots import draw"),

@@ -69,7 +69,7 @@ class FloatRun(_Walk):
         steps: int,
         options: dict[str, Any],
     ) -> None:
-        from kahanmaps.maps.fast import FloatEnsemble, float_function, to_float
+        from kahanmaps.maps.floats.fast import FloatEnsemble, float_function, to_float
 
         value = to_float(eps)  # backward too: the inverse conserves what the map conserves
 
@@ -123,7 +123,7 @@ class FloatRun(_Walk):
 
     def _first_and_last(self, steps: int, look: int, output: str, progress: Told) -> None:
         """Look at integrals more often than points are kept."""
-        from kahanmaps.maps.float_stream import NpyFile
+        from kahanmaps.maps.floats.stream import NpyFile
 
         with NpyFile(output, self.shape) as file:
             file.append(self.ensemble.x[None])
@@ -196,7 +196,7 @@ class ModularRun(_Walk):
         steps: int,
         options: dict[str, Any],
     ) -> None:
-        from kahanmaps.maps.modular import ModularEnsemble
+        from kahanmaps.maps.residues.ensemble import ModularEnsemble
 
         self.file = file
         self.eps = eps
@@ -223,7 +223,7 @@ class ModularRun(_Walk):
         return len(self.ensemble), self.ensemble.system.dim
 
     def walk(self, steps: int, every: int, output: str | None, told: Told) -> None:
-        from kahanmaps.maps.float_stream import NpyFile
+        from kahanmaps.maps.floats.stream import NpyFile
 
         if output is None:
             self._advance(steps, told)

@@ -30,8 +30,8 @@ def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> NDArr
     import numpy as np
 
     from kahanmaps.algebra.fields import rational
-    from kahanmaps.maps.float_ensemble import starts_in_box
-    from kahanmaps.maps.float_numbers import to_float
+    from kahanmaps.maps.floats.doubles import to_float
+    from kahanmaps.maps.floats.ensemble import starts_in_box
 
     if count < 1:
         raise InputError(f"found --random {count}, expected at least 1 start")
@@ -190,7 +190,7 @@ def _mistakes(where: str, lines: Sequence[str], count: int) -> InputError:
 
 def _to_double(text: str) -> float:
     from kahanmaps.algebra.text import parse_number
-    from kahanmaps.maps.float_numbers import to_float
+    from kahanmaps.maps.floats.doubles import to_float
 
     return to_float(parse_number(text))
 

@@ -126,7 +126,7 @@ class OrbitRun:
         from kahanmaps.invariants.integrals import ClaimedIntegral
 
         if self.kind == "float":
-            from kahanmaps.maps.fast import float_function, to_float
+            from kahanmaps.maps.floats.fast import float_function, to_float
 
             # eps itself, also where the orbit steps by -eps: integrals are those of the map.
             self.columns.append((name, _float_column(float_function(function), to_float(self.eps))))

@@ -13,17 +13,17 @@ from kahanmaps.display.systems import CHARACTERS, equations_html
 from kahanmaps.displayed import html_form
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.analysis import Analysis
-from kahanmaps.laboratory.commuting import CommutingSystems
-from kahanmaps.laboratory.cycles import Census
-from kahanmaps.laboratory.darboux import DarbouxSearch
-from kahanmaps.laboratory.degrees import DegreeGrowth
-from kahanmaps.laboratory.densities import DensitySearch
-from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures
-from kahanmaps.laboratory.height_survey import HeightSurvey
-from kahanmaps.laboratory.integrals import IntegralSearch
-from kahanmaps.laboratory.poisson_tensors import PoissonSearch
-from kahanmaps.laboratory.singularities import SingularityRun
-from kahanmaps.laboratory.symmetries import Symmetries
+from kahanmaps.laboratory.finite.cycles import Census
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.growth.height_survey import HeightSurvey
+from kahanmaps.laboratory.preserve.darboux import DarbouxSearch
+from kahanmaps.laboratory.preserve.densities import DensitySearch
+from kahanmaps.laboratory.preserve.hamiltonian_structure import ConstantStructures
+from kahanmaps.laboratory.preserve.integrals import IntegralSearch
+from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch
+from kahanmaps.laboratory.singular.singularities import SingularityRun
+from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
+from kahanmaps.laboratory.symmetry.symmetries import Symmetries
 
 _ROWS = 20
 _FORMULAS = 5  # rows of which each has several formulas

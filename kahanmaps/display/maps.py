@@ -8,8 +8,8 @@ from kahanmaps.display.systems import CHARACTERS, system_latex
 from kahanmaps.displayed import html_form, latex_form
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
 from kahanmaps.maps.kahan import Kahan, KahanMap
+from kahanmaps.maps.normal_form.periods import OrbitPeriod
 from kahanmaps.maps.orbits import Orbit, OrbitPoint
-from kahanmaps.maps.periods import OrbitPeriod
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _EQUATIONS = 8

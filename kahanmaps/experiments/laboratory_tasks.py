@@ -23,12 +23,12 @@ from kahanmaps.experiments.registry import Result, fields, task, whole_report
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
-    from kahanmaps.laboratory.cycle_laws import Comparison
-    from kahanmaps.laboratory.cycles import Census
-    from kahanmaps.laboratory.degrees import DegreeGrowth
-    from kahanmaps.laboratory.densities import DensitySearch
-    from kahanmaps.laboratory.integrals import IntegralSearch
-    from kahanmaps.laboratory.singularities import SingularityRun
+    from kahanmaps.laboratory.finite.cycle_laws import Comparison
+    from kahanmaps.laboratory.finite.cycles import Census
+    from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+    from kahanmaps.laboratory.preserve.densities import DensitySearch
+    from kahanmaps.laboratory.preserve.integrals import IntegralSearch
+    from kahanmaps.laboratory.singular.singularities import SingularityRun
 
 _ENDINGS = ("constant", "singular")  # of degrees without a recurrence that are known for all iterates
 
@@ -44,7 +44,7 @@ def degrees(
     report: bool = False,
 ) -> Result:
     """The degrees of the iterates: the kind of growth, the dynamical degree, a recurrence."""
-    from kahanmaps.laboratory.degrees import degree_growth
+    from kahanmaps.laboratory.growth.degrees import degree_growth
 
     found = degree_growth(system.map, eps, seconds=seconds, max_terms=terms, max_degree=max_degree, seed=seed)
     return {
@@ -69,7 +69,7 @@ def integrals(
     report: bool = False,
 ) -> Result:
     """Integrals in closed form with their verdict, and how many there are at least, by theorems and by orbits."""
-    from kahanmaps.laboratory.integrals import find_integrals
+    from kahanmaps.laboratory.preserve.integrals import find_integrals
 
     found = find_integrals(system, symbols=symbolic or (), eps=eps, max_degree=max_degree, seconds=seconds, seed=seed)
     return {
@@ -96,7 +96,7 @@ def density(
     report: bool = False,
 ) -> Result:
     """The densities phi of least degree, or a product of powers, for which the measure dx/phi is invariant."""
-    from kahanmaps.laboratory.densities import find_densities
+    from kahanmaps.laboratory.preserve.densities import find_densities
 
     found = find_densities(system, symbols=symbolic or (), eps=eps, max_degree=max_degree, seconds=seconds, seed=seed)
     return {
@@ -122,7 +122,7 @@ def poisson(
     report: bool = False,
 ) -> Result:
     """The Poisson tensors with polynomial entries: how many, their ranks, Casimirs among the integrals."""
-    from kahanmaps.laboratory.poisson_tensors import find_poisson
+    from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
 
     found = find_poisson(system, max_degree, symbols=symbolic or (), eps=eps, seconds=seconds, seed=seed)
     return {
@@ -142,7 +142,7 @@ def poisson(
 @task("find-symmetry")
 def symmetry(system: SystemFile, seconds: int = 30, report: bool = False) -> Result:
     """Affine symmetries and reversing symmetries, for every eps: how many, and what generates them."""
-    from kahanmaps.laboratory.symmetries import linear_symmetries
+    from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
     found = linear_symmetries(system.system, seconds=seconds)
     return {
@@ -169,7 +169,7 @@ def commuting(
     report: bool = False,
 ) -> Result:
     """The quadratic systems whose Kahan map commutes with this one at the same eps, for every eps."""
-    from kahanmaps.laboratory.commuting import commuting_systems
+    from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 
     found = commuting_systems(system.system, shape, seed=seed, error_bits=error_bits, seconds=seconds)
     return {
@@ -231,8 +231,8 @@ def confinement(
     report: bool = False,
 ) -> Result:
     """Are singularities confined? The hypersurfaces that the map contracts; without eps two values are compared."""
-    from kahanmaps.laboratory.fates import NOT_CONTRACTED, UNDECIDED
-    from kahanmaps.laboratory.singularities import default_eps, singularities
+    from kahanmaps.laboratory.singular.fates import NOT_CONTRACTED, UNDECIDED
+    from kahanmaps.laboratory.singular.singularities import default_eps, singularities
 
     values = default_eps(system.map, seed) if eps is None else (eps,)
     runs = [singularities(system.map, value, steps=steps, seed=seed, seconds=seconds) for value in values]
@@ -273,9 +273,9 @@ def cycles(
     report: bool = False,
 ) -> Result:
     """The cycles of the map over a finite field, and the laws that their lengths are compatible with."""
-    from kahanmaps.laboratory.cycle_laws import LAWS, compare
-    from kahanmaps.laboratory.cycles import cycle_census, default_eps
-    from kahanmaps.laboratory.reversors import find_reversor
+    from kahanmaps.laboratory.finite.cycle_laws import LAWS, compare
+    from kahanmaps.laboratory.finite.cycles import cycle_census, default_eps
+    from kahanmaps.laboratory.symmetry.reversors import find_reversor
 
     if steps is not None and samples is None:
         raise InputError(f"found steps = {steps} without samples, expected both: whole graphs have no last step")
@@ -321,9 +321,9 @@ def lyapunov(
     seed: int = 0,
 ) -> Result:
     """Lyapunov exponents of float orbits from random starts, by the exact tangent map, per unit of time."""
-    from kahanmaps.maps.float_ensemble import starts_in_box
-    from kahanmaps.maps.float_lyapunov import lyapunov_exponents
-    from kahanmaps.maps.float_numbers import to_floats
+    from kahanmaps.maps.floats.doubles import to_floats
+    from kahanmaps.maps.floats.ensemble import starts_in_box
+    from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     skipped = steps // 10 if transient is None else transient

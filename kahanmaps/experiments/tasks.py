@@ -30,9 +30,9 @@ from kahanmaps.invariants.heights import height_growth
 from kahanmaps.maps.arithmetic import Arithmetic
 from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.methods import choose_method
+from kahanmaps.maps.normal_form.periods import period_of
 from kahanmaps.maps.orbit import orbit as find_orbit
 from kahanmaps.maps.orbits import DEFAULT_MAX_DIGITS, OrbitPoint
-from kahanmaps.maps.periods import period_of
 
 _WORTH_COMPILING = 5_000_000  # orbits times steps
 _LONGEST_POINT = 400  # characters of a last point that are kept; longer ones are known by their hash
@@ -198,8 +198,8 @@ def ensemble(
     seed: int = 0,
 ) -> Result:
     """Float orbits from random starts: how many are completed, how far the integrals of the planes drift."""
-    from kahanmaps.maps.fast import to_floats
-    from kahanmaps.maps.float_ensemble import FloatEnsemble, starts_in_box
+    from kahanmaps.maps.floats.ensemble import FloatEnsemble, starts_in_box
+    from kahanmaps.maps.floats.fast import to_floats
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     structure = _float_structure(system, method)

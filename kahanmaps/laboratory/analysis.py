@@ -17,26 +17,26 @@ from kahanmaps.displayed import Displayed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.structure import Structure, structure_of
-from kahanmaps.laboratory.commuting import commuting_systems
-from kahanmaps.laboratory.degrees import degree_growth
-from kahanmaps.laboratory.densities import find_densities
 from kahanmaps.laboratory.findings import Findings
-from kahanmaps.laboratory.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
-from kahanmaps.laboratory.hamiltonian_structure import constant_structures
-from kahanmaps.laboratory.height_survey import height_survey
-from kahanmaps.laboratory.integrals import find_integrals
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.poisson_tensors import find_poisson
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
+from kahanmaps.laboratory.preserve.hamiltonian_structure import constant_structures
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
+from kahanmaps.laboratory.preserve.sparse_relations import sparse_relations
 from kahanmaps.laboratory.report import Conclusion, Statement, conclude, sections
-from kahanmaps.laboratory.singularities import (
+from kahanmaps.laboratory.singular.singularities import (
     WRITTEN_DIMENSION,
     can_be_written,
     default_eps,
     patterns_of,
     singularities,
 )
-from kahanmaps.laboratory.sparse_relations import sparse_relations
-from kahanmaps.laboratory.symmetries import linear_symmetries
+from kahanmaps.laboratory.symmetry.commuting import commuting_systems
+from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
 # Seconds for everything, by dimension; about half of it is used where nothing is hard.
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}

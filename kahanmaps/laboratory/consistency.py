@@ -9,7 +9,7 @@ from __future__ import annotations
 from kahanmaps.errors import counted
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.findings import Findings
-from kahanmaps.laboratory.recurrences import GrowthClass
+from kahanmaps.laboratory.growth.recurrences import GrowthClass
 
 _POLYNOMIAL = (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
 

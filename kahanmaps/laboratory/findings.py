@@ -8,16 +8,16 @@ from flint import fmpq
 
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.structure import NoStructure, Structure
-from kahanmaps.laboratory.commuting import CommutingSystems
-from kahanmaps.laboratory.degrees import DegreeGrowth
-from kahanmaps.laboratory.densities import DensitySearch
-from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures
-from kahanmaps.laboratory.height_survey import HeightSurvey
-from kahanmaps.laboratory.integrals import IntegralSearch
-from kahanmaps.laboratory.poisson_tensors import PoissonSearch
-from kahanmaps.laboratory.singularities import SingularityRun
-from kahanmaps.laboratory.sparse_relations import SparseRelation
-from kahanmaps.laboratory.symmetries import Symmetries
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.growth.height_survey import HeightSurvey
+from kahanmaps.laboratory.preserve.densities import DensitySearch
+from kahanmaps.laboratory.preserve.hamiltonian_structure import ConstantStructures
+from kahanmaps.laboratory.preserve.integrals import IntegralSearch
+from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch
+from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
+from kahanmaps.laboratory.singular.singularities import SingularityRun
+from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
+from kahanmaps.laboratory.symmetry.symmetries import Symmetries
 
 
 @dataclass

@@ -13,10 +13,10 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.laboratory.affine_functions import affine_cofactor, affine_darboux
-from kahanmaps.laboratory.closed_forms import ClosedForms, Spaces, closed_forms
-from kahanmaps.laboratory.cofactors import Cofactor, cofactor_of_affine, determinant_factors, jacobian_factors
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
+from kahanmaps.laboratory.preserve.affine_functions import affine_cofactor, affine_darboux
+from kahanmaps.laboratory.preserve.closed_forms import ClosedForms, Spaces, closed_forms
+from kahanmaps.laboratory.preserve.cofactors import Cofactor, cofactor_of_affine, determinant_factors, jacobian_factors
 from kahanmaps.maps.kahan import Kahan
 
 

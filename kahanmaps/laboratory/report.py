@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.errors import counted
 from kahanmaps.family.structure import Structure
-from kahanmaps.laboratory.affine_functions import affine_darboux
-from kahanmaps.laboratory.commuting import CommutingField
 from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
 from kahanmaps.laboratory.findings import Findings
-from kahanmaps.laboratory.recurrences import GrowthClass
+from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
+from kahanmaps.laboratory.symmetry.commuting import CommutingField
 
 PROVED, SUPPORTED, MEASURED, UNDECIDED, NOTE = "proved", "supported", "measured", "undecided", "note"
 _SHOWN_DEGREES = 12

@@ -7,8 +7,8 @@ have it as they stand. Three values say it all, and everything else asks them:
 * `BirationalMap` is the map over Q, eps and all. A new discretization is a function that returns an `ImplicitMap`.
 * `MapOver` is the map over one field at one eps: images, the inverse map, Jacobi matrices.
 * `Equation` has the coefficients of M and r over that field. The evaluators start from it: integers over one
-  denominator (integer_steps.py), residues (modular.py), machine numbers (float_steps.py), curves and forms in
-  projective space (projective.py), and the generic one here, over any field.
+  denominator (integer_steps.py), residues (residues/ensemble.py), machine numbers (floats/steps.py), curves and forms
+  in projective space (projective.py), and the generic one here, over any field.
 
 In homogeneous coordinates (X : Z), x = X/Z, the equation says that L(X, Z) (X~ : Z~) = 0 for an n x (n + 1) matrix
 L = (M | -r) of forms of one degree. Where that degree is 1, exchanging the two points gives the inverse map.

@@ -73,7 +73,7 @@ def choose_method(
 
 
 def _why_not_over_Q(structure: Structure) -> str:
-    from kahanmaps.maps.splitting import Splitting
+    from kahanmaps.maps.normal_form.splitting import Splitting
 
     degrees = [plane.degree for plane in Splitting(structure.form, QQ, 1, structure.T).planes]
     return "" if max(degrees) == 1 else f"chi does not split over Q (a factor has degree {max(degrees)})"
@@ -81,7 +81,7 @@ def _why_not_over_Q(structure: Structure) -> str:
 
 def why_no_reduction(structure: Structure, field: Field, eps: object) -> str:
     """Empty where jumps are possible over the field, otherwise the reason (a bad prime)."""
-    from kahanmaps.maps.jump import Jump
+    from kahanmaps.maps.normal_form.iterate import Jump
 
     try:
         Jump(structure, eps, field)

@@ -15,9 +15,9 @@ from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.arithmetic import Arithmetic
 from kahanmaps.maps.implicit import BirationalMap
-from kahanmaps.maps.jump import special_start
 from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.maps.methods import JUMP_FROM, choose_method, why_no_reduction
+from kahanmaps.maps.normal_form.iterate import special_start
 from kahanmaps.maps.orbits import (
     DEFAULT_MAX_DIGITS,
     Iterates,
@@ -112,7 +112,7 @@ def orbit(
 
     def made(numbers: Arithmetic) -> Any:
         if numbers.kind == "float":
-            from kahanmaps.maps.fast import FloatOrbit
+            from kahanmaps.maps.floats.fast import FloatOrbit
 
             form = None if used is None else used.form
             return FloatOrbit(map_, exact_eps, start, far, backward=backward, form=form, kernel=kernel, every=interval)
@@ -164,7 +164,7 @@ class Walk:
         if self.arithmetic.kind != "float":
             yield from self.orbit
             return
-        from kahanmaps.maps.fast import FLOATS
+        from kahanmaps.maps.floats.fast import FLOATS
 
         for step, x in self.orbit:
             yield OrbitPoint(step, FLOATS, tuple(x.tolist()))

@@ -21,7 +21,7 @@ from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.maps.implicit import MapOver, det_of
 from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.planes_point import PlanesPoint
+from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 
 # Normal forms are loaded where they are used: an orbit by single steps, which most are, starts in half the time.
 if TYPE_CHECKING:
@@ -174,11 +174,11 @@ class Orbit(Displayed):
         """The start and its images; ends, or raises SingularStep, where the map has no value."""
         field = self.map.field
         if self.structure is not None and field is QQ:
-            from kahanmaps.maps.normal_steps import NormalSteps
+            from kahanmaps.maps.normal_form.steps import NormalSteps
 
             yield from NormalSteps(self.structure, self.map.eps).points(self.start)
         elif self.structure is not None and isinstance(field, BallField):
-            from kahanmaps.maps.jump import Jump
+            from kahanmaps.maps.normal_form.iterate import Jump
 
             jump = Jump(self.structure, self.map.eps, field)
             value: Any = self.start
@@ -246,7 +246,7 @@ class Iterates:
             require_steps(step)
         self.max_digits = max_digits
         self.end: OrbitEnd | None = None
-        from kahanmaps.maps.jump import Jump
+        from kahanmaps.maps.normal_form.iterate import Jump
 
         self._jump = Jump(structure, self.map.eps, self.map.field)
         self._interrupted = False
@@ -268,7 +268,7 @@ class Iterates:
             self._busy_in = None
 
     def _points(self) -> Iterator[OrbitPoint]:
-        from kahanmaps.maps.rational_jump import OverBudget
+        from kahanmaps.maps.normal_form.rational_iterate import OverBudget
 
         done = 0
         max_bits = _bits(self.max_digits)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kahanmaps.maps.float_numbers import FloatArray
+from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.trajectories import VectorField, ensemble_for
 from kahanmaps.systems.quadratic import QuadraticSystem
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from kahanmaps.algebra.text import parse_number
 from kahanmaps.errors import InputError, printable
-from kahanmaps.laboratory.degrees import DegreeGrowth
-from kahanmaps.laboratory.singularities import Patterns
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.singular.singularities import Patterns
 
 _MOST_TERMS = 10_000
 _LARGEST = 10**15

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.float_numbers import FloatArray
+from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.windows import Window
 

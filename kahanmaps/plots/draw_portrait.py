@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.float_numbers import FloatArray
+from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.density import Density
 from kahanmaps.plots.figures import RASTERISE_ABOVE, dot_size, drawing, new_figure, points
 from kahanmaps.plots.portrait import Portrait

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.planar import NormalForm
-from kahanmaps.maps.fast import FloatOrbit
-from kahanmaps.maps.float_classical import ClassicalOrbit
-from kahanmaps.maps.float_numbers import FloatArray, to_floats
+from kahanmaps.maps.floats.classical import ClassicalOrbit
+from kahanmaps.maps.floats.doubles import FloatArray, to_floats
+from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.maps.orbits import OrbitEnd
 from kahanmaps.plots.drift_functions import WatchedFunction
 from kahanmaps.systems.quadratic import QuadraticSystem

@@ -15,8 +15,8 @@ from kahanmaps.algebra.text import format_polynomial, parse_rational_function
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
-from kahanmaps.maps.float_ensemble import FloatEnsemble
-from kahanmaps.maps.float_numbers import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
+from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.plots.figures import label_of, plain
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.systems.hamiltonian import CubicHamiltonian

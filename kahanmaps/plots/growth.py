@@ -10,9 +10,9 @@ import numpy as np
 
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
-from kahanmaps.laboratory.degrees import DegreeGrowth
-from kahanmaps.laboratory.height_survey import HeightSurvey
-from kahanmaps.laboratory.recurrences import GrowthClass
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.growth.height_survey import HeightSurvey
+from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.plots.figures import drawing, label_number, legend_above, legend_height, new_figure, plain
 from kahanmaps.plots.height_curves import HeightCurve, fit_of, height_curves
 from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
@@ -39,7 +39,7 @@ def draw_degrees(
     growth is exponential or looks so, else "linear". On a logarithmic scale a degree 0 lies in a band marked 0.
     Raises InputError for no system or more than 7, and for a scale of another name.
 
-    >>> from kahanmaps.laboratory.degrees import degree_growth
+    >>> from kahanmaps.laboratory.growth.degrees import degree_growth
     >>> from kahanmaps.documents.catalog import load
     >>> figure = draw_degrees({"Euler top": degree_growth(load("euler_top").system)})
     >>> figure.legends[0].get_texts()[0].get_text()

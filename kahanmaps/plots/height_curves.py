@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.text import parse_number
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
-from kahanmaps.laboratory.height_survey import HeightSurvey
+from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 
 _MOST_ORBITS = 2000
 _LARGEST = 10**15  # steps and bits: what no orbit has
@@ -40,7 +40,7 @@ class HeightCurve:
 def height_curves(survey: HeightSurvey) -> tuple[HeightCurve, ...]:
     """The orbits of a survey as curves, every height of them.
 
-    >>> from kahanmaps.laboratory.height_survey import height_survey
+    >>> from kahanmaps.laboratory.growth.height_survey import height_survey
     >>> from kahanmaps.documents.catalog import load
     >>> [curve] = height_curves(height_survey(load("weierstrass").system, "1/10", starts=[[1, "1/2"]], steps=40))
     >>> curve.bits[:6].tolist(), str(curve.kind), round(curve.constant, 4)

@@ -25,8 +25,8 @@ from kahanmaps.algebra.text import format_number
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.structure import NoStructure
-from kahanmaps.maps.planar_block import PlanarBlock, Triple
-from kahanmaps.maps.splitting import Splitting
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
+from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.plots.plane_cubics import PlaneCubic
 from kahanmaps.plots.symmetric_planes import COMPLEX, Matrix, symmetric_coordinates, transformed
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.float_numbers import FloatArray
+from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.figures import require_matplotlib
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.windows import Window

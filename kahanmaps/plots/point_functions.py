@@ -15,7 +15,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.display.latex import latex_polynomial
 from kahanmaps.errors import InputError
-from kahanmaps.maps.float_numbers import FloatArray, to_float
+from kahanmaps.maps.floats.doubles import FloatArray, to_float
 from kahanmaps.plots.figures import label_of, plain
 
 _SHORT = 60  # characters of a formula that fits along an axis

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.maps.float_numbers import FloatArray
+from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.level_sets import LevelCurves
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.trajectories import Trajectories

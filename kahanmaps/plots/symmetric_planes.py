@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from flint import acb_mat, arb, arb_mat
 
-from kahanmaps.maps.planar_block import PlanarBlock
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock
 
 Matrix = arb_mat | acb_mat  # complex in a complex plane
 

@@ -13,8 +13,8 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.float_ensemble import FloatEnsemble
-from kahanmaps.maps.float_numbers import FloatArray, to_floats
+from kahanmaps.maps.floats.doubles import FloatArray, to_floats
+from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.orbits import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem

@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.float_numbers import FloatArray
+from kahanmaps.maps.floats.doubles import FloatArray
 
 Window = tuple[tuple[float, float], ...]  # low and high along each axis
 

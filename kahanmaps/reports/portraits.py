@@ -11,7 +11,7 @@ from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.errors import counted
-from kahanmaps.maps.float_ensemble import starts_in_box
+from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.plots.automatic_starts import automatic_starts
 from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
 from kahanmaps.plots.draw_portrait import draw_portrait

@@ -13,7 +13,7 @@ from kahanmaps.reports.page import CHARACTERS, ROOM, text
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
-    from kahanmaps.laboratory.sparse_relations import SparseRelation
+    from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
 
 _PARSED = 4_000  # characters of a relation that is read once more, to be set as a formula
 

@@ -6,7 +6,7 @@ import pytest
 from cli_helpers import shell
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory.cycles import cycle_census
+from kahanmaps.laboratory.finite.cycles import cycle_census
 from kahanmaps.version import __version__
 
 

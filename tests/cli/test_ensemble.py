@@ -20,8 +20,8 @@ import pytest
 from cli_helpers import COMMAND, shell, terminal
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.maps.fast import FloatEnsemble
-from kahanmaps.maps.float_stream import NpyFile
+from kahanmaps.maps.floats.fast import FloatEnsemble
+from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps.version import __version__
 from kahanmaps_cli import ensemble_starts
 

@@ -179,7 +179,9 @@ def test_standard_input_is_not_written_over(given):
 
 
 def test_nothing_is_computed_before_the_output_is_refused(kahanmaps, given, monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.degrees.degree_growth", lambda *_, **__: pytest.fail("it was computed"))
+    monkeypatch.setattr(
+        "kahanmaps.laboratory.growth.degrees.degree_growth", lambda *_, **__: pytest.fail("it was computed")
+    )
     Path("system.svg").write_bytes(Path("system.toml").read_bytes())
     assert kahanmaps("plot degrees harmonic ./system.svg -o system.svg").status == 2
 

@@ -7,7 +7,7 @@ import pytest
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
-from kahanmaps.laboratory.height_survey import height_survey
+from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.version import __version__
 
 OSCILLATOR = "--vars q,p --rhs p --rhs '2*q^2-q'"  # q'' = -q + 2 q^2; the fourth iterate at eps = 1 is the identity
@@ -47,7 +47,7 @@ def test_a_special_eps_is_seen_as_such(kahanmaps):
 
 
 def test_eps_that_disagree_are_told(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.height_survey.DEFAULT_EPS", (1, 2))
+    monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.DEFAULT_EPS", (1, 2))
     from kahanmaps.systems.quadratic import QuadraticSystem
 
     found = height_survey(QuadraticSystem.from_text(["q", "p"], ["p", "2*q^2 - q"]), starts=2, steps=40)

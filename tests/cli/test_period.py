@@ -223,6 +223,6 @@ def test_an_error_on_the_way_is_a_message(kahanmaps, pair, monkeypatch):
     def fail(*_):
         raise SingularStep("no value")
 
-    monkeypatch.setattr("kahanmaps.maps.periods.period_over_rationals", fail)
+    monkeypatch.setattr("kahanmaps.maps.normal_form.periods.period_over_rationals", fail)
     outcome = kahanmaps("period", pair, PAIR)
     assert (outcome.status, outcome.err) == (3, "Error: no value\n")

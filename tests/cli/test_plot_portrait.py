@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.maps.fast import FloatOrbit
+from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.plots import draw_portrait as drawing
 from kahanmaps.plots.recipe import read_recipe
 from kahanmaps_cli.pictures.stored import read_orbits

@@ -14,9 +14,9 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.structured_facts import GROWTHS, VERDICTS
 from kahanmaps.experiments.records import KEPT
 from kahanmaps.invariants.heights import Growth
-from kahanmaps.laboratory.cycle_laws import LAWS
-from kahanmaps.laboratory.recurrences import GrowthClass
-from kahanmaps.maps.periods import Kind
+from kahanmaps.laboratory.finite.cycle_laws import LAWS
+from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.maps.normal_form.periods import Kind
 from kahanmaps_cli.main import cli
 from kahanmaps_cli.schema_files import ALIASES, schema, schema_titles
 

@@ -10,9 +10,9 @@ from kahanmaps.documents.catalog import load, map_names, names, titles
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.structured_facts import relations
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.degrees import degree_growth
-from kahanmaps.laboratory.hirota_kimura import hirota_kimura_basis
+from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis
 from kahanmaps.maps.inverse import inverse_rows
 
 every_map = pytest.mark.parametrize("name", map_names())

@@ -18,8 +18,8 @@ from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.invariants.measures import ClaimedDensity
-from kahanmaps.laboratory.degrees import degree_growth
-from kahanmaps.laboratory.singularities import patterns, singularities, symbolic_denominator
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.singular.singularities import patterns, singularities, symbolic_denominator
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.orbit import orbit
 

@@ -24,18 +24,18 @@ from kahanmaps.experiments.export import write_csv
 from kahanmaps.experiments.registry import task_kind
 from kahanmaps.experiments.store import Store
 from kahanmaps.experiments.summary import summarise
-from kahanmaps.laboratory import densities, integrals
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.commuting import commuting_systems
-from kahanmaps.laboratory.cycle_laws import compare
-from kahanmaps.laboratory.cycles import cycle_census
-from kahanmaps.laboratory.degrees import degree_growth
-from kahanmaps.laboratory.poisson_tensors import find_poisson
-from kahanmaps.laboratory.reversors import find_reversor
-from kahanmaps.laboratory.singularities import singularities
-from kahanmaps.laboratory.symmetries import linear_symmetries
-from kahanmaps.maps.float_ensemble import starts_in_box
-from kahanmaps.maps.float_lyapunov import lyapunov_exponents
+from kahanmaps.laboratory.finite.cycle_laws import compare
+from kahanmaps.laboratory.finite.cycles import cycle_census
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.preserve import densities, integrals
+from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
+from kahanmaps.laboratory.singular.singularities import singularities
+from kahanmaps.laboratory.symmetry.commuting import commuting_systems
+from kahanmaps.laboratory.symmetry.reversors import find_reversor
+from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
+from kahanmaps.maps.floats.ensemble import starts_in_box
+from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 
 TASKS = (
     "degrees", "find-integrals", "find-density", "find-poisson", "find-symmetry", "find-commuting", "analyze",

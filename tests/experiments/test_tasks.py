@@ -27,10 +27,10 @@ from kahanmaps.experiments.records import canonical
 from kahanmaps.family.cubics import cubic_space
 from kahanmaps.family.structure import structure_of
 from kahanmaps.invariants.heights import height_growth
-from kahanmaps.maps.fast import FloatOrbit
+from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.normal_form.periods import period_of
 from kahanmaps.maps.orbits import Orbit
-from kahanmaps.maps.periods import period_of
 from kahanmaps.paper.examiner import VerifyOptions
 from kahanmaps.paper.verify import verify, verify_universal
 
@@ -293,7 +293,7 @@ def test_heights_are_those_of_the_library(system, steps, growth):
 
 
 def test_an_ensemble_is_that_of_the_library():
-    from kahanmaps.maps.float_ensemble import FloatEnsemble, starts_in_box
+    from kahanmaps.maps.floats.ensemble import FloatEnsemble, starts_in_box
 
     found = perform("ensemble", load("lorenz"), eps="1/10", orbits=50, box="1/2", steps=300, seed=4)
     run = FloatEnsemble(load("lorenz").system, "1/10", starts_in_box(50, 3, 0.5, 4), kernel="numpy")

@@ -19,7 +19,7 @@ from kahanmaps.family.cubics import default_variables
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.splitting import Splitting
+from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 

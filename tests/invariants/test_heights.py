@@ -37,9 +37,9 @@ from kahanmaps.invariants.heights import (
 )
 from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_steps import NormalSteps
+from kahanmaps.maps.normal_form.planar_integers import IntegerBlock
+from kahanmaps.maps.normal_form.steps import NormalSteps
 from kahanmaps.maps.orbits import Orbit, OrbitEnd
-from kahanmaps.maps.planar_integers import IntegerBlock
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 START = ["1/2", "1/3", "-1/5", "2/7", "3/4", "-2/3"]

@@ -18,8 +18,8 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory import analysis as module
 from kahanmaps.laboratory import report
 from kahanmaps.laboratory.analysis import Analysis, analyze
-from kahanmaps.laboratory.hirota_kimura import Profile
-from kahanmaps.laboratory.integrals import IntegralSearch
+from kahanmaps.laboratory.preserve.hirota_kimura import Profile
+from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 
 FURTHER = Path(__file__).parent / "further_systems"
 PARTS = (

@@ -17,8 +17,8 @@ from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.structured_facts import relations
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.hirota_kimura import hirota_kimura_basis, relations_on_orbit
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis, relations_on_orbit
 
 FACTS = [name for name in names() if set(load(name).catalog) & {"degrees", "growth", "verdict", "codimension"}]
 # Seconds that are enough, where the default would be long. All below takes less than a second.

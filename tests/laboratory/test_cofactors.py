@@ -9,9 +9,10 @@ from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.laboratory import cofactors as module
-from kahanmaps.laboratory.affine_functions import affine_darboux
-from kahanmaps.laboratory.cofactors import (
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve import cofactors as module
+from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.cofactors import (
     DETERMINANT,
     Cofactor,
     CofactorProduct,
@@ -24,7 +25,6 @@ from kahanmaps.laboratory.cofactors import (
     products,
     search_cofactors,
 )
-from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.maps.kahan import Kahan
 
 SMALL_ONES = [name for name in names() if load(name).system.dim <= 4]

@@ -20,11 +20,16 @@ from kahanmaps.checks.claims import Evidence, Finding, Verdict
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.laboratory import commuting as module
-from kahanmaps.laboratory.commuting import _Search, commuting_systems
-from kahanmaps.laboratory.commuting_equations import coefficients_of, combination, commutator_equations, system_of
-from kahanmaps.laboratory.commuting_proofs import _family_identity, affine, judge_family, judge_field
-from kahanmaps.laboratory.commuting_space import bracket_vanishes, commuting_space, field_at
+from kahanmaps.laboratory.symmetry import commuting as module
+from kahanmaps.laboratory.symmetry.commuting import _Search, commuting_systems
+from kahanmaps.laboratory.symmetry.commuting_equations import (
+    coefficients_of,
+    combination,
+    commutator_equations,
+    system_of,
+)
+from kahanmaps.laboratory.symmetry.commuting_proofs import _family_identity, affine, judge_family, judge_field
+from kahanmaps.laboratory.symmetry.commuting_space import bracket_vanishes, commuting_space, field_at
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 TRIVIAL = ["0", "f", "-f"]

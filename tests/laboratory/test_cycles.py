@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import BadPrime, InputError, SingularStep
-from kahanmaps.laboratory.cycle_laws import LAWS, _critical, _distance, _passes_components, _reversible, compare
-from kahanmaps.laboratory.cycles import cycle_census, default_eps
-from kahanmaps.laboratory.reversors import find_reversor, is_reversor
+from kahanmaps.laboratory.finite.cycle_laws import LAWS, _critical, _distance, _passes_components, _reversible, compare
+from kahanmaps.laboratory.finite.cycles import cycle_census, default_eps
+from kahanmaps.laboratory.symmetry.reversors import find_reversor, is_reversor
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.modular_projective import ProjectiveMap, graph_of, hasse_weil
 from kahanmaps.maps.projective import homogeneous_map
+from kahanmaps.maps.residues.projective import ProjectiveMap, graph_of, hasse_weil
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

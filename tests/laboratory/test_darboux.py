@@ -16,8 +16,8 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.darboux import darboux_polynomials
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 

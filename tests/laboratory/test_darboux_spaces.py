@@ -10,16 +10,16 @@ from flint import nmod_mat
 from search_helpers import random_system, system
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory import darboux_spaces as module
-from kahanmaps.laboratory.darboux_spaces import (
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import combine, echelon, exponents_up_to, monomial_values
+from kahanmaps.laboratory.preserve import darboux_spaces as module
+from kahanmaps.laboratory.preserve.darboux_spaces import (
     DarbouxSpace,
     _is_darboux,
     _of_rank_two,
     darboux_spaces,
     gradient_rank,
 )
-from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import combine, echelon, exponents_up_to, monomial_values
 
 SMALL = 101
 

@@ -16,9 +16,9 @@ from flint import fmpz_poly
 from kahanmaps.algebra.fields import GF
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory import curves
-from kahanmaps.laboratory.degrees import DegreeGrowth, _Search, degree_growth
-from kahanmaps.laboratory.recurrences import GrowthClass
+from kahanmaps.laboratory.growth import curves
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth, _Search, degree_growth
+from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 CATALOG = {

@@ -20,11 +20,11 @@ from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.laboratory import densities as module
-from kahanmaps.laboratory.densities import find_densities
-from kahanmaps.laboratory.identities import verdict_on
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import rank
+from kahanmaps.laboratory.preserve import densities as module
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.maps.kahan import KahanMap
 
 density_verdict = partial(verdict_on, is_density=True)

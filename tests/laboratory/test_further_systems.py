@@ -36,10 +36,10 @@ from kahanmaps.checks.preserve import check_measure
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.files import parse_system, read_system
 from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.densities import find_densities
-from kahanmaps.laboratory.integrals import find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.integrals import find_integrals
 
 FOLDER = Path(__file__).parent / "further_systems"
 FURTHER = json.loads((FOLDER / "answers.json").read_text(encoding="utf-8"))

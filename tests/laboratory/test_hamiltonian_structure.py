@@ -20,7 +20,12 @@ from kahanmaps.documents.files import read_system
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.integrals import ModifiedHamiltonian
 from kahanmaps.invariants.measures import DeterminantDensity
-from kahanmaps.laboratory.hamiltonian_structure import ConstantStructures, _invertible, _small, constant_structures
+from kahanmaps.laboratory.preserve.hamiltonian_structure import (
+    ConstantStructures,
+    _invertible,
+    _small,
+    constant_structures,
+)
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem

@@ -12,8 +12,10 @@ from search_helpers import random_system, system
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.structured_facts import relation_functions, relations
 from kahanmaps.documents.symbols import with_symbols
-from kahanmaps.laboratory import hirota_kimura as module
-from kahanmaps.laboratory.hirota_kimura import (
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, monomial_values
+from kahanmaps.laboratory.preserve import hirota_kimura as module
+from kahanmaps.laboratory.preserve.hirota_kimura import (
     OrbitRelations,
     Profile,
     hirota_kimura_basis,
@@ -21,8 +23,6 @@ from kahanmaps.laboratory.hirota_kimura import (
     relations_on_orbit,
     span_of_relations,
 )
-from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, monomial_values
 
 # Sets of more than 300 functions are measured by the tests of the catalogue.
 RELATIONS = [

@@ -14,11 +14,11 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory import identities
-from kahanmaps.laboratory.darboux import darboux_polynomials
-from kahanmaps.laboratory.densities import find_densities
-from kahanmaps.laboratory.identities import verdict_on
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve import identities
+from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 ROTATION = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])

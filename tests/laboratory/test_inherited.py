@@ -14,10 +14,10 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.analysis import Analysis
-from kahanmaps.laboratory.inherited import inherited_integrals
-from kahanmaps.laboratory.integrals import _gradient, find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import rank
+from kahanmaps.laboratory.preserve.inherited import inherited_integrals
+from kahanmaps.laboratory.preserve.integrals import _gradient, find_integrals
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 

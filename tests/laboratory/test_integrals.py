@@ -18,10 +18,10 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.symbols import with_symbols
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.hirota_kimura import Profile
-from kahanmaps.laboratory.identities import verdict_on
-from kahanmaps.laboratory.integrals import IntegralSearch, _is_affine_integral, closing_note, find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve.hirota_kimura import Profile
+from kahanmaps.laboratory.preserve.identities import verdict_on
+from kahanmaps.laboratory.preserve.integrals import IntegralSearch, _is_affine_integral, closing_note, find_integrals
 
 integral_verdict = partial(verdict_on, is_density=False)
 PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
@@ -463,7 +463,7 @@ def test_on_the_line_orbits_that_show_nothing_show_that_there_is_no_integral():
 
 
 def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.integrals.repeat", lambda *_: None)
+    monkeypatch.setattr("kahanmaps.laboratory.preserve.integrals.repeat", lambda *_: None)
     found = find_integrals(load("euler_top"))
     assert (found.integrals, found.codimension, found.reason) == (
         (),

@@ -26,8 +26,10 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.analysis import Analysis, analyze
 from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
-from kahanmaps.laboratory.degrees import DegreeGrowth, degree_growth
-from kahanmaps.laboratory.fates import (
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
+from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.laboratory.modular_points import rank
+from kahanmaps.laboratory.singular.fates import (
     CONFINED,
     NO_TIME,
     NOT_CONFINED,
@@ -41,10 +43,8 @@ from kahanmaps.laboratory.fates import (
     _walked,
     fate_of,
 )
-from kahanmaps.laboratory.jets import PrecisionTooLow
-from kahanmaps.laboratory.modular_points import rank
-from kahanmaps.laboratory.recurrences import GrowthClass
-from kahanmaps.laboratory.singularities import (
+from kahanmaps.laboratory.singular.jets import PrecisionTooLow
+from kahanmaps.laboratory.singular.singularities import (
     MAX_DIGITS,
     Patterns,
     _patterns,
@@ -198,7 +198,7 @@ def test_the_lengths_of_patterns_in_the_catalogue(name, lengths, searched):
 def test_random_points_have_the_patterns_of_polynomials(name, monkeypatch):
     system = load(name).system
     written = patterns(system, None)
-    monkeypatch.setattr("kahanmaps.laboratory.singularities.WRITTEN_DIMENSION", 1)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.singularities.WRITTEN_DIMENSION", 1)
     assert patterns(system, None) == written
 
 
@@ -497,6 +497,6 @@ def test_series_are_taken_again_with_twice_the_terms_up_to_a_limit(steps, option
         yield SimpleNamespace(name="t", common=1)
         yield SimpleNamespace(name="last", common=0)
 
-    monkeypatch.setattr("kahanmaps.laboratory.fates.walk", walk)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.fates.walk", walk)
     run, whole = _walked((), (), (), (), steps, **{"end": math.inf, **options})
     assert ([step.name for step in run], whole, tried) == found

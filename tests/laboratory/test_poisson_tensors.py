@@ -14,8 +14,8 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory import poisson_tensors
-from kahanmaps.laboratory.poisson_tensors import find_poisson
+from kahanmaps.laboratory.preserve import poisson_tensors
+from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
 
 PROVED, REFUTED = Verdict.PROVED, Verdict.REFUTED
 

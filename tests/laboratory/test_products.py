@@ -14,11 +14,17 @@ from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
-from kahanmaps.laboratory.densities import find_densities
-from kahanmaps.laboratory.identities import verdict_on
-from kahanmaps.laboratory.integrals import find_integrals
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.products import candidates, coprime_base, multiplicative_relations, products_of, relations
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.identities import verdict_on
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.products import (
+    candidates,
+    coprime_base,
+    multiplicative_relations,
+    products_of,
+    relations,
+)
 
 P = 2**61 - 1
 

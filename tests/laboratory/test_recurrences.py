@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.recurrences import GrowthClass, find_recurrence, needed_checks
+from kahanmaps.laboratory.growth.recurrences import GrowthClass, find_recurrence, needed_checks
 
 PRIMES = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53]
 

@@ -10,13 +10,13 @@ from search_helpers import random_system, system
 
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.documents.catalog import load
-from kahanmaps.laboratory import search as module
-from kahanmaps.laboratory.closed_forms import closed_forms
-from kahanmaps.laboratory.darboux_spaces import DarbouxSpace, gradient_rank
-from kahanmaps.laboratory.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
-from kahanmaps.laboratory.search import affine_space, repeat, search
+from kahanmaps.laboratory.preserve import search as module
+from kahanmaps.laboratory.preserve.closed_forms import closed_forms
+from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace, gradient_rank
+from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
+from kahanmaps.laboratory.preserve.search import affine_space, repeat, search
 
 
 def searched(file, eps=None, seconds=30.0):

@@ -14,9 +14,9 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.critical import critical_points, pole_points
-from kahanmaps.laboratory.fates import CONFINED, NOT_CONFINED
-from kahanmaps.laboratory.jets import (
+from kahanmaps.laboratory.singular.critical import critical_points, pole_points
+from kahanmaps.laboratory.singular.fates import CONFINED, NOT_CONFINED
+from kahanmaps.laboratory.singular.jets import (
     Jet,
     NotGeneric,
     PrecisionTooLow,
@@ -24,7 +24,7 @@ from kahanmaps.laboratory.jets import (
     valuation,
     walk,
 )
-from kahanmaps.laboratory.singularities import _range, default_eps, singularities, symbolic_denominator
+from kahanmaps.laboratory.singular.singularities import _range, default_eps, singularities, symbolic_denominator
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -194,7 +194,7 @@ def test_where_the_determinant_is_too_large_random_points_tell():
 def test_random_points_tell_what_polynomials_do(name, monkeypatch):
     system = load(name).system
     written = singularities(system, "4/13")
-    monkeypatch.setattr("kahanmaps.laboratory.singularities._MAX_TERMS", 0)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.singularities._MAX_TERMS", 0)
     unwritten = singularities(system, "4/13")
     assert unwritten.verdict == written.verdict
 
@@ -214,8 +214,10 @@ def test_random_points_tell_what_polynomials_do(name, monkeypatch):
 
 
 def test_zeros_without_points_are_undecided(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.singularities._MAX_TERMS", 0)
-    monkeypatch.setattr("kahanmaps.laboratory.fates._fate_at", lambda *_, **__: (_ for _ in ()).throw(NotGeneric()))
+    monkeypatch.setattr("kahanmaps.laboratory.singular.singularities._MAX_TERMS", 0)
+    monkeypatch.setattr(
+        "kahanmaps.laboratory.singular.fates._fate_at", lambda *_, **__: (_ for _ in ()).throw(NotGeneric())
+    )
     run = singularities(load("weierstrass").system, "4/13")
     assert run.verdict == "undecided"
 
@@ -366,7 +368,7 @@ def test_the_denominator_is_that_determinant_in_every_dimension(name):
 
 
 def test_steps_are_between_one_and_the_limit(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.singularities.MAX_STEPS", 3)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.singularities.MAX_STEPS", 3)
     system = load("riccati").system
     for steps in (0, 4):
         with pytest.raises(InputError, match=f"found {steps} steps, expected 1 to 3"):

@@ -15,10 +15,10 @@ from search_helpers import random_system, system, value_of
 from kahanmaps.checks.settings import random_starts
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, read_system
-from kahanmaps.laboratory import sparse_relations as module
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint
-from kahanmaps.laboratory.sparse_relations import SparseRelation, sparse_relations
+from kahanmaps.laboratory.preserve import sparse_relations as module
+from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation, sparse_relations
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 FURTHER = Path(__file__).parent / "further_systems"

@@ -16,11 +16,11 @@ from kahanmaps.algebra.small_systems import Component
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError, SingularStep
-from kahanmaps.laboratory.affine_functions import affine_darboux
-from kahanmaps.laboratory.commuting import commuting_systems
-from kahanmaps.laboratory.signed_permutations import signed_permutations
-from kahanmaps.laboratory.symmetries import linear_symmetries
-from kahanmaps.laboratory.symmetry_equations import is_singular, is_symmetry
+from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
+from kahanmaps.laboratory.symmetry.commuting import commuting_systems
+from kahanmaps.laboratory.symmetry.signed_permutations import signed_permutations
+from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
+from kahanmaps.laboratory.symmetry.symmetry_equations import is_singular, is_symmetry
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 

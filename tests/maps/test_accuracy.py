@@ -13,8 +13,8 @@ from kahanmaps.algebra.fields import QQ, RR
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.structure import structure_of
 from kahanmaps.maps.accuracy import NotAccurate, bits_for
-from kahanmaps.maps.jump import Jump
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.normal_form.iterate import Jump
 from kahanmaps.maps.orbits import Iterates, Orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
 

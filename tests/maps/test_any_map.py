@@ -24,14 +24,14 @@ from kahanmaps.maps.arithmetic import Arithmetic
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.composed import composed_map
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit
+from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan, KahanMap
-from kahanmaps.maps.modular import ModularEnsemble
 from kahanmaps.maps.orbit import orbit
 from kahanmaps.maps.orbits import Orbit
 from kahanmaps.maps.polarised import polarised_map
 from kahanmaps.maps.projective import homogeneous_map
+from kahanmaps.maps.residues.ensemble import ModularEnsemble
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "maps"

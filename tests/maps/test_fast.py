@@ -28,7 +28,7 @@ from hypothesis import strategies as st
 
 from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.errors import InexactNumber, InputError
-from kahanmaps.maps.fast import FloatOrbit, float_function, to_float, to_floats
+from kahanmaps.maps.floats.fast import FloatOrbit, float_function, to_float, to_floats
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import OrbitEnd
 from kahanmaps.systems.quadratic import QuadraticSystem

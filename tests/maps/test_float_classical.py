@@ -11,8 +11,8 @@ from flint import fmpq_mat
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
-from kahanmaps.maps.float_classical import METHODS, ClassicalOrbit
-from kahanmaps.maps.float_numbers import exact, to_float
+from kahanmaps.maps.floats.classical import METHODS, ClassicalOrbit
+from kahanmaps.maps.floats.doubles import exact, to_float
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 GROWTH = QuadraticSystem.from_text(["x"], ["x"])

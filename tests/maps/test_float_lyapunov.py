@@ -9,8 +9,8 @@ import pytest
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
-from kahanmaps.maps.float_ensemble import starts_in_box
-from kahanmaps.maps.float_lyapunov import lyapunov_exponents
+from kahanmaps.maps.floats.ensemble import starts_in_box
+from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 

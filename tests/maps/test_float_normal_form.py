@@ -20,10 +20,10 @@ from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
-from kahanmaps.maps import float_steps
-from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
-from kahanmaps.maps.float_blocks import CUBES, GENERAL, LINES, _doubles, planar_blocks
-from kahanmaps.maps.float_ensemble import has_numba
+from kahanmaps.maps.floats import steps as float_steps
+from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, _doubles, planar_blocks
+from kahanmaps.maps.floats.ensemble import has_numba
+from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -515,7 +515,7 @@ def test_a_complex_step_is_that_of_the_formulas(name):
 )
 def test_compiled_loops_over_the_blocks_of_a_lane_do_what_they_do_uncompiled(reals, others):
     pytest.importorskip("numba")
-    from kahanmaps.maps.float_numba import Blocks, _single
+    from kahanmaps.maps.floats.numba_kernel import Blocks, _single
 
     rng = np.random.default_rng(reals + 10 * others)
     kinds = np.array([LINES, CUBES, GENERAL, LINES, LINES][:reals] + [GENERAL, LINES, LINES][:others], dtype=np.int64)

@@ -17,8 +17,8 @@ import pytest
 from helpers import EULER_TOP
 
 from kahanmaps.errors import InputError
-from kahanmaps.maps.fast import FloatEnsemble, FloatOrbit, stream_orbit
-from kahanmaps.maps.float_stream import NpyFile
+from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, stream_orbit
+from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 START = ["1", "1/2", "1/3"]
@@ -104,7 +104,7 @@ def test_more_rows_than_the_header_can_count_are_refused_before_they_are_written
 
 
 ENDLESS = """
-from kahanmaps.maps.fast import FloatOrbit, stream_orbit
+from kahanmaps.maps.floats.fast import FloatOrbit, stream_orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
 top = QuadraticSystem.from_text(["x1", "x2", "x3"], ["x2*x3", "-2*x3*x1", "x1*x2"])
 orbit = FloatOrbit(top, "1/10", ["1", "1/2", "1/3"], None, every=50, kernel="numpy")

@@ -18,10 +18,10 @@ from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.modular import Arithmetic, ModularEnsemble
-from kahanmaps.maps.modular_numba import kernels
+from kahanmaps.maps.normal_form.periods import orbit_period
 from kahanmaps.maps.orbits import Orbit
-from kahanmaps.maps.periods import orbit_period
+from kahanmaps.maps.residues.ensemble import Arithmetic, ModularEnsemble
+from kahanmaps.maps.residues.numba_kernel import kernels
 
 MERSENNE = 2**61 - 1
 over_kernels = pytest.mark.parametrize("kernel", ["numpy", "numba"])

@@ -21,15 +21,14 @@ from kahanmaps.errors import BadPrime, SingularStep
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.level_curves import (
+from kahanmaps.maps.normal_form.level_curves import (
     Jacobian,
     LevelCubic,
     inverses,
     number_of_points,
     translation_order,
 )
-from kahanmaps.maps.orbits import Orbit
-from kahanmaps.maps.periods import (
+from kahanmaps.maps.normal_form.periods import (
     Kind,
     OrbitPeriod,
     _reductions,
@@ -41,9 +40,10 @@ from kahanmaps.maps.periods import (
     poles,
     torsion_order,
 )
-from kahanmaps.maps.planar_block import PlanarBlock, same_point
-from kahanmaps.maps.schoof import trace_modulo
-from kahanmaps.maps.translation import iterate
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
+from kahanmaps.maps.normal_form.schoof import trace_modulo
+from kahanmaps.maps.normal_form.translation import iterate
+from kahanmaps.maps.orbits import Orbit
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 
 MERSENNE = 2**61 - 1

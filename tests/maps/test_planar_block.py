@@ -18,7 +18,7 @@ from planar_helpers import STARTS, by_gcds, image, integer_block, over_starts, p
 
 from kahanmaps.errors import SingularStep
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.planar_block import PlanarBlock, determinant, same_point
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, determinant, same_point
 
 small = st.integers(-6, 6)
 cubics = st.tuples(small, small, small, small)

@@ -29,9 +29,9 @@ from planar_helpers import (
 )
 
 from kahanmaps.errors import SingularStep
-from kahanmaps.maps import planar_integers
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.planar_integers import (
+from kahanmaps.maps.normal_form import planar_integers
+from kahanmaps.maps.normal_form.planar_integers import (
     IntegerBlock,
     bad_part,
     content,

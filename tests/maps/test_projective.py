@@ -18,14 +18,14 @@ from helpers import fraction
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.modular_projective import (
+from kahanmaps.maps.projective import homogeneous_map, linear_forms
+from kahanmaps.maps.residues.projective import (
     ProjectiveMap,
     graph_of,
     hasse_weil,
     random_points,
     walk_until_back,
 )
-from kahanmaps.maps.projective import homogeneous_map, linear_forms
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 NAMES = ["x", "y", "z", "w"]

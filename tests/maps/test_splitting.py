@@ -14,8 +14,8 @@ from planar_helpers import over_members, over_split, over_unsplit, structure_and
 from kahanmaps.algebra.fields import CC, GF, QQ, RR
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_steps import NormalSteps, splits
-from kahanmaps.maps.splitting import Splitting, rational_factors
+from kahanmaps.maps.normal_form.splitting import Splitting, rational_factors
+from kahanmaps.maps.normal_form.steps import NormalSteps, splits
 
 FIELDS = [QQ, GF(11), GF(101), GF(10007), GF(2**61 - 1), GF(2**89 - 1), RR(128)]
 over_fields = pytest.mark.parametrize("field", FIELDS, ids=repr)

@@ -10,7 +10,7 @@ import pytest
 from flint import fmpq, fmpz
 from planar_helpers import STARTS, integer_block
 
-from kahanmaps.maps import tau
+from kahanmaps.maps.normal_form import tau
 
 
 @pytest.mark.parametrize(

@@ -26,11 +26,11 @@ from planar_helpers import (
     reduced,
 )
 
-from kahanmaps.maps import planar_integers, tau, tau_table
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.level_curves import Jacobian
-from kahanmaps.maps.planar_block import determinant, same_point
-from kahanmaps.maps.planar_integers import primitive
+from kahanmaps.maps.normal_form import planar_integers, tau, tau_table
+from kahanmaps.maps.normal_form.level_curves import Jacobian
+from kahanmaps.maps.normal_form.planar_block import determinant, same_point
+from kahanmaps.maps.normal_form.planar_integers import primitive
 
 GENERAL = ["three real roots, irrational", "one real root, irrational", "one rational root", "chi_5 = 0"]
 over_general = pytest.mark.parametrize("name", GENERAL)

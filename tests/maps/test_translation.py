@@ -19,10 +19,10 @@ from planar_helpers import STARTS, by_gcds, integer_block, random_cubic, reduced
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import CC, GF, RR
 from kahanmaps.errors import SingularStep
-from kahanmaps.maps import translation
-from kahanmaps.maps.level_curves import LevelCubic
-from kahanmaps.maps.planar_block import PlanarBlock, same_point
-from kahanmaps.maps.translation import NoTranslation, iterate
+from kahanmaps.maps.normal_form import translation
+from kahanmaps.maps.normal_form.level_curves import LevelCubic
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, same_point
+from kahanmaps.maps.normal_form.translation import NoTranslation, iterate
 
 ZERO_COUNT = 16  # that many steps are taken before doubling
 

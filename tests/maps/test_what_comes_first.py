@@ -16,11 +16,11 @@ from planar_helpers import STARTS, over_members, planar_system, side_by_side, st
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.family.structure import Structure, structure_of
-from kahanmaps.maps.jump import Jump
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_steps import splits
+from kahanmaps.maps.normal_form.iterate import Jump
+from kahanmaps.maps.normal_form.splitting import Splitting
+from kahanmaps.maps.normal_form.steps import splits
 from kahanmaps.maps.orbits import Iterates, Orbit, OrbitEnd
-from kahanmaps.maps.splitting import Splitting
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 # Roots: three rational, one rational (in other coordinates), none rational, double, triple.

@@ -15,7 +15,7 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.family.structure import structure_of
 from kahanmaps.invariants.integrals import CommutantIntegral, ModifiedHamiltonian
-from kahanmaps.maps.fast import FloatOrbit
+from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.plots.draw_drift import clipped_from, draw_drift
 from kahanmaps.plots.drift import BINS, _Bins, _edges, small_start, survey_drift
 from kahanmaps.plots.drift_functions import OfTheImage, asked_functions, functions_of, known_functions

@@ -12,8 +12,8 @@ from flint import fmpq
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
-from kahanmaps.laboratory.degrees import DegreeGrowth
-from kahanmaps.laboratory.height_survey import height_survey
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.growth import draw_degrees, draw_heights
 from kahanmaps.plots.height_curves import HeightCurve, curves_of_record, fit_of, height_curves

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 
-from kahanmaps.maps.planar_block import PlanarBlock
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock
 from kahanmaps.plots.plane_cubics import PlaneCubic
 from kahanmaps.plots.symmetric_planes import (
     ONE_LINE,

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from flint import fmpq_mat
 
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.cycle_laws import Comparison
-    from kahanmaps.laboratory.cycles import Census
+    from kahanmaps.laboratory.finite.cycle_laws import Comparison
+    from kahanmaps.laboratory.finite.cycles import Census
 
 _LENGTHS_SHOWN = 12
 
@@ -59,9 +59,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 done, 2 wrong use, 3 samples stopped by the clock.
     """
-    from kahanmaps.laboratory.cycle_laws import compare
-    from kahanmaps.laboratory.cycles import cycle_census, default_eps
-    from kahanmaps.laboratory.reversors import find_reversor
+    from kahanmaps.laboratory.finite.cycle_laws import compare
+    from kahanmaps.laboratory.finite.cycles import cycle_census, default_eps
+    from kahanmaps.laboratory.symmetry.reversors import find_reversor
 
     if options["steps"] is not None and options["samples"] is None:
         raise click.UsageError("--steps N is for --samples N")

@@ -21,7 +21,7 @@ from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.degrees import DegreeGrowth
+    from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 
 
 @click.command("degrees")
@@ -58,7 +58,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
     vary; 2 wrong use; 3 undecided, or stopped early.
     """
-    from kahanmaps.laboratory.degrees import degree_growth
+    from kahanmaps.laboratory.growth.degrees import degree_growth
 
     eps = the_eps(options["eps"], options["time_step"], required=False)
     file = load_system(system, options)

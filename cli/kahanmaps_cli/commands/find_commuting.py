@@ -20,7 +20,7 @@ from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.commuting import CommutingField, CommutingSystems
+    from kahanmaps.laboratory.symmetry.commuting import CommutingField, CommutingSystems
 
 _SHAPES = {"linear": "g = B f with a constant matrix B", "quadratic": "any quadratic g"}
 
@@ -54,7 +54,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Exit status: 0 the list is complete, 2 wrong use, 3 something remained open.
     """
     from kahanmaps.checks.settings import Settings
-    from kahanmaps.laboratory.commuting import commuting_systems
+    from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 
     file = load_system(system, options)
     seed, error_bits = options["seed"], options["error_bits"]

@@ -28,7 +28,7 @@ def command(system: str | None, **options: Any) -> int:
 
     Exit status: 0 found, 2 wrong use, 3 none up to the degree that was tried.
     """
-    from kahanmaps.laboratory.densities import find_densities
+    from kahanmaps.laboratory.preserve.densities import find_densities
 
     require_one_form(options)
     with Progress(options["quiet"]) as progress:

@@ -54,7 +54,7 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 every integral that theorems give or orbits show has a formula, 2 wrong use, 3 some have none,
     orbits were not measured, or the time was too short.
     """
-    from kahanmaps.laboratory.integrals import find_integrals
+    from kahanmaps.laboratory.preserve.integrals import find_integrals
 
     require_one_form(options)
     with Progress(options["quiet"]) as progress:
@@ -95,7 +95,7 @@ def _count(found: Any) -> str:
 
 def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, Any], progress: Progress) -> int:
     from kahanmaps.algebra.text import format_polynomial
-    from kahanmaps.laboratory.darboux import darboux_polynomials
+    from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
 
     found = darboux_polynomials(
         file,
@@ -125,10 +125,10 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
 def _bases(file: Any, eps: Any, options: dict[str, Any]) -> int:
     from kahanmaps.algebra.text import parse_polynomial
     from kahanmaps.errors import InputError, quoted
-    from kahanmaps.laboratory.hirota_kimura import Basis, hirota_kimura_basis
-    from kahanmaps.laboratory.integrals import closing_note
     from kahanmaps.laboratory.laboratory import Laboratory
     from kahanmaps.laboratory.modular_points import NoPoint
+    from kahanmaps.laboratory.preserve.hirota_kimura import Basis, hirota_kimura_basis
+    from kahanmaps.laboratory.preserve.integrals import closing_note
 
     if options["symbolic"]:
         raise click.UsageError("--monomials goes without --symbolic: the null space is measured at random eps")

@@ -34,7 +34,7 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 found, 2 wrong use, 3 none up to the degree that was tried.
     """
     from kahanmaps.algebra.text import parse_rational_function
-    from kahanmaps.laboratory.poisson_tensors import find_poisson
+    from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
 
     require_one_form(options)
     with Progress(options["quiet"]) as progress:

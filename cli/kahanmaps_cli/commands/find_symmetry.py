@@ -13,7 +13,7 @@ from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.symmetries import Symmetries
+    from kahanmaps.laboratory.symmetry.symmetries import Symmetries
 
 _SHOWN = 40
 
@@ -41,7 +41,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Exit status: 0 searched as said, 2 wrong use, 3 a search was too large or the time over.
     """
     from kahanmaps.checks.settings import Settings
-    from kahanmaps.laboratory.symmetries import linear_symmetries
+    from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 
     file = load_system(system, options)
     with Progress(quiet) as progress:

@@ -23,7 +23,7 @@ from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.height_survey import HeightSurvey
+    from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 
 
 @click.command("heights")
@@ -71,7 +71,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     """
     from kahanmaps.errors import InputError
     from kahanmaps.invariants.heights import Growth
-    from kahanmaps.laboratory.height_survey import DEFAULT_STARTS, height_survey
+    from kahanmaps.laboratory.growth.height_survey import DEFAULT_STARTS, height_survey
 
     if options["count"] is not None and options["given"]:
         raise click.UsageError("give --start X or --random N, not both")

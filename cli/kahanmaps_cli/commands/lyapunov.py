@@ -23,7 +23,7 @@ from kahanmaps_cli.terminal import on_terminal, print_table, tell
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.maps.float_lyapunov import Lyapunov
+    from kahanmaps.maps.floats.lyapunov import Lyapunov
 
 _MAX_STEPS = 10**9
 _DEFAULT_STARTS = 16
@@ -55,7 +55,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     """
     from flint import fmpq
 
-    from kahanmaps.maps.float_lyapunov import lyapunov_exponents
+    from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 
     steps = options["steps"]
     transient = steps // 10 if options["transient"] is None else options["transient"]

@@ -170,7 +170,7 @@ def _require_npy(options: dict[str, Any], output: str | None) -> None:
 
 def _stream(run: OrbitRun, output: str, quiet: bool) -> int:
     """Float points, as fast as they come."""
-    from kahanmaps.maps.fast import stream_orbit
+    from kahanmaps.maps.floats.fast import stream_orbit
 
     try:
         with interruptible(run.walk.interrupt), Progress(quiet) as progress:

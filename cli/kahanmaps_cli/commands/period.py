@@ -15,7 +15,7 @@ from kahanmaps_cli.terminal import tell
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
     from kahanmaps.family.structure import Structure
-    from kahanmaps.maps.periods import OrbitPeriod
+    from kahanmaps.maps.normal_form.periods import OrbitPeriod
 
 _STATUS = {"periodic": 0, "aperiodic": 0}
 _LONG_PRIME, _LONGEST_PRIME = 90, 192  # bits, between which it takes from seconds to minutes
@@ -50,7 +50,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     or the orbit comes to a point where it cannot be continued.
     """
     from kahanmaps.errors import InputError
-    from kahanmaps.maps.periods import period_of
+    from kahanmaps.maps.normal_form.periods import period_of
 
     eps = the_eps(options["eps"], options["time_step"])
     kind, prime = options["arithmetic"]

@@ -21,8 +21,8 @@ from kahanmaps_cli.terminal import on_terminal, shorten, tell
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.fates import Hypersurface
-    from kahanmaps.laboratory.singularities import SingularityRun
+    from kahanmaps.laboratory.singular.fates import Hypersurface
+    from kahanmaps.laboratory.singular.singularities import SingularityRun
 
 
 @click.command("singularities")
@@ -60,8 +60,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 done, 2 wrong use, 3 undecided (stopped by the clock, or two points or two eps that differ).
     """
-    from kahanmaps.laboratory.fates import UNDECIDED
-    from kahanmaps.laboratory.singularities import default_eps, singularities, symbolic_denominator
+    from kahanmaps.laboratory.singular.fates import UNDECIDED
+    from kahanmaps.laboratory.singular.singularities import default_eps, singularities, symbolic_denominator
 
     eps = the_eps(options["eps"], options["time_step"], required=False)
     file = load_system(system, options)
@@ -146,7 +146,7 @@ def _record(
 ) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
     from kahanmaps.checks.settings import convention
-    from kahanmaps.laboratory.singularities import steps_by_default
+    from kahanmaps.laboratory.singular.singularities import steps_by_default
     from kahanmaps.version import __version__
 
     return {

@@ -22,7 +22,7 @@ from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.degrees import DegreeGrowth
+    from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 
 
 @click.command("degrees", cls=PictureCommand)
@@ -88,7 +88,7 @@ def command(systems: tuple[str, ...], **options: Any) -> int:
 
 
 def _measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> DegreeGrowth:
-    from kahanmaps.laboratory.degrees import degree_growth
+    from kahanmaps.laboratory.growth.degrees import degree_growth
 
     return degree_growth(
         file.map,

@@ -14,7 +14,7 @@ from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.height_survey import HeightSurvey
+    from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 
 # Of OrbitEnd: a number limit or a return are ends that the picture is made for, a hole in the map is not.
 _EARLY = ("singular",)
@@ -83,7 +83,7 @@ def command(system: str | None, **options: Any) -> int:
 
 def _surveyed(file: SystemFile, options: dict[str, Any]) -> HeightSurvey:
     from kahanmaps.errors import InputError
-    from kahanmaps.laboratory.height_survey import DEFAULT_STARTS, height_survey
+    from kahanmaps.laboratory.growth.height_survey import DEFAULT_STARTS, height_survey
 
     if options["max_digits"] < 1:
         raise InputError(f"found --max-digits {options['max_digits']}, expected at least 1")

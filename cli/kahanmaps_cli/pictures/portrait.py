@@ -160,7 +160,7 @@ def _stored(system: str | None, options: dict[str, Any]) -> Orbits:
 def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
     from flint import fmpq
 
-    from kahanmaps.maps.float_numbers import to_floats
+    from kahanmaps.maps.floats.doubles import to_floats
     from kahanmaps_cli.ensemble_starts import drawn, read_starts
 
     file = load_system(system, options)
@@ -188,7 +188,7 @@ def _walked(system: str | None, options: dict[str, Any]) -> Orbits:
 
 
 def _window(options: dict[str, Any], axes: int) -> Window | None:
-    from kahanmaps.maps.float_numbers import to_floats
+    from kahanmaps.maps.floats.doubles import to_floats
     from kahanmaps.plots.windows import require_window
 
     return None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), axes)
@@ -220,7 +220,7 @@ def _portrait(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Fi
 
 def _levels(orbits: Orbits, function: Any, axes: Sequence[Any], at: Any, window: Window) -> LevelCurves:
     from kahanmaps.errors import InputError
-    from kahanmaps.maps.float_numbers import to_floats
+    from kahanmaps.maps.floats.doubles import to_floats
     from kahanmaps.plots.level_sets import level_curves, levels_through
 
     plane = [axis.variable for axis in axes if not isinstance(axis, str) and axis.variable is not None]

@@ -12,7 +12,7 @@ from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.maps.float_numbers import FloatArray
+    from kahanmaps.maps.floats.doubles import FloatArray
     from kahanmaps.plots.density import Density
     from kahanmaps.plots.drift_functions import WatchedFunction
     from kahanmaps.plots.point_functions import PointFunction

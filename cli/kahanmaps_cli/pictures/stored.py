@@ -19,7 +19,7 @@ import click
 from kahanmaps.errors import InputError
 
 if TYPE_CHECKING:
-    from kahanmaps.maps.float_numbers import FloatArray
+    from kahanmaps.maps.floats.doubles import FloatArray
 
 _ENDINGS = (".npy", ".npz", ".jsonl", ".csv")
 _MAX_POINTS = 4_000_000  # of a file that has to be read as text

@@ -1,0 +1,1 @@
+"""Maps over finite fields: the lengths of their cycles."""

@@ -1,0 +1,1 @@
+"""How the degrees and heights of a map grow."""

@@ -1,0 +1,353 @@
+"""Degrees of the iterates of a Kahan map: d_n is the degree of Phi^n as a map of projective space to itself.
+
+It is measured as the degree of the rational curve t -> Phi^n(a + b t) for a random line over GF(p) (`curves`), with p
+and (where eps is not given) the residue of eps random. A line in special position, or a prime that divides what it
+should not, can only make a degree too small. So two lines, each with a prime and an eps of its own, are compared, and
+where they differ the larger degree stands.
+
+A recurrence of the first degrees can be that of another map: nothing is seen of a hypersurface that is contracted until
+its image meets points without a value, perhaps a hundred steps later. So the fates of these hypersurfaces are asked
+(`singularities`), and a recurrence counts where there are terms enough beyond the last thing that happens to them.
+
+The growth of d_n measures complexity: lim d_n^(1/n), the dynamical degree, is 1 for integrable maps as far as is
+known, and its logarithm is the algebraic entropy (bellon-viallet-1999).
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.fields import rational
+from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.text import format_number
+from kahanmaps.displayed import Displayed
+from kahanmaps.errors import BadPrime, InputError, counted
+from kahanmaps.laboratory.growth.curves import Line, Stopped
+from kahanmaps.laboratory.growth.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence
+from kahanmaps.laboratory.singular.singularities import MAX_STEPS, Patterns
+from kahanmaps.laboratory.singular.singularities import patterns as patterns_of_map
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+DEFAULT_SECONDS = 10.0
+DEFAULT_MAX_DEGREE = 20_000
+_MOST_TERMS = 10_000
+_LINES = 2
+_OFTEN, _SELDOM = 64, 8  # up to so many terms a recurrence is looked for after each, then after so many
+_ENOUGH_QUOTIENTS = 6
+_REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
+
+
+@dataclass(frozen=True)
+class DegreeGrowth(Displayed):
+    """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a Kahan map, and what they say of its complexity.
+
+    `eps` is None for generic eps (a random residue for each line). `ended` is "recurrence" (one was found, with
+    terms to spare), "terms" (as many as asked for), "time", "degree" (the next is over the limit), "constant" (the
+    iterate is a constant map), "singular" (the next iterate exists nowhere), "lines" (the lines do not agree) or
+    "unconfirmed" (a recurrence fits, and the patterns of the singularities are not known to the end).
+    `patterns` is what the singularities say, None where they were not asked. The degrees are measured: evidence, and no
+    proof.
+    """
+
+    degrees: tuple[int, ...]
+    eps: fmpq | None
+    ended: str
+    message: str
+    seed: int
+    primes: tuple[int, ...]
+    residues: tuple[int, ...]
+    notes: tuple[str, ...] = ()
+    patterns: Patterns | None = None
+
+    @cached_property
+    def fitted(self) -> Recurrence | None:
+        """The shortest linear recurrence of the degrees with terms left to check it, or None; see `unconfirmed`."""
+        return find_recurrence(self.degrees)
+
+    @cached_property
+    def unconfirmed(self) -> str:
+        """Why the recurrence that fits may be that of other maps; empty where there is none, or it is confirmed."""
+        if self.fitted is None or self.patterns is None:
+            return ""
+        if self.patterns.running:
+            return self.patterns.running
+        if not self.patterns.lengths and any(d != self.degrees[1] ** n for n, d in enumerate(self.degrees)):
+            return "degrees drop where no contracted hypersurface meets points without a value (another --seed)"
+        if len(self.degrees) < (needed := self.patterns.terms_needed(self.fitted.order)):
+            last = max(self.patterns.lengths)
+            return f"after a pattern of {last} steps {needed - 1} iterates are needed (--seconds, --max-degree)"
+        return ""
+
+    @property
+    def recurrence(self) -> Recurrence | None:
+        """The shortest linear recurrence of the degrees with terms left to check it, or None.
+
+        None also where it is not confirmed by terms beyond the last confinement, or singularities are undecided.
+        """
+        return None if self.unconfirmed else self.fitted
+
+    @property
+    def growth(self) -> GrowthClass:
+        """How the degrees grow if the recurrence goes on; `GrowthClass.UNKNOWN` without one."""
+        if self.ended == "constant":
+            return GrowthClass.ZERO
+        return GrowthClass.UNKNOWN if self.recurrence is None else self.recurrence.growth
+
+    @property
+    def dynamical_degree(self) -> GrowthRate | None:
+        """lim d_n^(1/n) as an algebraic number if the recurrence goes on, else None."""
+        return None if self.recurrence is None else self.recurrence.rate
+
+    @property
+    def estimate(self) -> str | None:
+        """d_n/d_{n-1} for the last n, rounded: an estimate of the dynamical degree and no more."""
+        if len(self.degrees) < 3 or self.degrees[-2] == 0:
+            return None
+        return f"{self.degrees[-1] / self.degrees[-2]:.6g}"
+
+    @property
+    def looks_exponential(self) -> bool:
+        """Whether the last quotients d_n/d_{n-1} change by far less than those of a sequence of polynomial growth.
+
+        There a quotient 1 + r falls by about r/n from one step to the next; here by less than a quarter of that, over
+        two steps. An estimate, for sequences that end before a recurrence could be checked.
+        """
+        d = self.degrees
+        n = len(d) - 1
+        if n < _ENOUGH_QUOTIENTS or d[n - 3] == 0:
+            return False
+        a, b, c = (d[k] / d[k - 1] for k in (n - 2, n - 1, n))
+        return c > 1.2 and all(abs(later / earlier - 1) < (c - 1) / (4 * n) for earlier, later in ((a, b), (b, c)))
+
+    @property
+    def kind_text(self) -> str:
+        """The kind of growth with its power or rate, or what can be said without a confirmed recurrence: one phrase."""
+        if self.growth is GrowthClass.ZERO:
+            return "zero from some iterate on: that iterate is a constant map"
+        if (found := self.recurrence) is not None:
+            if found.growth is GrowthClass.EXPONENTIAL:
+                return "exponential growth" + (
+                    f", dynamical degree {found.rate.text}" if found.rate is not None else ""
+                )
+            power = f" of degree {found.power}" if found.growth is GrowthClass.POLYNOMIAL else ""
+            return f"{found.growth} growth{power}, dynamical degree 1"
+        terms = counted(len(self.degrees), "term")
+        if self.looks_exponential:
+            why = self.unconfirmed or f"no recurrence in {terms}"
+            return f"exponential growth by a factor of about {self.estimate} (estimated: {why})"
+        if self.fitted is not None:
+            return f"{terms} fit {self.fitted.growth} growth, an estimate only: {self.unconfirmed}"
+        estimate = f"; d_n/d_(n-1) is {self.estimate} at the end, an estimate only" if self.estimate else ""
+        return f"no recurrence found in {terms}{estimate}"
+
+    @property
+    def basis(self) -> str:
+        """How the growth is known where there is a recurrence: measured, and with which limit."""
+        limit = self.patterns.limit if self.patterns is not None else ""
+        return f"measured: {limit}" if limit else "measured"
+
+    @property
+    def growth_text(self) -> str:
+        """The kind of growth with its power or rate, and how far confinement was looked for: one phrase."""
+        limited = self.recurrence is not None and self.basis != "measured"
+        return self.kind_text + (f" ({self.basis})" if limited else "")
+
+    @property
+    def text(self) -> str:
+        """Lines for people, a word and a tab at the front: degrees, growth, recurrence, how it ended."""
+        lines = [("degrees", ", ".join(map(str, self.degrees))), ("growth", self.growth_text)]
+        if self.recurrence is not None:
+            lines.append(("recurrence", self.recurrence.text))
+            if self.recurrence.closed_form_text:
+                lines.append(("closed form", self.recurrence.closed_form_text))
+        if self.patterns is not None:
+            lines.append(("singularities", self.patterns.text))
+        lines += [("ended", self.message), *(("note", note) for note in self.notes)]
+        return "\n".join(f"{word}\t{rest}" for word, rest in lines)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; primes are text, for they exceed what readers of JSON hold exactly."""
+        lines = zip(self.primes, self.residues, strict=True)
+        names = ("growth", "growth_text", "dynamical_degree", "estimate", "looks_exponential", "recurrence")
+        return {
+            **attributes(self, "degrees"),
+            "eps": "generic" if self.eps is None else format_number(self.eps),
+            **attributes(self, "ended", "message", "seed"),
+            "lines": [{"prime": str(p), "eps_residue": str(e)} for p, e in lines],
+            **attributes(self, *names, singularities="patterns"),
+            **attributes(self, "unconfirmed", "notes"),
+        }
+
+
+def degree_growth(
+    system: QuadraticSystem | BirationalMap,
+    eps: Any = None,
+    *,
+    seconds: float = DEFAULT_SECONDS,
+    max_terms: int | None = None,
+    max_degree: int = DEFAULT_MAX_DEGREE,
+    seed: int = 0,
+    steps: int | None = None,
+    patterns: Patterns | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> DegreeGrowth:
+    """The degrees of the iterates of a map, for one exact `eps` or generic eps; a system stands for its Kahan map.
+
+    Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare, and with terms enough
+    beyond the last confinement; with `max_terms` instead after the degrees d_1, ..., d_max_terms. Stops in any case
+    after about `seconds`, or before a degree above `max_degree`. `patterns` are those of the singularities, which are
+    followed here, for `steps` steps, where they are not given. Modulo random primes of 63 bits, so the answer is
+    measured and not proved; the same for the same `seed`, except for where the time ends it. Raises InputError for
+    wrong values.
+
+    Source: bellon-viallet-1999.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> found = degree_growth(load("euler_top").system)
+    >>> found.degrees[:6], str(found.growth), found.recurrence.closed_form
+    ((1, 3, 9, 19, 33, 51), 'quadratic', '2*n^2 + 1')
+    """
+    exact = None if eps is None else rational(eps)
+    if exact == 0:
+        raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+    if not (seconds > 0 and math.isfinite(seconds)):
+        raise InputError(f"found {seconds} seconds, expected a positive number")
+    if max_terms is not None and not 0 <= max_terms <= _MOST_TERMS:
+        raise InputError(f"found {max_terms} terms, expected 0 to {_MOST_TERMS}")
+    if steps is not None and not 1 <= steps <= MAX_STEPS:
+        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
+    if max_degree < 1:
+        raise InputError(f"found the largest degree {max_degree}, expected at least 1")
+    return _Search(as_map(system), exact, time.monotonic() + seconds, max_degree, seed, steps, patterns).run(
+        max_terms, progress
+    )
+
+
+class _Search:
+    """The lines, and the degrees found on them so far."""
+
+    def __init__(
+        self,
+        map_: BirationalMap,
+        eps: fmpq | None,
+        deadline: float,
+        max_degree: int,
+        seed: int,
+        steps: int | None,
+        patterns: Patterns | None,
+    ) -> None:
+        self._map, self._eps, self._steps, self._patterns = map_, eps, steps, patterns
+        self._deadline, self._max_degree, self._seed = deadline, max_degree, seed
+        self._rng = random.Random(f"degrees {seed_for(seed, map_.subject, eps)}")
+        self._replaced = 0
+        self.degrees = [1]
+        self.notes: list[str] = []
+
+    def run(self, max_terms: int | None, progress: Callable[[str], None]) -> DegreeGrowth:
+        """Step after step until something ends it."""
+        lines = [self._line() for _ in range(_LINES)]
+        try:
+            while True:
+                self._look_at_fit(max_terms is None)
+                if max_terms is not None and len(self.degrees) > max_terms:
+                    raise Stopped("terms", f"{counted(max_terms, 'iterate')} asked for and measured")
+                if len(self.degrees) > _MOST_TERMS:
+                    raise Stopped("terms", f"{_MOST_TERMS} iterates, and no more are worked out")
+                progress(f"degrees: iterate {len(self.degrees)}, degree {self.degrees[-1]} before it")
+                self._step(lines)
+                if self.degrees[-1] == 0 and max_terms is None:
+                    raise Stopped("constant", f"iterate {len(self.degrees) - 1} is a constant map")
+        except Stopped as end:
+            ended, message = end.ended, end.message
+        return DegreeGrowth(
+            tuple(self.degrees),
+            self._eps,
+            ended,
+            message,
+            self._seed,
+            tuple(line.prime for line in lines),
+            tuple(line.eps for line in lines),
+            tuple(self.notes),
+            self._patterns,
+        )
+
+    def _look_at_fit(self, may_stop: bool) -> None:
+        """Follow the singularities as soon as some recurrence fits, and stop where one is certain."""
+        size = len(self.degrees)
+        if size > _OFTEN and size % _SELDOM:
+            return
+        found = find_recurrence(self.degrees)
+        if found is None:
+            return
+        if self._patterns is None and max(self.degrees) > 1:  # an affine map contracts nothing
+            left = max(0.0, self._deadline - time.monotonic())
+            self._patterns = patterns_of_map(
+                self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
+            )
+        known = self._patterns
+        if not may_stop or found.checked < max(6, found.order):
+            return
+        if known is not None and known.running:
+            raise Stopped("unconfirmed", f"a recurrence of order {found.order} fits, but {known.running}")
+        if known is None or size >= known.terms_needed(found.order):
+            raise Stopped("recurrence", f"a recurrence of order {found.order} holds for {found.checked} terms to spare")
+
+    def _line(self) -> Line:
+        while True:
+            try:
+                return Line(self._map, self._eps, self._rng, self._deadline, self._max_degree)
+            except BadPrime:
+                continue
+
+    def _step(self, lines: list[Line]) -> None:
+        """All lines one step on; those in special position are replaced by others."""
+        n = len(self.degrees)
+        while True:
+            found = [self._degree(line, n) for line in lines]
+            best = max(found)
+            if best >= 0 and min(found) == best:
+                self.degrees.append(best)
+                return
+            self._replaced += 1
+            if best < 0 and self._replaced > _LINES:
+                raise Stopped("singular", f"iterate {n} exists nowhere: {self._map.denominator_name} = 0 on the image")
+            if self._replaced > _REPLACEMENTS:
+                raise Stopped("lines", f"random lines do not agree on the degree of iterate {n}: {found}")
+            if best >= 0:
+                self.notes.append(f"a line gave a smaller degree of iterate {n} and was replaced by another: {found}")
+            for k, degree in enumerate(found):
+                if degree < best or best < 0:
+                    lines[k] = self._line()
+
+    def _degree(self, line: Line, n: int) -> int:
+        """The degree of iterate n on a line, which is walked there; -1 where that cannot be done on this line."""
+        try:
+            while line.steps < n:
+                line.step(self._guess(line.steps + 1))
+                if line.steps < n and line.degree != self.degrees[line.steps]:
+                    return -1
+        except ZeroDivisionError:
+            return -1
+        return line.degree
+
+    def _guess(self, n: int) -> int:
+        """What the degree of iterate n hardly exceeds; a guess too low costs a second attempt."""
+        known = self.degrees
+        if n < len(known):
+            return known[n]
+        if n == 1:
+            return self._map.dim
+        most = known[1] * known[-1]
+        # Degrees are as good as log-concave, so that the last ratio bounds the next one.
+        return min(most, known[-1] * known[-1] // known[-2] + 4) if known[-2] else most

@@ -1,0 +1,1 @@
+"""What a map preserves: integrals, densities, Darboux polynomials, Poisson tensors."""

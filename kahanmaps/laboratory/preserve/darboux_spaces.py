@@ -1,0 +1,320 @@
+"""Spaces of polynomials with one common cofactor, found without knowing the cofactor, modulo a prime.
+
+If P o Phi = C P and Q o Phi = C Q with the same rational function C, then P/Q is an integral, P and Q are discrete
+Darboux polynomials, and P - c Q vanishes along the orbits on which P/Q = c. Read backwards:
+
+1. All relations of degree d of all orbits (hirota_kimura.py) span a space W of polynomials; it contains P and Q.
+2. The antisymmetric matrices A on W with sum A_ab (w_a(x~) w_b(x) - w_b(x~) w_a(x)) = 0 for all x are a linear space
+   that contains the sum over a, b in U of every space U with a common cofactor.
+3. The matrices E with E A = A E^T for all these A are the scalars on each U; eigenvectors of a random E are the U.
+   Where the sum is not direct, the A of rank 2 are sought instead, by the vanishing of their 4 x 4 Pfaffians.
+
+What lower degrees explain is taken out first: W_T, the multiples of the spaces that are known. A matrix A that comes
+from multiples lives on W_T alone. So the component of A that joins the complement of W_T with W_T tells how elements
+of the complement are to be corrected to become Darboux polynomials.
+
+Sources: petrera-pfadler-suris-2009 for the relations, celledoni-2019 for discrete Darboux polynomials.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flint import nmod_mat
+
+from kahanmaps.algebra.matrices import combination_of
+from kahanmaps.laboratory.modular_points import (
+    ModularMap,
+    combine,
+    echelon,
+    exponents_up_to,
+    gradient_values,
+    integers,
+    monomial_values,
+    null_space,
+    product_of,
+    rank,
+)
+from kahanmaps.laboratory.preserve.hirota_kimura import span_of_relations
+
+_SPARE = 8
+_ENOUGH = 12
+LARGEST_SPAN = 60  # of W: 1770 unknown entries of A
+
+Vectors = list[list[int]]
+
+
+@dataclass(frozen=True)
+class DarbouxSpace:
+    """Polynomials of degree at most `degree` with one common cofactor, modulo a prime.
+
+    `basis` is on `exponents_up_to(dim, degree)`; ratios of two elements are integrals. Every element ends in a 1 at its
+    largest monomial. Two elements are the sparsest that there are, by degree, then by their number of terms; more are
+    the reduced echelon basis for the monomials in falling order. The first is the natural denominator.
+    """
+
+    dim: int
+    degree: int
+    basis: Vectors
+
+    @classmethod
+    def spanned_by(cls, dim: int, degree: int, vectors: Vectors, prime: int) -> DarbouxSpace:
+        """The space that vectors span modulo a prime."""
+        falling = echelon([vector[::-1] for vector in vectors], prime)
+        basis = [vector[::-1] for vector in reversed(falling)]
+        return cls(dim, degree, _sparsest(basis, dim, degree, prime) if len(basis) == 2 else basis)
+
+    @property
+    def support(self) -> tuple[tuple[int, ...], ...]:
+        """The monomials that occur in it."""
+        everything = exponents_up_to(self.dim, self.degree)
+        used = [any(vector[k] for vector in self.basis) for k in range(len(everything))]
+        return tuple(exponent for exponent, use in zip(everything, used, strict=True) if use)
+
+    def multiples(self, degree: int, prime: int) -> Vectors:
+        """A basis of the products with all monomials, up to a degree."""
+        factors = [[0] * k + [1] for k in range(len(exponents_up_to(self.dim, degree - self.degree)))]
+        rows = [product_of(P, vector, self.dim, degree, prime) for P in factors for vector in self.basis]
+        return echelon([row for row in rows if row is not None], prime)
+
+
+def _sparsest(basis: Vectors, dim: int, degree: int, prime: int) -> Vectors:
+    """The two sparsest elements of a pencil: among those that lack a monomial which others have."""
+    degrees = [sum(exponent) for exponent in exponents_up_to(dim, degree)]
+    P, Q = basis
+    members: dict[tuple[int, ...], list[int]] = {}
+    for a, b in zip(P, Q, strict=True):
+        if a or b:
+            member = [(b * p - a * q) % prime for p, q in zip(P, Q, strict=True)]
+            last = max(k for k, entry in enumerate(member) if entry)
+            inverse = pow(member[last], -1, prime)
+            members[tuple(k for k, entry in enumerate(member) if entry)] = [c * inverse % prime for c in member]
+    keys = sorted(members, key=lambda places: (degrees[places[-1]], len(places), places))
+    return [members[key] for key in keys[:2]]
+
+
+def darboux_spaces(
+    map_: ModularMap, degree: int, known: Sequence[DarbouxSpace] = (), seconds: float = 30.0
+) -> list[DarbouxSpace]:
+    """The spaces of degree `degree` that are not multiples of the `known` ones of lower degree.
+
+    Relations that no space accounts for have integrals for coefficients that are no P/Q of this degree. None are looked
+    for where relations span too many dimensions.
+    """
+    prime = map_.prime
+    deadline = time.monotonic() + seconds
+    span = span_of_relations(map_, degree, seconds / 2)
+    explained = echelon([row for space in known for row in space.multiples(degree, prime)], prime)
+    fresh = _complement(explained, span, prime)
+    if not fresh:
+        return []
+    if not explained and _is_darboux(map_, fresh, degree):
+        return [DarbouxSpace.spanned_by(map_.dim, degree, fresh, prime)]
+    if len(fresh) + len(explained) > LARGEST_SPAN or time.monotonic() > deadline:
+        return []
+    solutions = _antisymmetric(map_, [*fresh, *explained], degree)
+    bases = [basis for basis in _separate(solutions, fresh, explained, prime) if _is_darboux(map_, basis, degree)]
+    if not bases and not explained:
+        bases = [basis for basis in _of_rank_two(solutions, fresh, prime) if _is_darboux(map_, basis, degree)]
+    return [DarbouxSpace.spanned_by(map_.dim, degree, basis, prime) for basis in bases]
+
+
+def _complement(inner: Vectors, outer: Vectors, prime: int) -> Vectors:
+    """Vectors of `outer` that together with `inner` are a basis of the sum."""
+    if not outer:
+        return []
+    stacked = [*inner, *outer]
+    pivots = _pivots(echelon(list(zip(*stacked, strict=True)), prime))
+    return [stacked[k] for k in pivots if k >= len(inner)]
+
+
+def _pivots(basis: Vectors) -> list[int]:
+    """Where the vectors of an echelon basis have their first entries."""
+    return [next(k for k, entry in enumerate(row) if entry) for row in basis]
+
+
+def _values(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[nmod_mat, nmod_mat]:
+    """The values of the polynomials at random points and at their images: one row a point."""
+    prime = map_.prime
+    matrix = nmod_mat(basis, prime).transpose()
+    here, there = (
+        nmod_mat([monomial_values(point, degree, prime) for point in points], prime) * matrix
+        for points in zip(*map_.pairs(count), strict=True)
+    )
+    return here, there
+
+
+def _is_darboux(map_: ModularMap, basis: Vectors, degree: int) -> bool:
+    """Whether all ratios of the polynomials are conserved, at random points."""
+    here, there = _values(map_, basis, degree, 6)
+    return all(
+        here[i, 0] * there[i, a] == here[i, a] * there[i, 0] for i in range(here.nrows()) for a in range(1, len(basis))
+    )
+
+
+def _antisymmetric(map_: ModularMap, basis: Vectors, degree: int) -> list[nmod_mat]:
+    """A basis of the antisymmetric A with sum A_ab w_a(x~) w_b(x) = 0 for all x."""
+    size, prime = len(basis), map_.prime
+    places = [(a, b) for a in range(size) for b in range(a + 1, size)]
+    here, there = _values(map_, basis, degree, len(places) + _SPARE)
+    rows = []
+    for x, y in zip(integers(here), integers(there), strict=True):
+        rows.append([(y[a] * x[b] - y[b] * x[a]) % prime for a, b in places])
+    solutions = []
+    for vector in null_space(rows, len(places), prime):
+        matrix = nmod_mat(size, size, prime)
+        for (a, b), entry in zip(places, vector, strict=True):
+            matrix[a, b] = entry
+            matrix[b, a] = -entry
+        solutions.append(matrix)
+    return solutions
+
+
+def _separate(solutions: list[nmod_mat], fresh: Vectors, explained: Vectors, prime: int) -> list[Vectors]:
+    """The spaces with a common cofactor from the matrices A on fresh + explained."""
+    k, size = len(fresh), len(fresh) + len(explained)
+    # Columns of the fresh-fresh parts span the fresh parts of the spaces, in coordinates.
+    columns = [[int(A[a, b]) for a in range(k)] for A in solutions for b in range(k)]
+    coordinates = echelon(columns, prime)
+    found = []
+    for block in _blocks(solutions, coordinates, prime):
+        lifted = _lift(solutions, block, k, size, prime)
+        if lifted is None:
+            continue
+        found.append(echelon(combine(lifted, [*fresh, *explained], prime), prime))
+    return found
+
+
+def _restricted(solutions: list[nmod_mat], basis: Vectors, prime: int) -> list[nmod_mat]:
+    """The fresh-fresh parts A = sum A'_ij b_i b_j^T as matrices A' in terms of a basis in echelon form."""
+    pivots = _pivots(basis)
+    return [nmod_mat([[int(A[i, j]) for j in pivots] for i in pivots], prime) for A in solutions]
+
+
+def _some_combinations(forms: list[nmod_mat], prime: int) -> list[nmod_mat]:
+    """The matrices, or random combinations of them where there are many: what all satisfy can be read off a few."""
+    if len(forms) <= _ENOUGH:
+        return forms
+    rng = random.Random(prime)
+    return [combination_of([rng.randrange(prime) for _ in forms], forms) for _ in range(_ENOUGH)]
+
+
+def _blocks(solutions: list[nmod_mat], coordinates: Vectors, prime: int) -> list[Vectors]:
+    """The spaces, in coordinates of the fresh part: eigenspaces of a random E with E A = A E^T for all A."""
+    n = len(coordinates)
+    if n < 2:
+        return []
+    forms = _some_combinations(_restricted(solutions, coordinates, prime), prime)
+    rows = []
+    for A in forms:
+        for i in range(n):
+            for j in range(i, n):
+                row = [0] * (n * n)
+                for m in range(n):  # (E A)_ij - (A E^T)_ij = sum E_im A_mj - A_im E_jm
+                    row[i * n + m] = (row[i * n + m] + int(A[m, j])) % prime
+                    row[j * n + m] = (row[j * n + m] - int(A[i, m])) % prime
+                rows.append(row)
+    algebra = null_space(rows, n * n, prime)
+    if len(algebra) == 1:
+        return [coordinates]
+    rng = random.Random(prime)
+    entries = combine([[rng.randrange(prime) for _ in algebra]], algebra, prime)[0]
+    E = nmod_mat(n, n, entries, prime)
+    found = []
+    for factor, _ in E.charpoly().factor()[1]:
+        if factor.degree() != 1:
+            continue  # spaces that are conjugate over an extension of the field
+        root = -int(factor[0]) * pow(int(factor[1]), -1, prime) % prime
+        shifted = [[(entries[i * n + j] - (root if i == j else 0)) % prime for j in range(n)] for i in range(n)]
+        eigen = null_space(shifted, n, prime)
+        if len(eigen) > 1:
+            found.append(echelon(combine(eigen, coordinates, prime), prime))
+    return found
+
+
+def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[Vectors]:
+    """The row space of the only matrix of rank 2 among the combinations of few matrices; nothing where it is not one.
+
+    The 4 x 4 Pfaffians of sum c_s A_s are quadratic forms in c. A single common zero c (up to a factor) shows in the
+    matrix c c^T, which spans what all of them annihilate.
+    """
+    count = len(solutions)
+    if not 1 <= count <= _ENOUGH:
+        return []
+    rng = random.Random(prime)
+    size = len(fresh)
+    pairs = [(s, t) for s in range(count) for t in range(s, count)]
+    rows = []
+    for _ in range(2 * len(pairs) + 4):
+        mix = nmod_mat(4, size, [rng.randrange(prime) for _ in range(4 * size)], prime)
+        small = [mix * A * mix.transpose() for A in solutions]
+
+        def pfaffian(A: nmod_mat, B: nmod_mat) -> int:
+            return int(
+                A[0, 1] * B[2, 3]
+                - A[0, 2] * B[1, 3]
+                + A[0, 3] * B[1, 2]
+                + B[0, 1] * A[2, 3]
+                - B[0, 2] * A[1, 3]
+                + B[0, 3] * A[1, 2]
+            )
+
+        # entry (s, t) of c c^T is c_s c_t: its factor is the polar form, half of it on the diagonal
+        half = (prime + 1) // 2
+        rows.append([pfaffian(small[s], small[t]) * (half if s == t else 1) % prime for s, t in pairs])
+    common = null_space(rows, len(pairs), prime)
+    if len(common) != 1:
+        return []
+    products = dict(zip(pairs, common[0], strict=True))
+    lead = next((s for s in range(count) if products[s, s]), None)
+    if lead is None:
+        return []
+    total = combination_of([products[min(lead, t), max(lead, t)] for t in range(count)], solutions)
+    coordinates = echelon(integers(total), prime)
+    return [echelon(combine(coordinates, fresh, prime), prime)] if len(coordinates) == 2 else []
+
+
+def _lift(solutions: list[nmod_mat], block: Vectors, k: int, size: int, prime: int) -> Vectors | None:
+    """The block with its corrections by explained polynomials, in coordinates of fresh + explained."""
+    if size == k:
+        return block
+    # Combinations of the A whose fresh-fresh part lives on the block: their columns are combinations of it.
+    pivots = _pivots(block)
+    others = [i for i in range(k) if i not in pivots]
+    conditions = []
+    for b in range(k):
+        for i in others:
+            # entry (i, b) must be what the block makes of the entries (pivot, b)
+            conditions.append(
+                [
+                    (int(A[i, b]) - sum(int(A[p, b]) * row[i] for p, row in zip(pivots, block, strict=True))) % prime
+                    for A in solutions
+                ]
+            )
+    combinations = null_space(conditions, len(solutions), prime)
+    n = len(block)
+    system = []
+    for weights in combinations:
+        A = combination_of(weights, solutions)
+        for p in pivots:
+            # A = sum a_pq (p + w_p)(q + w_q)^T: the part of row p outside the fresh ones is sum_q a_pq w_q
+            system.append([int(A[p, q]) for q in pivots] + [int(A[p, t]) for t in range(k, size)])
+    reduced = echelon(system, prime)
+    if len(reduced) < n or any(reduced[i][j] != (i == j) for i in range(n) for j in range(n)):
+        return None
+    return [[*block[i], *reduced[i][n:]] for i in range(n)]
+
+
+def gradient_rank(map_: ModularMap, spaces: Sequence[DarbouxSpace]) -> int:
+    """The number of functionally independent integrals among the ratios of the spaces, at a random point."""
+    prime, x = map_.prime, map_.random_point()
+    rows = []
+    for space in spaces:
+        values = [gradient_values(vector, x, space.degree, prime) for vector in space.basis]
+        q, dq = values[0]
+        for p, dp in values[1:]:
+            rows.append([(q * a - p * b) % prime for a, b in zip(dp, dq, strict=True)])
+    return rank(rows, prime)

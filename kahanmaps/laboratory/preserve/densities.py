@@ -1,0 +1,281 @@
+"""Invariant measures dx/phi of a map with a polynomial phi, or a product of powers of polynomials, in closed form.
+
+dx/phi is invariant if phi(x~) = det dPhi(x) phi(x): phi is a discrete Darboux polynomial with the cofactor det dPhi.
+All of them up to a degree are one null space modulo a prime. Products of powers of known polynomials, of any degree,
+are found by their exponents (products.py). Source: celledoni-2019.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from math import comb
+from typing import Any
+
+from flint import fmpq, fmpz
+
+from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part
+from kahanmaps.algebra.text import format_rational_function
+from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.displayed import Displayed, latex
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
+from kahanmaps.laboratory.preserve.cofactors import (
+    DETERMINANT,
+    CofactorProduct,
+    Sample,
+    cofactor_space,
+    determinant_polynomial,
+    points_needed,
+)
+from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION, constant_structures
+from kahanmaps.laboratory.preserve.identities import verdict_on
+from kahanmaps.laboratory.preserve.integrals import closing_note, toml_comment
+from kahanmaps.laboratory.preserve.products import candidates, products_of
+
+_MAX_UNKNOWNS = 1000
+_MAX_DEGREE = 12
+_CLOSES_WITHIN = 64  # points of an orbit
+_ONCE = CofactorProduct((1,), 1)
+
+
+@dataclass(frozen=True)
+class FoundDensity:
+    """A density phi(x, eps): the measure dx/phi is invariant, with the verdict on that; `product` is phi in factors."""
+
+    function: RationalFunction
+    verdict: Verdict
+    evidence: Evidence
+    product: str = ""
+
+    def degree(self, dim: int) -> int:
+        """The larger of the degrees of numerator and denominator in the variables."""
+        return max(degree_in(part, dim) for part in (self.function.numerator, self.function.denominator))
+
+    @property
+    def text(self) -> str:
+        """The formula of phi."""
+        return self.product or format_rational_function(self.function)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {"phi": self.text, "latex": latex(self.function), **attributes(self, "verdict", "evidence")}
+
+
+@dataclass(frozen=True)
+class DensitySearch(Displayed):
+    """What `find_densities` found.
+
+    `densities` span all phi of the least degree that has some, or are det(I - eps f') of a Hamiltonian system, which
+    need not be of least degree; `degree` is the largest that was tried, and `reason` says why the search ended without
+    a density. `eps` is None for every eps; `period` is the number of points of orbits that close. `turning` is a phi
+    with phi(x~) = -det dPhi(x) phi(x): the map turns dx/phi into -dx/phi, and |dx/phi| is invariant.
+    """
+
+    file: SystemFile
+    symbols: tuple[str, ...]
+    eps: fmpq | None
+    densities: tuple[FoundDensity, ...]
+    degree: int
+    reason: str
+    primes: tuple[int, ...]
+    seed: int
+    period: int | None = None
+    turning: FoundDensity | None = None
+
+    @property
+    def note(self) -> str:
+        """That orbits close, and for which eps; of which phi the sign changes; empty where there is nothing to say."""
+        closes = closing_note(self.period, self.eps, self.file.map)
+        if self.turning is None:
+            return closes
+        turns = f"|dx/phi| is invariant for phi = {self.turning.text}: phi(x~) = -det dPhi(x) phi(x)"
+        return "; ".join(filter(None, (f"{turns} ({self.turning.verdict})", closes)))
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        more = attributes(self, "period", "note", "reason", "primes")
+        return {**attributes(self, "densities", degree_tried="degree"), **more}
+
+    def toml_section(self) -> str:
+        """The first density as a section [density] of a system file, which `check-measure` accepts.
+
+        Empty where there is none; for a given eps a comment says that it holds there only.
+        """
+        if not self.densities:
+            return ""
+        return "\n".join([*toml_comment(self.eps, self.file.map), "[density]", f'phi = "{self.densities[0].text}"', ""])
+
+
+def find_densities(
+    file: SystemFile,
+    *,
+    symbols: Sequence[str] = (),
+    eps: Any = None,
+    max_degree: int | None = None,
+    seconds: float = 30.0,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> DensitySearch:
+    """The polynomials phi of the least degree for which the map preserves dx/phi; failing these, a product of powers.
+
+    Args:
+        file: the map; a differential equation stands for its Kahan map.
+        symbols: names of parameters that formulas are to contain; the others have the values of the file.
+        eps: an exact number, or None for formulas that contain eps (the time step is 2 eps).
+        max_degree: of phi; by default as the number of unknowns allows, at most 12.
+        seconds: the time that the search may take, about.
+        seed: of everything random.
+        progress: is told what is being tried.
+
+    Returns:
+        A `DensitySearch`; formulas are exact, proved or supported. Finding none up to a degree is measured.
+
+    Raises:
+        InputError: for unknown symbols, symbols in a [family] file, eps = 0, less than no time or degree.
+
+    Source: celledoni-2019.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> found = find_densities(load("lotka_volterra"))
+    >>> [(one.text, str(one.verdict)) for one in found.densities]
+    [('x*y', 'proved')]
+    """
+    if not seconds > 0:
+        raise InputError(f"found {seconds} seconds, expected a time above 0")
+    if max_degree is not None and max_degree < 0:
+        raise InputError(f"found the largest degree {max_degree}, expected at least 0")
+    laboratory = Laboratory(file, symbols, eps, seed)
+    densities, tried, reason, period = list[FoundDensity](), -1, laboratory.defect, None
+    product = turning = None
+    if not reason:
+        period = _period(laboratory)
+        deadline = time.monotonic() + seconds
+        theorem, dim = _theorem(laboratory), laboratory.map.dim
+        if theorem is not None and (max_degree is None or theorem.degree(dim) <= max_degree):
+            densities, tried = [theorem], theorem.degree(dim)
+        else:
+            progress("densities that are products")
+            product, turning = _products(laboratory, max_degree)
+            densities, tried, reason = _search(laboratory, product, max_degree, deadline, progress)
+    return DensitySearch(
+        file,
+        laboratory.symbols,
+        laboratory.eps,
+        tuple(densities),
+        tried,
+        "" if densities else reason,
+        laboratory.primes,
+        seed,
+        period,
+        turning,
+    )
+
+
+def _search(
+    laboratory: Laboratory,
+    product: FoundDensity | None,
+    max_degree: int | None,
+    deadline: float,
+    progress: Callable[[str], None],
+) -> tuple[list[FoundDensity], int, str]:
+    """Densities, the largest degree that was tried, and why there are none; the product where none is simpler."""
+    dim = laboratory.map.dim
+    of_product = 0 if product is None else product.degree(dim)
+    top = max_degree if max_degree is not None else _MAX_DEGREE
+    top = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0)
+    # With a product in hand only lower degrees are worth a part of the time, and the others of its own degree.
+    until = deadline if product is None else time.monotonic() + (deadline - time.monotonic()) / 3
+    for degree in range(top + 1 if product is None else min(top, of_product) + 1):
+        if time.monotonic() > until:
+            if product is not None:
+                break
+            return [], degree - 1, f"the time was over at degree {degree}"
+        progress(f"densities of degree {degree}")
+        try:
+            first, second = (_space(map_, degree) for map_ in laboratory.maps)
+            if first.basis and len(first.basis) == len(second.basis):
+                found, reason = _formulas(laboratory, first, degree, deadline)
+                if found or product is None:
+                    return found, degree, reason
+        except NoPoint as error:
+            return [], degree - 1, str(error)
+    if product is not None:
+        return [product], of_product, ""
+    return [], top, f"no polynomial of degree at most {top}, and no product of powers of known ones, is a density"
+
+
+def _products(laboratory: Laboratory, max_degree: int | None) -> tuple[FoundDensity | None, FoundDensity | None]:
+    """A density that is a product of powers of known polynomials, or one that changes its sign, as far as there are."""
+    try:
+        found = products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density
+    except NoPoint:
+        return None, None
+    phi = None if found is None else found.function
+    if found is None or phi is None:
+        return None, None
+    verdict, evidence = verdict_on(
+        laboratory.map, phi, laboratory.eps, laboratory.seed, is_density=True, factor=found.constant
+    )
+    one = FoundDensity(phi, verdict, evidence, found.text)
+    if not verdict.holds or (max_degree is not None and one.degree(laboratory.map.dim) > max_degree):
+        return None, None
+    return (one, None) if found.constant.numerator == found.constant.denominator else (None, one)
+
+
+def _theorem(laboratory: Laboratory) -> FoundDensity | None:
+    """det(I - eps f') of a Hamiltonian system with numbers for parameters, made primitive; None for others."""
+    if laboratory.symbols or laboratory.system is None or laboratory.system.dim > MAX_DIMENSION:
+        return None
+    if constant_structures(laboratory.system).hamiltonian is None:
+        return None
+    D = determinant_polynomial(laboratory.map)
+    if D is None:
+        return None
+    if laboratory.eps is not None:
+        at: dict[str | int, int | fmpz | fmpq] = {"eps": laboratory.eps}
+        D = D.subs(at)
+    if D.is_zero():
+        return None
+    content = reduce(lambda common, c: common.gcd(c), coefficients_in(D, laboratory.system.dim))
+    _, phi = primitive_part(D / content)
+    evidence = Evidence(
+        "theorem", "f = J grad H with a constant skew matrix J: dx/det(I - eps f'(x)) is invariant (cmoq-2013)"
+    )
+    return FoundDensity(RationalFunction(phi, phi.context().constant(1)), Verdict.PROVED, evidence)
+
+
+def _period(laboratory: Laboratory) -> int | None:
+    """The number of points of orbits that close soon, on all maps; None where they do not."""
+    try:
+        periods = {len(map_.orbit(_CLOSES_WITHIN)) for map_ in laboratory.maps}
+    except NoPoint:
+        return None
+    period = periods.pop()
+    return None if periods or period == _CLOSES_WITHIN else period
+
+
+def _space(map_: ModularMap, degree: int) -> DarbouxSpace:
+    """The P of degree at most `degree` with P(x~) = det dPhi P(x)."""
+    return cofactor_space(Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree)), _ONCE, degree)
+
+
+def _formulas(
+    laboratory: Laboratory, model: DarbouxSpace, degree: int, deadline: float
+) -> tuple[list[FoundDensity], str]:
+    forms = laboratory.formulas([model], lambda map_: [_space(map_, degree)], deadline)
+    if forms.bases is None:
+        return [], f"there is a density of degree {degree} modulo primes, but no closed form: {forms.reason}"
+    found = []
+    for P in forms.bases[0]:
+        phi = RationalFunction(P, P.context().constant(1))
+        verdict, evidence = verdict_on(laboratory.map, phi, laboratory.eps, laboratory.seed, is_density=True)
+        if verdict.holds:
+            found.append(FoundDensity(phi, verdict, evidence))
+    return found, f"a density of degree {degree} that was found modulo primes did not pass as an identity"

@@ -1,0 +1,561 @@
+"""Integrals of a map in closed form, found without being told anything but the map.
+
+How many there are at least is found first: by theorems (inherited.py) and by the codimension of orbits, which is
+measured (hirota_kimura.py). Then spaces of polynomials with a common cofactor are sought modulo a prime (search.py);
+their ratios are the integrals. The coefficients are functions of eps and of the parameters that are left as symbols;
+they are interpolated (closed_forms.py), and what comes out is put to the proof as an identity (identities.py). What the
+theorems give and was not found is added.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly, fmpz
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate, ring
+from kahanmaps.algebra.text import format_rational_function
+from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.displayed import Displayed, latex
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
+from kahanmaps.laboratory.preserve.branches import Branches, Pattern, tell_apart
+from kahanmaps.laboratory.preserve.cofactors import Cofactor
+from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
+from kahanmaps.laboratory.preserve.identities import verdict_on
+from kahanmaps.laboratory.preserve.inherited import InheritedIntegrals, inherited_integrals
+from kahanmaps.laboratory.preserve.products import candidates, products_of
+from kahanmaps.laboratory.preserve.search import AFFINE, Found, classes, may_be_conjugate, repeat, search
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+_AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
+_SHOWN_TERMS = 500
+_CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
+
+
+@dataclass(frozen=True)
+class FoundIntegral:
+    """An integral I(x, eps), a function of (variables, symbols, eps), with the verdict on I(x~) = I(x)."""
+
+    name: str
+    function: RationalFunction
+    origin: str
+    verdict: Verdict
+    evidence: Evidence
+    product: str = ""  # the formula in factors, where it is known so
+
+    @property
+    def text(self) -> str:
+        """The formula."""
+        return self.product or format_rational_function(self.function)
+
+    @property
+    def short_text(self) -> str:
+        """The formula, or its size where it would fill pages."""
+        sizes = len(self.function.numerator), len(self.function.denominator)
+        if sum(sizes) <= _SHOWN_TERMS:
+            return self.text
+        return f"P/Q with {sizes[0]} and {sizes[1]} terms, which find-integrals writes out"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        degrees = [degree(self.function.numerator), degree(self.function.denominator)]
+        return {
+            **attributes(self, "name", integral="text"),
+            "latex": latex(self.function),
+            "degrees": degrees,
+            **attributes(self, "origin", "verdict", "evidence"),
+        }
+
+
+@dataclass(frozen=True)
+class TimedIntegral:
+    """An integral c^-n I(x) that depends on time, x being the n-th point of an orbit: I(x~) = c I(x), c a number."""
+
+    name: str
+    integral: FoundIntegral
+    factor: RationalFunction
+
+    @property
+    def text(self) -> str:
+        """The formula."""
+        I = self.integral.text
+        return f"({format_rational_function(self.factor)})^-n*{I if I.isidentifier() else f'({I})'}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            **attributes(self, "name"),
+            "integral": self.integral.text,
+            "factor": format_rational_function(self.factor),
+            **attributes(self.integral, "verdict", "evidence"),
+        }
+
+
+@dataclass(frozen=True)
+class IntegralSearch(Displayed):
+    """What `find_integrals` found.
+
+    `integrals` are functionally independent, also together with those that depend on time, `in_time`. `profile` is what
+    relations along orbits show (measured); `by_theorems` is how many independent integrals the Kahan map has by the
+    theorems of inherited.py, and `theorems` says which (with symbols: at random values). `reason` says what is missing
+    and why, empty where nothing is. `eps` is None for every eps.
+    """
+
+    file: SystemFile
+    symbols: tuple[str, ...]
+    eps: fmpq | None
+    integrals: tuple[FoundIntegral, ...]
+    profile: Profile
+    reason: str
+    primes: tuple[int, ...]
+    seed: int
+    by_theorems: int
+    theorems: str
+    in_time: tuple[TimedIntegral, ...] = ()
+
+    @property
+    def note(self) -> str:
+        """What is special about the orbits: that they close; empty where they do not."""
+        return closing_note(self.profile.period, self.eps, self.file.map)
+
+    @property
+    def codimension(self) -> int:
+        """How many independent integrals are known: shown by orbits, given by theorems, or found in closed form."""
+        return max(self.profile.codimension, self.profile.with_known, self.by_theorems, len(self.integrals))
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether there can be no more than `codimension` integrals: else it is a lower bound.
+
+        Relations of higher degrees, which were not tried, can show more, until orbits lie on curves; points, where
+        they close.
+        """
+        dim, measured = self.profile.dim, bool(self.profile.nullities)
+        return self.codimension >= (dim - 1 if measured and self.profile.period is None else dim)
+
+    @property
+    def count_text(self) -> str:
+        """How many integrals there are, and how that is known."""
+        tried = f"relations of degree up to {self.profile.degree} along orbits"
+        if self.codimension == 0:
+            if not self.profile.nullities:
+                return "orbits were not measured"
+            return f"there is no integral (measured, {tried})" if self.is_exact else f"none shows in {tried} (measured)"
+        parts = [f"{self.by_theorems} by theorems: {self.theorems}"] if self.by_theorems else []
+        if self.profile.nullities:
+            shown = max(self.profile.codimension, self.profile.with_known, self.by_theorems)
+            parts.append(f"measured: {tried} show {'no more' if shown == self.by_theorems else shown}")
+            if len(self.integrals) > shown:
+                parts.append(f"{len(self.integrals)} have formulas")
+        at_least = "" if self.is_exact else "at least "
+        return f"in all {at_least}{self.codimension} independent ({'; '.join(parts)})"
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether there is a closed form for every integral that is known."""
+        return len(self.integrals) >= self.codimension
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            **attributes(self, "integrals"),
+            "found": len(self.integrals),
+            **attributes(self, "in_time"),
+            **attributes(self, "codimension", codimension_is_exact="is_exact"),
+            **attributes(self, "by_theorems", relations="profile"),
+            **attributes(self, "note", "reason", "primes"),
+        }
+
+    def toml_section(self) -> str:
+        """The integrals as a section [integrals] of a system file, which `check-integrals` accepts.
+
+        Empty where there are none; for a given eps a comment says that they hold there only.
+        """
+        if not self.integrals:
+            return ""
+        lines = ["[integrals]", *(f'{one.name} = "{one.text}"' for one in self.integrals)]
+        return "\n".join([*toml_comment(self.eps, self.file.map), *lines]) + "\n"
+
+
+def closing_note(period: int | None, eps: fmpq | None, map_: BirationalMap) -> str:
+    """What orbits that close after `period` steps mean at this eps (None: at every one); empty where they do not.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> closing_note(4, fmpq(1), load("weierstrass").map)
+    'orbits close after 4 steps: at eps = 1 the map is periodic (measured); nothing follows for other eps'
+    """
+    if period is None:
+        return ""
+    closes = f"orbits close after {period} step{'s' * (period != 1)}"
+    if not map_.has_eps:
+        return f"{closes}: the map is periodic (measured)"
+    if eps is None:
+        return f"{closes} at every eps that was tried: the map is periodic (measured)"
+    return f"{closes}: at eps = {eps} the map is periodic (measured); nothing follows for other eps"
+
+
+def toml_comment(eps: fmpq | None, map_: BirationalMap) -> list[str]:
+    """The line of a system file that says that formulas hold at one eps only; none where eps is in them."""
+    if eps is None:
+        return []
+    step = f" (time step 2 eps = {2 * eps})" if map_.has_time_step else ""
+    return [f"# for eps = {eps} only{step}: check with --eps {eps}"]
+
+
+def find_integrals(
+    file: SystemFile,
+    *,
+    symbols: Sequence[str] = (),
+    eps: Any = None,
+    max_degree: int | None = None,
+    seconds: float = 60.0,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> IntegralSearch:
+    """Independent integrals of a map in closed form, each with its verdict.
+
+    Args:
+        file: the map; a differential equation stands for its Kahan map.
+        symbols: names of parameters that formulas are to contain; the others have the values of the file.
+        eps: an exact number, the formulas are then for this eps only; None: formulas contain eps (time step 2 eps).
+        max_degree: the largest degree of relations along orbits; by default as dimension and time allow.
+        seconds: the time that the search may take, about.
+        seed: of everything random.
+        progress: is told what is being tried.
+
+    Returns:
+        An `IntegralSearch`. Its formulas are exact and proved or supported as identities; the number of integrals
+        that orbits show is measured modulo two primes.
+
+    Raises:
+        InputError: for unknown symbols, symbols in a [family] file, eps = 0 and less than no time.
+
+    Source: petrera-pfadler-suris-2009, celledoni-2019, cmoq-2013.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> found = find_integrals(load("nahm_tetrahedral"))
+    >>> [(one.text, str(one.verdict)) for one in found.integrals], found.codimension
+    ([('(3*x^2*y - y^3)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
+    """
+    if not seconds > 0:
+        raise InputError(f"found {seconds} seconds, expected a time above 0")
+    if max_degree is not None and max_degree < 1:
+        raise InputError(f"found the largest degree {max_degree}, expected at least 1")
+    laboratory = Laboratory(file, symbols, eps, seed)
+    deadline = time.monotonic() + seconds
+    primes = laboratory.primes
+
+    inherited: list[InheritedIntegrals] = []  # of each map; theorems speak of Kahan maps
+    if laboratory.system is not None:
+        # Without symbols the maps have the same values, none, and one system.
+        systems = {
+            values: inherited_integrals(laboratory.system.at(values), seed=seed)
+            for values in {map_.values for map_ in laboratory.maps}
+        }
+        inherited = [systems[map_.values] for map_ in laboratory.maps]
+    by_theorems = 0
+    in_time: list[TimedIntegral] = []
+
+    def gradients(map_: ModularMap, x: Point) -> list[list[int]]:
+        return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
+
+    def result(integrals: Sequence[FoundIntegral], profile: Profile, reason: str) -> IntegralSearch:
+        values = f", at random values of {', '.join(laboratory.symbols)}" if laboratory.symbols else ""
+        theorems = inherited[0].text + values if inherited else ""
+        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems, tuple(in_time))
+        return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found)
+
+    empty = Profile(file.dim, (), (), None, True, False)
+    if laboratory.defect:
+        return result([], empty, laboratory.defect)
+    if inherited:
+        by_theorems = min(one.count(map_) for one, map_ in zip(inherited, laboratory.maps, strict=True))
+    try:
+        profile = orbit_profile(
+            laboratory.maps, max_degree=max_degree, seconds=seconds / 3, known=gradients, progress=progress
+        )
+        cofactors = laboratory.cofactors()
+        base, found = _search(laboratory, profile, cofactors, deadline, progress)
+        formulas, reason = _formulas(laboratory, base, found, cofactors, deadline, progress)
+    except NoPoint as error:
+        return result([], empty, str(error))
+    integrals = _independent(laboratory, formulas, progress)
+    if inherited and not laboratory.symbols:
+        integrals = _by_theorems(laboratory, inherited[0], integrals, deadline)
+    if len(integrals) < file.dim - 1:
+        progress("products of powers of known polynomials")
+        integrals, in_time = _products(laboratory, cofactors, integrals, progress)
+    done = result(integrals, profile, "")
+    missing = done.codimension - len(integrals)
+    if missing <= 0:
+        reason = ""
+    elif not reason:
+        have = "has" if missing == 1 else "have"
+        reason = (
+            f"{missing} of the {done.codimension} independent integrals {have} no closed form P/Q of the degrees and "
+            "sizes that were tried: coefficients of Hirota-Kimura bases are such integrals"
+        )
+    return replace(done, reason="; ".join(filter(None, (reason, _unfinished(profile, max_degree)))))
+
+
+def _unfinished(profile: Profile, max_degree: int | None) -> str:
+    """What the profile leaves open; empty where it left nothing that was asked for or is likely to show more."""
+    if not profile.complete and (max_degree is not None or not profile.is_settled):
+        return f"relations of degree {profile.degree + 1} and more were not tried: too many unknowns or too little time"
+    return "" if profile.agree else "the orbits that were compared do not agree: try another --seed"
+
+
+def _search(
+    laboratory: Laboratory,
+    profile: Profile,
+    cofactors: Sequence[Cofactor],
+    deadline: float,
+    progress: Callable[[str], None],
+) -> tuple[ModularMap, Found]:
+    """What is found modulo a prime where spaces that are conjugate over an extension of Q do not occur, and the map."""
+    base = laboratory.maps[0]
+    found = search(base, profile, cofactors, (deadline - time.monotonic()) / 2, progress)
+    if may_be_conjugate(found):
+        for map_ in laboratory.other_maps(_CONJUGATE_PRIMES):
+            if time.monotonic() < deadline and repeat(found, map_, cofactors, base.prime) is None:
+                base, found = map_, search(map_, profile, cofactors, (deadline - time.monotonic()) / 2, progress)
+    return base, found
+
+
+def _formulas(
+    laboratory: Laboratory,
+    base: ModularMap,
+    found: Found,
+    cofactors: Sequence[Cofactor],
+    deadline: float,
+    progress: Callable[[str], None],
+) -> tuple[list[tuple[RationalFunction, str]], str]:
+    """All ratios of the spaces in closed form, with how they were found, and a reason where that failed."""
+    if not found.steps:
+        return [], ""
+    reference = base.prime
+    if repeat(found, laboratory.maps[1], cofactors, reference) is None:
+        return [], "what was found at one eps was not found at another"
+    progress("interpolating closed forms")
+
+    branches, reason = _branches(laboratory, found, cofactors, reference, deadline)
+    if reason:
+        return [], f"integrals were found modulo primes, but no closed form: {reason}"
+
+    def spaces_on(map_: ModularMap) -> list[DarbouxSpace] | None:
+        again = repeat(found, map_, cofactors, reference, branches)
+        return None if again is None else again.all_spaces
+
+    forms = laboratory.formulas(found.all_spaces, spaces_on, deadline)
+    if forms.bases is None:
+        return [], f"integrals were found modulo primes, but no closed form: {forms.reason}"
+    origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
+    return [
+        (_ratio(P, basis[0]), origin) for basis, origin in zip(forms.bases, origins, strict=True) for P in basis[1:]
+    ], ""
+
+
+def _branches(
+    laboratory: Laboratory, found: Found, cofactors: Sequence[Cofactor], reference: int, deadline: float
+) -> tuple[dict[int, dict[Pattern, Branches]], str]:
+    """What tells the spaces of each step apart that have zeros at the same places, and a reason where nothing does."""
+    names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
+
+    @cache
+    def again(prime: int, values: tuple[int, ...]) -> Found | None:
+        try:
+            return repeat(found, laboratory.map_for(prime, values), cofactors, reference)
+        except (NoPoint, BadPrime):
+            return None
+
+    branches: dict[int, dict[Pattern, Branches]] = {}
+    for number, group in enumerate(found.spaces):
+        for kind, model in classes(group).items():
+            if len(model) == 1:
+                continue
+
+            def alike(
+                prime: int, values: tuple[int, ...], number: int = number, kind: Pattern = kind
+            ) -> list[DarbouxSpace] | None:
+                other = again(prime, values)
+                return None if other is None else classes(other.spaces[number])[kind]
+
+            told = tell_apart(model, alike, names, laboratory.seed, deadline)
+            if told is None:
+                return {}, f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
+            branches.setdefault(number, {})[kind] = told
+    return branches, ""
+
+
+def _ratio(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
+    """P/Q, or Q/P where P is the one that becomes a number for eps = 0."""
+    origin: dict[str | int, int | fmpz | fmpq] = {"eps": 0}
+    if P.subs(origin).is_constant() and not Q.subs(origin).is_constant():
+        return RationalFunction(Q, P)
+    return RationalFunction(P, Q)
+
+
+def _products(
+    laboratory: Laboratory,
+    cofactors: Sequence[Cofactor],
+    integrals: Sequence[FoundIntegral],
+    progress: Callable[[str], None],
+) -> tuple[list[FoundIntegral], list[TimedIntegral]]:
+    """The integrals and those among products of powers that do not depend on them; and such that depend on time."""
+    origin = "product of powers of known polynomials"
+    try:
+        products = products_of(laboratory, candidates(laboratory, cofactors))
+    except NoPoint:
+        return list(integrals), []
+    written = [(function, one) for one in products.integrals if (function := one.function) is not None]
+    text = {id(function): one.text for function, one in written}
+    found = _independent(laboratory, [(function, origin) for function, _ in written], progress, integrals)
+    found = [replace(one, product=text.get(id(one.function), one.product)) for one in found]
+    in_time: list[TimedIntegral] = []
+    map_ = laboratory.maps[0]
+    point = map_.random_point()
+    rows = [_gradient(map_, one.function, point) for one in found]
+    for product in products.in_time:
+        function = product.function
+        if function is None or len(found) + len(in_time) >= laboratory.map.dim:
+            continue
+        row = _gradient(map_, function, point)
+        if rank([*rows, row], map_.prime) == len(rows):
+            continue
+        verdict, evidence = verdict_on(
+            laboratory.map,
+            function,
+            laboratory.eps,
+            laboratory.seed,
+            is_density=False,
+            factor=product.constant,
+        )
+        if verdict.holds:
+            rows.append(row)
+            name = f"T{len(in_time) + 1}"
+            one = FoundIntegral(name, function, origin, verdict, evidence, product.text)
+            in_time.append(TimedIntegral(name, one, product.constant))
+    return found, in_time
+
+
+def _independent(
+    laboratory: Laboratory,
+    formulas: Sequence[tuple[RationalFunction, str]],
+    progress: Callable[[str], None],
+    known: Sequence[FoundIntegral] = (),
+) -> list[FoundIntegral]:
+    """The known integrals and those that do not depend on them and each other, with verdicts; none that was refuted."""
+    map_ = laboratory.maps[0]
+    point = map_.random_point()
+    found = list(known)
+    rows = [_gradient(map_, one.function, point) for one in known]
+
+    # By size, then by monomials: the order must not depend on the primes.
+    def size(P: fmpq_mpoly) -> tuple[int, int, list[list[int]]]:
+        return degree(P), len(P), [[-int(e) for e in monomial] for monomial in P.monoms()]
+
+    by_size = sorted(formulas, key=lambda pair: size(pair[0].numerator))
+    for function, origin in by_size:
+        row = _gradient(map_, function, point)
+        if rank([*rows, row], map_.prime) == len(rows):
+            continue
+        progress("verifying an integral")
+        if laboratory.system is not None and _is_affine_integral(laboratory.system, function):
+            verdict, evidence = Verdict.PROVED, _AFFINE_EVIDENCE
+        else:
+            verdict, evidence = verdict_on(laboratory.map, function, laboratory.eps, laboratory.seed, is_density=False)
+        if verdict.holds:
+            rows.append(row)
+            found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, verdict, evidence))
+    return found
+
+
+def _is_affine_integral(system: QuadraticSystem, function: RationalFunction) -> bool:
+    """Whether the function is v.x with v.f = 0; v may contain the symbols."""
+    if not function.is_polynomial:
+        return False
+    n = system.dim
+    context = function.numerator.context()
+    rhs = [polynomial.compose(*context.gens()[: n + len(system.symbols)], ctx=context) for polynomial in system.rhs]
+    slopes = [function.numerator.derivative(k) for k in range(n)]
+    if any(int(e) for slope in slopes for m in slope.monoms() for e in (*m[:n], m[-1])):
+        return False  # not affine in x, or with eps
+    return bool(sum((v * f for v, f in zip(slopes, rhs, strict=True)), context.constant(0)).is_zero())
+
+
+def _gradient(map_: ModularMap, function: RationalFunction, point: Sequence[int]) -> list[int]:
+    """A multiple of the gradient of P/Q with respect to the variables, modulo the prime."""
+    field = GF(map_.prime)
+    at = [field.convert(c) for c in (*point, *map_.values, map_.eps)]
+    P, Q = evaluate(function.numerator, field, at), evaluate(function.denominator, field, at)
+    return [
+        int(
+            evaluate(function.numerator.derivative(k), field, at) * Q
+            - evaluate(function.denominator.derivative(k), field, at) * P
+        )
+        for k in range(map_.dim)
+    ]
+
+
+def _by_theorems(
+    laboratory: Laboratory, inherited: InheritedIntegrals, known: Sequence[FoundIntegral], deadline: float
+) -> list[FoundIntegral]:
+    """The integrals of the theorems that do not depend on the known ones, as far as they can be written out."""
+    map_ = laboratory.maps[0]
+    point = map_.random_point()
+    rows = [_gradient(map_, one.function, point) for one in known]
+    found = list(known)
+    affine = len(inherited.quotient.integrals)
+    for k, row in enumerate(inherited.gradients(map_, point)):
+        if rank([*rows, row], map_.prime) == len(rows):
+            continue
+        if k < affine:
+            function, origin, evidence = _affine(laboratory, inherited.quotient.integrals[k])
+        else:
+            written = None if time.monotonic() > deadline else _modified(laboratory, inherited, k - affine)
+            if written is None:
+                continue
+            function, origin, evidence = written
+        rows.append(row)
+        found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, Verdict.PROVED, evidence))
+    return found
+
+
+def _affine(laboratory: Laboratory, vector: Sequence[fmpz]) -> tuple[RationalFunction, str, Evidence]:
+    """v.x as a function of the variables and eps."""
+    context = ring((*laboratory.map.variables, "eps"))
+    total = sum((gen * v for gen, v in zip(context.gens(), vector, strict=False)), context.constant(0))
+    return RationalFunction(total, context.constant(1)), AFFINE, _AFFINE_EVIDENCE
+
+
+def _modified(
+    laboratory: Laboratory, inherited: InheritedIntegrals, k: int
+) -> tuple[RationalFunction, str, Evidence] | None:
+    """The modified Hamiltonian that belongs to the k-th form; None where it is too long to be written out."""
+    field = FunctionField((*laboratory.map.variables, "eps"), reduces=False)
+    eps = field.variables[-1] if laboratory.eps is None else field.convert(laboratory.eps)
+    try:
+        value = inherited.modified(k, field, eps, field.variables[:-1])
+    except BudgetExceeded:
+        return None
+    common = value.above.gcd(value.below)
+    function = RationalFunction(value.above / common, value.below / common)
+    is_hamiltonian = inherited.forms[k].rank() == len(inherited.quotient.free)
+    what = (
+        "f = J grad H with a constant skew matrix J" if is_hamiltonian else "K f = grad H with a constant skew matrix K"
+    )
+    summary = f"{what}: H + grad H . (x~ - x)/3 is conserved (cmoq-2013)"
+    evidence = Evidence("theorem", summary, {"H": str(inherited.hamiltonian(k))})
+    return function, "modified Hamiltonian (cmoq-2013)", evidence

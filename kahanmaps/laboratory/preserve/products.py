@@ -1,0 +1,446 @@
+"""Integrals and densities that are products of powers of known polynomials: exponents from a lattice, of any degree.
+
+For polynomials g_1, ..., g_r let C_i = g_i(x~)/g_i(x). A product g_1^k_1 ... g_r^k_r, exponents of either sign, is an
+integral if C_1^k_1 ... C_r^k_r = 1, and phi of an invariant measure dx/phi if that is det dPhi. If it is another number
+c, c^-n times the product at step n does not depend on n: an integral that depends on time.
+
+On a random line modulo a prime all of these functions are quotients of polynomials in one variable. Written over a
+basis of coprime polynomials, which takes gcds and no factorization, each C_i is a vector of integers, and the k are a
+lattice. Polynomials in x without a common factor have none on a random line, but for a probability of about degree^2/p.
+What is left are numbers c, functions of eps and the symbols: they are interpolated, and their relations are a lattice
+again.
+
+None of the polynomials need be a Darboux polynomial, of which alone celledoni-2019 forms products: for the map of
+Lyness, (x, y) -> (y, (a + y)/x), neither x nor y is one, and dx dy/(x y) is invariant. Source: celledoni-2019.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from math import prod
+
+from flint import fmpq, fmpq_mpoly, fmpz, fmpz_mat, nmod_poly
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
+from kahanmaps.algebra.interpolation import reconstruct
+from kahanmaps.algebra.matrices import det
+from kahanmaps.algebra.polynomials import (
+    RationalFunction,
+    degree_in,
+    evaluate,
+    over_one_denominator,
+    primitive_part,
+    ring,
+)
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.invariants.measures import jacobian_determinant_sides
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
+from kahanmaps.laboratory.preserve.cofactors import Cofactor
+
+_BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
+_MAX_CANDIDATES = 60
+_MAX_TERMS = 20_000  # of a product that is written out
+_FIRST = 10**6  # the weight of the exponent of det dPhi: it is made as small as can be before all others
+
+
+@dataclass(frozen=True)
+class Product:
+    """The product I of powers g^k of the `factors`, a function of (variables, symbols, eps); there may be none.
+
+    `constant` is the number c with I(x~) = c I(x), a function of the symbols and eps: 1 for an integral. For a density
+    it is that in phi(x~) = c det dPhi(x) phi(x), 1 or -1.
+    """
+
+    factors: tuple[tuple[fmpq_mpoly, int], ...]
+    constant: RationalFunction
+
+    @property
+    def text(self) -> str:
+        """The product as a formula in factors."""
+        parts = []
+        for sign in (1, -1):
+            powers = [(format_polynomial(g), len(g) > 1, sign * k) for g, k in self.factors if sign * k > 0]
+            bases = [(f"({g})" if is_sum else g, k) for g, is_sum, k in powers]
+            parts.append([base + (f"^{k}" if k > 1 else "") for base, k in bases])
+        if len(self.factors) == 1 and self.factors[0][1] == 1:
+            return format_polynomial(self.factors[0][0])
+        above, below = ("*".join(part) for part in parts)
+        if not below:
+            return above or "1"
+        return f"{above or 1}/({below})" if len(parts[1]) > 1 else f"{above or 1}/{below}"
+
+    @property
+    def function(self) -> RationalFunction | None:
+        """The product written out; None where it is too long."""
+        parts = []
+        for sign in (1, -1):
+            powers = [(g, sign * k) for g, k in self.factors if sign * k > 0]
+            if prod(len(g) ** k for g, k in powers) > _MAX_TERMS:
+                return None
+            one = self.constant.numerator.context().constant(1)
+            parts.append(reduce(lambda P, power: P * power[0] ** power[1], powers, one))
+        return RationalFunction(*parts)
+
+
+@dataclass(frozen=True)
+class Products:
+    """What `products_of` found: integrals, a density (None without one), and what depends on time.
+
+    Where there is no density, one that changes its sign takes its place: then |dx/phi| is invariant.
+    """
+
+    integrals: tuple[Product, ...]
+    density: Product | None
+    in_time: tuple[Product, ...]
+
+
+def candidates(laboratory: Laboratory, cofactors: Sequence[Cofactor]) -> list[fmpq_mpoly]:
+    """Irreducible polynomials over Q in (variables, symbols, eps) that integrals and densities may be products of.
+
+    They are the variables, the polynomials of the cofactors (affine Darboux functions of a system, and factors of
+    Jacobi determinants), and the factors of det dPhi and det dPhi^-1, as far as these are not too long.
+    """
+    n, context = laboratory.map.dim, ring(laboratory.map.names)
+    known = [one.polynomial for one in cofactors if one.polynomial is not None]
+    found: dict[str, fmpq_mpoly] = {}
+    for P in (*context.gens()[:n], *known, *_jacobians(laboratory)):
+        if laboratory.eps is not None:
+            at: dict[str | int, int | fmpz | fmpq] = {"eps": laboratory.eps}
+            P = P.subs(at)
+        for factor, _ in [] if P.is_zero() else P.factor()[1]:
+            if degree_in(factor, n):
+                one = primitive_part(factor)[1]
+                found.setdefault(str(one), one)
+    return sorted(found.values(), key=lambda P: (degree_in(P, n), len(P)))[:_MAX_CANDIDATES]
+
+
+def _jacobians(laboratory: Laboratory) -> list[fmpq_mpoly]:
+    """Numerators and denominators of det dPhi^-1 and, for systems, of det dPhi: among the cofactors of other maps."""
+    map_, found = laboratory.map, list[fmpq_mpoly]()
+    n = map_.dim
+    for backward in (False, True) if laboratory.system is not None else (True,):
+        field = FunctionField(map_.names, _BUDGET, reduces=True)
+        *x, eps = field.variables
+        try:
+            local = map_.at(eps, field, x[n:])
+            local = local.inverse if backward else local
+            sides = jacobian_determinant_sides(local, x[:n], local.generic_step(tuple(x[:n])))
+        except (BudgetExceeded, InputError, SingularStep):
+            continue
+        found += [part for side in sides for part in (side.above, side.below)]
+    return found
+
+
+class _Line:
+    """A random line modulo the prime of a map, and its image (X : Z) without common factor, polynomials in t.
+
+    det dPhi is `above` / (Z^n `below`) on it. Raises NoPoint.
+    """
+
+    def __init__(self, map_: ModularMap) -> None:
+        p, n = map_.prime, map_.dim
+        self.prime, self.map = p, map_
+        start, slope = map_.random_point(), map_.random_point()
+        self.here = [*(nmod_poly([c, d], p) for c, d in zip(start, slope, strict=True)), nmod_poly([1], p)]
+        top = max(1, map_.map.equation.degree)
+
+        def step(t: int) -> tuple[tuple[int, ...], list[int], int]:
+            """A point of the line, its image and det M."""
+            x = tuple((c + t * d) % p for c, d in zip(start, slope, strict=True))
+            image = map_.step(x)
+            if image is None:
+                raise SingularStep("the map has no value at a point of a line", x, map_.eps)
+            return x, list(image), int(map_.map.determinant(x))
+
+        def homogeneous(t: int) -> list[int]:
+            _, image, below = step(t)
+            return [*(c * below % p for c in image), below]
+
+        raw = _interpolated(homogeneous, n * top, p)
+        common = reduce(nmod_poly.gcd, raw)
+        self.there = [entry // common for entry in raw]
+        self.below = raw[-1]
+        Z = self.there[-1]
+
+        def numerator(t: int) -> list[int]:
+            x, image, _ = step(t)
+            return [int(det(map_.map.numerator_matrix(x, image))) * pow(int(Z(t)), n, p) % p]
+
+        reach = max(int(entry.degree()) for entry in self.there)
+        [self.above] = _interpolated(numerator, n * (top - 1 + reach), p)
+
+    def along(self, g: fmpq_mpoly, place: Sequence[nmod_poly]) -> nmod_poly:
+        """g on the line, or the numerator Z^deg g(X/Z) of g on its image."""
+        n, p = self.map.dim, self.prime
+        field = GF(p)
+        rest = [field.convert(c) for c in (*self.map.values, self.map.eps)]
+        top = degree_in(g, n)
+        powers = [[nmod_poly([1], p)] for _ in place]
+
+        def power(k: int, e: int) -> nmod_poly:
+            while len(powers[k]) <= e:
+                powers[k].append(powers[k][-1] * place[k])
+            return powers[k][e]
+
+        total = nmod_poly([0], p)
+        for monomial, coefficient in g.terms():
+            value = field.convert(coefficient)
+            for c, e in zip(rest, monomial[n:], strict=True):
+                value = value * c ** int(e)
+            exponents = [int(e) for e in monomial[:n]]
+            term = nmod_poly([int(value)], p)
+            for k, e in enumerate([*exponents, top - sum(exponents)]):
+                if e:
+                    term = term * power(k, e)
+            total = total + term
+        return total
+
+
+def _interpolated(values: Callable[[int], list[int]], top: int, p: int) -> list[nmod_poly]:
+    """The polynomials of degree at most `top` that have these values at t = 1, 2, ... Raises NoPoint."""
+    nodes, rows, t, missed = list[int](), list[list[int]](), 0, 0
+    while len(nodes) <= top:
+        t += 1
+        try:
+            rows.append(values(t))
+            nodes.append(t)
+        except SingularStep:
+            missed += 1
+            if missed > top + 20:
+                raise NoPoint("the map has no value at random points modulo a prime") from None
+    found = []
+    for column in zip(*rows, strict=True):
+        # Newton's divided differences
+        table = list(column)
+        for k in range(1, len(nodes)):
+            for i in range(len(nodes) - 1, k - 1, -1):
+                table[i] = (table[i] - table[i - 1]) * pow(nodes[i] - nodes[i - k], -1, p) % p
+        P = nmod_poly([0], p)
+        for node, c in zip(reversed(nodes), reversed(table), strict=True):
+            P = P * nmod_poly([-node % p, 1], p) + nmod_poly([c], p)
+        found.append(P)
+    return found
+
+
+def coprime_base(polynomials: Sequence[nmod_poly]) -> list[nmod_poly]:
+    """Coprime polynomials, none constant, of which all those given are products up to constants.
+
+    >>> P, Q = nmod_poly([1, 1], 101), nmod_poly([2, 1], 101)
+    >>> [B.degree() for B in coprime_base([P * P * Q, P * Q])]
+    [1, 1]
+    """
+    base: list[nmod_poly] = []
+    waiting = list(polynomials)
+    while waiting:
+        P = waiting.pop()
+        if P.degree() < 1:
+            continue
+        for k, Q in enumerate(base):
+            common = P.gcd(Q)
+            if common.degree() > 0:
+                base.pop(k)
+                waiting += [P // common, Q // common, common]
+                break
+        else:
+            base.append(P)
+    return base
+
+
+def _exponents(P: nmod_poly, base: Sequence[nmod_poly]) -> list[int]:
+    """How often the elements of a coprime base divide a polynomial."""
+    found = []
+    for B in base:
+        count = 0
+        quotient, rest = divmod(P, B)
+        while rest.is_zero():
+            count, P = count + 1, quotient
+            quotient, rest = divmod(P, B)
+        found.append(count)
+    return found
+
+
+def relations(rows: Sequence[Sequence[int]]) -> list[list[int]]:
+    """A basis over Z of all integer vectors k with sum k_i row_i = 0.
+
+    >>> relations([[2, 0], [3, 0], [0, 1]])
+    [[3, -2, 0]]
+    """
+    count, width = len(rows), len(rows[0]) if rows else 0
+    if not count:
+        return []
+    wide = fmpz_mat([[*row, *(int(i == k) for i in range(count))] for k, row in enumerate(rows)]).hnf()
+    return [[int(e) for e in row[width:]] for row in wide.tolist() if not any(row[:width])]
+
+
+def _reduced(vectors: Sequence[Sequence[int]], weights: Sequence[int]) -> list[list[int]]:
+    """A basis of the same lattice, of short vectors, each entry times its weight."""
+    if not vectors:
+        return []
+    weighted = fmpz_mat([[e * w for e, w in zip(v, weights, strict=True)] for v in vectors]).lll()
+    return [[int(e) // w for e, w in zip(row, weights, strict=True)] for row in weighted.tolist()]
+
+
+def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Products:
+    """The integrals, the density and the integrals depending on time that are products of powers of the polynomials.
+
+    Exponents are found modulo one prime: what comes out is to be put to the proof. Raises NoPoint.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> laboratory = Laboratory(load("lotka_volterra"))
+    >>> products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density.function.numerator
+    x*y
+    """
+    line = _Line(laboratory.maps[0])
+    n = laboratory.map.dim
+    here = [line.along(g, line.here) for g in polynomials]
+    there = [line.along(g, line.there) for g in polynomials]
+    base = coprime_base([*here, *there, line.there[-1], line.above, line.below])
+    Z, N, M = (_exponents(P, base) for P in (line.there[-1], line.above, line.below))
+    rows = [[a - b - n * c for a, b, c in zip(N, M, Z, strict=True)]]  # of det dPhi
+    weights = [_FIRST]
+    for g, P, Q in zip(polynomials, here, there, strict=True):
+        d = degree_in(g, n)
+        rows.append([b - a - d * c for a, b, c in zip(_exponents(P, base), _exponents(Q, base), Z, strict=True)])
+        weights.append(len(g))  # short formulas before long ones
+    vectors = _reduced(relations(rows), weights)
+    return _sorted_by_constant(laboratory, polynomials, vectors, weights)
+
+
+def _sorted_by_constant(
+    laboratory: Laboratory,
+    polynomials: Sequence[fmpq_mpoly],
+    vectors: Sequence[list[int]],
+    weights: Sequence[int],
+) -> Products:
+    """Which products of the vectors have the constant 1; the exponent of det dPhi comes first in them."""
+    degrees = [0, *(degree_in(g, laboratory.map.dim) for g in polynomials)]
+    context = ring(laboratory.map.names)
+    one = RationalFunction(context.constant(1), context.constant(1))
+    values = _constants(laboratory, polynomials, vectors)
+    known = [(v, c) for v, c in zip(vectors, values, strict=True) if c is not None]
+    minus = RationalFunction(context.constant(-1), context.constant(1))
+
+    def with_constant_1(more: list[RationalFunction]) -> list[list[int]]:
+        """The vectors whose constant is 1 or, up to such factors, one of those given: a basis."""
+        combinations = multiplicative_relations([*(c for _, c in known), *more])
+        vectors = [_combined(a[: len(known)], [v for v, _ in known]) for a in combinations if any(a[: len(known)])]
+        return _reduced(vectors, weights)
+
+    exact = with_constant_1([])
+    integrals = [_upright(v, degrees) for v in exact if v[0] == 0]
+
+    def product(vector: Sequence[int], constant: RationalFunction) -> Product:
+        return Product(tuple((g, k) for g, k in zip(polynomials, vector[1:], strict=True) if k), constant)
+
+    density = None
+    for constant, choice in ((one, exact), (minus, with_constant_1([minus]))):
+        vector = next((v if v[0] == -1 else [-e for e in v] for v in choice if abs(v[0]) == 1), None)
+        if vector is not None and density is None:
+            density = product(_most_polynomial(vector, integrals, degrees), constant)
+    return Products(
+        tuple(product(v, one) for v in integrals),
+        density,
+        tuple(product(v, c) for v, c in known if v[0] == 0 and c != one),
+    )
+
+
+def _constants(
+    laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly], vectors: Sequence[Sequence[int]]
+) -> list[RationalFunction | None]:
+    """The numbers that the products of the vectors are, functions of the symbols and eps; None where not found."""
+    context = ring(laboratory.map.names)
+    one = RationalFunction(context.constant(1), context.constant(1))
+
+    def constants(map_: ModularMap) -> list[int]:
+        return [_constant(map_, polynomials, vector) for vector in vectors]
+
+    def box(prime: int, place: tuple[int, ...]) -> list[int] | None:
+        try:
+            return constants(laboratory.map_for(prime, place))
+        except (NoPoint, BadPrime):
+            return None
+
+    is_one = [all(c == 1 for c in column) for column in zip(*map(constants, laboratory.maps), strict=True)]
+    if all(is_one):
+        return [one] * len(vectors)
+    names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
+    answer = reconstruct(box, names, seed=laboratory.seed)
+    if answer.functions is None:
+        return [one if good else None for good in is_one]
+    gens = [gen for gen, name in zip(context.gens(), laboratory.map.names, strict=True) if name in names]
+    moved = [over_one_denominator([c], context, gens) for c in answer.functions]
+    return [RationalFunction(above, below) for [above], below in moved]
+
+
+def _upright(vector: list[int], degrees: Sequence[int]) -> list[int]:
+    """Of I and 1/I the one of positive degree or, where that is 0, whose first exponent is positive."""
+    total = sum(k * d for k, d in zip(vector, degrees, strict=True))
+    return vector if (total, next((k for k in vector if k), 0)) > (0, 0) else [-k for k in vector]
+
+
+def _most_polynomial(density: list[int], integrals: Sequence[Sequence[int]], degrees: Sequence[int]) -> list[int]:
+    """The density times integrals, as long as single ones help: few negative exponents, then a low degree."""
+
+    def cost(vector: Sequence[int]) -> tuple[int, int, int]:
+        below = sum(-k * d for k, d in zip(vector, degrees, strict=True) if k < 0)
+        above = sum(k * d for k, d in zip(vector, degrees, strict=True) if k > 0)
+        return below, above, sum(map(abs, vector))
+
+    while True:
+        others = [_combined((1, sign), (density, v)) for v in integrals for sign in (1, -1)]
+        best = min(others, key=cost, default=density)
+        if cost(best) >= cost(density):
+            return density
+        density = best
+
+
+def _combined(weights: Sequence[int], vectors: Sequence[Sequence[int]]) -> list[int]:
+    return [sum(w * e for w, e in zip(weights, column, strict=True)) for column in zip(*vectors, strict=True)]
+
+
+def _constant(map_: ModularMap, polynomials: Sequence[fmpq_mpoly], vector: Sequence[int]) -> int:
+    """prod C_i^k_i det dPhi^k_0 at a random point. Raises NoPoint."""
+    p, field = map_.prime, GF(map_.prime)
+    rest = [field.convert(c) for c in (*map_.values, map_.eps)]
+    [(x, image)] = map_.pairs(1)
+    total = pow(int(det(map_.map.jacobian(x))), vector[0], p)
+    for g, k in zip(polynomials, vector[1:], strict=True):
+        if k:
+            before, after = (int(evaluate(g, field, [*map(field.convert, place), *rest])) for place in (x, image))
+            if not before or not after:
+                raise NoPoint("a polynomial vanishes at a random point modulo a prime")
+            total = total * pow(after, k, p) * pow(before, -k, p) % p
+    return total
+
+
+def multiplicative_relations(functions: Sequence[RationalFunction]) -> list[list[int]]:
+    """A basis over Z of all k for which the product of the powers f_i^k_i is 1; none of the functions is 0.
+
+    >>> from kahanmaps.algebra.text import parse_rational_function
+    >>> functions = [parse_rational_function(text, ["a"]) for text in ("-4*a^2", "2*a", "3", "-1")]
+    >>> multiplicative_relations(functions)
+    [[1, -2, 0, 1], [0, 0, 0, 2]]
+    """
+    rows: list[dict[str, int]] = []
+    for function in functions:
+        row: dict[str, int] = {}
+        for part, sign in ((function.numerator, 1), (function.denominator, -1)):
+            number, factors = part.factor()
+            for factor, k in factors:
+                c, one = primitive_part(factor)
+                number = number * c ** int(k)
+                row[str(one)] = row.get(str(one), 0) + sign * int(k)
+            row["sign"] = row.get("sign", 0) + (number < 0)
+            for whole, s in ((number.p, sign), (number.q, -sign)):
+                for q, k in abs(whole).factor():
+                    row[str(q)] = row.get(str(q), 0) + s * int(k)
+        rows.append(row)
+    keys = sorted({key for row in rows for key in row} | {"sign"})
+    # A sign counts modulo 2: one more unknown, which is left out of the answer, takes twice it.
+    table = [*([row.get(key, 0) for key in keys] for row in rows), [2 * (key == "sign") for key in keys]]
+    return [vector[:-1] for vector in relations(table)]

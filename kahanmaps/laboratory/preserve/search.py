@@ -1,0 +1,222 @@
+"""The search for spaces of polynomials with a common cofactor, recorded so that it can be repeated on another map.
+
+A search runs on one map: modulo a prime, at one eps, at one value of each symbol. What it found are steps: affine
+integrals, the relations of a degree, a product of cofactors. Repeating the steps on maps with other primes, eps and
+values of the symbols gives the coefficients of the same polynomials there, from which closed forms are interpolated.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import takewhile
+from math import comb
+from types import MappingProxyType
+
+from kahanmaps.algebra.residues import rational_reconstruction
+from kahanmaps.laboratory.modular_points import ModularMap, null_space
+from kahanmaps.laboratory.preserve.branches import Branches, Pattern, pattern
+from kahanmaps.laboratory.preserve.cofactors import (
+    Cofactor,
+    CofactorProduct,
+    Sample,
+    cofactor_space,
+    points_needed,
+    search_cofactors,
+)
+from kahanmaps.laboratory.preserve.darboux_spaces import LARGEST_SPAN, DarbouxSpace, darboux_spaces, gradient_rank
+from kahanmaps.laboratory.preserve.hirota_kimura import Profile
+from kahanmaps.maps.kahan import KahanMapOver
+
+# Degrees up to which polynomials with a given cofactor are sought, by dimension.
+_COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 5, 6: 4}
+_MOST_TERMS = 1000
+NOTHING: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
+_SPARE = 8
+AFFINE = "v.x with v.f(x) = 0"
+_FEW = 20  # with more relations than these, cofactors come first
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a search; `product` is None except for cofactors. `text` says how for people."""
+
+    kind: str  # "affine", "relations" or "cofactor"
+    degree: int
+    product: CofactorProduct | None
+    text: str
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found on one map: a list of spaces for each step."""
+
+    steps: list[Step] = field(default_factory=list)
+    spaces: list[list[DarbouxSpace]] = field(default_factory=list)
+
+    @property
+    def all_spaces(self) -> list[DarbouxSpace]:
+        """The spaces of all steps."""
+        return [space for spaces in self.spaces for space in spaces]
+
+    def add(self, step: Step, spaces: list[DarbouxSpace]) -> None:
+        """One more step."""
+        self.steps.append(step)
+        self.spaces.append(spaces)
+
+
+def affine_space(map_: ModularMap) -> DarbouxSpace | None:
+    """The span of 1 and the affine integrals v.x, for Kahan maps those with v.f = 0; None where there are none."""
+    n, prime = map_.dim, map_.prime
+    changes = [[b - a for a, b in zip(x, image, strict=True)] for x, image in map_.pairs(n + _SPARE)]
+    vectors = null_space(changes, n, prime)
+    if not vectors:
+        return None
+    return DarbouxSpace.spanned_by(n, 1, [[1] + [0] * n, *([0, *vector] for vector in vectors)], prime)
+
+
+def search(
+    map_: ModularMap,
+    profile: Profile,
+    cofactors: Sequence[Cofactor],
+    seconds: float,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Found:
+    """Spaces whose ratios are as many independent integrals as the profile shows, as far as they can be found."""
+    deadline = time.monotonic() + seconds
+    found, wanted = Found(), profile.codimension
+
+    def done() -> bool:
+        return gradient_rank(map_, found.all_spaces) >= wanted or time.monotonic() > deadline
+
+    affine = affine_space(map_)
+    if affine is not None:
+        text = AFFINE if isinstance(map_.map, KahanMapOver) else "affine integral"
+        found.add(Step("affine", 1, None, text), [affine])
+
+    def take_relations(least: int, most: int) -> None:
+        sizes = takewhile(lambda size: size < LARGEST_SPAN, profile.nullities)
+        for degree in [degree for degree, size in enumerate(sizes, 1) if least <= size <= most]:
+            if done():
+                break
+            progress(f"closed forms from the relations of degree {degree}")
+            _take_relations(map_, degree, found, deadline)
+
+    take_relations(1, _FEW)
+    if not done():
+        top = _COFACTOR_DEGREE.get(map_.dim, 2)
+        while comb(map_.dim + top, top) > _MOST_TERMS:
+            top -= 1
+        progress(f"polynomials of degree up to {top} with {comb(map_.dim + top, top)} terms and known cofactors")
+        left = deadline - time.monotonic()
+        for product, space in search_cofactors(map_, cofactors, found.all_spaces, wanted, top, left):
+            found.add(Step("cofactor", space.degree, product, f"common cofactor {product.text(cofactors)}"), [space])
+    take_relations(_FEW + 1, LARGEST_SPAN)
+    return found
+
+
+def _take_relations(map_: ModularMap, degree: int, found: Found, deadline: float) -> None:
+    known = found.all_spaces
+    spaces = darboux_spaces(map_, degree, known, max(1.0, deadline - time.monotonic()))
+    if spaces and gradient_rank(map_, [*known, *spaces]) > gradient_rank(map_, known):
+        step = Step("relations", degree, None, f"relations of degree {degree} along orbits")
+        found.add(step, sorted(spaces, key=pattern))
+
+
+def repeat(
+    found: Found,
+    map_: ModularMap,
+    cofactors: Sequence[Cofactor],
+    reference: int,
+    branches: Mapping[int, Mapping[Pattern, Branches]] = NOTHING,
+) -> Found | None:
+    """The same steps on another map; None where they give spaces of another shape (a special value).
+
+    `reference` is the prime of `found`. Spaces of the same shape come in any order where there are no `branches` of
+    their step, by which they are told apart.
+    """
+    again = Found()
+    top = max((step.degree for step in found.steps if step.kind == "cofactor"), default=0)
+    sample = Sample.of(map_, cofactors, points_needed(map_.dim, top)) if top else None
+    for number, (step, model) in enumerate(zip(found.steps, found.spaces, strict=True)):
+        if step.kind == "affine":
+            affine = affine_space(map_)
+            group = [affine] if affine is not None else []
+        elif step.product is not None:
+            assert sample is not None
+            group = [cofactor_space(sample, step.product, step.degree)]
+        else:
+            group = darboux_spaces(map_, step.degree, again.all_spaces)
+        ordered = _in_order(group, model, map_, reference, branches.get(number, {}))
+        if ordered is None:
+            return None
+        again.add(step, ordered)
+    return again
+
+
+def classes(group: Sequence[DarbouxSpace]) -> dict[Pattern, list[DarbouxSpace]]:
+    """The spaces by the places of their zeros."""
+    found: dict[Pattern, list[DarbouxSpace]] = {}
+    for space in group:
+        found.setdefault(pattern(space), []).append(space)
+    return found
+
+
+def may_be_conjugate(found: Found) -> bool:
+    """Whether spaces of one degree have the same monomials, as spaces have that are conjugate over an extension of Q.
+
+    These exist only modulo primes where the extension splits, and have no formula over Q.
+    """
+    return any(len(classes(group)) < len(group) for group in found.spaces)
+
+
+def _in_order(
+    group: list[DarbouxSpace],
+    model: list[DarbouxSpace],
+    map_: ModularMap,
+    reference: int,
+    branches: Mapping[Pattern, Branches],
+) -> list[DarbouxSpace] | None:
+    """The spaces in the order of the model, by the places of their zeros and, where these agree, by `branches`.
+
+    There may be more of them than in the model, see `may_be_conjugate`; None where there are fewer.
+    """
+    by_pattern = classes(group)
+    waiting: dict[Pattern, list[DarbouxSpace]] = {}
+    for kind, wanted in classes(model).items():
+        alike = by_pattern.get(kind, [])
+        if kind in branches:
+            known = branches[kind].in_order(alike, map_)
+            if known is None:
+                return None
+            alike = known
+        elif len(alike) > len(wanted):
+            alike = _most_alike(alike, wanted, map_.prime, reference)
+        if len(alike) < len(wanted):
+            return None
+        waiting[kind] = alike
+    return [waiting[pattern(space)].pop(0) for space in model]
+
+
+def _most_alike(
+    alike: list[DarbouxSpace], wanted: list[DarbouxSpace], prime: int, reference: int
+) -> list[DarbouxSpace]:
+    """Those spaces that share most numbers with the wanted ones: conjugate ones, which are too many, share none."""
+    waiting = list(alike)
+    found = []
+    for space in wanted:
+        found.append(max(waiting, key=lambda one: _equal_entries(one, space, prime, reference)))
+        waiting.remove(found[-1])
+    return found
+
+
+def _equal_entries(one: DarbouxSpace, model: DarbouxSpace, prime: int, reference: int) -> int:
+    """How many coefficients seem to be the same rational number."""
+    count = 0
+    for mine, its in zip(one.basis, model.basis, strict=True):
+        for a, b in zip(mine, its, strict=True):
+            if b and b != 1:
+                value = rational_reconstruction(b, reference)
+                count += value is not None and (value.p - a * value.q) % prime == 0
+    return count

@@ -1,0 +1,162 @@
+"""The relations of one degree along orbits, written out: which monomials, which numbers, which integrals.
+
+Of the null space of an orbit the reduced echelon basis is taken for the monomials of the highest degree first, and what
+lower degrees imply is left out. A coefficient that differs for two orbits is an integral; these are named c1, c2, ...
+One that does not is a number, times a power of eps where the maps differ in eps, or, where no such number is found,
+some function of eps named e1, e2, ... Measured, as everything in hirota_kimura.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flint import fmpq
+
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.residues import rational_reconstruction
+from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.laboratory.modular_points import ModularMap, echelon, exponents_up_to
+from kahanmaps.laboratory.preserve.hirota_kimura import relations_on_orbit
+
+_SIMPLE = 10**6  # a number that both maps share and that is no simpler is taken for an accident
+_POWERS = (0, 2, 1, 4, 3, 6, -2, -1, -4, -3, -6)  # of eps
+
+
+@dataclass(frozen=True)
+class SparseRelation:
+    """A polynomial that vanishes along every orbit, with coefficients that are integrals.
+
+    `terms` are pairs of a monomial and its coefficient: text of a number, perhaps with a power of eps, or a name, such
+    as "c3" for an integral and "e1" for a function of eps; `integrals` and `functions_of_eps` list these names.
+    """
+
+    terms: tuple[tuple[str, str], ...]
+    integrals: tuple[str, ...] = ()
+    functions_of_eps: tuple[str, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """E.g. m1^2 + m2^2 + c1*p3^2 + c2 = 0."""
+        parts = []
+        for monomial, coefficient in self.terms:
+            if monomial == "1":
+                parts.append(coefficient)
+            elif coefficient in ("1", "-1"):
+                parts.append(coefficient[:-1] + monomial)
+            else:
+                parts.append(f"{coefficient}*{monomial}")
+        return " + ".join(parts).replace("+ -", "- ") + " = 0"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The coefficients that are names."""
+        return tuple(text for _, text in self.terms if text in self.integrals or text in self.functions_of_eps)
+
+
+def sparse_relations(
+    maps: Sequence[ModularMap], degree: int, variables: Sequence[str], most_terms: int = 12, first: int = 1
+) -> tuple[SparseRelation, ...] | None:
+    """The relations of degree `degree` that those of lower degree do not imply; None where orbits disagree.
+
+    `maps` are two or more maps of one system, with different primes. A relation with more than `most_terms` terms is
+    left out. The names of integrals go through all relations of the degree, from c1 or the given `first` on; those
+    that are equal have one name. Raises NoPoint where orbits meet the singular set.
+
+    Source: petrera-pfadler-suris-2009.
+
+    >>> from kahanmaps.laboratory.laboratory import Laboratory
+    >>> from kahanmaps.documents.catalog import load
+    >>> top = load("euler_top")
+    >>> [one.text for one in sparse_relations(Laboratory(top).maps, 2, top.variables)]
+    ['x1^2 + c1*x3^2 + c2 = 0', 'x2^2 + c3*x3^2 + c4 = 0']
+    """
+    support = _falling(maps[0].dim, degree)
+    tables = [_relations(map_, degree) for map_ in (maps[0], maps[0], maps[1])]
+    patterns = {tuple(tuple(bool(c) for c in row) for row in table) for table in tables}
+    if len(patterns) != 1:
+        return None
+    lower = _implied(maps[0], degree, support)
+    found = []
+    integral, function = (_letter(choice, variables) for choice in (("c", "k", "C", "K"), ("e", "s", "E", "S")))
+    names: dict[tuple[int, int, int], str] = {}
+    functions: dict[tuple[int, int], str] = {}  # of eps
+    for one, again, other in zip(*tables, strict=True):
+        used = [k for k, entry in enumerate(one) if entry]
+        lead = used[0]
+        if support[lead] in lower or len(used) > most_terms:
+            continue
+        terms = []
+        for k in used:
+            if one[k] != again[k]:
+                text = names.setdefault((one[k], again[k], other[k]), f"{integral}{first + len(names)}")
+            else:
+                number = _number_text(one[k], other[k], maps[0], maps[1])
+                text = number or functions.setdefault((one[k], other[k]), f"{function}{first + len(functions)}")
+            terms.append((_monomial(support[k], variables), text))
+        found.append(
+            SparseRelation(
+                tuple(terms),
+                tuple(text for _, text in terms if text in names.values()),
+                tuple(text for _, text in terms if text in functions.values()),
+            )
+        )
+    return tuple(found)
+
+
+def _falling(dim: int, degree: int) -> list[tuple[int, ...]]:
+    """The monomials of degree at most `degree`, those of the highest degree first."""
+    return sorted(exponents_up_to(dim, degree), key=lambda e: -sum(e))
+
+
+def _relations(map_: ModularMap, degree: int) -> list[list[int]]:
+    """The reduced echelon basis of the relations of a random orbit, on these monomials."""
+    places = {exponent: k for k, exponent in enumerate(exponents_up_to(map_.dim, degree))}
+    order = [places[exponent] for exponent in _falling(map_.dim, degree)]
+    return echelon([[v[k] for k in order] for v in relations_on_orbit(map_, degree).vectors], map_.prime)
+
+
+def _letter(choice: Sequence[str], variables: Sequence[str]) -> str:
+    """The first letter that names like c1, c2, ... may begin with, none of them being a variable."""
+    taken = {name.rstrip("0123456789") for name in variables if name[-1].isdigit()}
+    return next((letter for letter in choice if letter not in taken), f"{choice[0]}_")
+
+
+def _implied(map_: ModularMap, degree: int, support: Sequence[tuple[int, ...]]) -> set[tuple[int, ...]]:
+    """The leading monomials of the multiples of all relations of lower degree."""
+    if degree == 1:
+        return set()
+    below = _falling(map_.dim, degree - 1)
+    leads = [below[next(k for k, entry in enumerate(row) if entry)] for row in _relations(map_, degree - 1)]
+    return {
+        exponent
+        for exponent in support
+        if any(all(a >= b for a, b in zip(exponent, lead, strict=True)) for lead in leads)
+    }
+
+
+def _number_text(one: int, other: int, map_: ModularMap, other_map: ModularMap) -> str | None:
+    """The coefficient as a simple number times a power of eps, which both maps share; None where it is none."""
+    for power in _POWERS:
+        value = rational_reconstruction(one * pow(map_.eps, -power, map_.prime) % map_.prime, map_.prime)
+        again = other * pow(other_map.eps, -power, other_map.prime) % other_map.prime
+        if value is None or value != rational_reconstruction(again, other_map.prime):
+            continue
+        if abs(value.p) < _SIMPLE and value.q < _SIMPLE:
+            return _times_power(value, power)
+    return None
+
+
+def _times_power(value: fmpq, power: int) -> str:
+    """E.g. -1/6*eps^2, or 3/eps."""
+    number = format_number(value)
+    if power == 0:
+        return number
+    eps = "eps" if abs(power) == 1 else f"eps^{abs(power)}"
+    if power > 0:
+        return f"{number}*{eps}".replace("1*", "", 1) if abs(value) == 1 else f"{number}*{eps}"
+    return f"{value.p}/{eps}" if value.q == 1 else f"{value.p}/({value.q}*{eps})"
+
+
+def _monomial(exponent: tuple[int, ...], variables: Sequence[str]) -> str:
+    return format_polynomial(ring(variables).from_dict({exponent: 1}))

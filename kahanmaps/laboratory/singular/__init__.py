@@ -1,0 +1,1 @@
+"""What a map contracts, and what becomes of it."""

@@ -1,0 +1,124 @@
+"""Points on the hypersurfaces that a map contracts, where their polynomials are too large to be written down.
+
+For an equation M(x) x~ = r(x) that is linear in both points det dPhi(x) is det M'(x~)/det M(x) up to its sign, with the
+M' of the inverse map. So away from poles and infinity they are the zeros of E(X) = det M'(X~), where (X~ : Z~) is the
+image of X. On a line E is a polynomial of one variable. Source: petrera-suris-2016, eq. (Jac).
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+from flint import nmod_poly
+
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.laboratory.singular.jets import Jet
+from kahanmaps.maps.implicit import Equation
+
+
+@dataclass(frozen=True)
+class CriticalPoint:
+    """A point modulo p where the differential degenerates, how often it is a zero of E, and the gradient there.
+
+    Or a pole: then E stands for det(I - eps f').
+    """
+
+    point: tuple[int, ...]
+    gradient: tuple[int, ...]
+    multiplicity: int
+
+
+def critical_points(
+    equation: Equation, inverse: Equation, rng: random.Random
+) -> tuple[list[CriticalPoint], dict[int, int]]:
+    """The critical points modulo p on a random line that are neither poles nor at infinity; exact.
+
+    `equation` is that of the map over the field, linear in the point, and `inverse` that of its inverse. Returns the
+    points and, for each multiplicity, the number of zeros of E over the closure of GF(p): there may be zeros without
+    points in GF(p).
+    """
+    a, b, line = _random_line(equation, rng)
+    p = equation.over.characteristic
+    image = kernel_minors(equation.rows(equation.monomials(line), nmod_poly([], p)))
+    common = reduce(nmod_poly.gcd, image)
+    if common.degree() > 0:
+        image = [entry // common for entry in image]
+    value = _without(_denominator(inverse, image, nmod_poly([], p)), image[-1] * common, line[-1])
+
+    def E(X: Sequence[Any], zero: Any) -> Any:
+        return _denominator(inverse, kernel_minors(equation.rows(equation.monomials(X), zero)), zero)
+
+    return _zeros(value, E, a, b, rng)
+
+
+def pole_points(equation: Equation, rng: random.Random) -> tuple[list[CriticalPoint], dict[int, int]]:
+    """The poles modulo p on a random line that are not at infinity, as `critical_points` gives critical points."""
+    a, b, line = _random_line(equation, rng)
+    value = _without(_denominator(equation, line, nmod_poly([], equation.over.characteristic)), line[-1])
+    return _zeros(value, lambda X, zero: _denominator(equation, X, zero), a, b, rng)
+
+
+def _random_line(equation: Equation, rng: random.Random) -> tuple[list[int], list[int], list[nmod_poly]]:
+    p = equation.over.characteristic
+    a, b = ([rng.randrange(p) for _ in range(equation.dim + 1)] for _ in range(2))
+    return a, b, [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
+
+
+def _without(value: nmod_poly, *others: nmod_poly) -> nmod_poly:
+    """What is left of a polynomial when the zeros of others are divided out."""
+    for other in others:
+        while (shared := value.gcd(other)).degree() > 0:
+            value = value // shared
+    return value
+
+
+def _zeros(
+    value: nmod_poly,
+    function: Callable[[Sequence[Any], Any], Any],
+    a: Sequence[int],
+    b: Sequence[int],
+    rng: random.Random,
+) -> tuple[list[CriticalPoint], dict[int, int]]:
+    """The zeros in GF(p) of a function that has the given value on the line, and how many there are in all."""
+    if value.degree() < 1:
+        return [], {}
+    p = value.modulus()
+    found, degrees = [], dict[int, int]()
+    for factor, exponent in value.factor()[1]:
+        power = int(exponent)
+        degrees[power] = degrees.get(power, 0) + int(factor.degree())
+        if factor.degree() == 1:
+            s = -int(factor[0])
+            point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
+            gradient = _gradient(function, point, power, p, rng)
+            if any(gradient):
+                found.append(CriticalPoint(tuple(point), tuple(gradient), power))
+    return found, degrees
+
+
+def _gradient(
+    function: Callable[[Sequence[Any], Any], Any],
+    point: Sequence[int],
+    power: int,
+    p: int,
+    rng: random.Random,
+) -> list[int]:
+    """The gradient of F up to a factor, where E = F^power G: on x + t v + d w it is (t F_v + d F_w)^power G + ..."""
+    size, n = len(point), power + 1
+    zero, one = nmod_poly([], p), nmod_poly([1], p)
+    curve = [
+        Jet(nmod_poly([x, rng.randrange(p)], p), [one if i == k else zero for i in range(size)], n)
+        for k, x in enumerate(point)
+    ]
+    value = function(curve, Jet(zero, [zero] * size, n))
+    return [int(slope[power - 1]) for slope in value.slopes]
+
+
+def _denominator(equation: Equation, X: Sequence[Any], zero: Any) -> Any:
+    """The last minor of L at X, whose coordinates are polynomials or jets: up to its sign det M."""
+    rows = equation.rows(equation.monomials(X), zero)
+    return kernel_minors([[*row[:-1], zero] for row in rows])[-1]

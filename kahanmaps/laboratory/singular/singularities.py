@@ -1,0 +1,402 @@
+"""Singularity confinement: what becomes of the hypersurfaces that the Kahan map contracts, and of its poles.
+
+A hypersurface on which the differential of the map degenerates may be contracted to something smaller: two points on it
+have the same image, and memory is lost. The singularity is confined if, followed along curves through the hypersurface,
+later images are a hypersurface again. Degrees of iterates drop below their maximum only where contracted hypersurfaces
+meet points without a value. Hypersurfaces are found exactly over Q, for an exact eps; what becomes of them is computed
+at random points modulo large primes, which is evidence and no proof.
+Source: grammaticos-ramani-papageorgiou-1991, and for Kahan maps zander-2021.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import comb
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.matrices import det
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.displayed import Displayed
+from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
+from kahanmaps.laboratory.singular.fates import (
+    CONFINED,
+    FIRST_STEPS,
+    NOT_CONFINED,
+    NOT_CONTRACTED,
+    UNDECIDED,
+    Hypersurface,
+    Range,
+    fate_of,
+    fates_at_random,
+    untold,
+    unwritten,
+)
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.projective import homogeneous_map
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+MAX_DIMENSION = 6
+MAX_STEPS = 10_000
+MAX_DIGITS = 10_000  # of eps and the system, in whose numbers hypersurfaces are written
+_DIGITS_A_SECOND = {1: 10_000, 2: 10_000, 3: 2_000, 4: 100, 5: 1_000, 6: 500}  # by dimension: above 4 less is expanded
+_FEW_DIGITS = 50
+_REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the least
+_LEAST_REACH = 100
+_ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
+_LEAST_ALONG = 30
+_MOST_SHOWN = 200
+_DRAWS = 2  # of two values of eps, where the first ones are special
+WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
+_POINTS = 3  # random ones, where det dPhi is looked at
+_MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
+
+
+@dataclass(frozen=True)
+class SingularityRun(Displayed):
+    """The singularities of a Kahan map at one exact eps, half the time step.
+
+    `denominator` is det(I - eps f'(x)) as text; `critical_degree` the degree of the Jacobian determinant of the
+    homogeneous map (None where it was too large to expand: contracted hypersurfaces are then known by random points).
+    The map is not dominant where that determinant vanishes identically: its image lies in a hypersurface, and none is
+    followed.
+    """
+
+    eps: fmpq
+    denominator: str
+    map_degree: int
+    critical_degree: int | None
+    hypersurfaces: tuple[Hypersurface, ...]
+    stopped: bool
+    is_undefined: bool
+    is_dominant: bool
+
+    @property
+    def verdict(self) -> str:
+        """What all hypersurfaces together say.
+
+        "no singularities", "nothing contracted", "confined", "not confined", "some confined" or "undecided"; where that
+        has no meaning at this eps, "singular everywhere" or "not dominant".
+        """
+        if self.is_undefined:
+            return "singular everywhere"
+        if not self.is_dominant:
+            return "not dominant"
+        states = {h.status for h in self.hypersurfaces if h.status != NOT_CONTRACTED}
+        if self.stopped or UNDECIDED in states:
+            return UNDECIDED
+        if not self.hypersurfaces:
+            return "no singularities"
+        if not states:
+            return "nothing contracted"
+        return "some confined" if len(states) > 1 else states.pop()
+
+    @property
+    def followed(self) -> int | None:
+        """For how many steps those hypersurfaces were followed that are not confined; None where all are."""
+        steps = [h.followed for h in self.hypersurfaces if h.status == NOT_CONFINED]
+        return min(steps, default=None)
+
+    @property
+    def text(self) -> str:
+        """The verdict, with the number of steps after which confinement was no longer looked for."""
+        if self.followed is None or self.verdict not in (NOT_CONFINED, "some confined"):
+            return self.verdict
+        others = ", others not" if self.verdict == "some confined" else ""
+        return f"{self.verdict}{others} within {counted(self.followed, 'step')}"
+
+    @property
+    def shape(self) -> tuple[Any, ...]:
+        """What does not depend on eps if eps is generic: degrees, kinds and patterns."""
+        patterns = sorted(
+            (h.degree, h.is_pole, h.multiplicity or 0, h.status, tuple(step.rank for step in h.steps))
+            for h in self.hypersurfaces
+        )
+        return (self.is_undefined, self.is_dominant, *patterns)
+
+
+def singularities(
+    system: QuadraticSystem | BirationalMap,
+    eps: Any,
+    *,
+    steps: int | None = None,
+    seed: int = 0,
+    seconds: float = 60.0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> SingularityRun:
+    """The contracted hypersurfaces and poles of a Kahan map at one exact eps (half the time step), and their fate.
+
+    They are followed for `steps` steps; by default for 1000 in the plane, 500 in space, 250 in dimension 4 and 100
+    above, fewer where series are needed all the way. Hypersurfaces are exact, their fate is that of two random points
+    modulo two random primes; "not confined" means within so many steps. Stops after about `seconds` seconds. Returns a
+    SingularityRun; raises InputError for dimensions above 6, a wrong number of steps, and an eps or coefficients of
+    more than 10,000 digits, or so long that writing formulas would take more than `seconds`. Source:
+    grammaticos-ramani-papageorgiou-1991, zander-2021.
+
+    >>> run = singularities(QuadraticSystem.from_text(["x", "y"], ["x*(1 - y)", "y*(x - 1)"]), "1/10")
+    >>> run.denominator, run.verdict
+    ('-9/100*x + 11/100*y + 99/100', 'not confined')
+    """
+    map_, exact_eps = as_map(system), rational(eps)
+    if map_.dim > MAX_DIMENSION:
+        raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
+    most = _most_digits(map_.dim, seconds)
+    if (digits := _digits(map_, exact_eps)) > most:
+        raise InputError(
+            f"found numbers of about {digits} digits in eps and the system, expected at most {most}: "
+            f"in dimension {map_.dim} formulas with longer ones are not written within {seconds:g} s (--seconds)"
+        )
+    if steps is not None and not 1 <= steps <= MAX_STEPS:
+        raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
+    limits = _range(map_.dim, steps, time.monotonic() + seconds)
+    forms, common = homogeneous_map(map_.at(exact_eps))
+    degree = max(0, *(int(form.total_degree()) for form in forms))
+    # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
+    denominator = _affine(forms[-1] * common * (-1) ** map_.dim, map_)
+    is_undefined = bool(forms[-1].is_zero())  # det(I - eps f'(x)) = 0 for all x
+    if is_undefined or not _is_dominant(map_, exact_eps):
+        return SingularityRun(exact_eps, denominator, degree, None, (), False, is_undefined, False)
+    factors: dict[str, tuple[fmpq_mpoly, bool, int | None]] = {}
+    for factor, _ in (forms[-1] * common).factor()[1]:
+        if not _is_infinity(factor):
+            factors[str(factor)] = (factor, True, 0)
+    critical_degree: int | None = 0
+    if degree > 1:
+        progress("the Jacobian determinant of the homogeneous map")
+        critical = _critical(forms, degree)
+        critical_degree = None if critical is None else int(critical.total_degree())
+        if critical is None:
+            factors = {text: (factor, pole, None) for text, (factor, pole, _) in factors.items()}
+            infinity = forms[0].context().gens()[-1]
+            factors[str(infinity)] = (infinity, False, None)
+        else:
+            for factor, multiplicity in critical.factor()[1]:
+                pole = factors.get(str(factor), (factor, False, 0))[1]
+                factors[str(factor)] = (factor, pole, int(multiplicity))
+    rng = random.Random(f"singularities {seed_for(seed, map_.subject, exact_eps)}")
+    found, stopped = [], False
+    for factor, pole, multiplicity in factors.values():
+        if limits.is_over:
+            stopped = True
+            break
+        text = "Z" if _is_infinity(factor) else _affine(factor, map_)
+        progress(f"following {text[:40]}")
+        found.append(fate_of(map_, exact_eps, factor, text, pole, multiplicity, rng, limits))
+    if critical_degree is None and not stopped:
+        progress("following critical points")
+        if map_.at(exact_eps).equation.degree == 1:
+            found += unwritten(map_, exact_eps, rng, limits)
+        else:
+            found.append(untold("the hypersurfaces that this map contracts are too large to be written down"))
+        stopped = limits.is_over
+    return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
+
+
+@dataclass(frozen=True)
+class Patterns:
+    """What the fates of contracted hypersurfaces say of degrees: how many of them tell how they go on.
+
+    Degrees drop below powers of the first only where the images of contracted hypersurfaces meet points without a
+    value, so that nothing new can be seen in them before the last pattern has come to its end. `lengths` are the
+    different numbers of steps after which patterns had settled, `searched` is the number of steps those were followed
+    for that are not confined (None if all are), `some_confined` tells whether others are. `running` is empty, or says
+    why the patterns are not known to the end.
+    """
+
+    lengths: tuple[int, ...]
+    searched: int | None
+    some_confined: bool
+    running: str = ""
+
+    def terms_needed(self, order: int) -> int:
+        """The number of terms, d_0 included, from which a recurrence of this order can be told from all others.
+
+        With two rational generating functions of degrees r and R that agree in r + R + 1 terms they are the same; R is
+        at most 1 more than the sum of the lengths of different patterns (hypersurfaces of the same pattern count once).
+        """
+        return order + sum(self.lengths) + 2
+
+    @property
+    def limit(self) -> str:
+        """What was not seen, and how far it was looked for; empty where everything is confined."""
+        if self.searched is None:
+            return ""
+        return f"{'no other' if self.some_confined else 'no'} confinement within {counted(self.searched, 'step')}"
+
+    @property
+    def text(self) -> str:
+        """One line: the longest pattern, and how far others were followed."""
+        if self.running:
+            return self.running
+        longest = max(self.lengths, default=0)
+        ends = f"nothing new after step {longest}" if longest else "none that lowers degrees"
+        return f"{ends}; {self.limit}" if self.limit else ends
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return attributes(self, "lengths", "searched", "some_confined", "running", "text")
+
+
+def patterns_of(runs: Sequence[SingularityRun]) -> Patterns:
+    """What runs at one eps, or at two that stand for all, say together."""
+    return _one_of({_refused(run.eps, run.is_dominant, run.stopped) or _patterns(run.hypersurfaces) for run in runs})
+
+
+def patterns(
+    system: QuadraticSystem | BirationalMap,
+    eps: fmpq | None,
+    *,
+    steps: int | None = None,
+    seed: int = 0,
+    seconds: float = 60.0,
+) -> Patterns:
+    """The patterns of the Kahan map at one exact eps (half the time step) or, where none is given, at two.
+
+    Up to dimension 4 those of `singularities`; above it, and for an eps too long for formulas, random points stand for
+    hypersurfaces.
+    """
+    map_ = as_map(system)
+    end = time.monotonic() + seconds
+    found = _unknown("")
+    for again in range(_DRAWS if eps is None else 1):
+        if again and (not found.running or time.monotonic() > end):
+            break
+        values = default_eps(map_, seed + again) if eps is None else (eps,)
+        part = max(0.0, end - time.monotonic()) / len(values)
+        if map_.dim <= WRITTEN_DIMENSION and all(can_be_written(map_, value, part) for value in values):
+            runs = [singularities(map_, value, steps=steps, seed=seed, seconds=part) for value in values]
+            found = patterns_of(runs)
+        else:
+            found = _one_of({_at_random(map_, value, steps, seed, part) for value in values})
+    return found
+
+
+def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, seconds: float) -> Patterns:
+    limits = _range(map_.dim, steps, time.monotonic() + seconds)
+    limits = replace(limits, shown=min(limits.shown, FIRST_STEPS), briefly=True)
+    if not _is_dominant(map_, eps):
+        return _refused(eps, False, False) or _unknown("")
+    if map_.at(eps).equation.degree > 1:
+        return _unknown(f"the singularities of a {map_.title} are followed in dimension {WRITTEN_DIMENSION} at most")
+    found = fates_at_random(map_, eps, random.Random(f"patterns {seed_for(seed, map_.subject, eps)}"), limits)
+    return _refused(eps, True, limits.is_over) or _patterns(found)
+
+
+def _digits(map_: BirationalMap, eps: fmpq) -> int:
+    return int(max(eps.p.bit_length(), eps.q.bit_length()) * 0.30103) + 1 + map_.digits
+
+
+def _most_digits(dim: int, seconds: float) -> int:
+    """The digits with which formulas are written within this time; a few always are."""
+    return max(_FEW_DIGITS, min(MAX_DIGITS, int(_DIGITS_A_SECOND[dim] * min(seconds, MAX_DIGITS))))
+
+
+def can_be_written(system: QuadraticSystem | BirationalMap, eps: fmpq, seconds: float) -> bool:
+    """Whether `singularities` takes a map and eps."""
+    map_ = as_map(system)
+    return map_.dim <= MAX_DIMENSION and _digits(map_, eps) <= _most_digits(map_.dim, seconds)
+
+
+def _one_of(several: set[Patterns]) -> Patterns:
+    return several.pop() if len(several) == 1 else _unknown("the singularities at two values of eps differ (--eps)")
+
+
+def _refused(eps: fmpq, is_dominant: bool, stopped: bool) -> Patterns | None:
+    if not is_dominant:
+        return _unknown(f"the map is not dominant at eps = {format_number(eps)}, and no singularity is followed")
+    return _unknown("the time was over before all singularities were followed (--seconds)") if stopped else None
+
+
+def _unknown(reason: str) -> Patterns:
+    return Patterns((), None, False, reason)
+
+
+def _patterns(hypersurfaces: Sequence[Hypersurface]) -> Patterns:
+    # A pole of multiplicity 0 is no critical hypersurface: what it becomes lowers no degree.
+    contracted = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
+    for h in contracted:
+        name = "a hypersurface" if h.polynomial == "?" else f"{h.polynomial[:60]} = 0"
+        if h.status == UNDECIDED:
+            return _unknown(f"what becomes of {name} is undecided: {h.note or 'its series ended'}")
+        if h.settled_at is None:
+            return _unknown(f"the pattern of {name} is still running after {h.followed} steps (--steps)")
+    lengths = {h.settled_at for h in contracted if h.settled_at}
+    open_ones = [h.followed for h in contracted if h.status != CONFINED]
+    return Patterns(tuple(sorted(lengths)), min(open_ones, default=None), len(open_ones) < len(contracted))
+
+
+def steps_by_default(dim: int) -> int:
+    """For how many steps hypersurfaces are followed in this dimension unless told otherwise."""
+    return _REACH.get(dim, _LEAST_REACH)
+
+
+def _range(dim: int, steps: int | None, end: float) -> Range:
+    reach = steps or steps_by_default(dim)
+    return Range(min(reach, steps or FIRST_STEPS, _MOST_SHOWN), reach, steps or _ALONG.get(dim, _LEAST_ALONG), end)
+
+
+def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[str, int]] | None:
+    """The irreducible factors over Q of det M(x), for Kahan maps det(I - eps f'(x)), in x and eps, with multiplicities.
+
+    Exact. None above dimension 4, where it may be long, and where a variable is called eps.
+
+    >>> symbolic_denominator(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]))
+    [('12*x*eps^2 - 1', 1)]
+    """
+    map_ = as_map(system)
+    if map_.dim > 4 or "eps" in map_.variables:
+        return None
+    rows = [[*row, row[0] * 0] for row in map_.matrix]
+    return [(format_polynomial(factor), int(power)) for factor, power in kernel_minors(rows)[-1].factor()[1]]
+
+
+def default_eps(system: QuadraticSystem | BirationalMap, seed: int) -> tuple[fmpq, ...]:
+    """Two rational numbers of small height, the same ones for the same map and seed; one for a map without eps."""
+    if not as_map(system).has_eps:
+        return (fmpq(1),)
+    rng = random.Random(f"singularities eps {seed_for(seed, as_map(system).subject)}")
+    first = fmpq(rng.randint(2, 9), 11)
+    return first, fmpq(rng.randint(2, 11), 13)
+
+
+def _is_dominant(map_: BirationalMap, eps: fmpq) -> bool:
+    """Whether det dPhi is not 0 at one of a few points: proved where it is, and false otherwise as good as never."""
+    rng = random.Random(f"dominant {seed_for(0, map_.subject, eps)}")
+    for _ in range(_POINTS):
+        field = GF(random_prime(rng))  # what is not 0 there is not 0 over Q
+        try:
+            if det(map_.at(eps, field).jacobian([rng.randrange(field.prime) for _ in range(map_.dim)])) != 0:
+                return True
+        except (SingularStep, BadPrime):
+            continue
+    return False
+
+
+def _critical(forms: Sequence[Any], degree: int) -> Any:
+    """The Jacobian determinant of the homogeneous map, None where it is too large."""
+    size = len(forms)
+    if comb(size * (degree - 1) + size - 1, size - 1) > _MAX_TERMS:
+        return None
+    zero = forms[0].context().constant(0)
+    return kernel_minors([[*(form.derivative(j) for j in range(size)), zero] for form in forms])[-1]
+
+
+def _is_infinity(factor: Any) -> bool:
+    return len(factor) == 1 and all(exponent == 0 for exponent in factor.monoms()[0][:-1])
+
+
+def _affine(form: Any, map_: BirationalMap) -> str:
+    """The form at Z = 1 in the variables of the system, as text."""
+    context = ring(map_.variables)
+    return format_polynomial(context.from_dict({tuple(m)[:-1]: c for m, c in form.terms()}))

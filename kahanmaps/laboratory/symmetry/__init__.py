@@ -1,0 +1,1 @@
+"""Symmetries of a vector field, and fields whose maps commute."""

@@ -1,0 +1,330 @@
+"""All quadratic systems g, of a given shape, whose Kahan map commutes with that of f at equal eps, for every eps.
+
+Three steps. The Lie bracket [f, g] vanishes: a linear space of candidates. The next terms of the commutator, in powers
+of eps, vanish: polynomial equations on that space, solved over Q. Both are necessary, so no commuting system is
+lost. Every solution is then judged by itself, as an identity in x and eps: proved, or supported at random points.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from flint import fmpq, fmpq_mat
+
+from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import combination_of, primitive_integers
+from kahanmaps.algebra.plain import attributes, plain
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.small_systems import Component, decoupling, normal_form, solve_system, without_contained
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.checks.claims import Finding, Verdict, combined
+from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
+from kahanmaps.checks.settings import Settings
+from kahanmaps.displayed import Displayed
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.symmetry.commuting_equations import commutator_equations
+from kahanmaps.laboratory.symmetry.commuting_proofs import affine, judge_family, judge_field
+from kahanmaps.laboratory.symmetry.commuting_space import (
+    MAX_UNKNOWNS,
+    SHAPES,
+    CommutingSpace,
+    commuting_space,
+    field_at,
+    unknowns,
+)
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
+
+DEFAULT_SECONDS = 60
+ORDERS = (4, 6, 8)  # powers of eps in the commutator; odd ones follow from those before
+MAX_TOLD = 6  # sentences about equations that were not solved
+MAX_SPACE = 24  # the cubic equations have up to C(l + 2, 3) + l terms
+
+
+@dataclass(frozen=True)
+class CommutingField:
+    """One g that commutes: the system, B with g = B f if that was the shape, and the finding on it.
+
+    `trivial` says "0", "f" or "-f" where g is that, else it is empty.
+    """
+
+    system: QuadraticSystem
+    B: fmpq_mat | None
+    trivial: str
+    finding: Finding
+
+    @property
+    def rhs(self) -> list[str]:
+        """The right-hand sides as text, to be given back as a system."""
+        return [format_polynomial(p) for p in self.system.rhs]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data: rhs, B, trivial, verdict and evidence."""
+        return {
+            **attributes(self, "rhs", "B"),
+            "trivial": self.trivial or None,
+            **attributes(self.finding, "verdict", "evidence"),
+        }
+
+
+@dataclass(frozen=True)
+class CommutingFamily:
+    """A linear family of g that commute: `base` + sum t_i `directions[i]`, for all values of the parameters t."""
+
+    base: CommutingField
+    directions: tuple[CommutingField, ...]
+    finding: Finding
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data: base, directions (rhs and B), verdict and evidence."""
+        return {
+            "parameters": len(self.directions),
+            "base": attributes(self.base, "rhs", "B"),
+            "directions": [attributes(direction, "rhs", "B") for direction in self.directions],
+            **attributes(self.finding, "verdict", "evidence"),
+        }
+
+
+@dataclass
+class CommutingSystems(Displayed):
+    """What was found. `complete` says that there are no other rational g of that shape.
+
+    `dimension` is that of the space of g with [f, g] = 0; `irrational` tells of solutions outside Q; `discarded` counts
+    solutions of the equations that do not commute; `every_g_commutes` where f = 0, and then nothing is listed;
+    `undecided` says in sentences what remains open.
+    """
+
+    system: QuadraticSystem
+    shape: str
+    dimension: int | None = None
+    basis: list[QuadraticSystem] = field(default_factory=list)
+    solutions: list[CommutingField] = field(default_factory=list)
+    families: list[CommutingFamily] = field(default_factory=list)
+    irrational: list[str] = field(default_factory=list)
+    every_g_commutes: bool = False
+    discarded: int = 0
+    order: int = 2  # the highest power of eps of which equations were taken
+    undecided: list[str] = field(default_factory=list)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every rational g of the shape that commutes was found."""
+        return not self.undecided
+
+    @property
+    def nontrivial(self) -> list[CommutingField]:
+        """The single solutions other than 0, f and -f."""
+        return [g for g in self.solutions if not g.trivial]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The weakest verdict on what was found; undecided where the list may not be complete."""
+        found = [g.finding.verdict for g in self.solutions] + [family.finding.verdict for family in self.families]
+        return combined([*found, *([] if self.complete else [Verdict.UNDECIDED])])
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data, the shape that scripts rely on."""
+        return {
+            **attributes(self, "shape"),
+            "status": "complete" if self.complete else "undecided",
+            **attributes(self, "verdict"),
+            "bracket_space": {"dimension": self.dimension, "basis": plain([g.rhs for g in self.basis])},
+            **attributes(self, "solutions", "families", "every_g_commutes"),
+            **attributes(self, "irrational", "discarded", "order", "undecided"),
+        }
+
+
+def commuting_systems(
+    system: QuadraticSystem,
+    shape: str = "linear",
+    *,
+    seed: int = 0,
+    error_bits: int = DEFAULT_ERROR_BITS,
+    seconds: float = DEFAULT_SECONDS,
+    progress: Callable[[str], None] = lambda _: None,
+) -> CommutingSystems:
+    """All rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
+
+    `shape` "linear": g = B f with a constant matrix B; "quadratic": any g with terms of degree at most 2. Exact over Q;
+    what no lemma proves is supported at random points, with a probability of error below 2^-error_bits. `seconds`
+    bounds the time, roughly. Raises InputError for another shape or a bound that is not positive. What is too large is
+    told in `undecided`. Source: petrera-suris-2016.
+
+    >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2 + 1", "y^2 - x*y"])
+    >>> [(g.trivial, str(g.finding.verdict)) for g in commuting_systems(f).solutions]
+    [('0', 'proved'), ('f', 'proved'), ('-f', 'proved')]
+    """
+    if shape not in SHAPES:
+        raise InputError(f"found the shape {shape!r}, expected {' or '.join(SHAPES)}")
+    if not seconds > 0:
+        raise InputError(f"found {seconds} seconds, expected a positive number")
+    settings = Settings(seed=seed_for(seed, system.rhs), error_bits=error_bits, progress=progress)
+    search = _Search(system, shape, settings, time.monotonic() + seconds)
+    search.run()
+    return search.found
+
+
+class _Search:
+    def __init__(self, f: QuadraticSystem, shape: str, settings: Settings, deadline: float) -> None:
+        self.f, self.settings, self.deadline = f, settings, deadline
+        self.found = CommutingSystems(f, shape)
+        self.space = CommutingSpace((), (), 0)
+        self.points: list[Component] = []
+        self.families: list[Component] = []
+
+    def run(self) -> None:
+        f, found = self.f, self.found
+        count = unknowns(f, found.shape)
+        if all(p.is_zero() for p in f.rhs):
+            self._add_zero(count)
+            return
+        if count > MAX_UNKNOWNS:
+            found.undecided.append(f"g has {count} unknown coefficients, and at most {MAX_UNKNOWNS} are tried")
+        elif f.digits > LONG_COEFFICIENTS:
+            found.undecided.append(f"other g are searched for coefficients of up to {LONG_COEFFICIENTS} digits only")
+        if found.undecided:
+            self.space = CommutingSpace((f,), (QQ.identity(f.dim),) * (found.shape == "linear"), 1)
+        else:
+            self.settings.progress("the fields g with [f, g] = 0")
+            self.space = commuting_space(f, found.shape, self.settings.seed)
+            found.basis = list(self.space.fields)
+            found.dimension = len(found.basis) if len(found.basis) == self.space.dimension else None
+            self._search()
+        self._add_points()
+
+    def _add_zero(self, count: int) -> None:
+        found = self.found
+        found.dimension = count
+        matrix = fmpq_mat(self.f.dim, self.f.dim) if found.shape == "linear" else None
+        found.solutions.append(CommutingField(self.f, matrix, "0", judge_field(self.f, self.f, self.settings)))
+        found.every_g_commutes = found.shape == "quadratic"
+
+    def _search(self) -> None:
+        size = self.space.dimension
+        whole = Component(tuple(ring([f"b{k + 1}" for k in range(len(self.space.fields))]).gens()))
+        # Where f is affine the space may be large, and often all of it commutes: a proof without equations.
+        if self.found.dimension is not None and self.f.degree <= 1 and affine(self.f, self.space.fields) is not None:
+            self._add_family(whole, judge_family(self.f, self.space, whole, self.settings))
+        elif size > MAX_SPACE:
+            self.found.undecided.append(
+                f"the fields g with [f, g] = 0 have dimension {'up to ' * (self.found.dimension is None)}{size}, "
+                f"and equations are solved up to {MAX_SPACE}"
+            )
+        else:
+            self._solve(whole, 0)
+
+    def _solve(self, part: Component, level: int) -> None:
+        """Solve the equations of the order that belongs to `level` inside a part of the space."""
+        order, found = ORDERS[level], self.found
+        self.settings.progress(f"equations at eps^{order}, {len(part.free)} unknowns")
+        found.order = max(found.order, order)
+        rng = random.Random(f"commuting {self.settings.seed} {order}")
+        equations = commutator_equations(self.f, self.space.fields, part.values, order, rng, self._in_time)
+        equations = [*part.equations, *(normal_form(p, part.equations) for p in equations)]
+        gens = part.values[0].context().gens()
+        T = decoupling(equations, len(gens))
+        if T is not None and level == 0:
+            zero = gens[0].context().constant(0)
+            moved = [sum((y * T[i, j] for j, y in enumerate(gens) if T[i, j] != 0), zero) for i in range(len(gens))]
+            equations = [p.compose(*moved, ctx=zero.context()) for p in equations]
+            part = Component(tuple(v.compose(*moved, ctx=zero.context()) for v in part.values))
+        solutions = solve_system(equations, part.values, self.deadline)
+        found.irrational += [text for text in solutions.irrational if text not in found.irrational]
+        for component in solutions.components:
+            if component.free:
+                self._family(component, level)
+            else:
+                self.points.append(component)
+        for component in solutions.unsolved:
+            if level + 1 < len(ORDERS) and self._in_time():
+                self._solve(component, level + 1)
+            else:
+                self._leave(component, solutions.reason)
+
+    def _leave(self, part: Component, reason: str) -> None:
+        """Tell of equations that were not solved; a few of them are enough."""
+        texts = [format_polynomial(p) for p in part.equations]
+        shown = "; ".join(f"{text if len(text) < 200 else text[:200] + '...'} = 0" for text in texts[:6])
+        message = f"equations for b1, ..., b{len(part.values)} were not solved over Q ({reason}): {shown}"
+        if message in self.found.undecided:
+            return
+        if len(self.found.undecided) < MAX_TOLD:
+            self.found.undecided.append(message)
+        elif len(self.found.undecided) == MAX_TOLD:
+            self.found.undecided.append("and more equations that were not solved")
+
+    def _family(self, family: Component, level: int) -> None:
+        if any(known.contains(family) for known in self.families):
+            return
+        if not self._in_time():
+            self._leave(family, "the time is over")
+            return
+        self.settings.progress(f"a family with {len(family.free)} parameters")
+        finding = judge_family(self.f, self.space, family, self.settings)
+        if finding.verdict is not Verdict.REFUTED:
+            self._add_family(family, finding)
+        elif level + 1 < len(ORDERS) and self._in_time():
+            self._solve(family, level + 1)
+        else:
+            self.found.undecided.append(
+                f"a family with {len(family.free)} parameters solves the equations up to eps^{ORDERS[level]}, "
+                "and not all of it commutes"
+            )
+
+    def _add_family(self, family: Component, finding: Finding) -> None:
+        if finding.verdict is Verdict.UNDECIDED:
+            self.found.undecided.append(f"a family with {len(family.free)} parameters: {finding.evidence.summary}")
+            return
+        # A family found later, at a higher order, may hold an earlier one.
+        kept = [k for k, known in enumerate(self.families) if not family.contains(known)]
+        self.families = [*(self.families[k] for k in kept), family]
+        self.found.families = [self.found.families[k] for k in kept]
+        # Short directions, and as the base the member that has zeros where these have their leading ones.
+        slopes, _ = fmpq_mat([family.slopes(i) for i in family.free]).rref()
+        base = list(family.point)
+        for row in slopes.tolist():
+            lead = next(k for k, entry in enumerate(row) if entry != 0)
+            base = [b - base[lead] * entry for b, entry in zip(base, row, strict=True)]
+        directions = [tuple(fmpq(e) for e in primitive_integers(tuple(row))) for row in slopes.tolist()]
+        self.found.families.append(
+            CommutingFamily(self._field(base, finding), tuple(self._field(d, finding) for d in directions), finding)
+        )
+
+    def _add_points(self) -> None:
+        size = len(self.space.fields)
+        trivial = [tuple(fmpq(first if k == 0 else 0) for k in range(size)) for first in (0, 1, -1)]
+        single = [c.point for c in without_contained([*self.families, *self.points]) if not c.free]
+        # g and -g stand together, as 1 and -1 times the same integers.
+        others = sorted({p for p in single if p not in trivial}, key=_up_to_sign)
+        for k, weights in enumerate([*trivial, *others]):
+            if not self._in_time() and weights not in trivial:
+                self.found.undecided.append(f"the time is over: {len(others) + 3 - k} solutions were not judged")
+                return
+            self.settings.progress(f"solution {k + 1} of {len(others) + 3}")
+            finding = judge_field(self.f, field_at(self.space, weights), self.settings)
+            if finding.verdict is Verdict.REFUTED:
+                self.found.discarded += 1
+            elif finding.verdict is Verdict.UNDECIDED:
+                self.found.undecided.append(f"one solution: {finding.evidence.summary}")
+            else:
+                self.found.solutions.append(self._field(weights, finding))
+
+    def _field(self, weights: Sequence[fmpq], finding: Finding) -> CommutingField:
+        matrix = None
+        if self.space.matrices:
+            matrix = combination_of(weights, self.space.matrices)
+        g = field_at(self.space, weights)
+        names = [name for name, factor in (("0", 0), ("f", 1), ("-f", -1)) if g == self.f.scaled(factor)]
+        return CommutingField(g, matrix, names[0] if names else "", finding)
+
+    def _in_time(self) -> bool:
+        return time.monotonic() < self.deadline
+
+
+def _up_to_sign(weights: tuple[fmpq, ...]) -> tuple[Any, ...]:
+    lead = next(w for w in weights if w != 0)
+    return (*(abs(w) for w in weights), *(w * (1 if lead > 0 else -1) for w in weights), lead < 0)

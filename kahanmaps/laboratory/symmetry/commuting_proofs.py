@@ -1,0 +1,149 @@
+"""Do the Kahan maps of f and of one g, or of a linear family of g, commute: by a lemma, else at random points.
+
+Lemmas beside the splitting lemma of checks/theorems.py, each with hypotheses that are verified exactly:
+
+affine       One of the fields is affine. Its Kahan map is affine, x -> P x + q, and commutes with the other map for
+             every eps if P g(x) = g(P x + q). That is an identity of polynomials of degree at most 2n in eps once
+             det(I - eps B)^2 is multiplied in, so it holds if it does at 2n + 1 values of eps. It is linear in g.
+dimension 1  The Kahan map of a x^2 + b x + c is the Moebius map of I + eps M, M = [[b, 2c], [-2a, -b]], linear in the
+             field; proportional fields have commuting maps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.fields import QQ, Field
+from kahanmaps.algebra.matrices import rank
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.small_systems import Component
+from kahanmaps.checks import theorems
+from kahanmaps.checks.claims import Evidence, Finding
+from kahanmaps.checks.commute import commutativity
+from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.checks.judge import judge
+from kahanmaps.checks.settings import Settings
+from kahanmaps.laboratory.symmetry.commuting_equations import coefficients_of, combination
+from kahanmaps.laboratory.symmetry.commuting_space import CommutingSpace, field_at
+from kahanmaps.maps.kahan import KahanMap, KahanMapOver
+from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
+
+_FORMULA = "Phi_f o Phi_g = Phi_g o Phi_f"
+
+
+def judge_field(f: QuadraticSystem, g: QuadraticSystem, settings: Settings) -> Finding:
+    """The finding that the Kahan maps of f and g commute at equal eps, for every eps.
+
+    `settings.seed` and `settings.error_bits` are used. Proved, refuted with a witness, or supported with the bound on
+    the probability of error. Source: schwartz-1980.
+
+    >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2 + x"])
+    >>> str(judge_field(f, f.scaled(-1), Settings()).verdict), str(judge_field(f, f.scaled(2), Settings()).verdict)
+    ('proved', 'refuted')
+    """
+    claim = "the Kahan maps of f and g commute"
+    trivial = _trivially(f, g)
+    if trivial is not None:
+        return Finding(claim, theorems.PROVED, trivial, formula=_FORMULA)
+    identity = commutativity(f, g, None, ("f", "g"))
+    proof = theorems.commuting_by_splitting(f, g) or affine(f, [g]) or _in_dimension_one(f, g)
+    return judge(claim, identity, settings, proof, formula=_FORMULA)
+
+
+def judge_family(f: QuadraticSystem, space: CommutingSpace, family: Component, settings: Settings) -> Finding:
+    """The finding that the Kahan maps of f and of every member of a linear family commute, for every eps."""
+    members = [field_at(space, family.point), *(field_at(space, family.slopes(i)) for i in family.free)]
+    proof = affine(f, members) or _in_dimension_one(f, f)
+    claim = "the Kahan maps of f and of every member g of the family commute"
+    return judge(claim, _family_identity(f, space, family), settings, proof, formula=_FORMULA)
+
+
+def affine(f: QuadraticSystem, fields: Sequence[QuadraticSystem]) -> Evidence | None:
+    """The evidence by an affine map: f is affine, or there is one g and it is; None where that proves nothing."""
+    if f.degree <= 1:
+        name, pairs = "f", [(f, g) for g in fields]
+    elif len(fields) == 1 and fields[0].degree <= 1:
+        name, pairs = "g", [(fields[0], f)]
+    else:
+        return None
+    count = 2 * f.dim + 1
+    return theorems.evidence(
+        "the lemma of affine maps",
+        [
+            (f"{name} is affine", True),
+            (
+                f"P h(x) = h(P x + q) for its map x -> P x + q and the other field h, at {count} values of eps",
+                all(_symmetric_at(a, h, count) for a, h in pairs),
+            ),
+        ],
+    )
+
+
+def _symmetric_at(a: QuadraticSystem, h: QuadraticSystem, count: int) -> bool:
+    """Whether the affine Kahan map of `a` is a symmetry of h, at so many values of eps."""
+    n, checked, k = a.dim, 0, 0
+    identity = QQ.identity(n)
+    while checked < count:
+        k += 1
+        below = identity - a.B * fmpq(1, k)
+        if below.det() == 0:
+            continue
+        P = below.solve(identity + a.B * fmpq(1, k))
+        q = below.solve(fmpq_mat(n, 1, list(a.c))) * fmpq(2, k)
+        if h.composed(P, q.entries()) != h.transformed(P):
+            return False
+        checked += 1
+    return True
+
+
+def _trivially(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
+    for factor, why in ((1, "g = f"), (-1, "g = -f, and its map is the inverse"), (0, "g = 0, and its map is x -> x")):
+        if g == f.scaled(factor):
+            return Evidence(theorems.METHOD, why)
+    return None
+
+
+def _in_dimension_one(f: QuadraticSystem, g: QuadraticSystem) -> Evidence | None:
+    if f.dim > 1:
+        return None
+    proportional = rank(QQ, fmpq_mat([*coefficients_of(f), *coefficients_of(g)])) <= 1
+    return theorems.evidence("the lemma of Moebius maps", [("f and g are proportional, in dimension 1", proportional)])
+
+
+def _family_identity(f: QuadraticSystem, space: CommutingSpace, family: Component) -> Identity:
+    """Commutativity as an identity in x, eps and the free parameters, which follow the coordinates of the point."""
+    n, free = f.dim, family.free
+    zero = family.values[0].context().constant(0)
+    table = combination(space.fields, family.values, zero)
+    count = len(family.values)
+
+    def sides(field: Field, point: tuple[Any, ...], eps: Any) -> Sides:
+        parameters = [field.zero] * count
+        for i, value in zip(free, point[n:], strict=True):
+            parameters[i] = value
+        phi_f, phi_g = KahanMap(f, eps, field), KahanMapOver(_over(field, table, parameters, n), eps)
+        x = point[:n]
+        return phi_g.step(phi_f.step(x)), phi_f.step(phi_g.step(x))
+
+    labels = ("Phi_g(Phi_f(x))", "Phi_f(Phi_g(x))")
+    subject = (f.rhs, table, free)
+    return Identity(n + len(free), sides, None, *labels, subject=subject)
+
+
+def _over(field: Field, table: Sequence[Sequence[fmpq_mpoly]], parameters: Sequence[Any], n: int) -> SystemOver:
+    """The system whose coefficients are the polynomials of the table at these parameters."""
+    two = field.convert(2)
+    tensor = [field.zero] * (n**3)
+    linear, constants = [], []
+    for i, row in enumerate(table):
+        values = [evaluate(p, field, parameters) for p in row]
+        pairs = ((j, k) for j in range(n) for k in range(j, n))
+        for value, (j, k) in zip(values, pairs, strict=False):
+            tensor[(i * n + j) * n + k] = tensor[(i * n + k) * n + j] = value * two if j == k else value
+        linear += values[-n - 1 : -1]
+        constants.append(values[-1])
+    matrices = field.matrix(n * n, n, tensor), field.matrix(n, n, linear), field.column(constants)
+    return SystemOver(field, *matrices)

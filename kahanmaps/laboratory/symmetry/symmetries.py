@@ -1,0 +1,310 @@
+"""Linear and affine symmetries of a Kahan map, and its reversing symmetries.
+
+The map goes along with affine changes of variables. So an affine T(x) = S x + r with f(T(x)) = S f(x) is a symmetry,
+T Phi T^{-1} = Phi, and one with f(T(x)) = -S f(x) a reversing symmetry, T Phi T^{-1} = Phi^{-1}, both for every eps.
+Conversely the term of first order in eps gives these equations. They are identities of polynomials of degree 2, and
+are verified on coefficients, exactly: everything reported is proved. What was searched is said in `searched`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from flint import fmpq, fmpq_mat
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import nullspace, primitive_integers
+from kahanmaps.algebra.plain import attributes, plain
+from kahanmaps.algebra.polynomials import linear_combinations, ring
+from kahanmaps.algebra.small_systems import solve_system
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.displayed import Displayed
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.symmetry.signed_permutations import MAX_DIMENSION as MAX_SIGNED
+from kahanmaps.laboratory.symmetry.signed_permutations import signed_permutations
+from kahanmaps.laboratory.symmetry.symmetry_equations import is_singular, matrix_equations, translation
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
+
+DEFAULT_SECONDS = 30
+MAX_LINEAR = 16  # dimension up to which infinitesimal symmetries are computed: n^2 + n + 1 unknowns
+MAX_LISTED = 200  # of each kind in the JSON
+MAX_GENERAL = 3  # dimension up to which the polynomial equations for S are solved
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """T(x) = S x + r with T Phi T^{-1} = Phi, or Phi^{-1} where it is `reversing`; for every eps."""
+
+    variables: tuple[str, ...]
+    S: fmpq_mat
+    r: tuple[fmpq, ...]
+    reversing: bool
+
+    @property
+    def text(self) -> str:
+        """The action: (x, y) -> (y, -x)."""
+        return f"({', '.join(self.variables)}) -> ({', '.join(_affine_text(self.variables, self.S, self.r))})"
+
+    @property
+    def obvious(self) -> bool:
+        """Whether S is I or -I and r = 0."""
+        return not any(e != 0 for e in self.r) and self.S in (QQ.identity(len(self.r)), -QQ.identity(len(self.r)))
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data: S, r, what it is, the action as text."""
+        kind = "reversing symmetry" if self.reversing else "symmetry"
+        return {"kind": kind, **attributes(self, "S", "r", "text", "obvious"), "verdict": "proved"}
+
+
+@dataclass(frozen=True)
+class Infinitesimal:
+    """A field S x + s with f'(x)(S x + s) - S f(x) = weight f(x).
+
+    Its flow T_t gives T_t Phi(., eps) T_t^{-1} = Phi(., e^(-weight t) eps): a symmetry where the weight is 0.
+    """
+
+    variables: tuple[str, ...]
+    S: fmpq_mat
+    s: tuple[fmpq, ...]
+    weight: int
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether s = 0."""
+        return not any(e != 0 for e in self.s)
+
+    @property
+    def rhs(self) -> list[str]:
+        """The components of S x + s as text."""
+        return _affine_text(self.variables, self.S, self.s)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data: S, s, weight, the components as text."""
+        return {**attributes(self, "S", "s", "rhs", "weight"), "verdict": "proved"}
+
+
+@dataclass
+class Symmetries(Displayed):
+    """What was found. `complete` says that each search in `searched` came to its end.
+
+    `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` a field of weight 1 or None;
+    `signed` are all signed permutations (with a translation where needed), `others` linear symmetries that are none.
+    `generators` generate the linear parts of `signed`, which are a group of `order` elements (None: not known).
+    """
+
+    system: QuadraticSystem
+    infinitesimal: list[Infinitesimal] = field(default_factory=list)
+    scaling: Infinitesimal | None = None
+    signed: list[Symmetry] = field(default_factory=list)
+    generators: list[Symmetry] = field(default_factory=list)
+    order: int | None = None
+    others: list[Symmetry] = field(default_factory=list)
+    searched: list[str] = field(default_factory=list)
+    undecided: list[str] = field(default_factory=list)
+
+    @property
+    def complete(self) -> bool:
+        """Whether each search came to its end."""
+        return not self.undecided
+
+    @property
+    def symmetries(self) -> list[Symmetry]:
+        """All finite ones that commute with the map."""
+        return [t for t in (*self.signed, *self.others) if not t.reversing]
+
+    @property
+    def reversing(self) -> list[Symmetry]:
+        """All finite ones that take the map to its inverse."""
+        return [t for t in (*self.signed, *self.others) if t.reversing]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data, the shape that scripts rely on."""
+        group = {
+            "of": "signed permutations",
+            "order": self.order,
+            "symmetries": sum(not t.reversing for t in self.signed),
+            "reversing_symmetries": sum(t.reversing for t in self.signed),
+            **attributes(self, "generators"),
+        }
+        listed = {"symmetries": self.symmetries[:MAX_LISTED], "reversing_symmetries": self.reversing[:MAX_LISTED]}
+        return {
+            "status": "complete" if self.complete else "undecided",
+            **attributes(self, "infinitesimal", "scaling"),
+            "group": group,
+            "listed": sum(map(len, listed.values())),
+            **plain(listed),
+            **attributes(self, "searched", "undecided"),
+        }
+
+
+def linear_symmetries(
+    system: QuadraticSystem,
+    *,
+    seconds: float = DEFAULT_SECONDS,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Symmetries:
+    """Affine symmetries and reversing symmetries of the Kahan map of `system`, for every eps.
+
+    Searched: the Lie algebra of affine symmetries, and a scaling; signed permutations, with a translation where
+    needed (dimension at most 12); in dimension at most 3, where that algebra has no linear element, all rational
+    matrices. All exact and proved. `seconds` bounds the time, roughly. Raises InputError where it is not positive.
+    Source: cmoq-2013.
+
+    >>> found = linear_symmetries(QuadraticSystem.from_text(["x", "y", "z"], ["y*z", "z*x", "x*y"]))
+    >>> found.order, [t.text for t in found.generators]
+    (48, ['(x, y, z) -> (z, x, -y)', '(x, y, z) -> (-x, -z, y)'])
+    """
+    if not seconds > 0:
+        raise InputError(f"found {seconds} seconds, expected a positive number")
+    deadline = time.monotonic() + seconds
+    found = Symmetries(system)
+    progress("infinitesimal symmetries")
+    _add_infinitesimal(found)
+    progress("signed permutations")
+    _add_signed(found, deadline)
+    if system.dim <= MAX_GENERAL:
+        progress("all matrices")
+        _add_general(found, deadline)
+    return found
+
+
+def _add_infinitesimal(found: Symmetries) -> None:
+    f = found.system
+    n = f.dim
+    if n > MAX_LINEAR:
+        found.undecided.append(f"infinitesimal symmetries are computed up to dimension {MAX_LINEAR}, found {n}")
+        return
+    gens = ring(f.variables).gens()
+    columns = []
+    for i, j in itertools.product(range(n), repeat=2):  # S = E_ij
+        columns.append([p.derivative(i) * gens[j] - (f.rhs[j] if k == i else 0) for k, p in enumerate(f.rhs)])
+    columns += [[p.derivative(i) for p in f.rhs] for i in range(n)]
+    columns.append([-p for p in f.rhs])
+    # One row for each component and each monomial.
+    rows: dict[tuple[int, tuple[int, ...]], list[fmpq]] = {}
+    for place, column in enumerate(columns):
+        for k, p in enumerate(column):
+            for monomial, value in p.terms():
+                rows.setdefault((k, tuple(monomial)), [fmpq(0)] * len(columns))[place] = value
+    table = list(rows.values()) or [[fmpq(0)] * len(columns)]
+    # In echelon form from the right, with s last, the linear fields come first and are a basis of their own.
+    basis = nullspace(QQ, fmpq_mat([row[:-1] for row in table]))
+    found.infinitesimal = [_infinitesimal(f, [fmpq(e) for e in primitive_integers(v)], 0) for v in basis]
+    scalings = [v for v in nullspace(QQ, fmpq_mat(table)) if v[-1] != 0]
+    if f.is_homogeneous:  # S = I, rather than another one
+        found.scaling = Infinitesimal(f.variables, QQ.identity(n), (fmpq(0),) * n, 1)
+    elif scalings:
+        vector = min(scalings, key=lambda v: sum(e != 0 for e in v))
+        found.scaling = _infinitesimal(f, [e / vector[-1] for e in vector[:-1]], 1)
+    found.searched.append("affine infinitesimal symmetries and scalings: all")
+
+
+def _infinitesimal(f: QuadraticSystem, vector: Sequence[fmpq], weight: int) -> Infinitesimal:
+    n = f.dim
+    return Infinitesimal(f.variables, fmpq_mat(n, n, vector[: n * n]), tuple(vector[n * n :]), weight)
+
+
+def _add_signed(found: Symmetries, deadline: float) -> None:
+    f = found.system
+    if f.dim > MAX_SIGNED:
+        found.undecided.append(f"signed permutations are tried up to dimension {MAX_SIGNED}, found {f.dim}")
+        return
+    done = True
+    for sign in (1, -1):
+        matrices, finished = signed_permutations(f, sign, deadline)
+        done = done and finished
+        for S in matrices:
+            if time.monotonic() > deadline:
+                done = False
+                break
+            r = translation(f, S, sign, deadline)
+            if r is not None:
+                found.signed.append(Symmetry(f.variables, S, r, sign < 0))
+    found.signed.sort(key=lambda t: (t.reversing, not t.obvious, any(e != 0 for e in t.r)))
+    if not done:
+        found.undecided.append("there are too many signed permutations, or the time is over: not all were tried")
+        return
+    found.searched.append("signed permutations, with a translation: all")
+    found.order = len({_key(t.S) for t in found.signed})  # for f = 0 each is both kinds
+    found.generators = _generators(found.signed)
+
+
+def _generators(elements: Sequence[Symmetry]) -> list[Symmetry]:
+    """Elements whose linear parts generate those of all: of high order first, and none that the others make."""
+    generators: list[Symmetry] = []
+    group = _generated([], len(elements[0].r))
+    for element in sorted(elements, key=lambda t: -_order(t.S)):
+        if _key(element.S) not in group:
+            generators.append(element)
+            group = _generated([t.S for t in generators], len(element.r))
+    for element in list(generators):
+        rest = [t for t in generators if t is not element]
+        if len(_generated([t.S for t in rest], len(element.r))) == len(group):
+            generators = rest
+    return generators
+
+
+def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
+    """The finite group that the matrices generate."""
+    waiting = [QQ.identity(n)]
+    group = {_key(waiting[0])}
+    while waiting:
+        known = waiting.pop()
+        for matrix in matrices:
+            product = known * matrix
+            if _key(product) not in group:
+                group.add(_key(product))
+                waiting.append(product)
+    return group
+
+
+def _order(matrix: fmpq_mat) -> int:
+    """The order of a signed permutation."""
+    power, count = matrix, 1
+    while power != QQ.identity(matrix.nrows()):
+        power, count = power * matrix, count + 1
+    return count
+
+
+def _add_general(found: Symmetries, deadline: float) -> None:
+    """All rational S with f(S x) = sign S f(x), by its polynomial equations."""
+    f = found.system
+    n = f.dim
+    if any(x.is_linear for x in found.infinitesimal):
+        found.searched.append("other matrices: not searched, since there are infinitesimal linear symmetries")
+        return
+    if f.digits > LONG_COEFFICIENTS:
+        found.undecided.append(f"other matrices are searched for coefficients of up to {LONG_COEFFICIENTS} digits only")
+        return
+    context = ring([f"s{i + 1}{j + 1}" for i in range(n) for j in range(n)])
+    gens = context.gens()
+    matrix = [list(gens[i * n : (i + 1) * n]) for i in range(n)]
+    known = {_key(t.S) for t in found.signed if not any(e != 0 for e in t.r)}
+    complete = True
+    for sign in (1, -1):
+        equations = matrix_equations(f, matrix, sign)
+        solved = solve_system(equations, gens, deadline)
+        for component in solved.components:
+            # In a family of solutions all are singular: invertible ones would be a group with infinitesimal symmetries.
+            S = fmpq_mat(n, n, list(component.point))
+            if not component.free and S.det() != 0 and _key(S) not in known:
+                found.others.append(Symmetry(f.variables, S, (fmpq(0),) * n, sign < 0))
+        left = [part for part in solved.unsolved if not is_singular(part, n)]
+        if left:
+            complete = False
+            found.undecided.append(f"the equations f(S x) = {'-' * (sign < 0)}S f(x) were not solved: {solved.reason}")
+    if complete:
+        found.searched.append("rational matrices S, without a translation: all")
+
+
+def _key(matrix: fmpq_mat) -> tuple[str, ...]:
+    return tuple(str(e) for e in matrix.entries())
+
+
+def _affine_text(variables: Sequence[str], S: fmpq_mat, r: Sequence[fmpq]) -> list[str]:
+    images = linear_combinations(S, ring(variables).gens())
+    return [format_polynomial(image + shift) for image, shift in zip(images, r, strict=True)]

@@ -1,0 +1,324 @@
+"""The normal form in machine numbers: one planar map for each root of chi, nearly all of them the same two.
+
+At a root r of chi the Kahan map of a member is planar, with a binary cubic h_r (see kahanmaps/family/planar.py). In
+(U, V) = 2 eps (u, v), with half the second derivatives A = a U + b V, B = b U + c V, C = c U + d V of
+h = a U^3/3 + b U^2 V + c U V^2 + d V^3/3, it is Cramer's rule for two equations:
+
+    U~ = ((1 + B) U + C V)/w,     V~ = ((1 - B) V - A U)/w,     w = (1 + B)(1 - B) + A C = 1 + eps^2 D.
+
+A linear change of U and V (h is divided by its determinant) makes h one of
+
+    lines    U V (U + V)         (a, b, c, d) = (0, 1, 1, 0)    three linear factors over R, or over C at a complex r
+    cubes    (U^3 + V^3)/3                      (1, 0, 0, 1)    one real linear factor
+    general                      whatever they are              a repeated factor, h = 0, or a frame too oblique
+
+so that nearly every map has no coefficient left, and costs a kernel five or six multiplications and a division. The
+two factors that serve as U and V are those whose forms in x are the least oblique. The block's integral
+h_r/(1 + eps^2 D) is kappa (A U^2 + 2 B U V + C V^2)/w.
+
+A real root gives one real block (two rows: U, V), a pair of complex roots one complex block (four rows: Re U, Im U,
+Re V, Im V). Roots, coefficients and the linear maps between x and the rows are found in balls and rounded once, so each
+of these numbers is the double nearest to the true one, or next to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import acb, acb_poly, arb, ctx, fmpq, fmpq_poly
+from numpy.typing import NDArray
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.errors import InputError
+from kahanmaps.family.planar import NormalForm
+from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import Kahan
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+
+LINES, CUBES, GENERAL = 0, 1, 2  # kinds of block
+
+_CANONICAL = {LINES: (0, 1, 1, 0), CUBES: (1, 0, 0, 1)}
+_ROTATIONS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1))  # one of them makes u^3 or u^2 appear in a form that is not 0
+_OBLIQUE = 0.02  # of the sine between the forms U and V: below, digits are lost, so no canonical form
+_BITS = (192, 384, 768, 1536, 3072)
+_GOOD_BITS = 60  # of an entry before it is rounded
+_NEGLIGIBLE = 120  # bits below the largest entry of its row: 0, as far as doubles can tell
+
+Frame = tuple[list[acb], list[acb]]
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarBlocks:
+    """The planar maps of a normal form for one eps, in doubles.
+
+    Real blocks, `reals` of them, come first, by increasing root; then one block for each root with positive imaginary
+    part. `coefficients` has a row (Re a, Im a, Re b, Im b, ...) for each, `kinds` says LINES, CUBES or GENERAL, `kappa`
+    is (Re, Im). `into` is the 2m x 2m matrix that takes x to the rows, `out` the one that takes them back.
+
+    >>> from flint import fmpq_poly
+    >>> from kahanmaps.family.draw import draw_with_chi
+    >>> from kahanmaps.family.planar import normal_form
+    >>> blocks = planar_blocks(normal_form(draw_with_chi(fmpq_poly([-2, 0, 0, 1]), seed=7)), "1/10")
+    >>> blocks.reals, blocks.kinds.tolist(), blocks.labels
+    (1, [1, 0], ('1.25992', '-0.629961+-1.09112i'))
+    """
+
+    reals: int
+    kinds: NDArray[np.int64]
+    coefficients: FloatArray
+    kappa: FloatArray
+    into: FloatArray
+    out: FloatArray
+    roots: tuple[complex, ...]
+
+    @property
+    def rows(self) -> int:
+        """2m, the number of rows of a state."""
+        return len(self.into)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The roots as short text; a complex one stands for itself and its conjugate."""
+        found = []
+        for root in self.roots:
+            real = 0.0 if abs(root.real) < 1e-30 * abs(root.imag) else root.real  # a ball around 0, rounded
+            found.append(f"{root.real:.6g}" if root.imag == 0 else f"{real:.6g}+-{root.imag:.6g}i")
+        return tuple(found)
+
+
+def planar_blocks(form: NormalForm, eps: Any) -> PlanarBlocks:
+    """The blocks of a normal form for an exact eps (half the time step; negative for the inverse map).
+
+    Raises InputError where eps is 0 or a number leaves the range of doubles.
+    """
+    epsilon = rational(eps)
+    if epsilon == 0:
+        raise InputError("found eps = 0, for which the Kahan map is the identity")
+    for bits in _BITS:
+        with ctx.workprec(bits), suppress(_Unclear):
+            return _Blocks(form, epsilon).rounded()
+    raise InputError(f"the normal form needs more than {_BITS[-1]} bits: its coefficients are too long for doubles")
+
+
+def require_same_system(form: NormalForm, map_: BirationalMap) -> None:
+    """Raises InputError where the normal form is that of another map."""
+    theirs = CubicHamiltonian(form.H, standard_structure(form.dim)).system
+    if not isinstance(map_, Kahan) or theirs.dim != map_.dim or theirs.renamed(map_.variables) != map_.system:
+        raise InputError(
+            "the normal form belongs to another system: take normal_form(member) of the member that gave it"
+        )
+
+
+class _Unclear(Exception):
+    """The working precision does not decide a sign, or leaves a ball too wide to be rounded."""
+
+
+class _Blocks:
+    """The same in balls of the working precision."""
+
+    def __init__(self, form: NormalForm, eps: fmpq) -> None:
+        self.form = form
+        self.eps = arb(eps)
+        m = form.m
+        self.inverse = [
+            (fmpq_poly(column[:m]), fmpq_poly(column[m:])) for column in form.S_inverse.transpose().tolist()
+        ]
+        a, b, c, d = form.coefficients
+        self.discriminant = (
+            b * b * c * c - 4 * a * c**3 - 4 * b**3 * d - 27 * a * a * d * d + 18 * a * b * c * d
+        ) % form.chi
+        found: Any = form.chi.complex_roots()  # the stub has forgotten the multiplicities
+        roots = [root for root, _ in found]
+        real = sorted((r for r in roots if r.imag.is_zero()), key=lambda r: float(r.real.mid()))
+        upper = [r for r in roots if not r.imag.is_zero() and r.imag > 0]
+        self.roots = real + sorted(upper, key=lambda r: (float(r.real.mid()), float(r.imag.mid())))
+
+    def rounded(self) -> PlanarBlocks:
+        """Each number as a double. Raises _Unclear where the precision is too low for that."""
+        kinds, coefficients, kappas, into, out = [], [], [], [], []
+        for root in self.roots:
+            kind, numbers, kappa, into_uv, out_uv = self._block(root)
+            kinds.append(kind)
+            real = root.imag.is_zero()
+            coefficients.append(_doubles([part for entry in numbers for part in (entry.real, entry.imag)]))
+            kappas.append(_doubles([kappa.real, kappa.imag]))
+            for row, column in zip(into_uv, out_uv, strict=True):
+                into.append(_doubles([entry.real for entry in row]))
+                out.append(_doubles([entry.real if real else 2 * entry.real for entry in column]))
+                if not real:
+                    into.append(_doubles([entry.imag for entry in row]))
+                    out.append(_doubles([-2 * entry.imag for entry in column]))
+        reals = sum(1 for root in self.roots if root.imag.is_zero())
+        tables = [np.array(table, dtype=np.float64) for table in (coefficients, kappas, into, out)]
+        if not all(np.isfinite(table).all() for table in tables):
+            raise InputError("the normal form leaves the range of machine floats: use exact arithmetic")
+        return PlanarBlocks(
+            reals,
+            np.array(kinds, dtype=np.int64),
+            tables[0].reshape(-1, 8),
+            tables[1].reshape(-1, 2),
+            tables[2],
+            np.ascontiguousarray(tables[3].T),
+            tuple(complex(float(root.real.mid()), float(root.imag.mid())) for root in self.roots),
+        )
+
+    def _block(self, root: acb) -> tuple[int, list[acb], acb, list[list[acb]], list[list[acb]]]:
+        """Kind; a, b, c, d; kappa; the rows of U and V over x; the columns of x over U and V."""
+        cubic = [_value(coefficient, root) for coefficient in self.form.coefficients]
+        rows = [[_value(element[k], root) for element in self.inverse] for k in (0, 1)]
+        kind, frame = self._frame(root, cubic, rows)
+        det = frame[0][0] * frame[1][1] - frame[0][1] * frame[1][0]
+        a, b, c, d = (entry * det for entry in _transformed(cubic, _inverse(frame)))
+        if kind == LINES:
+            scale_U, scale_V = b, c
+        elif kind == CUBES:
+            # U = s L1, V = t L2 with 3 a t = s^2 and 3 d s = t^2: s^3 = 27 a^2 d, t^3 = 27 a d^2
+            scale_U, scale_V = acb(_cube_root((27 * a * a * d).real)), acb(_cube_root((27 * a * d * d).real))
+        else:
+            scale_U, scale_V = acb(1), acb(1)
+        numbers = [acb(entry) for entry in _CANONICAL.get(kind, ())] or [3 * a, b, c, 3 * d]
+        if kind == GENERAL and self._is_zero(root):
+            numbers = [acb(0)] * 4
+        frame = ([entry * scale_U for entry in frame[0]], [entry * scale_V for entry in frame[1]])
+        kappa = 1 / (24 * self.eps**3 * det * scale_U * scale_V)
+        step = 2 * self.eps
+        into = [[step * (f * x + g * y) for x, y in zip(*rows, strict=True)] for f, g in frame]
+        lagrange = _lagrange(self.form.chi, root)
+        m, S = self.form.m, self.form.S.tolist()
+        x_u = [_dot(row[:m], lagrange) for row in S]
+        x_v = [_dot(row[m:], lagrange) for row in S]
+        back = _inverse(frame)
+        out = [[(x * back[0][k] + y * back[1][k]) / step for x, y in zip(x_u, x_v, strict=True)] for k in (0, 1)]
+        return kind, numbers, kappa, into, out
+
+    def _frame(self, root: acb, cubic: list[acb], rows: list[list[acb]]) -> tuple[int, Frame]:
+        """The kind of h and two linear forms in u and v, still without scale, that make it so."""
+        if self._vanishes(self.discriminant, root):
+            return GENERAL, self._upright(rows)
+        if root.imag.is_zero() and _value(self.discriminant, root).real < 0:
+            a, b, c, d = cubic
+            kind, lines = CUBES, _factors([3 * a * c - b * b, 9 * a * d - b * c, 3 * b * d - c * c])
+        else:
+            kind, lines = LINES, _factors(cubic)
+        if root.imag.is_zero():  # then the factors are real
+            lines = [[acb(entry.real) for entry in line] for line in lines]
+        pairs = [(lines[i], lines[j]) for i in range(len(lines)) for j in range(i)]
+        sine, frame = max(((_sine(pair, rows), pair) for pair in pairs), key=lambda found: found[0])
+        return (kind, frame) if sine > _OBLIQUE else (GENERAL, self._upright(rows))
+
+    def _upright(self, rows: list[list[acb]]) -> Frame:
+        """Two forms of length 1 and at right angles as forms in x."""
+        one, zero = acb(1), acb(0)
+        length = acb(_inner(rows[0], rows[0]).real.sqrt())
+        slant = _inner(rows[1], rows[0]) / _inner(rows[0], rows[0]).real
+        rest = [y - slant * x for x, y in zip(*rows, strict=True)]
+        height = acb(_inner(rest, rest).real.sqrt())
+        return [one / length, zero], [-slant / height, one / height]
+
+    def _is_zero(self, root: acb) -> bool:
+        return all(self._vanishes(coefficient, root) for coefficient in self.form.coefficients)
+
+    def _vanishes(self, element: fmpq_poly, root: acb) -> bool:
+        """Whether an element of K is 0 at the root, exactly."""
+        value = _value(element, root)
+        if not value.contains(acb(0)):
+            return False
+        common = element.gcd(self.form.chi)  # 0 at the root if anything is: the roots of chi are simple
+        if common.degree() < 1 or not _value(common, root).contains(acb(0)):
+            raise _Unclear
+        if common.degree() < self.form.chi.degree() and _value(self.form.chi / common, root).contains(acb(0)):
+            raise _Unclear
+        return True
+
+
+def _factors(form: list[acb]) -> list[list[acb]]:
+    """Linear factors f u + g v, without scale, of a binary form without repeated factors (u^k first)."""
+    for p, q in _ROTATIONS:
+        # u = p u' - q v', v = q u' + p v'
+        turned = _transformed(form, ([acb(p), acb(-q)], [acb(q), acb(p)]))
+        if not turned[0].contains(acb(0)):
+            try:
+                roots = acb_poly(turned[::-1]).roots(tol=arb(2) ** (ctx.prec // -2), maxprec=2 * ctx.prec)
+            except ValueError as error:
+                raise _Unclear from error
+            # u' - root v', with u' = (p u + q v)/N, v' = (p v - q u)/N
+            return [[p + root * q, q - root * p] for root in roots]
+    raise _Unclear
+
+
+def _transformed(form: list[acb], matrix: Frame) -> list[acb]:
+    """The binary form with (u, v) = matrix (u', v')."""
+    degree = len(form) - 1
+    total = [acb(0)] * (degree + 1)
+    for k, coefficient in enumerate(form):
+        product = [coefficient]  # of degree - k factors u and k factors v
+        for first, second in [matrix[0]] * (degree - k) + [matrix[1]] * k:
+            raised = [*(entry * first for entry in product), acb(0)]
+            for i, entry in enumerate(product):
+                raised[i + 1] += entry * second
+            product = raised
+        total = [t + entry for t, entry in zip(total, product, strict=True)]
+    return total
+
+
+def _inverse(frame: Frame) -> Frame:
+    (f, g), (k, l) = frame
+    det = f * l - g * k
+    return [l / det, -g / det], [-k / det, f / det]
+
+
+def _sine(frame: Frame, rows: list[list[acb]]) -> float:
+    """The sine of the angle between two forms in u and v, as forms in x."""
+    one, two = ([f * x + g * y for x, y in zip(*rows, strict=True)] for f, g in frame)
+    cosine = abs(_inner(one, two)) ** 2 / (_inner(one, one).real * _inner(two, two).real)
+    return float((1 - cosine).mid()) ** 0.5 if cosine < 1 else 0.0
+
+
+def _inner(left: list[acb], right: list[acb]) -> acb:
+    return sum((x * acb(y.real, -y.imag) for x, y in zip(left, right, strict=True)), acb(0))
+
+
+def _cube_root(number: arb) -> arb:
+    root = abs(number).root(3)
+    return root if number > 0 else -root
+
+
+def _lagrange(chi: fmpq_poly, root: acb) -> list[acb]:
+    """The coefficients of chi(t)/((t - root) chi'(root)): 1 at this root, 0 at the others."""
+    quotient: list[acb] = []
+    carry = acb(0)
+    for coefficient in reversed(chi.coeffs()):
+        carry = carry * root + arb(coefficient)
+        quotient.append(carry)
+    slope = _value(chi.derivative(), root)
+    return [entry / slope for entry in reversed(quotient[:-1])]
+
+
+def _value(polynomial: fmpq_poly, at: acb) -> acb:
+    total = acb(0)
+    for coefficient in reversed(polynomial.coeffs()):
+        total = total * at + arb(coefficient)
+    return total
+
+
+def _dot(row: Sequence[fmpq], column: Sequence[acb]) -> acb:
+    return sum((arb(entry) * other for entry, other in zip(row, column, strict=True)), acb(0))
+
+
+def _doubles(row: Sequence[arb]) -> list[float]:
+    """The entries as doubles; what is beyond doubt negligible beside the largest is 0."""
+    largest = max((abs(entry) for entry in row), key=lambda entry: entry.mid())
+    found = []
+    for entry in row:
+        if entry.is_zero() or abs(entry) * arb(2) ** _NEGLIGIBLE < largest:
+            found.append(0.0)
+        elif entry.rel_accuracy_bits() >= _GOOD_BITS:
+            found.append(float(entry.mid()))
+        else:
+            raise _Unclear
+    return found

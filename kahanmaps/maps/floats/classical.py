@@ -1,0 +1,134 @@
+"""Classical one-step methods in machine numbers, to compare the Kahan map with: explicit RK4 and implicit midpoint.
+
+Both take the time step h = 2 eps. The midpoint equation y = x + (h/2) f(y), x~ = x + h f(y), is solved by Newton's
+method from y = x until the corrections are round-off; an orbit ends where it does not get there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from kahanmaps.algebra.fields import rational
+from kahanmaps.errors import InputError, counted
+from kahanmaps.maps.floats.doubles import FloatArray, to_float, to_floats
+from kahanmaps.maps.orbits import OrbitEnd, require_steps
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+METHODS = {"rk4": "explicit RK4", "midpoint": "implicit midpoint"}
+_PORTION = 20_000
+_MOST_CORRECTIONS = 50
+_ROUND_OFF = 4e-16  # corrections below it, relative to the point, are the last ones
+_STALLED = 1e-10  # where corrections stop falling below it, they have become round-off
+
+
+class ClassicalOrbit:
+    """The orbit of `start` under RK4 or the implicit midpoint rule with the time step 2 eps, in double precision.
+
+    `method` is "rk4" or "midpoint"; `start` and `eps` are exact. Iterate once over `portions`, then look at `end`.
+    Raises InputError for wrong values.
+
+    >>> orbit = ClassicalOrbit(QuadraticSystem.from_text(["x"], ["x"]), "1/20", [1], 10, "midpoint")
+    >>> points = np.concatenate([x for _, x in orbit.portions()])
+    >>> points.shape, round(float(points[-1, 0]), 10), round((1.05 / 0.95) ** 10, 10)
+    ((11, 1), 2.7205514142, 2.7205514142)
+    >>> orbit.end.status
+    'completed'
+    """
+
+    def __init__(self, system: QuadraticSystem, eps: Any, start: Sequence[Any], steps: int, method: str) -> None:
+        require_steps(steps)
+        if method not in METHODS:
+            raise InputError(f"found the method {str(method)[:40]!r}, expected {' or '.join(METHODS)}")
+        if len(start) != system.dim:
+            raise InputError(f"found a point with {len(start)} coordinates, expected {system.dim}")
+        self.steps, self.method = steps, method
+        self.end: OrbitEnd | None = None
+        self._dim = system.dim
+        self._h = to_float(2 * rational(eps))
+        self._start = to_floats(start)
+        self._field = _Field(system)
+
+    def portions(self) -> Iterator[tuple[int, FloatArray]]:
+        """The step reached, and the points (count, dim) on the way; the start first."""
+        yield 0, self._start[None].copy()
+        take = self._rk4 if self.method == "rk4" else self._midpoint
+        step, x = 0, self._start
+        while step < self.steps:
+            out = np.empty((min(_PORTION, self.steps - step), self._dim))
+            done = 0
+            with np.errstate(all="ignore"):  # what leaves the range of doubles is a status, not a warning
+                while done < len(out):
+                    image = take(x)
+                    if image is None or not np.isfinite(image).all():
+                        break
+                    x = out[done] = image
+                    done += 1
+            step += done
+            if done:
+                yield step, out[:done]
+            if done < len(out):
+                self.end = _end(image is None, step)
+                return
+        self.end = OrbitEnd("completed", step, counted(step, "step"))
+
+    def _rk4(self, x: FloatArray) -> FloatArray | None:
+        f, h = self._field, self._h
+        a = f(x)
+        b = f(x + 0.5 * h * a)
+        c = f(x + 0.5 * h * b)
+        d = f(x + h * c)
+        image: FloatArray = x + h / 6.0 * (a + 2.0 * (b + c) + d)
+        return image
+
+    def _midpoint(self, x: FloatArray) -> FloatArray | None:
+        f, h = self._field, self._h
+        one = np.eye(self._dim)
+        y, last = x, np.inf
+        for _ in range(_MOST_CORRECTIONS):
+            try:
+                change = np.linalg.solve(one - 0.5 * h * f.jacobian(y), x - y + 0.5 * h * f(y))
+            except np.linalg.LinAlgError:
+                return None
+            y = y + change
+            size, scale = np.abs(change).max(), np.abs(y).max()
+            if size <= _ROUND_OFF * scale or (size >= last and size <= _STALLED * scale):
+                image: FloatArray = x + h * f(y)
+                return image
+            last = size
+        return None
+
+
+class _Field:
+    """f and f' in machine numbers: f_i(x) = z^T S_i z with z = (x, 1) and S_i symmetric."""
+
+    def __init__(self, system: QuadraticSystem) -> None:
+        n = system.dim
+        self._S = np.zeros((n, n + 1, n + 1))
+        for i in range(n):
+            self._S[i, :n, :n] = [[to_float(entry) for entry in row] for row in system.Q[i].tolist()]
+            self._S[i, :n, n] = self._S[i, n, :n] = [to_float(system.B[i, j] / 2) for j in range(n)]
+            self._S[i, n, n] = to_float(system.c[i])
+        self._z = np.ones(n + 1)
+
+    def _half(self, x: FloatArray) -> FloatArray:
+        self._z[:-1] = x
+        half: FloatArray = self._S @ self._z
+        return half
+
+    def __call__(self, x: FloatArray) -> FloatArray:
+        value: FloatArray = self._half(x) @ self._z
+        return value
+
+    def jacobian(self, x: FloatArray) -> FloatArray:
+        """f'(x)."""
+        return 2.0 * self._half(x)[:, :-1]
+
+
+def _end(no_solution: bool, step: int) -> OrbitEnd:
+    if no_solution:
+        sentence = f"step {step + 1}: Newton's method finds no solution of the midpoint equation"
+        return OrbitEnd("singular", step, sentence)
+    return OrbitEnd("overflow", step, f"step {step + 1} leaves the range of machine floats")

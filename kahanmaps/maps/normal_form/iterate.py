@@ -1,0 +1,120 @@
+"""The n-th iterate of a Kahan map directly, without the iterates before it, for members of the family.
+
+In every plane of the normal form the map is a translation on a plane cubic, so n takes about log2(n) doublings: over
+Q in integers (`tau_table`), over GF(p), Q[t]/g and balls with field elements (`translation`). Poles on the way are
+passed over, except over Q, where none goes unnoticed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from kahanmaps.algebra.fields import QQ, BallField, Field, PrimeField
+from kahanmaps.errors import BadPrime, InputError, PrecisionLost, SingularStep
+
+if TYPE_CHECKING:
+    from kahanmaps.family.structure import Structure
+    from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
+    from kahanmaps.maps.normal_form.planes_point import PlanesPoint
+    from kahanmaps.maps.normal_form.rational_iterate import RationalOrbit
+
+_CYCLE = 2 * 10**6  # the longest orbit in a plane over a small field that is walked around
+
+
+class Jump:
+    """Iterates of Phi(., eps) over QQ, GF(p) or real balls for a structure; the time step is 2 eps.
+
+    Raises BadPrime where the structure has no reduction modulo p.
+
+    >>> from kahanmaps.algebra.fields import GF
+    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.structure import structure_of
+    >>> structure = structure_of(draw_with_eigenvalues([1, -2, 3], seed=7).chosen.system)
+    >>> Jump(structure, "1/10", GF(10**9 + 7)).value([1, 2, 3, 4, 5, 6], 10**30)[0]
+    946728668
+    """
+
+    def __init__(self, structure: Structure, eps: Any, field: Field) -> None:
+        self.structure, self.field = structure, field
+        self.eps = field.convert(eps)
+        if field.characteristic == 2:
+            raise BadPrime("2 eps = 0 modulo 2, where the coordinates are 2 eps (u, v): take another prime", 2)
+        from kahanmaps.maps.normal_form.splitting import Splitting
+
+        self.splitting = Splitting(structure.form, field, self.eps, structure.T)
+        self._rational: tuple[Any, RationalOrbit] | None = None  # the last one, with what it is of
+
+    def value(self, start: Sequence[Any], n: int, max_bits: int | None = None) -> PlanesPoint | tuple[Any, ...]:
+        """Phi^n(start) for n >= 0: over Q a PlanesPoint, if chi splits; otherwise the coordinates.
+
+        Raises SingularStep where the map has no value, over Q at any step, elsewhere at one of the first few or the
+        last; PrecisionLost for balls that are too wide; OverBudget, over Q, where an orbit that is stepped has numbers
+        of more than `max_bits` bits before it is there, and before it meets a pole.
+        """
+        if n < 0:
+            raise InputError(f"found the step {n}, expected 0 or more (for the inverse map, change the sign of eps)")
+        if self.field is QQ:
+            from kahanmaps.maps.normal_form.rational_iterate import RationalOrbit
+
+            key = (tuple(start), max_bits)
+            if self._rational is None or self._rational[0] != key:
+                self._rational = key, RationalOrbit(self.structure, self.eps, start, max_bits)
+            return self._rational[1].value(n)
+        with self.field.working():
+            x = [self.field.convert(entry) for entry in start]
+            found = []
+            for plane, triple in zip(self.splitting.planes, self.splitting.triples(x), strict=True):
+                found.append(self._in_plane(plane.block, triple, n))
+            for _, _, W in found:
+                if self.field.is_zero(W):
+                    raise SingularStep(f"the map has a pole: its iterate {n} has no value at the start")
+            return self.splitting.point(found)
+
+    def _in_plane(self, block: PlanarBlock, start: Triple, n: int) -> Triple:
+        from kahanmaps.maps.normal_form import translation
+
+        if block.is_zero or (start[0] == 0 and start[1] == 0):
+            return start
+        small = isinstance(self.field, PrimeField) and self.field.prime < 5
+        if not small:
+            try:
+                return translation.iterate(block, start, n, self.field.is_zero)
+            except translation.NoTranslation:
+                if isinstance(self.field, BallField):
+                    raise PrecisionLost("the orbit meets special positions that balls cannot decide") from None
+        return _around_cycle(block, start, n)
+
+
+def _around_cycle(block: PlanarBlock, start: Triple, n: int) -> Triple:
+    """P_n over a small finite field, where orbits soon come back or meet a pole. Raises SingularStep."""
+    from kahanmaps.maps.normal_form.planar_block import same_point
+    from kahanmaps.maps.normal_form.rational_iterate import stepped_over
+
+    point = start
+    for k in range(1, n + 1):
+        if k > _CYCLE:
+            raise InputError(f"the iterate {n} cannot be reached directly here: take fewer steps or another prime")
+        point = stepped_over(block, point, 1)
+        if same_point(point, start):
+            return stepped_over(block, start, n % k)
+    return point
+
+
+def special_start(structure: Structure, eps: Any, start: Sequence[Any]) -> str:
+    """Empty, or why the orbit of a rational start is special in a plane, which balls cannot decide.
+
+    Special are planes in which the start is at rest, or on a singular level cubic (delta is 0 or 1).
+    """
+    from kahanmaps.maps.normal_form.splitting import Splitting
+
+    splitting = Splitting(structure.form, QQ, eps, structure.T)
+    for plane, (U, V, W) in zip(splitting.planes, splitting.triples([QQ.convert(x) for x in start]), strict=True):
+        above, below = plane.block.level((U, V, W))
+        if plane.block.is_zero or (U == 0 and V == 0):
+            return f"the start is at rest in the plane {plane.name}"
+        if below == 0 or above == 0 or plane.block.discriminant == 0:
+            return f"the start is on a singular level in the plane {plane.name}"
+        if plane.block.discriminant * above * above == below * below:
+            return f"the start is on three lines in the plane {plane.name}"
+    return ""

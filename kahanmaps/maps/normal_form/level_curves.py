@@ -1,0 +1,279 @@
+"""The level cubics of a plane as groups: the order of the translation Psi, and whether a point is an image of another.
+
+Elements are FLINT's, of a field of q elements of characteristic at least 5 (or of a number field, where only single
+sums are wanted); the levels are smooth. See maps/planar_block.py for the cubic E, its Jacobian and T.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isqrt
+from typing import Any
+
+from flint import fmpz, fq_default_ctx
+
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
+from kahanmaps.maps.normal_form.schoof import trace_modulo
+
+AffinePoint = tuple[Any, Any]
+
+_LARGEST_DIGIT = 2000
+_GIANTS_AT_ONCE = 2048
+_RADIUS = 1 << 32  # the largest interval searched without Schoof's algorithm, with about 2^17 steps
+
+
+class Jacobian:
+    """Y^2 = x^3 + a2 x^2 + a4 x + a6, the Jacobian with Y = y + 3x + 8 gamma, and T on it; None is its zero.
+
+    a2 = 9 + 3 gamma, a4 = 48 gamma, a6 = 64 gamma^2, T = (0, 8 gamma).
+
+    >>> from flint import fmpq
+    >>> E = Jacobian(fmpq(32, 27))
+    >>> E.multiple(5, E.T) is None, E.multiple(4, E.T) == E.negative(E.T)
+    (True, True)
+    """
+
+    def __init__(self, gamma: Any) -> None:
+        self.a2, self.a4 = 9 + 3 * gamma, 48 * gamma
+        self.T: AffinePoint = (0 * gamma, 8 * gamma)
+
+    @staticmethod
+    def negative(P: AffinePoint | None) -> AffinePoint | None:
+        """-P."""
+        return None if P is None else (P[0], -P[1])
+
+    def add(self, P: AffinePoint | None, Q: AffinePoint | None) -> AffinePoint | None:
+        """P + Q."""
+        if P is None or Q is None:
+            return Q if P is None else P
+        if P[0] != Q[0]:
+            slope = (Q[1] - P[1]) / (Q[0] - P[0])
+        elif P[1] == -Q[1]:
+            return None
+        else:
+            slope = ((3 * P[0] + 2 * self.a2) * P[0] + self.a4) / (2 * P[1])
+        x = slope * slope - self.a2 - P[0] - Q[0]
+        return x, slope * (P[0] - x) - P[1]
+
+    def multiple(self, n: int, P: AffinePoint | None) -> AffinePoint | None:
+        """n P for n >= 0."""
+        total: AffinePoint | None = None
+        for bit in bin(n)[2:]:
+            total = self.add(total, total)
+            if bit == "1":
+                total = self.add(total, P)
+        return total
+
+    def multiples(self, P: AffinePoint | None, length: int) -> tuple[list[AffinePoint], int | None]:
+        """P, 2P, ..., `length` P and None; if one of about these is zero, some of them and the order of P."""
+        if P is None:
+            return [], 1
+        points = [P]
+        while (k := len(points)) < length:
+            # j P + k P for all j < k, and the double of k P.
+            X, Y = points[-1]
+            others = points[: min(k - 1, length - k)]
+            differences = [x - X for x, _ in others]
+            for j, difference in enumerate(differences, 1):
+                if difference == 0:
+                    return points, j + k
+            for (x, y), inverse in zip(others, inverses(differences), strict=True):
+                slope = (y - Y) * inverse
+                above = slope * slope - self.a2 - x - X
+                points.append((above, slope * (X - above) - Y))
+            if len(points) < length:
+                double = self.add((X, Y), (X, Y))
+                if double is None:
+                    return points, 2 * k
+                points.append(double)
+        return points, None
+
+
+def inverses(values: Sequence[Any]) -> list[Any]:
+    """The inverses of elements none of which is zero, with one division."""
+    if not values:
+        return []
+    products = [values[0]]
+    for value in values[1:]:
+        products.append(products[-1] * value)
+    inverse = 1 / products.pop()
+    found = []
+    for value, before in zip(reversed(values[1:]), reversed(products), strict=True):
+        found.append(inverse * before)
+        inverse = inverse * value
+    found.append(inverse)
+    return found[::-1]
+
+
+def translation_order(gamma: Any, q: int, context: fq_default_ctx | None = None) -> int:
+    """The order of T over GF(q), or the field of q elements that is given; gamma is not 0 or 1.
+
+    A number k with k T = 0 is sought among those |k - q - 1| <= 2 sqrt(q), one of which is the number of points. In a
+    large field that is found modulo a product of small primes first (schoof.py). Then k is freed of the primes that it
+    can do without.
+    """
+    curve = Jacobian(gamma)
+    radius, middle, unit = isqrt(4 * q), q + 1, 1
+    if q < 1000:
+        _, order = curve.multiples(curve.T, 2 * q + 2)
+        assert order is not None
+        return order
+    if radius > _RADIUS:
+        field = fq_default_ctx(q, 1) if context is None else context
+        a2, a4, a6 = (c if context is not None else field(int(c)) for c in (curve.a2, curve.a4, 64 * gamma * gamma))
+        trace, unit = trace_modulo(a2, a4, a6, field, radius // _RADIUS)
+        middle -= trace if 2 * trace <= unit else trace - unit
+    return _reduced(curve, _annihilator(curve, middle, unit, radius // unit + 2))
+
+
+def _annihilator(curve: Jacobian, middle: int, unit: int, radius: int) -> int:
+    """Some k > 0 with k T = 0, where one is `middle` + m `unit`, |m| <= `radius`.
+
+    m is sought as i (2b + 1) - j with |j| <= b: b baby steps of `unit` T, and giant steps of (2b + 1) `unit` T.
+    """
+    babies, order = curve.multiples(curve.multiple(unit, curve.T), isqrt(radius) + 2)
+    if order is not None:
+        return unit * order
+    stride = (2 * len(babies) + 1) * unit
+    centre, leap = curve.multiple(middle, curve.T), curve.multiple(stride, curve.T)
+    if centre is None:
+        return middle
+    index = {x: j * unit for j, (x, _) in enumerate(babies, 1)}
+    giants, order = curve.multiples(leap, radius * unit // stride + 2)
+    if order is not None:
+        return stride * order
+    if centre[0] in index:
+        return _matched(middle, index[centre[0]], centre, babies, unit)
+    for first in range(0, len(giants), _GIANTS_AT_ONCE):
+        batch = giants[first : first + _GIANTS_AT_ONCE]
+        differences = [x - centre[0] for x, _ in batch]
+        for i, difference in enumerate(differences, first + 1):
+            if difference == 0:  # i leaps lead to the centre or to its negative
+                return abs(middle - i * stride if giants[i - 1] == centre else middle + i * stride)
+        shift = curve.a2 + centre[0]
+        for i, ((x, y), inverse) in enumerate(zip(batch, inverses(differences), strict=True), first + 1):
+            for sign, rise in ((1, y - centre[1]), (-1, -y - centre[1])):
+                slope = rise * inverse
+                above = slope * slope - shift - x
+                if above in index:
+                    point = (above, slope * (centre[0] - above) - centre[1])
+                    return _matched(middle + sign * i * stride, index[above], point, babies, unit)
+    raise AssertionError("no multiple of T in the Hasse interval is zero: it would be a mistake of ours")
+
+
+def _matched(k: int, j: int, point: AffinePoint, babies: list[AffinePoint], unit: int) -> int:
+    """k - j or k + j, for k T = `point` = +-j T."""
+    return abs(k - j if point[1] == babies[j // unit - 1][1] else k + j)
+
+
+def _reduced(curve: Jacobian, k: int) -> int:
+    """The order of T, which divides k."""
+    for factor, exponent in fmpz(k).factor():
+        for _ in range(int(exponent)):
+            if curve.multiple(k // int(factor), curve.T) is not None:
+                break
+            k //= int(factor)
+    return k
+
+
+def number_of_points(order: int, q: int) -> int | None:
+    """The number of points of the curve if T of this order leaves no choice in the Hasse interval."""
+    radius = isqrt(4 * q)
+    first = -(-(q + 1 - radius) // order) * order
+    return first if first + order > q + 1 + radius else None
+
+
+class LevelCubic:
+    """A smooth level cubic above h - below W (W^2 + D), as a group with a point of it for its zero.
+
+    The sum of points comes from chords and tangents, with no normal form. Its points are triples, not normalised.
+    """
+
+    def __init__(self, block: PlanarBlock, above: Any, below: Any, zero: Triple) -> None:
+        self.block, self.above, self.below, self.zero = block, above, below, zero
+        self._opposite = self.third(zero, zero)
+
+    def gradient(self, P: Triple) -> Triple:
+        """The three derivatives at P of F = below h - above W (W^2 + D)."""
+        (U, V, W), (p, q, r), block = P, self.block.D, self.block
+        along = self.above * W
+        return (
+            self.below * ((3 * block.a * U + 2 * block.b * V) * U + block.c * V * V) - along * (2 * p * U + q * V),
+            self.below * (block.b * U * U + (2 * block.c * U + 3 * block.d * V) * V) - along * (q * U + 2 * r * V),
+            -self.above * (3 * W * W + p * U * U + q * U * V + r * V * V),
+        )
+
+    def third(self, P: Triple, Q: Triple) -> Triple:
+        """The third point of the cubic on the line through P and Q, on the tangent where they are the same."""
+        if not same_point(P, Q):
+            s, t = _dot(self.gradient(P), Q), _dot(self.gradient(Q), P)
+            return t * P[0] - s * Q[0], t * P[1] - s * Q[1], t * P[2] - s * Q[2]
+        a, b, c = self.gradient(P)
+        nought = 0 * a
+        candidates = [(b, -a, nought), (c, nought, -a), (nought, c, -b)]
+        X = next(X for X in candidates if any(entry != 0 for entry in X) and not same_point(X, P))
+        gradient = self.gradient(X)
+        s, t = _dot(gradient, P), _dot(gradient, X) / 3
+        return t * P[0] - s * X[0], t * P[1] - s * X[1], t * P[2] - s * X[2]
+
+    def add(self, P: Triple, Q: Triple) -> Triple:
+        """P + Q."""
+        return self.third(self.zero, self.third(P, Q))
+
+    def subtract(self, P: Triple, Q: Triple) -> Triple:
+        """P - Q."""
+        return self.add(P, self.third(Q, self._opposite))
+
+    def multiple(self, n: int, P: Triple) -> Triple:
+        """n P for n >= 0."""
+        total = self.zero
+        for bit in bin(n)[2:]:
+            total = self.add(total, total)
+            if bit == "1":
+                total = self.add(total, P)
+        return total
+
+    def is_zero(self, P: Triple) -> bool:
+        """Whether P is the zero of the group."""
+        return same_point(P, self.zero)
+
+    def is_multiple(self, P: Triple, T: Triple, order: int, q: int) -> bool | None:
+        """Whether P is among the multiples of T, which has this order; None: not known.
+
+        It is none if order P is not zero. Otherwise, for every prime l that divides both the order and the index of
+        the multiples of T, the parts of P and T of l-power order are compared by one logarithm; the others agree.
+        """
+        if not self.is_zero(self.multiple(order, P)):
+            return False
+        points = number_of_points(order, q)
+        if points is None:
+            return None
+        unknown = False
+        for factor, exponent in fmpz(order).factor():
+            prime, power = int(factor), int(factor) ** int(exponent)
+            if points // order % prime != 0:
+                continue
+            if prime > _LARGEST_DIGIT:
+                unknown = True
+            elif not self._is_power(self.multiple(order // power, P), self.multiple(order // power, T), prime, power):
+                return False
+        return None if unknown else True
+
+    def _is_power(self, P: Triple, T: Triple, prime: int, power: int) -> bool:
+        """Whether P is a multiple of T, which has the order `power`, a power of the prime, and power P = 0."""
+        top = self.multiple(power // prime, T)
+        unit = 1
+        while unit < power:
+            # P = unit (...) + what has been taken off, so far.
+            rest, digit, step = self.multiple(power // prime // unit, P), 0, self.zero
+            while not same_point(rest, step):
+                digit, step = digit + 1, self.add(step, top)
+                if digit == prime:
+                    return False
+            P = self.subtract(P, self.multiple(digit * unit, T))
+            unit *= prime
+        return self.is_zero(P)
+
+
+def _dot(P: Triple, Q: Triple) -> Any:
+    return P[0] * Q[0] + P[1] * Q[1] + P[2] * Q[2]

@@ -1,0 +1,436 @@
+"""The exact period of an orbit of a family member: over GF(p) without walking it, over Q with a proof.
+
+In every plane of the normal form the Kahan map is a translation of the level cubic (maps/planar_block.py), and its
+period is the order of the point T = (0, 0) of the Jacobian y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, the same for all
+points of a level. Over a field of q elements a multiple of it lies in the Hasse interval q + 1 +- 2 sqrt(q), where baby
+steps and giant steps find it, about q^(1/4) of each; in large fields Schoof's algorithm narrows the interval first. The
+period of the orbit is the least common multiple.
+
+The translation goes on where the map does not: through poles, where W = 0. Whether an orbit meets one is decided too.
+On a smooth level the poles are the points (U : V : 0) with h(U, V) = 0. Without a root of h in the field there are
+none; otherwise the question is whether P - (U : V : 0) is a multiple of T.
+
+Levels with a singular cubic have their own, elementary answers: see `Kind`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from math import lcm
+from typing import Any
+
+from flint import (
+    fmpq,
+    fmpz,
+    fmpz_mod_ctx,
+    fmpz_mod_poly_ctx,
+    fq_default_ctx,
+    fq_default_poly_ctx,
+)
+
+from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.displayed import Displayed
+from kahanmaps.family.planar import NormalForm
+from kahanmaps.family.structure import Structure
+from kahanmaps.maps.normal_form.level_curves import Jacobian, LevelCubic, translation_order
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, same_point
+from kahanmaps.maps.normal_form.splitting import Plane, Splitting
+
+LARGEST_FIELD = 1 << 192  # of so many elements: it takes a minute or two
+_WALK = 1 << 16  # steps taken where no theorem helps
+_AGREEMENTS = 8
+
+
+class Kind(StrEnum):
+    """What the level cubic of a plane is, and so how its period is found (p is not 2 or 3)."""
+
+    FIXED = "a fixed point"  # period 1
+    SMOOTH = "a smooth level cubic"  # delta is not 0, 1 or infinite: the order of T
+    ADDITIVE = "a level with delta = 0"  # a parabolic map: period p, over Q none
+    TRIANGLE = "a level with delta = 1, three lines"  # Psi^3 multiplies by -8 along a line: 3 ord(-8), over Q none
+    VERTEX = "a vertex of the three lines"  # period 3
+    AT_POLE = "a pole at the start"  # W (W^2 + D) = 0, a conic and a line: period 4
+    NO_VALUE = "a start where the map has no value"  # a base point of the levels, or disc(h) = 0 there: none
+    STEPPED = "characteristic 2 or 3"  # walked
+
+
+@dataclass(frozen=True)
+class PlanePeriod:
+    """The period in one plane, over a field of `q` elements (0: of characteristic 0).
+
+    `period` is None where there is none (`status` "aperiodic" or "undefined") or it was not found ("undecided").
+    `meets_pole` says whether the orbit runs into a pole of the map, or starts at one; None: not known.
+    """
+
+    name: str
+    q: int
+    kind: Kind
+    status: str
+    period: int | None
+    meets_pole: bool | None
+    reason: str = ""
+
+    @property
+    def text(self) -> str:
+        """One line."""
+        what = f"period {self.period}" if self.period is not None else self.status
+        return f"{self.name}: {what} ({self.kind}{'; ' + self.reason if self.reason else ''})"
+
+
+@dataclass(frozen=True)
+class OrbitPeriod(Displayed):
+    """The period of an orbit, continued through poles: the least common multiple over the planes.
+
+    `status` is "periodic", "aperiodic" (proved), "undefined" (a plane starts where the map has no value and cannot be
+    continued) or "undecided". If `meets_pole` is False, the map itself brings the start back after `period` steps and
+    not before; if True, the orbit of the map ends at the pole; None: not known.
+    """
+
+    period: int | None
+    status: str
+    meets_pole: bool | None
+    planes: tuple[PlanePeriod, ...]
+
+    @property
+    def text(self) -> str:
+        """A sentence, and a line for each plane."""
+        lines = [self._sentence(), *(plane.text for plane in self.planes)]
+        return "\n".join(lines)
+
+    def _sentence(self) -> str:
+        if self.period is None:
+            return {
+                "aperiodic": "the orbit has no period",
+                "undefined": "the orbit comes to a point where the map has no value and cannot be continued",
+            }.get(self.status, "the period was not found")
+        if self.meets_pole is False:
+            return f"the orbit has period {self.period} and meets no pole of the map"
+        if self.meets_pole:
+            return f"continued through its poles the orbit has period {self.period}; the map itself stops at a pole"
+        return f"continued through its poles, if it meets any, the orbit has period {self.period}"
+
+
+def orbit_period(
+    form: NormalForm, eps: Any, start: Sequence[Any], prime: int, *, largest: int = LARGEST_FIELD
+) -> OrbitPeriod:
+    """The exact period modulo p of the orbit of `start` under the Kahan map at `eps` (the time step is 2 eps).
+
+    The period of a plane over a field of more than `largest` elements is "undecided". Raises BadPrime
+    where the member has no normal form modulo p, InputError for a wrong start.
+
+    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.planar import normal_form
+    >>> form = normal_form(draw_with_eigenvalues([1, -2], seed=7))
+    >>> found = orbit_period(form, "1/10", ["1/2", "-1/3", 0, 1], 2**61 - 1)
+    >>> found.period, found.meets_pole
+    (332306998856115862344354572863389520, True)
+    """
+    field = GF(prime)
+    splitting = Splitting(form, field, eps)
+    triples = splitting.triples([field.convert(value) for value in start])
+    return _joined(
+        [
+            plane_period(plane.block, triple, prime, _context(plane, prime), name=plane.name, largest=largest)
+            for plane, triple in zip(splitting.planes, triples, strict=True)
+        ]
+    )
+
+
+def _context(plane: Plane, prime: int) -> fq_default_ctx | None:
+    """The field of a plane over GF(p), for degree > 1: FLINT's elements do not tell it, but t^degree does."""
+    if plane.degree == 1:
+        return None
+    t = plane.residue([0, 1])
+    ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(prime))
+    modulus = [-int(c) for c in (t**plane.degree).to_list()]
+    return fq_default_ctx(modulus=ring([*modulus, *([0] * (plane.degree - len(modulus))), 1]))
+
+
+def _joined(planes: list[PlanePeriod]) -> OrbitPeriod:
+    """The verdict for the orbit; of the planes, the worst speaks."""
+    statuses = [plane.status for plane in planes]
+    worst = next((s for s in ("undefined", "aperiodic", "undecided") if s in statuses), "periodic")
+    period = lcm(*(plane.period or 1 for plane in planes)) if worst == "periodic" else None
+    poles = [plane.meets_pole for plane in planes]
+    meets = True if True in poles else (None if None in poles else False)
+    return OrbitPeriod(period, worst, meets, tuple(planes))
+
+
+def plane_period(
+    block: PlanarBlock,
+    point: Triple,
+    prime: int,
+    context: fq_default_ctx | None = None,
+    *,
+    name: str = "the plane",
+    largest: int = LARGEST_FIELD,
+) -> PlanePeriod:
+    """The period of (U : V : 1) under Psi of a block over GF(p), or over the extension of it that is given.
+
+    >>> from flint import nmod
+    >>> block = PlanarBlock(*(nmod(c, 10007) for c in (1, 0, 2, 1)))
+    >>> plane_period(block, (nmod(3, 10007), nmod(4, 10007), nmod(1, 10007)), 10007).text
+    'the plane: period 3347 (a smooth level cubic)'
+    """
+    q = prime if context is None else int(context.order())
+    if prime <= 3:
+        return _by_walking(block, point, q, name)
+    kind, gamma = _classify(block, point)
+
+    def found(period: int | None, meets_pole: bool | None, reason: str = "", status: str = "periodic") -> PlanePeriod:
+        return PlanePeriod(name, q, kind, status, period, meets_pole, reason)
+
+    if kind is Kind.FIXED:
+        return found(1, False)
+    if kind is Kind.NO_VALUE:
+        return found(None, True, status="undefined")
+    if kind is Kind.AT_POLE:
+        return found(4, True)
+    if kind is Kind.ADDITIVE:
+        return found(prime, _parabolic_meets_pole(block, point, prime))
+    if kind is Kind.VERTEX:
+        return found(3, False)
+    if kind is Kind.TRIANGLE:
+        period = 3 * _multiplicative_order(-8, prime)
+        return found(period, _walk_meets_pole(block, point, period) if poles(block, prime, context) else False)
+    if q > largest:
+        reason = f"its field has {_size(q)} elements, more than {_size(largest)}"
+        return found(None, None if poles(block, prime, context) else False, reason, status="undecided")
+    order = translation_order(gamma, q, context)
+    return found(order, _smooth_meets_pole(block, point, order, q, poles(block, prime, context)))
+
+
+def _size(q: int) -> str:
+    return str(q) if q < 10**6 else f"about 2^{q.bit_length() - 1}"
+
+
+def _classify(block: PlanarBlock, point: Triple) -> tuple[Kind, Any]:
+    """The kind of a point (U : V : 1) outside characteristics 2 and 3, and gamma if the level is smooth."""
+    above, below = block.level(point)
+    if block.is_zero or (point[0] == 0 and point[1] == 0):
+        return Kind.FIXED, None
+    disc = block.discriminant
+    if below == 0:
+        return (Kind.NO_VALUE if above == 0 or disc == 0 else Kind.AT_POLE), None
+    delta = disc * above * above / (below * below)
+    if delta == 0:
+        return (Kind.FIXED if same_point(block.image(point), point) else Kind.ADDITIVE), None
+    gamma = 1 - delta
+    if gamma == 0:
+        image = point
+        for _ in range(3):
+            image = block.image(image)
+        # A base point is no vertex, so that the vertices have images, and (0, 0, 0) is none.
+        vertex = any(entry != 0 for entry in image) and same_point(image, point)
+        return (Kind.VERTEX if vertex else Kind.TRIANGLE), None
+    return Kind.SMOOTH, gamma
+
+
+def _multiplicative_order(number: int, prime: int) -> int:
+    order = prime - 1
+    for factor, exponent in fmpz(order).factor():
+        for _ in range(exponent):
+            if pow(number, order // int(factor), prime) != 1:
+                break
+            order //= int(factor)
+    return order
+
+
+# Poles.
+
+
+def poles(block: PlanarBlock, prime: int, context: fq_default_ctx | None = None) -> list[Triple]:
+    """The points (U : V : 0) with h(U, V) = 0 over GF(p), or over the extension of it that is given.
+
+    >>> from flint import nmod
+    >>> sorted(poles(PlanarBlock(*(nmod(c, 7) for c in (1, 0, 0, 6))), 7), key=str)
+    [(1, 1, 0), (2, 1, 0), (4, 1, 0)]
+    """
+    nought = 0 * block.a
+    one = nought + 1
+    found: list[Triple] = [(one, nought, nought)] if block.a == 0 else []
+    coefficients: list[Any] = [block.d, block.c, block.b, block.a]
+    if context is None:
+        ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(prime))
+        factors: Any = ring([fmpz(int(c)) for c in coefficients]).factor()[1]
+    else:
+        factors = fq_default_poly_ctx(context)(coefficients).factor()[1]  # type: ignore[arg-type]
+    roots = [-factor[0] for factor, _ in factors if factor.degree() == 1]
+    return found + [(nought + (int(root) if context is None else root), one, nought) for root in roots]
+
+
+def _smooth_meets_pole(block: PlanarBlock, point: Triple, order: int, q: int, at_infinity: list[Triple]) -> bool | None:
+    """Whether one of the poles is an image of the point, on a smooth level where Psi has this order."""
+    above, below = block.level(point)
+    unknown = False
+    for pole in at_infinity:
+        # With the pole as zero of the group, T is its image, and the question is whether the point is a multiple.
+        cubic = LevelCubic(block, above, below, pole)
+        answer = cubic.is_multiple(point, block.image(pole), order, q)
+        if answer:
+            return True
+        unknown = unknown or answer is None
+    if unknown:
+        return _walk_meets_pole(block, point, order)
+    return False
+
+
+def _parabolic_meets_pole(block: PlanarBlock, point: Triple, prime: int) -> bool:
+    """On a level with delta = 0 one step takes 1 from W/s, where s^2 = -D: is W/s an element of GF(p)?"""
+    p, q, r = block.D
+    U, V, W = point
+    D = p * U * U + q * U * V + r * V * V
+    if D == 0:
+        return False
+    square = -W * W / D
+    return bool(square ** ((prime - 1) // 2) == square * 0 + 1)
+
+
+def _walk_meets_pole(block: PlanarBlock, point: Triple, period: int) -> bool | None:
+    """The same by walking, if the period is not long."""
+    image = point
+    for _ in range(min(period, _WALK)):
+        image = block.image(image)
+        if image[2] == 0:
+            return True
+    return None if period > _WALK else False
+
+
+def _by_walking(block: PlanarBlock, point: Triple, q: int, name: str) -> PlanePeriod:
+    """In characteristics 2 and 3: the first return, poles passed over where the formula leads on."""
+    image, met = point, bool(block.level(point)[1] == 0)
+    for step in range(1, min(q * q + q + 1, _WALK) + 1):
+        image = block.image(image)
+        if all(entry == 0 for entry in image):
+            return PlanePeriod(name, q, Kind.STEPPED, "undefined", None, True, f"no value after {step} steps")
+        met = met or bool(image[2] == 0)
+        if same_point(image, point):
+            return PlanePeriod(name, q, Kind.STEPPED, "periodic", step, met)
+    return PlanePeriod(name, q, Kind.STEPPED, "undecided", None, met or None, "the start did not come back")
+
+
+# Over the rationals.
+
+
+def period_of(structure: Structure, eps: Any, start: Sequence[Any], prime: int | None = None) -> OrbitPeriod:
+    """The period of the orbit of `start`, in the system's own coordinates, modulo a prime or (None) over Q.
+
+    `structure` is that of the system (family.structure.structure_of); otherwise like `orbit_period` and
+    `period_over_rationals`.
+
+    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.structure import structure_of
+    >>> structure = structure_of(draw_with_eigenvalues([1, -2], seed=7).chosen.system)
+    >>> period_of(structure, "1/10", ["1/2", "-1/3", 0, 1]).status
+    'aperiodic'
+    """
+    field = QQ if prime is None else GF(prime)
+    point = [field.convert(entry) for entry in start]
+    if structure.T is not None:  # x = T y with y the coordinates of the normal form
+        field.convert_matrix(structure.T)  # the prime may divide neither denominator
+        point = (field.convert_matrix(structure.T.inv()) * field.column(point)).entries()
+    if prime is None:
+        return period_over_rationals(structure.form, eps, point)
+    return orbit_period(structure.form, eps, point, prime)
+
+
+def period_over_rationals(form: NormalForm, eps: Any, start: Sequence[Any]) -> OrbitPeriod:
+    """The period over Q of the orbit of `start` under the Kahan map at `eps` (the time step is 2 eps), or a proof
+    that there is none.
+
+    Reduction modulo an unramified odd prime of good reduction is injective on torsion. So T has infinite order if it
+    has different orders modulo two such primes; where they agree, n T = 0 is put to the test over the field itself.
+
+    >>> from kahanmaps.family.draw import draw_with_eigenvalues
+    >>> from kahanmaps.family.planar import normal_form
+    >>> form = normal_form(draw_with_eigenvalues([1, -2], seed=7))
+    >>> period_over_rationals(form, "1/10", ["1/2", "-1/3", 0, 1]).status
+    'aperiodic'
+    """
+    splitting = Splitting(form, QQ, eps)
+    triples = splitting.triples([QQ.convert(value) for value in start])
+    return _joined(
+        [
+            plane_period_over_rationals(plane.block, triple, name=plane.name)
+            for plane, triple in zip(splitting.planes, triples, strict=True)
+        ]
+    )
+
+
+def plane_period_over_rationals(block: PlanarBlock, point: Triple, *, name: str = "the plane") -> PlanePeriod:
+    """The period of (U : V : 1) under Psi of a block over Q, or over Q[t]/g with g irreducible.
+
+    >>> block = PlanarBlock(*(fmpq(c) for c in (0, 2, -1, 2)))
+    >>> plane_period_over_rationals(block, (fmpq(-1, 3), fmpq(-1, 3), fmpq(1))).text
+    'the plane: period 5 (a smooth level cubic; 5 T = 0)'
+    """
+    kind, gamma = _classify(block, point)
+
+    def found(status: str, period: int | None = None, meets_pole: bool | None = None, reason: str = "") -> PlanePeriod:
+        return PlanePeriod(name, 0, kind, status, period, meets_pole, reason)
+
+    if kind is Kind.FIXED:
+        return found("periodic", 1, False)
+    if kind is Kind.NO_VALUE:
+        return found("undefined", None, True)
+    if kind is Kind.AT_POLE:
+        return found("periodic", 4, True)
+    if kind is Kind.VERTEX:
+        return found("periodic", 3, False)
+    if kind is not Kind.SMOOTH:
+        return found("aperiodic", reason="a parabolic map" if kind is Kind.ADDITIVE else "-8 is no root of unity")
+    order, reason = torsion_order(gamma)
+    if order is None:
+        return found("aperiodic", reason=reason)
+    return found("periodic", order, _walk_meets_pole(block, point, order), reason)
+
+
+def torsion_order(gamma: Any) -> tuple[int | None, str]:
+    """The order of T over Q, or Q[t]/g with g irreducible, None for an infinite one, and the reason.
+
+    >>> torsion_order(fmpq(32, 27)), torsion_order(fmpq(3))
+    ((5, '5 T = 0'), (None, 'T has the orders 54 and 88 modulo 101 and 103'))
+    """
+    seen: list[tuple[int, str]] = []
+    for prime, residue, context in _reductions(gamma):
+        if residue == 0 or residue == 1:
+            continue
+        place = f"{prime}" if context is None else f"a prime over {prime}"
+        seen.append((translation_order(residue, prime if context is None else int(context.order()), context), place))
+        (first, there), (last, here) = seen[0], seen[-1]
+        if first != last:
+            return None, f"T has the orders {first} and {last} modulo {there} and {here}"
+        if len(seen) == _AGREEMENTS:
+            curve = Jacobian(gamma)
+            if curve.multiple(first, curve.T) is None:
+                return first, f"{first} T = 0"
+    raise AssertionError("there are infinitely many primes")
+
+
+def _reductions(gamma: Any) -> Iterator[tuple[int, Any, fq_default_ctx | None]]:
+    """Unramified primes above 100 with gamma modulo each, in the smallest residue field there is above the prime."""
+    modulus = None if isinstance(gamma, fmpq) else gamma.field.chi
+    element = gamma if modulus is None else gamma.polynomial
+    denominator = element.q if modulus is None else element.denom() * modulus.denom()
+    prime = 100
+    while True:
+        prime += 1
+        if not fmpz(prime).is_prime() or denominator % prime == 0:
+            continue
+        field = GF(prime)
+        if modulus is None:
+            yield prime, field.convert(element), None
+            continue
+        ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(prime))
+        factors = ring([fmpz(int(field.convert(c))) for c in modulus.coeffs()]).factor()[1]
+        if any(exponent > 1 for _, exponent in factors):
+            continue
+        factor = min((f for f, _ in factors), key=lambda f: int(f.degree()))
+        rest = ring([fmpz(int(field.convert(c))) for c in element.coeffs()]) % factor
+        if factor.degree() == 1:
+            yield prime, field.convert(int(rest[0])), None
+        else:
+            context = fq_default_ctx(modulus=factor)
+            yield prime, context(rest), context

@@ -1,0 +1,237 @@
+"""The planes into which the normal form splits over a field, and the way from a point to its planes and back.
+
+Over Q there is one plane for each irreducible factor g of chi, with coordinates in Q[t]/g; over GF(p) one for each
+factor of chi modulo p, with coordinates in GF(p^deg g); over real balls one for each real root and one, with complex
+coordinates, for each pair of complex roots. In each plane the Kahan map is `PlanarBlock`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import acb, fmpq, fmpq_mat, fmpq_poly, fmpz, fmpz_mod_ctx, fmpz_mod_poly_ctx, fq_default_ctx
+
+from kahanmaps.algebra.etale import EtaleAlgebra
+from kahanmaps.algebra.fields import QQ, BallField, Field, PrimeField
+from kahanmaps.algebra.text import format_univariate
+from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.family.planar import NormalForm
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """One plane: `name` says at which root or factor of chi, `degree` is that of its field over the field of x.
+
+    `residue` takes the coefficients of an element of K (elements of the field of x) to its value in the plane, and
+    `coefficients` takes a value in the plane to `degree` elements of the field of x (two for a complex pair).
+    """
+
+    name: str
+    degree: int
+    block: PlanarBlock
+    residue: Any
+    coefficients: Any
+
+
+class Splitting:
+    """The planes of a normal form over QQ, GF(p) or real balls, for the map with this eps (the time step is 2 eps).
+
+    `T` is the change x = T y from the coordinates y of the form, None for none. Raises BadPrime where there is no
+    reduction modulo p, or chi has a repeated root there.
+    """
+
+    def __init__(self, form: NormalForm, field: Field, eps: Any, T: fmpq_mat | None = None) -> None:
+        self.form, self.field = form, field
+        S = form.S if T is None else T * form.S
+        with field.working():
+            self.eps = field.convert(eps)
+            self._scale = 2 * self.eps
+            if self.eps == 0:
+                raise BadPrime(f"eps = 0 in {field}: take another prime", field.characteristic)
+            self._inverse = field.convert_matrix(S.inv())
+            planes, lifts = _planes(form, field)
+            self.planes: tuple[Plane, ...] = tuple(planes)
+            rows = field.convert_matrix(S).tolist()
+            m = form.m
+            # x = sum over planes of `matrix` times the coefficients of u, then those of v.
+            self._matrices = []
+            for lift in lifts:
+                columns = []
+                for half in (0, m):
+                    for column in lift:
+                        columns.append([_dot(row[half : half + m], column, field) for row in rows])
+                self._matrices.append(columns)
+
+    @property
+    def dim(self) -> int:
+        """2m."""
+        return self.form.dim
+
+    def matrix(self, plane: int) -> list[list[Any]]:
+        """The rows of R with x = sum over the planes of R (u, v), coefficients of u and v in the field of x."""
+        return [list(row) for row in zip(*self._matrices[plane], strict=True)]
+
+    def triples(self, x: Sequence[Any]) -> list[Triple]:
+        """The homogeneous coordinates (2 eps u : 2 eps v : 1) of a point in every plane."""
+        n, m = self.dim, self.form.m
+        if len(x) != n:
+            raise InputError(f"found a point with {len(x)} coordinates, expected {n}")
+        with self.field.working():
+            z = (self._inverse * self.field.matrix(n, 1, list(x))).entries()
+            z = [entry * self._scale for entry in z]
+            found = []
+            for plane in self.planes:
+                U, V = plane.residue(z[:m]), plane.residue(z[m:])
+                found.append((U, V, U * 0 + 1))
+            return found
+
+    def point(self, triples: Sequence[Triple]) -> tuple[Any, ...]:
+        """The point with these homogeneous coordinates. Raises SingularStep where one of them is at infinity."""
+        with self.field.working():
+            total = [self.field.zero] * self.dim
+            for plane, (U, V, W), columns in zip(self.planes, triples, self._matrices, strict=True):
+                if W == 0:
+                    raise SingularStep("one of the planes is at infinity: the map has a pole here")
+                values = [*plane.coefficients(U / W), *plane.coefficients(V / W)]
+                for column, value in zip(columns, values, strict=True):
+                    total = [entry + factor * value for entry, factor in zip(total, column, strict=True)]
+            return tuple(entry / self._scale for entry in total)
+
+
+def _dot(row: Sequence[Any], column: Sequence[Any], field: Field) -> Any:
+    return sum((a * b for a, b in zip(row, column, strict=True)), field.zero)
+
+
+def _planes(form: NormalForm, field: Field) -> tuple[list[Plane], list[list[list[Any]]]]:
+    """The planes, and for each the coefficients in K of the elements that its own coefficients stand for."""
+    if field is QQ:
+        return _over_rationals(form)
+    if isinstance(field, PrimeField):
+        return _modulo(form, field)
+    if isinstance(field, BallField):
+        return _over_balls(form, field)
+    raise InputError(f"found the field {field}, expected QQ, GF(p) or real balls")
+
+
+def _over_rationals(form: NormalForm) -> tuple[list[Plane], list[list[list[Any]]]]:
+    planes, lifts = [], []
+    for factor in rational_factors(form.chi):
+        degree = int(factor.degree())
+        if degree == 1:
+            root = -factor[0]
+
+            def residue(z: Sequence[fmpq], root: fmpq = root) -> fmpq:
+                return fmpq_poly(list(z))(root)
+
+            plane = Plane(
+                f"t = {root}", 1, PlanarBlock(*(c(root) for c in form.coefficients)), residue, lambda value: [value]
+            )
+        else:
+            algebra = EtaleAlgebra(factor)
+
+            def residue_class(z: Sequence[fmpq], algebra: EtaleAlgebra = algebra) -> Any:
+                return algebra.convert(fmpq_poly(list(z)))
+
+            block = PlanarBlock(*(algebra.convert(c) for c in form.coefficients))
+            plane = Plane(
+                f"{format_univariate(factor)} = 0", degree, block, residue_class, lambda value: value.coefficients
+            )
+        planes.append(plane)
+        # The element that is 1 modulo this factor and 0 modulo the others.
+        others = form.chi // factor
+        _, inverse, _ = others.xgcd(factor)
+        unit = others * inverse % form.chi
+        t = fmpq_poly([0, 1])
+        lifts.append([[(unit * t**k % form.chi)[i] for i in range(form.m)] for k in range(degree)])
+    return planes, lifts
+
+
+def rational_factors(chi: fmpq_poly) -> list[fmpq_poly]:
+    """The monic irreducible factors over Q: linear ones by increasing root, then by degree and coefficients."""
+    factors = [factor / factor.leading_coefficient() for factor, _ in chi.factor()[1]]
+    return sorted(factors, key=lambda f: (f.degree(), [-c for c in f.coeffs()] if f.degree() == 1 else f.coeffs()))
+
+
+def _modulo(form: NormalForm, field: PrimeField) -> tuple[list[Plane], list[list[list[Any]]]]:
+    p = field.prime
+    ring = fmpz_mod_poly_ctx(fmpz_mod_ctx(p))
+
+    def polynomial(coefficients: Sequence[Any]) -> Any:
+        return ring([fmpz(int(c)) for c in coefficients])
+
+    chi = polynomial([field.convert(c) for c in form.chi.coeffs()])
+    elements = [polynomial([field.convert(c) for c in e.coeffs()] or [0]) for e in form.coefficients]
+    factors = chi.factor()[1]
+    if any(exponent > 1 for _, exponent in factors):
+        raise BadPrime(f"chi has a repeated root modulo {p}: take another prime", p)
+    planes, lifts = [], []
+    for factor, _ in sorted(factors, key=lambda pair: (pair[0].degree(), [int(c) for c in pair[0].coeffs()])):
+        degree = int(factor.degree())
+        if degree == 1:
+            root = -factor[0]
+
+            def residue(z: Sequence[Any], root: Any = root) -> Any:
+                return field.convert(int(polynomial(z)(root)))
+
+            block = PlanarBlock(*(field.convert(int(e(root))) for e in elements))
+            plane = Plane(f"t = {int(root)} mod {p}", 1, block, residue, lambda value: [value])
+        else:
+            extension = fq_default_ctx(modulus=factor)
+
+            def residue_class(z: Sequence[Any], factor: Any = factor, extension: Any = extension) -> Any:
+                return extension([int(c) for c in (polynomial(z) % factor).coeffs()] or [0])
+
+            def coefficients(value: Any, degree: int = degree) -> list[Any]:
+                known = [field.convert(int(c)) for c in value.to_list()]
+                return known + [field.zero] * (degree - len(known))
+
+            block = PlanarBlock(*(residue_class(e.coeffs()) for e in elements))
+            plane = Plane(f"a factor of degree {degree} of chi mod {p}", degree, block, residue_class, coefficients)
+        planes.append(plane)
+        others = chi // factor
+        _, inverse, _ = others.xgcd(factor)
+        unit = others * inverse % chi
+        t = ring([0, 1])
+        powers = [unit * t**k % chi for k in range(degree)]
+        lifts.append([[field.convert(int(power[i])) for i in range(form.m)] for power in powers])
+    return planes, lifts
+
+
+def _over_balls(form: NormalForm, field: BallField) -> tuple[list[Plane], list[list[list[Any]]]]:
+    planes, lifts = [], []
+    slope = form.chi.derivative()
+    for found in form.chi.complex_roots():
+        root: Any = found[0]  # type: ignore[index]  # the stub has forgotten the multiplicity
+        if root.imag < 0:
+            continue
+        real = bool(root.imag == 0)
+        at: Any = root.real if real else root
+
+        def value_at(coefficients: Sequence[Any], at: Any = at) -> Any:
+            total = at * 0
+            for coefficient in reversed(coefficients):
+                total = total * at + coefficient
+            return total
+
+        block = PlanarBlock(*(value_at(_balls(c, field)) for c in form.coefficients))
+        # chi / (t - root) by Horner's rule; divided by chi'(root) it is 1 at the root and 0 at the others.
+        chi, below = _balls(form.chi, field), value_at(_balls(slope, field))
+        quotient = [chi[-1]]
+        for coefficient in chi[-2:0:-1]:
+            quotient.append(quotient[-1] * at + coefficient)
+        unit = [entry / below for entry in reversed(quotient)]
+        if real:
+            planes.append(Plane(f"t = {at.str(8, radius=False)}", 1, block, value_at, lambda value: [value]))
+            lifts.append([unit])
+        else:
+            name = f"t = {acb(at).str(8, radius=False)} and its conjugate"
+            planes.append(Plane(name, 2, block, value_at, lambda value: [value.real, value.imag]))
+            lifts.append([[2 * acb(e).real for e in unit], [-2 * acb(e).imag for e in unit]])
+    return planes, lifts
+
+
+def _balls(element: fmpq_poly, field: BallField) -> list[Any]:
+    return [field.convert(c) for c in element.coeffs()]

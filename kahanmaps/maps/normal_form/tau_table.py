@@ -1,0 +1,234 @@
+"""psi_n and chi_n over Q for any n, from those near n/2: the table behind exact steps and behind the n-th iterate.
+
+A value phi_n is kept as an integer prime to the bad primes times a scale s_n that is never formed (see `tau`). With k
+= n // 2 the bilinear relation for psi_{2k}, psi_{2k+1} takes (a, b) = (k+1, k-1), (k+1, k), and for chi_n it takes
+(a, b) = (k, n-k); the left sides are then phi_n psi_2, phi_n, or phi_n chi_0 and phi_n chi_{-1}, so that nothing is
+divided by but constants. Each new value is a difference of two products of four factors a quarter of its length. Let
+rho_n be what a new value is to be multiplied by, so that s_n = s_a^2 s_b^2 rho_n; then
+
+    t_{2k} = rho_{2k+1} rho_{2k-1} / (t_k rho_{2k})^2,     t_{2k+1} = (t_k t_{k+1})^2 rho_{2k+2} rho_{2k} /
+    rho_{2k+1}^2      for psi
+
+with t_n = s_{n+1} s_{n-1} / s_n^2, and similar formulas give t_n for chi and r_n = (s_n / s_{n-1} of psi) / (that of
+chi). All these are small rational numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import islice
+
+from flint import fmpq, fmpz
+
+from kahanmaps.maps.normal_form.planar_integers import IntegerBlock, IntegerTriple, bad_part, divide_exactly
+from kahanmaps.maps.normal_form.tau import TauStart, start_near
+
+_FIRST = 4  # below it psi_{n-2} would be zero
+
+
+def triples(block: IntegerBlock) -> Iterator[IntegerTriple]:
+    """P_0, P_1, ... as `IntegerBlock.triples` gives them, up to signs, three times as fast.
+
+    What the table has to remember is less than the points between n/2 and n themselves.
+    """
+    start = _start(block)
+    if start is None:
+        yield from block.triples()
+        return
+    yield from islice(block.triples(), start.base + _FIRST)
+    yield from TauTable(start).points()
+
+
+def iterate(block: IntegerBlock, n: int) -> IntegerTriple | None:
+    """P_n, primitive, up to sign, for n >= 0; None where the table does not apply, so that one has to step.
+
+    That is where the cubic is singular, T has small order, or n is small. Poles on the way are passed over.
+    """
+    if block.is_constant:
+        return block.start
+    start = _start(block)
+    if start is None or n - start.base < _FIRST:
+        return None
+    return TauTable(start).point(n - start.base)
+
+
+def _start(block: IntegerBlock) -> TauStart | None:
+    if block.is_constant or block.level is None or block.is_degenerate:
+        return None
+    return start_near(block)
+
+
+def _second_ratio(rho: Callable[[int], fmpq], n: int) -> fmpq:
+    """rho_{n+1} rho_{n-1} / rho_n^2."""
+    middle = rho(n)
+    return rho(n + 1) * rho(n - 1) / (middle * middle)
+
+
+class TauTable:
+    """psi_n and chi_n, n >= 1, and the points P_n, n >= 4, relative to the base point of a start; all as needed.
+
+    The dictionaries are the tables; `_psi_rho` and the like hold the small rational numbers of the module's head.
+    """
+
+    def __init__(self, start: TauStart) -> None:
+        self._start, self._bad = start, start.bad
+        self._gamma = (start.gamma.p, start.gamma.q)
+        psi, chi = start.psi, start.chi
+        s = {n: psi.scale(n) for n in range(1, 5)}
+        c = {n: chi.scale(n) for n in range(-1, 3)}
+        self._psi = {n: psi[n] for n in range(1, 5)}
+        self._psi_rho = {3: s[3] / s[2] ** 2, 4: s[4] / s[3] ** 2}
+        self._psi_t = {2: psi.t(2), 3: psi.t(3)}
+        self._chi = {n: chi[n] for n in range(-1, 3)}
+        self._chi_rho = {1: c[1] / c[0] ** 2, 2: c[2] / c[1] ** 2}
+        self._chi_t = {n: chi.t(n) for n in (0, 1)}
+        self._r = {2: s[2] / s[1] * c[1] / c[2]}
+        self._r_next = {1: s[2] / s[1] * c[0] / c[1]}  # (s_{n+1} / s_n of psi) / (s_n / s_{n-1} of chi)
+        self._divisors = (chi[0], chi[-1])
+        self._divisor_scales = (c[0], c[-1])
+        # Squares and products of neighbours, of psi and of chi.
+        self._psi_square: dict[int, fmpz] = {}
+        self._psi_around: dict[int, fmpz] = {}
+        self._chi_square: dict[int, fmpz] = {}
+        self._chi_around: dict[int, fmpz] = {}
+
+    def points(self) -> Iterator[IntegerTriple]:
+        """P_4, P_5, ..., primitive, as long as the map has a value."""
+        n, before = _FIRST, self.psi(_FIRST - 1) * self.psi(_FIRST)
+        while True:
+            after = self.psi(n) * self.psi(n + 1)
+            chi = [self.chi(n - 1), self.chi(n), self.chi(n + 1)]
+            point = self._start.point(chi, [self.psi_around(n), after, before], self.r(n), self.r(n + 1))
+            if point[2] == 0:
+                return
+            yield point
+            n, before = n + 1, after
+            for products in (self._psi_square, self._psi_around, self._chi_square, self._chi_around):
+                products.pop(n // 2 - 4, None)
+            self._psi.pop(n // 2 - 6, None)
+            self._chi.pop(n // 2 - 6, None)
+
+    def point(self, n: int) -> IntegerTriple:
+        """P_n for n >= 4, primitive."""
+        before, here, after = self.psi(n - 1), self.psi(n), self.psi(n + 1)
+        chi = [self.chi(n - 1), self.chi(n), self.chi(n + 1)]
+        return self._start.point(chi, [before * after, here * after, before * here], self.r(n), self.r(n + 1))
+
+    def psi(self, n: int) -> fmpz:
+        """psi_n over its scale."""
+        value = self._psi.get(n)
+        if value is None:
+            k = n // 2
+            a, b = (k + 1, k) if n % 2 else (k + 1, k - 1)
+            left = self.psi_around(a) * self.psi_square(b)
+            right = self.psi_around(b) * self.psi_square(a) if b > 1 else fmpz(0)  # psi_0 = 0
+            raw, below = self._combined(self.psi_t(a), left, self.psi_t(b) if b > 1 else fmpq(1), right, a, b)
+            value, part = bad_part(raw, self._bad)
+            self._psi[n] = value
+            self._psi_rho[n] = fmpq(part, below if n % 2 else 2 * below)
+        return value
+
+    def chi(self, n: int) -> fmpz:
+        """chi_n over its scale."""
+        value = self._chi.get(n)
+        if value is None:
+            a = n // 2
+            b = n - a
+            left, right = self.chi_around(a) * self.psi_square(b), self.psi_around(b) * self.chi_square(a)
+            raw, below = self._combined(self.chi_t(a), left, self.psi_t(b), right, a, b)
+            quotient = divide_exactly([raw], self._divisors[b - a])[0]
+            value, part = bad_part(quotient, self._bad)
+            self._chi[n] = value
+            self._chi_rho[n] = fmpq(part, below) / self._divisor_scales[b - a]
+        return value
+
+    def _combined(self, t_a: fmpq, left: fmpz, t_b: fmpq, right: fmpz, a: int, b: int) -> tuple[fmpz, fmpz]:
+        """t_a left - t_b right, the square whose index alone is divisible by 3 times gamma; over the second number."""
+        first, second, below = t_a.p * t_b.q, t_b.p * t_a.q, t_a.q * t_b.q
+        if (a % 3 == 0) != (b % 3 == 0):
+            above, under = self._gamma
+            below = below * under
+            if b % 3 == 0:
+                first, second = first * above, second * under
+            else:
+                first, second = first * under, second * above
+        return first * left - second * right, below
+
+    def psi_square(self, n: int) -> fmpz:
+        """psi_n^2."""
+        found = self._psi_square.get(n)
+        if found is None:
+            value = self.psi(n)
+            found = self._psi_square[n] = value * value
+        return found
+
+    def psi_around(self, n: int) -> fmpz:
+        """psi_{n+1} psi_{n-1}."""
+        found = self._psi_around.get(n)
+        if found is None:
+            found = self._psi_around[n] = self.psi(n + 1) * self.psi(n - 1)
+        return found
+
+    def chi_square(self, n: int) -> fmpz:
+        """chi_n^2."""
+        found = self._chi_square.get(n)
+        if found is None:
+            value = self.chi(n)
+            found = self._chi_square[n] = value * value
+        return found
+
+    def chi_around(self, n: int) -> fmpz:
+        """chi_{n+1} chi_{n-1}."""
+        found = self._chi_around.get(n)
+        if found is None:
+            found = self._chi_around[n] = self.chi(n + 1) * self.chi(n - 1)
+        return found
+
+    def psi_t(self, n: int) -> fmpq:
+        """t_n = s_{n+1} s_{n-1} / s_n^2 of psi, n >= 2."""
+        found = self._psi_t.get(n)
+        if found is None:
+            k = n // 2
+            root = self.psi_t(k) * self.psi_t(k + 1) if n % 2 else 1 / self.psi_t(k)
+            found = self._psi_t[n] = root * root * _second_ratio(self._rho_of_psi, n)
+        return found
+
+    def chi_t(self, n: int) -> fmpq:
+        """t_n of chi, n >= 0."""
+        found = self._chi_t.get(n)
+        if found is None:
+            k = n // 2
+            root = 1 / self.r(k + 1) if n % 2 else self._next(k)
+            found = self._chi_t[n] = root * root * _second_ratio(self._rho_of_chi, n)
+        return found
+
+    def r(self, n: int) -> fmpq:
+        """(s_n / s_{n-1} of psi) / (s_n / s_{n-1} of chi), n >= 2."""
+        found = self._r.get(n)
+        if found is None:
+            if n == 3:
+                found = self.r(2) * self.psi_t(2) / self.chi_t(2)
+            else:
+                k = n // 2
+                root = 1 / self.psi_t(k) if n % 2 else self._next(k)
+                of_psi = self._rho_of_psi(n) / self._rho_of_psi(n - 1)
+                found = root * root * of_psi * self._rho_of_chi(n - 1) / self._rho_of_chi(n)
+            self._r[n] = found
+        return found
+
+    def _next(self, n: int) -> fmpq:
+        """(s_{n+1} / s_n of psi) / (s_n / s_{n-1} of chi) = r_n t_n."""
+        found = self._r_next.get(n)
+        if found is None:
+            found = self._r_next[n] = self.r(n) * self.psi_t(n)
+        return found
+
+    def _rho_of_psi(self, n: int) -> fmpq:
+        if n not in self._psi_rho:
+            self.psi(n)
+        return self._psi_rho[n]
+
+    def _rho_of_chi(self, n: int) -> fmpq:
+        if n not in self._chi_rho:
+            self.chi(n)
+        return self._chi_rho[n]

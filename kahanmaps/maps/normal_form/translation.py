@@ -1,0 +1,260 @@
+"""The n-th point of an orbit in a plane over any field, directly: a translation on a plane cubic, by doublings.
+
+The formulas are those of `tau`, with natural lifts and without scales: over a finite field, or in balls, numbers do
+not grow. Where the level cubic is three lines (gamma = 0), Psi^3 is a projective map of each line: a 2 x 2 matrix to
+the power n. Where delta = 0 there is a formula for P_n: see `parabolic_ratio`.
+
+Poles are passed over: P_n is the value of the rational map Psi^n, also if an orbit that steps would have met W = 0
+before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from kahanmaps.errors import SingularStep
+from kahanmaps.maps.normal_form.planar_block import PlanarBlock, Triple, determinant, same_point
+
+# Base points that are tried until no small value vanishes that has to be divided by.
+_BASES = 12
+_SMALLEST = 24  # below this n one steps
+
+
+class NoTranslation(Exception):
+    """Doubling does not apply to this orbit: it has to be stepped."""
+
+
+def iterate(block: PlanarBlock, start: Triple, n: int, is_zero: Callable[[Any], bool]) -> Triple:
+    """P_n for n >= 0, as a triple up to a factor, over a field of characteristic 0 or at least 5.
+
+    `is_zero` decides whether an element is zero. Raises SingularStep where a pole is met before `n`, as far as the
+    orbit is stepped (a few points from the start); NoTranslation where the orbit is periodic with a small period or
+    meets too many special positions.
+
+    >>> from kahanmaps.algebra.fields import GF
+    >>> F = GF(10007)
+    >>> block = PlanarBlock(*map(F.convert, (1, 2, 0, 5)))
+    >>> point = start = (F.convert(3), F.convert(4), F.one)
+    >>> for _ in range(100):
+    ...     point = block.image(point)
+    >>> same_point(point, iterate(block, start, 100, F.is_zero))
+    True
+    """
+    points = _first_points(block, start, min(n, _BASES + 4), is_zero)
+    if len(points) > n:
+        return points[n]
+    period = next((k for k in range(1, len(points)) if same_point(points[k], points[0])), None)
+    if period is not None:
+        return points[n % period]
+    above, below = block.level(start)
+    if above == 0 or block.discriminant == 0:
+        return _parabolic(block, start, n)
+    level = above / below
+    gamma = 1 - block.discriminant * level * level
+    if is_zero(gamma):
+        return _along_line(points[n % 3 : n % 3 + 10 : 3], n // 3, is_zero)
+    for base in range(3, len(points) - 3):
+        if n - base < 8:
+            break
+        small = _small_values(block, points[base - 3 : base + 4], is_zero)
+        if small is not None:
+            return _doubled(small, gamma, n - base)
+    raise NoTranslation
+
+
+def parabolic_ratio(block: PlanarBlock, start: Triple) -> Any:
+    """r = W/s at a start with delta = 0 and an image, s^2 = -D; None where D = 0, so that P_n = P_0 + n (P_1 - P_0).
+
+    A step takes 1 from r, and W' = W^2 - s^2 vanishes for r = 1 or r = -1: the orbit meets a pole at step r, if r is a
+    positive integer, and none otherwise. r is rational in r^2 at the start and at its image.
+    """
+
+    def square(point: Triple) -> Any:
+        U, V, W = point
+        p, q, r = block.D
+        below = p * (U * U) + q * (U * V) + r * (V * V)
+        return None if below == 0 else -(W * W) / below
+
+    here = square(start)
+    return None if here is None else (here - square(block.image(start)) + 1) / 2
+
+
+def _parabolic(block: PlanarBlock, start: Triple, n: int) -> Triple:
+    """P_n for delta = 0, in characteristic 0 or at least 5; the start has an image.
+
+    (U/W, V/W) has a part with h = 0 or in the simple root of h, which is multiplied by r/(r - n), and one in the double
+    root, which is multiplied by ((r - n)^2 - 1)/(r^2 - 1).
+    """
+    U, V, W = block.image(start)
+    here, after = (start[0] / start[2], start[1] / start[2]), (U / W, V / W)
+    r = parabolic_ratio(block, start)
+    if r is None:
+        u, v = (z + n * (w - z) for z, w in zip(here, after, strict=True))
+        return u, v, W / W
+    rest, below = r - n, r * r - 1
+    factor = rest * (rest * rest - 1)
+    parts = [(z, (z * r * (r + 1) - w * below) / (3 * r)) for z, w in zip(here, after, strict=True)]
+    u, v = ((z - double) * r * below + double * factor for z, double in parts)
+    return u, v, rest * below
+
+
+def _first_points(block: PlanarBlock, start: Triple, count: int, is_zero: Callable[[Any], bool]) -> list[Triple]:
+    """P_0, P_1, ...: natural lifts as soon as there are two. Raises SingularStep at a pole."""
+    points = [start]
+    for k in range(count):
+        U, V, W = block.image(points[-1])
+        if is_zero(W):
+            raise SingularStep(f"the map has no value at step {k}")
+        if k:
+            below = points[-2][2]
+            U, V, W = U / below, V / below, W / below
+        points.append((U, V, W))
+    return points
+
+
+def _along_line(points: Sequence[Triple], n: int, is_zero: Callable[[Any], bool]) -> Triple:
+    """The n-th point of an orbit on a line, from its first four, for a projective map of the line."""
+    P, Q = points[0], points[1]
+    if same_point(P, Q):
+        return P
+    # Coordinates (x, y) stand for x P + y Q, found from two entries of the triples that tell P and Q apart.
+    i, j = next((i, j) for i, j in ((0, 1), (0, 2), (1, 2)) if not is_zero(P[i] * Q[j] - P[j] * Q[i]))
+    whole = P[i] * Q[j] - P[j] * Q[i]
+    (a, b), (c, d) = (((R[i] * Q[j] - R[j] * Q[i]) / whole, (P[i] * R[j] - P[j] * R[i]) / whole) for R in points[2:4])
+    # The matrix takes (1, 0) to r (0, 1) and (0, 1) to (a, b), and (a, b) to a multiple of (c, d):
+    # r a (0, 1) + b (a, b) ~ (c, d).
+    if is_zero(a):
+        return Q
+    if is_zero(b):  # then the third point is P again
+        return points[n % 2]
+    if is_zero(c):  # the fourth point is Q: period 2 of a translation on the line is excluded, so P_3 = P_1
+        raise NoTranslation
+    r = (b * a * d / c - b * b) / a
+    x, y = _power_applied((0 * a, a, r, b), n)
+    return (x * P[0] + y * Q[0], x * P[1] + y * Q[1], x * P[2] + y * Q[2])
+
+
+def _power_applied(matrix: tuple[Any, Any, Any, Any], n: int) -> tuple[Any, Any]:
+    """The first column of the n-th power of a 2 x 2 matrix, given by rows."""
+    one = matrix[1] / matrix[1]
+    zero = one - one
+    x, y = one, zero
+    a, b, c, d = matrix
+    while n:
+        if n & 1:
+            x, y = a * x + b * y, c * x + d * y
+        n >>= 1
+        if n:
+            a, b, c, d = a * a + b * c, b * (a + d), c * (a + d), d * d + b * c
+    return x, y
+
+
+def _small_values(
+    block: PlanarBlock, points: Sequence[Triple], is_zero: Callable[[Any], bool]
+) -> tuple[dict[int, Any], Sequence[Triple]] | None:
+    """chi_{-2}, ..., chi_2 around the fourth of seven consecutive points, and the three in the middle, natural lifts.
+
+    None where a value is zero that would have to be divided by.
+    """
+    # Lifts that are natural around this base point: the first two of them decide the rest.
+    P = {-3: points[0], -2: points[1]}
+    for k in range(-2, 3):
+        below = P[k - 1][2]
+        U, V, W = block.image(P[k])
+        P[k + 1] = (U / below, V / below, W / below)
+    chi = {
+        0: 3 * determinant(P[-1], P[0], P[1]),
+        1: determinant(P[-1], P[0], P[2]),
+        -1: determinant(P[-2], P[0], P[1]),
+        2: determinant(P[-1], P[1], P[2]),
+        -2: determinant(P[-2], P[-1], P[1]),
+    }
+    if any(is_zero(chi[k]) for k in (-2, -1, 0, 1)):
+        return None
+    return chi, (P[-1], P[0], P[1])
+
+
+def _doubled(small: tuple[dict[int, Any], Sequence[Triple]], gamma: Any, n: int) -> Triple:
+    """P_n relative to the base point, n >= 8."""
+    chi, (minus, zero, plus) = small
+    one = gamma / gamma
+    half = one / 2
+    inverse = {k: one / chi[k] for k in (-2, -1, 0, 1)}
+    psi = {1: one, 2: 2 * one, 3: 3 * one, 4: 4 * one}
+    centre = n >> (n.bit_length() - 3)
+    values = dict(chi)
+
+    for k in range(5, centre + 5):
+        psi[k] = _psi(k, lambda j: psi[j] * psi[j], lambda j: psi[j + 1] * psi[j - 1], gamma, half)
+    for k in range(3, centre + 2):
+        i = k // 2
+        values[k] = _chi(i, k - i, values, lambda j: psi[j] * psi[j], lambda j: psi[j + 1] * psi[j - 1], gamma, inverse)
+    window = [psi[k] for k in range(centre - 3, centre + 5)]
+    middle = [values[k] for k in range(centre - 1, centre + 2)]
+    for digit in f"{n:b}"[3:]:
+        odd = int(digit)
+        window, middle = _next(window, middle, centre, odd, gamma, half, inverse)
+        centre = 2 * centre + odd
+    before, here, after = window[2:5]
+    A = -2 * (before * after * middle[1])
+    B = here * after * middle[0]
+    C = before * here * middle[2]
+    U, V, W = (A * p + B * q + C * r for p, q, r in zip(zero, plus, minus, strict=True))
+    return U, V, W
+
+
+def _next(
+    window: list[Any], middle: list[Any], centre: int, odd: int, gamma: Any, half: Any, inverse: dict[int, Any]
+) -> tuple[list[Any], list[Any]]:
+    """The windows around 2 centre + odd from those around `centre`."""
+    first = centre - 3
+    squares = [value * value for value in window]
+    neighbours = [None, *(window[k + 1] * window[k - 1] for k in range(1, 7)), None]
+    # Squares for a partner whose index is, or is not, divisible by 3.
+    special = [gamma * s if (first + k) % 3 == 0 else s for k, s in enumerate(squares)]
+    shift = 2 * centre + odd - 3
+    new = []
+    for n in range(shift, shift + 8):
+        k = n // 2 - first
+        a, b = (k + 1, k) if n % 2 else (k + 1, k - 1)
+        # Of two indices at distance 1 or 2 at most one is divisible by 3, so `special` is right for both.
+        value = neighbours[a] * special[b] - neighbours[b] * special[a]
+        new.append(value if n % 2 else value * half)
+    around, square = middle[0] * middle[2], middle[1] * middle[1]
+    by_three = centre % 3 == 0
+    values = []
+    for n in (shift + 2, shift + 3, shift + 4):
+        b = n - centre
+        k = b - first
+        if by_three and b % 3 == 0:
+            value = around * squares[k] - neighbours[k] * square
+        else:
+            value = around * special[k] - neighbours[k] * (gamma * square if by_three else square)
+        values.append(value * inverse[centre - b])
+    return new, values
+
+
+def _psi(n: int, square: Callable[[int], Any], neighbours: Callable[[int], Any], gamma: Any, half: Any) -> Any:
+    """psi_n from psi around n/2."""
+    k = n // 2
+    a, b = (k + 1, k) if n % 2 else (k + 1, k - 1)
+    left, right = neighbours(a) * square(b), neighbours(b) * square(a)
+    value = (gamma * left if b % 3 == 0 else left) - (gamma * right if a % 3 == 0 else right)
+    return value if n % 2 else value * half
+
+
+def _chi(
+    i: int,
+    b: int,
+    values: dict[int, Any],
+    square: Callable[[int], Any],
+    neighbours: Callable[[int], Any],
+    gamma: Any,
+    inverse: dict[int, Any],
+) -> Any:
+    """chi_{i+b} from chi around i and psi around b."""
+    left, right = values[i + 1] * values[i - 1] * square(b), neighbours(b) * (values[i] * values[i])
+    if (i % 3 == 0) != (b % 3 == 0):
+        left, right = (gamma * left, right) if b % 3 == 0 else (left, gamma * right)
+    return (left - right) * inverse[i - b]

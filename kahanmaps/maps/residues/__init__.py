@@ -1,0 +1,1 @@
+"""Orbits modulo a prime, as arrays."""
