@@ -24,8 +24,8 @@ from flint import fmpq
 
 from kahanmaps import draw_with_eigenvalues, normal_form
 from kahanmaps.maps.floats.blocks import planar_blocks
-from kahanmaps.maps.floats.ensemble import has_numba
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit
+from kahanmaps.maps.kernels import has_numba
 
 EPS = fmpq(1, 10)
 LANES = 100_000

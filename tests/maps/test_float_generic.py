@@ -16,9 +16,9 @@ from helpers import EULER_TOP, FORCED_PLANE, LORENZ, NAMED_SYSTEMS, over_named_s
 from kahanmaps.errors import InexactNumber, InputError
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.maps.floats.doubles import exact
-from kahanmaps.maps.floats.ensemble import has_numba
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, to_floats
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.kernels import has_numba
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 KERNELS = ["numpy", pytest.param("numba", marks=pytest.mark.skipif(not has_numba(), reason="numba is not installed"))]
@@ -235,7 +235,7 @@ def test_the_compiled_kernel_is_named_with_its_threads():
 
 
 def test_without_numba_the_default_is_numpy_and_numba_is_refused(monkeypatch):
-    monkeypatch.setattr("kahanmaps.maps.floats.ensemble.has_numba", lambda: False)
+    monkeypatch.setattr("kahanmaps.maps.kernels.has_numba", lambda: False)
     assert FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3))).kernel == "numpy generic"
     with pytest.raises(InputError, match=r"kahanmaps\[fast\]"):
         FloatEnsemble(EULER_TOP, "1/10", np.ones((1, 3)), kernel="numba")

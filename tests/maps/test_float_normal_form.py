@@ -22,9 +22,9 @@ from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenva
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.floats import steps as float_steps
 from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, _doubles, planar_blocks
-from kahanmaps.maps.floats.ensemble import has_numba
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.kernels import has_numba
 from kahanmaps.maps.orbits import Orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
 

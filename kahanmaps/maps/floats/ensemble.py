@@ -10,8 +10,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -36,10 +34,10 @@ from kahanmaps.maps.floats.steps import (
 from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.orbits import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-KERNELS = ("numpy", "numba")
 SAMPLED = 1000  # steps between samples of the block integrals
 
 Function = Callable[[Sequence[float]], float | None]
@@ -94,10 +92,7 @@ class Stepping:
     ) -> None:
         if to_float(eps) == 0.0:
             raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
-        if kernel is not None and kernel not in KERNELS:
-            raise InputError(f"found the kernel {kernel!r}, expected {' or '.join(KERNELS)}")
-        if kernel == "numba" and not has_numba():
-            raise InputError("the kernel numba needs numba: pip install 'kahanmaps[fast]'")
+        compiled = choose_kernel(kernel, long) == "numba"
         if threads is not None and threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
         map_ = as_map(system)
@@ -109,7 +104,6 @@ class Stepping:
         if form is not None:
             require_same_system(form, map_)
             self.blocks = planar_blocks(form, -eps if backward else eps)
-        compiled = kernel == "numba" or (kernel is None and long and has_numba())
         self.compiled = compiled
         self.threads = (threads or _cores()) if compiled else 1
         method = "generic" if form is None else "normal form"
@@ -393,15 +387,6 @@ def end_of(lanes: Lanes, orbit: int, step: int, matrix: str) -> OrbitEnd:
     if code == SINGULAR:
         return OrbitEnd("singular", last, f"{matrix} is singular in machine numbers at step {last}")
     return OrbitEnd("overflow", last, f"step {last + 1} leaves the range of machine floats")
-
-
-@cache
-def has_numba() -> bool:
-    """Whether numba is installed (it is not loaded)."""
-    try:
-        return find_spec("numba") is not None
-    except ValueError:  # somebody has put None into sys.modules to keep it out
-        return False
 
 
 def require_every(every: int) -> None:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.floats.blocks import require_same_system
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import as_map
+from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.normal_form.splitting import Splitting
 from kahanmaps.maps.orbits import require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -33,7 +33,6 @@ Integers = NDArray[np.int64]
 Factor = tuple[Any, ...]
 
 BITS = 61
-KERNELS = ("numpy", "numba")
 _SMALL = 1 << 31
 _LANES = 8192  # so many numbers of an array at a time stay in the cache
 
@@ -235,13 +234,8 @@ class ModularEnsemble:
 
 
 def _chosen(kernel: str | None, prime: int) -> str:
-    if kernel not in (None, *KERNELS):
-        raise InputError(f"found the kernel {kernel!r}, expected {' or '.join(KERNELS)}")
-    if kernel == "numba" and find_spec("numba") is None:
-        raise InputError("the kernel numba is not installed: pip install 'kahanmaps[fast]', or take kernel numpy")
-    if prime == 2:  # Montgomery's form needs an odd modulus
-        return "numpy"
-    return kernel or ("numba" if find_spec("numba") is not None else "numpy")
+    chosen = choose_kernel(kernel)
+    return "numpy" if prime == 2 else chosen  # Montgomery's form needs an odd modulus
 
 
 def _residues(starts: Any, dim: int, field: PrimeField) -> Residues:

@@ -1,0 +1,32 @@
+"""What computes many orbits: numpy, which is always there, or loops compiled by numba, the extra `fast`."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.util import find_spec
+
+from kahanmaps.errors import InputError
+
+KERNELS = ("numpy", "numba")
+
+
+@cache
+def has_numba() -> bool:
+    """Whether numba is installed (it is not loaded)."""
+    try:
+        return find_spec("numba") is not None
+    except ValueError:  # somebody has put None into sys.modules to keep it out
+        return False
+
+
+def choose_kernel(wish: str | None, long: bool = True) -> str:
+    """The wish, or numba where it is installed and `long` says that loading it pays. Raises InputError for another.
+
+    >>> choose_kernel("numpy"), choose_kernel(None, long=False)
+    ('numpy', 'numpy')
+    """
+    if wish not in (None, *KERNELS):
+        raise InputError(f"found the kernel {wish!r}, expected {' or '.join(KERNELS)}")
+    if wish == "numba" and not has_numba():
+        raise InputError("the kernel numba needs numba: pip install 'kahanmaps[fast]', or take the kernel numpy")
+    return wish or ("numba" if long and has_numba() else "numpy")
