@@ -151,6 +151,7 @@ def test_a_claim_holds_for_every_kind_of_spectrum(claim):
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 @over_right_claims
 def test_a_claim_holds_for_m_from_4_to_6(claim):
     assert failing(claim, LARGER) == []

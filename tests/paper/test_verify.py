@@ -33,18 +33,17 @@ from kahanmaps.paper.registry import Kind, claims
 from kahanmaps.paper.verify import verify, verify_universal
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
-SLOW = {
-    *LARGE_SPECTRA,
-    *(name for name in SPECTRA if name.startswith("m=4")),
-    "m=3, partly split",
-    "m=3, complex",
-    "m=3, irreducible",
-}
+QUICK = ("m=1", "m=2, split", "m=2, irreducible", "m=2, complex", "m=3, split")
+LONGER = [pytest.mark.slow, pytest.mark.timeout(900)]
 over_members = pytest.mark.parametrize(
     "name",
     [
-        pytest.param(name, marks=[pytest.mark.slow, pytest.mark.timeout(900)] if name in SLOW else [])
-        for name in [*SPECTRA, *LARGE_SPECTRA]
+        *quick([name for name in SPECTRA if name[:3] != "m=4"], QUICK),
+        *(
+            pytest.param(name, marks=LONGER)
+            for name in (*SPECTRA, *LARGE_SPECTRA)
+            if name[:3] not in ("m=1", "m=2", "m=3")
+        ),
     ],
 )
 SIXTH = VerifyOptions(sections=(6,))
