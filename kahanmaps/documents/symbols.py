@@ -23,8 +23,8 @@ def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> Birationa
     >>> from kahanmaps.documents.files import parse_system
     >>> lyness = 'variables = ["x", "y"]\\nparameters.a = 2\\n[map]\\nimage = ["y", "(a + y)/x"]'
     >>> print(map_with_symbols(parse_system(lyness), ["a"]))
-    -y + x_new = 0
-    x*y_new - y - a = 0
+    x~ = y
+    y~ = (y + a)/x
     """
     if file.is_quadratic:
         return Kahan(with_symbols(file, symbols))
