@@ -429,7 +429,7 @@ class ImplicitMap(BirationalMap):
         """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where it has no reduction."""
         element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
         for known, at, found in self._last:
-            if known is over and at is element and not values:
+            if known is over and at is element:
                 return found
         point = (*values, element)
         equation = equation_of(self.rows, over, point)
@@ -437,7 +437,7 @@ class ImplicitMap(BirationalMap):
         if self.backward is not None or equation.degree > 1:
             backward = lambda: equation_of(self.inverse_rows, over, point)  # noqa: E731
         found = EquationMap(equation, element, backward, self.variables)
-        self._last[:] = [] if values else [(over, element, found)]
+        self._last[:] = [] if values else [(over, element, found)]  # a map with symbols is not kept
         return found
 
     def __repr__(self) -> str:

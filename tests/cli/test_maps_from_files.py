@@ -66,6 +66,8 @@ def test_backward_steps_find_the_inverse(kahanmaps, tmp_path):
         ("ensemble --eps 1/10 --random 3 --steps 5 --arithmetic mod:10007", "ensemble"),
         ("lyapunov --eps 1/10 --random 2 --box 1/8 --steps 20", "lyapunov"),
         ("cycles --prime 7 --eps 1/3", "cycles"),
+        ("check-integrals --integral 'J=1' -v", "check"),
+        ("check-measure -v", "check"),
     ],
 )
 def test_what_is_found_out_about_any_map(kahanmaps, path, command, schema):

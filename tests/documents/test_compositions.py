@@ -55,6 +55,13 @@ def test_the_document_says_all_by_itself_and_keeps_its_parameters(tmp_path):
     assert isinstance(other, SystemFile)
 
 
+def test_a_table_has_its_own_parameters_and_otherwise_those_around_it(tmp_path):
+    table = '{{ map = {{ variables = ["x", "y"], map = {{ image = ["b*y", "x"] }}{} }} }}'
+    first, second = table.format(""), table.format(", parameters = { b = 3 }")
+    file = read_system(written(tmp_path, f"{first}, {second}", "parameters.b = 5"))
+    assert file.map.at(EPS).step((fmpq(1), fmpq(2))) == (3, 10)
+
+
 def test_variables_may_be_named_anew(tmp_path):
     path = written(tmp_path, '{ file = "field.toml" }', 'variables = ["p", "q"]')
     assert read_system(path).variables == ("p", "q")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
@@ -119,3 +120,17 @@ def test_the_clock_stops_it():
 def test_wrong_use_is_refused(starts, steps, eps, words):
     with pytest.raises(InputError, match=words):
         lyapunov_exponents(load("harmonic").system, eps, starts, steps)
+
+
+def test_the_exponents_of_a_map_without_a_time_step_are_per_step():
+    baker = parse_system('variables = ["x", "y"]\n[map]\nimage = ["3*x", "y/2"]').map
+    found = lyapunov_exponents(baker, 1, np.array([[1e-9, 1.0]]), 20)
+    assert found.mean == pytest.approx([math.log(3), -math.log(2)])
+    assert found.unit == 1.0
+    assert found.log_volume == pytest.approx([math.log(1.5)])
+
+
+@pytest.mark.parametrize("name", ["duffing_polarised", "lyness", "lotka_volterra_symplectic_euler"])
+def test_the_tangent_map_of_any_map_adds_up_to_its_determinant(name):
+    found = lyapunov_exponents(load(name).map, "1/10", starts_in_box(4, load(name).dim, 0.25, 1) + 1.0, 200)
+    assert found.residual < 1e-9 * max(1.0, float(np.abs(found.exponents).max()))
