@@ -266,10 +266,13 @@ class ModularRun(_Walk):
         return {"completed": len(self.ensemble) - singular, "singular": singular}
 
     def failures(self) -> Iterator[dict[str, Any]]:
-        sign = "+" if self.backward else "-"
+        from kahanmaps.maps.implicit import det_of
+
+        over = self.file.map.at(self.eps, self.ensemble.field)
+        det = det_of(over.denominator_name(self.backward))
         for orbit in (self.ensemble.singular_at >= 0).nonzero()[0].tolist():
             at = int(self.ensemble.singular_at[orbit])
-            message = f"det(I {sign} eps f'(x)) = 0 at step {at}: the map has no value there"
+            message = f"{det} = 0 at step {at}: the map has no value there"
             yield {"orbit": orbit, "status": "singular", "steps": at, "message": message}
 
     def moved(self) -> list[dict[str, Any]]:

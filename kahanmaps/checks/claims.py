@@ -47,7 +47,7 @@ class Witness:
     """A point at which a claim fails: x and eps, and the two sides that should be equal, all as exact text."""
 
     point: tuple[str, ...]
-    eps: str
+    eps: str | None  # None for a map that does not depend on it
     left: tuple[str, ...]
     right: tuple[str, ...]
     left_label: str

@@ -288,7 +288,7 @@ def witness_of(identity: Identity, field: Field, point: tuple[Any, ...], eps: An
         labels = (f"{identity.entries[k]} of {labels[0]}", f"{identity.entries[k]} of {labels[1]}")
     return Witness(
         tuple(field.format(entry) for entry in point),
-        field.format(eps) if identity.has_eps else "",
+        field.format(eps) if identity.has_eps else None,
         tuple(field.format(entry) for entry in left),
         tuple(field.format(entry) for entry in right),
         *labels,

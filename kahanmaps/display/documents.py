@@ -5,20 +5,15 @@ from __future__ import annotations
 from kahanmaps.algebra.text import format_number
 from kahanmaps.display import markup
 from kahanmaps.display.mathml import formula, matrix
-from kahanmaps.display.systems import CHARACTERS, equations_html
+from kahanmaps.display.systems import CHARACTERS, map_html
 from kahanmaps.displayed import html_form
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.maps.kahan import Kahan
 
 
 @html_form.register
 def file_html(file: SystemFile) -> str:
     """A system file: its equations, parameters and claims."""
-    if isinstance(file.map, Kahan):
-        shown = equations_html(file.map.system)
-    else:
-        shown = "<br/>\n".join(markup.escape(markup.shortened(line, CHARACTERS)) for line in str(file.map).split("\n"))
-    rows = [("equations", shown)]
+    rows = [("equations", map_html(file.map))]
     if file.parameters:
         values = (f"{name} = {markup.shortened(format_number(v))}" for name, v in list(file.parameters.items())[:20])
         rows.append(("parameters", markup.escape(", ".join(values))))

@@ -9,7 +9,7 @@ from flint import fmpq
 from kahanmaps.algebra.text import format_number
 from kahanmaps.display import markup
 from kahanmaps.display.mathml import formula
-from kahanmaps.display.systems import CHARACTERS, equations_html
+from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
 from kahanmaps.displayed import html_form
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.analysis import Analysis
@@ -24,6 +24,7 @@ from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries
+from kahanmaps.maps.implicit import BirationalMap
 
 _ROWS = 20
 _FORMULAS = 5  # rows of which each has several formulas
@@ -31,9 +32,16 @@ _STATEMENTS = 60
 _TEXT = 300
 
 
-def eps_sentence(eps: fmpq | None) -> str:
-    """For which eps a result is, with the time step: a phrase."""
+def eps_sentence(eps: fmpq | None, map_: BirationalMap | None = None) -> str:
+    """For which eps a result is, with the time step: a phrase, empty for a map that does not depend on eps."""
+    if map_ is not None and not map_.has_time_step:
+        words = "every eps" if eps is None else f"eps = {markup.shortened(format_number(eps))}"
+        return words if map_.has_eps else ""
     return markup.eps_words() if eps is None else markup.eps_words(format_number(eps), format_number(2 * eps))
+
+
+def _words(*parts: str) -> str:
+    return ", ".join(filter(None, parts))
 
 
 @html_form.register
@@ -44,11 +52,12 @@ def analysis_html(found: Analysis) -> str:
     rows = [(_text(title), markup.verdict(line.status), _text(line.text)) for title, line in statements[:_STATEMENTS]]
     more = f"<p>… and {len(statements) - _STATEMENTS} more statements</p>" if len(statements) > _STATEMENTS else ""
     inside = [
-        f"<p>{equations_html(found.file.system)}</p>",
+        f"<p>{map_html(found.file.map)}</p>",
         f"<p><strong>{_text(final.kind)}</strong>: {_text(final.sentence, 800)}</p>",
         markup.table(["", "known how", ""], rows) + more,
     ]
-    return markup.titled(_name(found.file), "\n".join(inside), f"dimension {found.dim}, {eps_sentence(found.eps)}")
+    more = _words(f"dimension {found.dim}", eps_sentence(found.eps, found.file.map))
+    return markup.titled(_name(found.file), "\n".join(inside), more)
 
 
 @html_form.register
@@ -61,9 +70,8 @@ def integrals_html(search: IntegralSearch) -> str:
     said = f"{len(search.integrals)} found; {search.count_text}"
     notes = _notes([_rest(search.integrals, _FORMULAS), search.note, search.reason])
     inside = markup.table(["integral", "verdict", "found by"], rows) if rows else ""
-    return markup.titled(
-        f"integrals of {_name(search.file)}", f"{inside}\n<p>{said}</p>{notes}", eps_sentence(search.eps)
-    )
+    more = eps_sentence(search.eps, search.file.map)
+    return markup.titled(f"integrals of {_name(search.file)}", f"{inside}\n<p>{said}</p>{notes}", more)
 
 
 @html_form.register
@@ -74,7 +82,7 @@ def densities_html(search: DensitySearch) -> str:
     ]
     inside = markup.table(["dx/phi is invariant", "verdict"], rows) if rows else ""
     notes = _notes([_rest(search.densities, _FORMULAS), search.note, search.reason])
-    more = eps_sentence(search.eps)
+    more = eps_sentence(search.eps, search.file.map)
     return markup.titled(f"densities of {_name(search.file)}", inside + notes, more)
 
 
@@ -88,7 +96,7 @@ def poisson_html(search: PoissonSearch) -> str:
         rows.append(("<br/>".join(lines), markup.verdict(one.verdict), _text(one.statement)))
     inside = markup.table(["brackets", "verdict", ""], rows) if rows else ""
     inside += _notes([_rest(search.tensors, _FORMULAS), search.note, search.reason])
-    return markup.titled(f"Poisson tensors of {_name(search.file)}", inside, eps_sentence(search.eps))
+    return markup.titled(f"Poisson tensors of {_name(search.file)}", inside, eps_sentence(search.eps, search.file.map))
 
 
 @html_form.register
@@ -104,7 +112,7 @@ def darboux_html(search: DarbouxSearch) -> str:
     ]
     inside = markup.table(["cofactor", "polynomials", "verdict"], rows) if rows else "<p>none</p>"
     notes = _notes([_rest(search.spaces, _FORMULAS), search.reason])
-    more = f"up to degree {search.degree}, {eps_sentence(search.eps)}"
+    more = _words(f"up to degree {search.degree}", eps_sentence(search.eps, search.file.map))
     return markup.titled(f"Darboux polynomials of {_name(search.file)}", inside + notes, more)
 
 
@@ -121,7 +129,7 @@ def heights_html(survey: HeightSurvey) -> str:
     """The kind of growth of each orbit."""
     rows = [
         (
-            _text(format_number(one.eps)),
+            *([_text(format_number(one.eps))] if survey.has_eps else []),
             _text(", ".join(map(format_number, one.start))),
             _text(str(one.growth.kind)),
             str(len(one.growth.heights)),
@@ -129,13 +137,15 @@ def heights_html(survey: HeightSurvey) -> str:
         )
         for one in survey.orbits[:_ROWS]
     ]
-    inside = markup.table(["eps", "start", "growth", "heights", "ended"], rows) + _notes([_rest(survey.orbits)])
-    return markup.titled("heights of exact orbits", f"<p>{_text(survey.text)}</p>\n{inside}", "the time step is 2 eps")
+    head = [*(["eps"] if survey.has_eps else []), "start", "growth", "heights", "ended"]
+    inside = markup.table(head, rows) + _notes([_rest(survey.orbits)])
+    step = "the time step is 2 eps" if survey.has_eps else ""
+    return markup.titled("heights of exact orbits", f"<p>{_text(survey.text)}</p>\n{inside}", step)
 
 
 @html_form.register
-def singularities_html(run: SingularityRun) -> str:
-    """Each contracted hypersurface and its fate."""
+def singularities_html(run: SingularityRun, map_: BirationalMap | None = None) -> str:
+    """Each contracted hypersurface and its fate; `map_` tells what eps is, where it is not Kahan's."""
     rows = [
         (
             _code(h.polynomial),
@@ -147,7 +157,7 @@ def singularities_html(run: SingularityRun) -> str:
     ]
     inside = markup.table(["hypersurface", "fate", "contracted at step", "confined at step"], rows) if rows else ""
     inside += _notes([_rest(run.hypersurfaces)])
-    return markup.titled(f"singularities: {run.text}", inside, eps_sentence(run.eps))
+    return markup.titled(f"singularities: {run.text}", inside, eps_sentence(run.eps, map_))
 
 
 @html_form.register

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from kahanmaps.algebra.text import format_number
+from kahanmaps.display import markup
 from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_number
 from kahanmaps.display.mathml import equations
 from kahanmaps.displayed import latex_form
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -39,6 +42,13 @@ def _J(hamiltonian: CubicHamiltonian) -> str:
         return rf"\text{{a constant skew matrix, {n} by {n}}}"
     rows = r" \\ ".join(" & ".join(latex_number(entry) for entry in row) for row in hamiltonian.J.tolist())
     return rf"\begin{{pmatrix}} {rows} \end{{pmatrix}}"
+
+
+def map_html(map_: BirationalMap) -> str:
+    """The equations of a vector field, or those of another map."""
+    if isinstance(map_, Kahan):
+        return equations_html(map_.system)
+    return "<br/>\n".join(markup.escape(markup.shortened(line, CHARACTERS)) for line in str(map_).split("\n"))
 
 
 def equations_html(system: QuadraticSystem, characters: int | None = CHARACTERS, most: int = _EQUATIONS) -> str:

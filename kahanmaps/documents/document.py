@@ -100,14 +100,16 @@ class DocumentReader:
         document: dict[str, Any],
         where: str,
         overrides: Mapping[str, Any],
-        other: Callable[[str, str], dict[str, Any]] | None = None,
+        other: Callable[[str, str], tuple[dict[str, Any], str, Any]] | None = None,
     ) -> None:
-        """`other` gives the document that a part of a composition names: by "file" or "system", and its value."""
+        """`other` gives the document that a part of a composition names, by "file" or "system" and its value, with a
+        name that no other file has, and the `other` for the parts of it.
+        """
         self.document = document
         self.where = where
         self.overrides = overrides
         self.other = other
-        self.inside: tuple[str, ...] = ()  # the names of the parts of compositions that this document is part of
+        self.inside: tuple[str, ...] = ()  # the files whose compositions this document is part of
         self.parts = [0]  # how many were read in all
         self.mistakes: list[tuple[str, str]] = []
         self.parameters: dict[str, fmpq] = {}
@@ -422,7 +424,7 @@ class DocumentReader:
         if len(known) < len(parts) or self.unsure:
             return None
         if sum(abs(power) for _, power, _ in known) > _MOST_FACTORS:
-            self._mistake("composition.of", f"found more than {_MOST_FACTORS} steps, expected fewer")
+            self._mistake("composition.of", f"found more than {_MOST_FACTORS} steps, expected at most so many")
             return None
         self.document = {**self.document, "composition": {"of": [plain for _, _, plain in known]}}
         try:
@@ -453,7 +455,11 @@ class DocumentReader:
             if not isinstance(entry.get(name, False), bool):
                 self._mistake(f"{path}.{name}", f"found {_show(entry[name])}, expected true or false")
         parameters: dict[str, fmpq] = {}
-        for name, value in (entry.get("parameters") or {}).items() if isinstance(entry.get("parameters"), dict) else ():
+        given = entry.get("parameters", {})
+        if not isinstance(given, dict):
+            self._mistake(f"{path}.parameters", f"found {_show(given)}, expected a table of numbers")
+            return None
+        for name, value in given.items():
             text = self._text(f"{path}.parameters.{name}", value)
             try:
                 parameters[name] = parse_constant(text, self.parameters) if text is not None else fmpq(1)
@@ -471,35 +477,37 @@ class DocumentReader:
             self._mistake(f"{path}.involution", "found a map whose square is not the identity, expected an involution")
             return None
         plain = {name: value for name, value in entry.items() if name not in named}
-        document = {name: data for name, data in reader.document.items() if name != "parameters"}
-        own = entry[key].get("parameters") if key == "map" else reader.document.get("parameters")
-        found = {**document, **({"parameters": own} if own else {})}
+        found = dict(reader.document)
+        if key != "map":
+            found.setdefault("parameters", {})  # so that, as a table, it knows no others
+        elif "parameters" not in entry[key]:
+            del found["parameters"]
         return map_, -power if inverse else power, {"map": _json_like(found), **plain}
 
     def _other_reader(self, key: str, value: Any, parameters: Mapping[str, fmpq]) -> DocumentReader:
         """What reads a part of a composition."""
         self.parts[0] += 1
         if self.parts[0] > _MOST_FACTORS:
-            raise InputError(f"found more than {_MOST_FACTORS} maps in one composition, expected fewer")
-        name = value if isinstance(value, str) else "map"
-        if name in self.inside and key == "file":
-            raise InputError(f"found {quoted(name)} as a part of itself")
+            raise InputError(f"found more than {_MOST_FACTORS} maps in one composition, expected at most so many")
+        name, place, other = "map", "", self.other
         if key == "map":
             if not isinstance(value, dict):
                 raise InputError(f"found {_show(value)}, expected a table like a system file")
-            # A table knows the parameters of the file that it stands in.
+            # A table without parameters of its own knows those of the file that it stands in.
             outer = {name: format_number(number) for name, number in self.parameters.items()}
-            own = value.get("parameters", {})
-            document = {**value, "parameters": {**outer, **own} if isinstance(own, dict) else own}
+            document = {"parameters": outer, **value}
         elif not isinstance(value, str):
             raise InputError(f"found {_show(value)}, expected a name in quotes")
         elif self.other is None:
             raise InputError(f"found {quoted(value)}, expected map = {{ ... }}: files are not looked up here")
         else:
-            document = self.other(key, value)
+            name = value
+            document, place, other = self.other(key, value)
+            if key == "file" and place in self.inside:
+                raise InputError(f"found {quoted(name)} as a part of itself")
         document = {part: data for part, data in document.items() if part not in ("catalog", "integrals", "density")}
-        reader = DocumentReader(document, name, parameters, self.other)
-        reader.inside, reader.parts = (*self.inside, name), self.parts
+        reader = DocumentReader(document, name, parameters, other)
+        reader.inside, reader.parts = (*self.inside, place), self.parts
         return reader
 
     def _sound(self, make: Callable[..., ImplicitMap], path: str, *given: Any) -> ImplicitMap | None:

@@ -171,19 +171,21 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
     kahanmaps.errors.SystemFileError: example: 1 mistake
       system.rhs[1]: found a polynomial of degree 3, expected at most 2
     """
-    base = Path(where).parent
-    return SystemFile(*DocumentReader(_document(text, where), where, parameters or {}, partial(_named, base)).read())
+    reader = DocumentReader(_document(text, where), where, parameters or {}, partial(_named, Path(where).parent))
+    reader.inside = (str(Path(where).resolve()),)
+    return SystemFile(*reader.read())
 
 
-def _named(base: Path, key: str, name: str) -> dict[str, Any]:
-    """The document of a part of a composition: a "system" of the catalogue, or a "file" beside the one in hand."""
+def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
+    """What `DocumentReader` asks of parts of compositions: a "system" of the catalogue, a "file" seen from `base`."""
     if key == "system":
         folder = resources.files("kahanmaps.documents").joinpath("catalog")
         for found in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
             if name.isidentifier() and found.is_file():
-                return _document(found.read_bytes(), name)
+                return _document(found.read_bytes(), name), name, None
         raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
-    return _document(_read(base / name), name)
+    path = base / name
+    return _document(_read(path), name), str(path.resolve()), partial(_named, path.parent)
 
 
 def _read(path: str | Path) -> bytes:

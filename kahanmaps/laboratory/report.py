@@ -174,6 +174,9 @@ def _measure_lines(found: Findings) -> list[Statement]:
     lines = [Statement(str(one.verdict), f"dx/phi is invariant, phi = {one.text}") for one in search.densities]
     if not search.densities:
         lines.append(Statement(MEASURED if "no polynomial" in search.reason else UNDECIDED, search.reason))
+    if search.turning is not None:
+        text = f"|dx/phi| is invariant, and dx/phi changes its sign, phi = {search.turning.text}"
+        lines.append(Statement(str(search.turning.verdict), text))
     return lines
 
 

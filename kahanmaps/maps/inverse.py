@@ -13,7 +13,7 @@ import random
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from flint import Ordering, fmpq_mpoly, fmpz_mod_mpoly_ctx
+from flint import Ordering, fmpq_mpoly, fmpz, fmpz_mod_mpoly_ctx
 
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import PrimeField
@@ -26,6 +26,7 @@ Quotient = tuple[Any, Any]  # of polynomials
 Solution = dict[int, Quotient]  # the unknowns, by their places among the variables
 
 _MOST_TERMS = 3000  # of a polynomial
+_BITS = 30  # of primes: FLINT's Python orders factors by coefficients that have to be C integers
 _LARGEST_RESULTANT = 60_000  # terms of one times terms of the other times the sum of their degrees
 
 
@@ -76,8 +77,13 @@ def inverse_rows(rows: Rows) -> Rows:
 
 def why_not_birational(rows: Rows) -> str:
     """Why a map is not birational, found modulo a prime at random eps and symbols; empty where it is or seems to be."""
+    found = [_why_not_modulo_a_prime(rows, seed) for seed in range(2)]
+    return found[0] if all(found) else ""
+
+
+def _why_not_modulo_a_prime(rows: Rows, seed: int) -> str:
     n, names = len(rows), names_of(rows[0][-1])
-    field, sample = _graph_point(rows)
+    field, sample = _graph_point(rows, _BITS, seed)
     context = fmpz_mod_mpoly_ctx.get(
         (*(f"{name}." for name in names[:n]), *names[:n]), modulus=field.prime, ordering=Ordering.degrevlex
     )
@@ -101,12 +107,12 @@ def why_not_birational(rows: Rows) -> str:
     return ""
 
 
-def _graph_point(rows: Rows) -> tuple[PrimeField, list[Any]]:
-    """A point (x, x~) of the graph modulo a random prime, followed by values of the symbols and eps."""
+def _graph_point(rows: Rows, bits: int = 0, seed: int = 0) -> tuple[PrimeField, list[Any]]:
+    """A point (x, x~) of the graph modulo a random prime (of so many bits), followed by values of symbols and eps."""
     n, names = len(rows), names_of(rows[0][-1])
-    rng = random.Random(f"graph {seed_for(0, *(entry for row in rows for entry in row))}")
+    rng = random.Random(f"graph {seed_for(seed, *(entry for row in rows for entry in row))}")
     while True:
-        field = random_prime_field(rng)
+        field = _small_prime_field(rng, bits) if bits else random_prime_field(rng)
         given = [field.random(rng) for _ in names]
         try:
             values = [evaluate(entry, field, given) for row in rows for entry in row]
@@ -115,6 +121,13 @@ def _graph_point(rows: Rows) -> tuple[PrimeField, list[Any]]:
         except (BadPrime, SingularMatrix):
             continue
         return field, [*given[:n], *image, *given[n:]]
+
+
+def _small_prime_field(rng: random.Random, bits: int) -> PrimeField:
+    while True:
+        candidate = fmpz(rng.getrandbits(bits) | 1 << (bits - 1) | 1)
+        if candidate.is_prime():
+            return PrimeField(int(candidate))
 
 
 def _vanishes(polynomial: Any, field: PrimeField, sample: Sequence[Any]) -> bool:
@@ -180,7 +193,10 @@ def _on_graph_factor(polynomial: Any, on_graph: Callable[[Any], bool]) -> Any:
     """The irreducible factor that vanishes on the graph."""
     if len(polynomial) > _MOST_TERMS:
         raise TooLarge("the inverse of this map is not known, and finding it is too large: give it as well")
-    return next(factor for factor, _ in polynomial.factor()[1] if on_graph(factor))
+    found = next((factor for factor, _ in polynomial.factor()[1] if on_graph(factor)), None)
+    if found is None:
+        raise TooLarge("the inverse of this map was not found: give it as well")
+    return found
 
 
 def _coefficients(polynomial: Any, u: int) -> list[Any]:

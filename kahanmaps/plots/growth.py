@@ -227,6 +227,8 @@ def _height_label(curves: Sequence[HeightCurve]) -> str:
     """A line of the legend: eps, the time step, and what kinds of growth were found."""
     eps = curves[0].eps
     head = rf"$\varepsilon = {label_number(eps)}$, $2\varepsilon = {label_number(2 * eps)}$"
+    if not curves[0].has_eps:
+        head = "heights"
     kinds = list(dict.fromkeys(curve.kind for curve in curves))
     if len(kinds) > 1:
         counts = ", ".join(f"{sum(curve.kind is kind for curve in curves)} {kind}" for kind in kinds)

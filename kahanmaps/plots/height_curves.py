@@ -35,6 +35,7 @@ class HeightCurve:
     constant: float | None
     ratio: float | None
     status: str
+    has_eps: bool = True
 
 
 def height_curves(survey: HeightSurvey) -> tuple[HeightCurve, ...]:
@@ -59,6 +60,7 @@ def height_curves(survey: HeightSurvey) -> tuple[HeightCurve, ...]:
                 None if growth.constant is None else float(growth.constant),
                 ratio if growth.kind is Growth.EXPONENTIAL else None,
                 growth.end.status,
+                survey.has_eps,
             )
         )
     return tuple(found)

@@ -28,7 +28,8 @@ _EQUATIONS = 40
 
 def analysis_page(found: Analysis, title: str, recipe: Recipe, pictures: Pictures) -> str:
     """The page about what `analyze` found."""
-    lead = f"{text(found.file.name)}, dimension {found.dim}, {text(eps_sentence(found.eps))}"
+    words = (found.file.name, f"dimension {found.dim}", eps_sentence(found.eps, found.file.map))
+    lead = text(", ".join(filter(None, words)))
     if found.symbols:
         lead += f"; formulas for every {text(', '.join(found.symbols))}"
     is_member = isinstance(found.structure, Structure)
@@ -45,8 +46,9 @@ def analysis_page(found: Analysis, title: str, recipe: Recipe, pictures: Picture
 
 def _verdict(found: Analysis) -> Section:
     final = found.conclusion
+    of = " in x and eps" if found.file.map.has_eps else ""
     words = (
-        "<p>Proved and supported: formulas, as identities in x and eps. Measured: modulo primes and along orbits, "
+        f"<p>Proved and supported: formulas, as identities{of}. Measured: modulo primes and along orbits, "
         "which is evidence. The number of integrals and the growth are separate findings.</p>"
     )
     sentence = f'<p class="conclusion"><strong>{text(final.kind)}</strong><br/>{text(final.sentence)}</p>'
@@ -104,7 +106,10 @@ def _more(found: Analysis, name: str, pictures: Pictures) -> list[str]:
         return [piece for piece in (*_degrees(found, pictures), *_heights(found, pictures)) if piece]
     if name == "singularities":
         return [
-            markup.details(f"Hypersurfaces at eps = {format_number(run.eps)}", wide(singularities_html(run)))
+            markup.details(
+                f"Hypersurfaces{f' at eps = {format_number(run.eps)}' if found.file.map.has_eps else ''}",
+                wide(singularities_html(run, found.file.map)),
+            )
             for run in found.singularities
         ]
     return []

@@ -10,7 +10,9 @@ import pytest
 from schema_helpers import mistakes
 
 from kahanmaps.checks.settings import NO_EPS
+from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import read_system
+from kahanmaps.laboratory.analysis import analyze
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
 NAMES = [path.stem for path in EXAMPLES]
@@ -137,3 +139,44 @@ def test_a_map_on_the_line_with_a_parameter(kahanmaps):
     found = kahanmaps("find-integrals --vars x,y --image 'y; (a + y)/x' -p a=3 --symbolic a -q")
     assert "I1\tproved\t(x^2*y + x*y^2 + x^2 + y^2 + x*a + y*a + x + y + a)/(x*y)" in found.out
     assert "for every a" in found.out
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "check-integrals --vars x,y --image 'y;(3+y)/x' --integral x",
+        "check-measure --vars x,y --image 'y;(3+y)/x' --density x",
+        "check-commute lyness fibonacci",
+    ],
+)
+def test_a_witness_of_a_map_without_eps_has_none(kahanmaps, command):
+    found = kahanmaps(f"{command} --json -q")
+    assert found.status == 1
+    record = json.loads(found.out)
+    assert mistakes("check", record) == []
+    assert record["claims"][0]["witness"]["eps"] is None
+    assert not re.search(r"\beps\b", kahanmaps(f"{command} -q").out)
+
+
+def test_an_ensemble_names_the_denominator_of_its_map(kahanmaps):
+    found = kahanmaps("ensemble lyness --random 5 --steps 20 --arithmetic mod:101 -q")
+    assert "det M(x) = 0 at step 11" in found.out
+
+
+def test_commands_about_fields_do_not_ask_for_eps_first(kahanmaps):
+    for command in ("period lyness --start 1,2", "plot drift lyness --start 1,2"):
+        assert "expected a quadratic vector field" in kahanmaps(command).err
+
+
+def test_a_page_about_a_map_without_eps_does_not_speak_of_it(kahanmaps, tmp_path):
+    kahanmaps(f"report lyness --seconds 3 -o {tmp_path}/page.html -q")
+    text = re.sub(
+        r"<style.*?</style>|<svg.*?</svg>|<script.*?</script>", "", (tmp_path / "page.html").read_text(), flags=re.S
+    )
+    assert not re.search(r"\beps\b|ε|time step", text)
+
+
+def test_a_notebook_shows_the_analysis_of_a_map():
+    found = analyze(load("lyness"), seconds=3)
+    assert "y~ = (y + 3)/x" in found._repr_html_()
+    assert not re.search(r"\beps\b", found._repr_html_())

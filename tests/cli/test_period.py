@@ -191,7 +191,7 @@ def test_verbose_says_what_was_found_and_quiet_says_nothing(kahanmaps, pair):
     ("command", "words"),
     [
         ("period", "Missing option '--start'"),
-        ("period --start 1,2", "missing --eps E"),
+        ("period paper_m2 --start 1,2,3,4", "missing --eps E"),
         ("period --start 1,2 --eps 1", "missing SYSTEM"),
         ("period lorenz --start 1,2,3 --eps 1/10", "x' is not J grad H"),
         ("period lorenz --start 1,2,3 --eps 1/10", "kahanmaps orbit ... --steps N"),

@@ -74,7 +74,7 @@ def test_a_picture_carries_its_recipe(kahanmaps, tmp_path):
 @pytest.mark.parametrize(
     ("command", "expected"),
     [
-        ("plot drift", "missing --eps"),
+        ("plot drift harmonic", "missing --eps"),
         ("plot drift --eps 1/10", "missing SYSTEM"),
         ("plot drift lotka_volterra --eps 1/10", "found no known integral of lotka_volterra"),
         ("plot drift harmonic --eps 0", "found eps = 0"),

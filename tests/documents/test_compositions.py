@@ -82,6 +82,8 @@ def test_variables_may_be_named_anew(tmp_path):
         ('{ file = "field.toml", power = 65 }', "more than 64 steps"),
         ('{ file = "field.toml", inverse = 1 }', "expected true or false"),
         ('{ file = "field.toml", turn = 1 }', "unknown key"),
+        ('{ file = "field.toml", parameters = "a=7" }', "found 'a=7', expected a table of numbers"),
+        ('{ file = "./word.toml" }', "as a part of itself"),
         ('{ file = "field.toml", system = "riccati" }', "expected exactly one"),
         ('{ file = "field.toml", involution = true }', "whose square is not the identity"),
         ('{ file = "field.toml", parameters = { b = 1 } }', "unknown parameter 'b'"),
@@ -96,6 +98,32 @@ def test_a_wrong_composition_says_what_is_wrong(tmp_path, of, sentence):
     with pytest.raises(SystemFileError) as caught:
         read_system(written(tmp_path, of))
     assert sentence in str(caught.value)
+
+
+def test_parameters_of_one_file_are_none_of_a_part_that_comes_from_another(tmp_path):
+    """Written out whole, the part still knows its own names only: x is a variable there, X the new point."""
+    (tmp_path / "lines.toml").write_text('variables = ["x"]\n[bilinear]\nequations = ["X - x = 2*eps*x*X"]')
+    lyness = '{ system = "lyness", parameters = { a = "x" } }'
+    heads = {lyness: 'variables = ["u", "v"]\nparameters.x = 2', '{ file = "lines.toml" }': "parameters.X = 2"}
+    for part, head in heads.items():
+        file = read_system(written(tmp_path, part, head))
+        again = parse_system(file.to_toml(), file.name)
+        assert again == file
+        assert again.map.at(EPS).step(START[: file.dim]) == file.map.at(EPS).step(START[: file.dim])
+
+
+def test_files_are_looked_for_beside_the_file_that_names_them(tmp_path):
+    (tmp_path / "sub").mkdir()
+    written(tmp_path / "sub", '{ file = "swap.toml" }', name="word.toml")
+    (tmp_path / "sub" / "swap.toml").write_text('variables = ["x", "y"]\n[map]\nimage = ["y", "x"]')
+    assert read_system(written(tmp_path, '{ file = "sub/word.toml" }')).map.at(1).step(START) == START[::-1]
+
+
+def test_steps_that_undo_each_other_are_left_out(tmp_path):
+    of = '{ system = "lyness", power = 32 }, { system = "lyness", power = 31, inverse = true }'
+    assert read_system(written(tmp_path, of)).map.at(1).step(START) == load("lyness").map.at(1).step(START)
+    of = '{ system = "lyness", power = 2 }, { system = "lyness", power = -2 }'
+    assert read_system(written(tmp_path, of)).map.at(1).step(START) == START
 
 
 def test_compositions_in_each_other_come_to_an_end(tmp_path):

@@ -28,6 +28,8 @@ BIRATIONAL = [
     made("x y z", "x + eps*(y + x*z)^2", "y + x*z", "z + x^2"),
     made("x y z", "x + y^2", "y + z^2", "z + (x + y^2)^2"),
     made("x y z w", "y", "z", "w", "(z*x + y*w + 1)/(x*y + z)"),
+    # FLINT's Python cannot order the factors here modulo primes of 63 bits
+    made("x y", "(x*y + 1)/(x + y)", "(x*y^2 - x*y - y^2 + y)/(4*x + 4*y)"),
 ]
 
 

@@ -52,11 +52,12 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     from kahanmaps.errors import InputError
     from kahanmaps.maps.normal_form.periods import period_of
 
-    eps = the_eps(options["eps"], options["time_step"])
     kind, prime = options["arithmetic"]
     if kind not in ("exact", "mod"):
         raise click.UsageError(f"found --arithmetic {kind}, expected exact or mod:P: a period is exact")
     file = load_system(system, options)
+    _ = file.system  # which says that other maps are none of a vector field
+    eps = the_eps(options["eps"], options["time_step"])
     _require_point(file, eps, options["start"], kind, prime)
     structure = _structure(file)
     if isinstance(structure, str):

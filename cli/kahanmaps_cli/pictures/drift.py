@@ -61,8 +61,9 @@ def command(system: str | None, **options: Any) -> int:
     from kahanmaps.plots.draw_drift import draw_drift
 
     require_output(options)
-    eps = the_eps(options["eps"], options["time_step"])
     file = load_system(system, options)
+    _ = file.system  # it is compared with methods for vector fields
+    eps = the_eps(options["eps"], options["time_step"])
     survey = _surveyed(file, eps, options)
     style = style_from(options)
     if options["size"] is None and options["output"] == "-" and options["kind"] in (None, "text"):

@@ -288,7 +288,7 @@ def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, sec
     if not _is_dominant(map_, eps):
         return _refused(eps, False, False) or _unknown("")
     if map_.at(eps).equation.degree > 1:
-        return _unknown(f"the singularities of a {map_.title} are followed in dimension {WRITTEN_DIMENSION} at most")
+        return _unknown(f"the singularities of {map_.kind} are followed in dimension {WRITTEN_DIMENSION} at most")
     found = fates_at_random(map_, eps, random.Random(f"patterns {seed_for(seed, map_.subject, eps)}"), limits)
     return _refused(eps, True, limits.is_over) or _patterns(found)
 
