@@ -302,8 +302,9 @@ class ExperimentReader:
         if any(self.sound(part) is None and part in self.raw for part in ("options", "axes")):
             return  # what is missing may be in the table that has not the right shape
         given = self.given()
+        needs_eps = not self.files or any(file.map.has_eps for file in self.files)
         for name in kind.required:
-            if name not in given:
+            if name not in given and (name != "eps" or needs_eps):
                 self.mistake(f"axes.{name}", f"missing, expected {kind.options[name].help} (in axes or options)")
         if _EPS2 in given and kind.needs == MEMBER_OR_OTHER:
             for name, reason in ((OTHER, "it is the eps of a second system"), ("eps", "without it every eps is meant")):

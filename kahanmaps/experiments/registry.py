@@ -53,6 +53,8 @@ class TaskKind:
             name: value if value is None or name == OTHER else self.options[name].make(value)
             for name, value in options.items()
         }
+        if "eps" in self.required and made.get("eps") is None:  # left out for maps that do not depend on it
+            made["eps"] = self.options["eps"].make("1")
         return self.function(**made) if self.needs is None else self.function(system, **made)
 
 

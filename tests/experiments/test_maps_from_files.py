@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
+from kahanmaps.errors import InputError
 from kahanmaps.experiments.run import run
 from kahanmaps.experiments.spec import parse_spec
 from kahanmaps.experiments.store import Store
@@ -47,3 +50,33 @@ def test_a_batch_takes_all_kinds_of_map_and_says_of_each_task_that_does_not(tmp_
     assert {(outcome, result["status"]) for outcome, result in found["orbit"]} == {("ok", "completed")}
     assert {verdict for kind, verdict in verdicts if kind == "check-measure"} == {"proved"}
     assert [outcome for outcome, _ in found["find-integrals"]] == ["ok"] * 5
+
+
+WITHOUT_EPS = """
+[experiments.orbits]
+task = "orbit"
+system = ["lyness", "somos_4"]
+options = { steps = 3 }
+[experiments.heights]
+task = "heights"
+system = "lyness"
+options = { steps = 12 }
+[experiments.exponents]
+task = "lyapunov"
+system = "lyness"
+options = { steps = 12, orbits = 2 }
+[experiments.many]
+task = "ensemble"
+system = "lyness"
+options = { steps = 12, orbits = 2 }
+"""
+
+
+def test_no_eps_is_asked_for_where_no_map_depends_on_it(tmp_path):
+    database = tmp_path / "maps.db"
+    list(run(parse_spec(WITHOUT_EPS, "maps.toml"), database))
+    with Store.open(database) as store:
+        rows = list(store.rows())
+    assert [row.record.outcome for row in rows] == ["ok"] * 5
+    with pytest.raises(InputError, match=r"axes\.eps: missing, expected the paper's epsilon"):
+        parse_spec(WITHOUT_EPS.replace('"lyness", "somos_4"', '"lyness", "euler_top"'), "maps.toml")
