@@ -7,6 +7,7 @@ Numbers are exact: decimals are read as decimals, quoted or not.
 
 from __future__ import annotations
 
+import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -172,7 +173,7 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
       system.rhs[1]: found a polynomial of degree 3, expected at most 2
     """
     reader = DocumentReader(_document(text, where), where, parameters or {}, partial(_named, Path(where).parent))
-    reader.inside = (str(Path(where).resolve()),)
+    reader.inside = (os.path.abspath(where),)
     return SystemFile(*reader.read())
 
 
@@ -185,7 +186,7 @@ def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
                 return _document(found.read_bytes(), name), name, None
         raise InputError(f"found the unknown system {quoted(name)}, expected a name of the catalogue")
     path = base / name
-    return _document(_read(path), name), str(path.resolve()), partial(_named, path.parent)
+    return _document(_read(path), name), os.path.abspath(path), partial(_named, path.parent)
 
 
 def _read(path: str | Path) -> bytes:

@@ -67,7 +67,7 @@ def test_the_period_is_that_of_the_orbit_walked(kahanmaps, pair, files, name, st
                 compared += end["period"] > 1
             else:
                 assert int(found["period"]) > end["steps"]
-    assert compared >= 5
+    assert compared >= 4
 
 
 @pytest.mark.parametrize(

@@ -76,11 +76,16 @@ def formulas(name):
     return tuple(parsed(name, text) for text in KNOWN[name]["integrals"] if text != MODIFIED)
 
 
+def denominator_of(map_: ModularMap, x):
+    """det(I - eps f'(x)) modulo the prime of the map."""
+    return int(map_.map.determinant(x))
+
+
 def answer_for(name):
     known = KNOWN[name]
     density = known["density"]
     if density == DETERMINANT:
-        value = ModularMap.determinant
+        value = denominator_of
     else:
         value = None if density is None else residues_of(parsed(name, density))
     return Answer(
