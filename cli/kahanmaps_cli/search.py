@@ -55,6 +55,8 @@ def scope(found: Any) -> str:
     """For which eps and which symbols the formulas hold, to follow the name of the map."""
     from kahanmaps.checks.settings import eps_record, eps_words
 
+    if getattr(found, "flow", False):
+        return ", the flow x' = f(x)" + (f", every {', '.join(found.symbols)}" if found.symbols else "")
     step = eps_words(eps_record(found.eps, found.file.map))
     return f"{step}, every {', '.join(found.symbols)}" if found.symbols else step
 

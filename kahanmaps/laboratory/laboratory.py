@@ -17,15 +17,16 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.affine_functions import affine_cofactor, affine_darboux
 from kahanmaps.laboratory.preserve.closed_forms import ClosedForms, Spaces, closed_forms
 from kahanmaps.laboratory.preserve.cofactors import Cofactor, cofactor_of_affine, determinant_factors, jacobian_factors
+from kahanmaps.laboratory.preserve.flow import ModularFlow
 from kahanmaps.maps.kahan import Kahan
 
 
 class Laboratory:
     """The maps on which a file's map is examined: two primes, each with its own eps and its own values of the symbols.
 
-    With `eps` (exact; the time step is 2 eps) all maps are at that eps. `system` is there if the map is the Kahan map
-    of a system without eps in its coefficients: what theorems say of these is known then. Raises InputError for
-    eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
+    With `eps` (exact; the time step is 2 eps) all maps are at that eps; with `flow` they are flows. `system` is there
+    if the map is the Kahan map of a system without eps in its coefficients: what theorems say of these is known then.
+    Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
     >>> laboratory = Laboratory(load("euler_top"), ["a1"])
@@ -33,7 +34,9 @@ class Laboratory:
     (2, 'by weight', '')
     """
 
-    def __init__(self, file: SystemFile, symbols: Sequence[str] = (), eps: Any = None, seed: int = 0) -> None:
+    def __init__(
+        self, file: SystemFile, symbols: Sequence[str] = (), eps: Any = None, seed: int = 0, *, flow: bool = False
+    ) -> None:
         self.file = file
         self.symbols = tuple(name for name in dict.fromkeys(symbols) if name != "eps")
         self.eps = None if eps is None else rational(eps)
@@ -45,6 +48,10 @@ class Laboratory:
         self.system = None
         if isinstance(self.map, Kahan) and "eps" not in self.map.system.symbols:
             self.system = self.map.system
+        self.flow = flow
+        if flow and (self.system is None or self.eps is not None):
+            what = "eps = " + str(self.eps) if self.system is not None else self.map.kind
+            raise InputError(f"found {what}, expected a quadratic vector field without eps: its flow is asked for")
         self.seed = seed_for(seed, self.symbols, self.map.subject, self.eps)  # of all that is drawn for this map
         self.maps = list(self._drawn("laboratory", 2))
 
@@ -54,6 +61,8 @@ class Laboratory:
             eps = int(GF(prime).convert(self.eps))
             if eps == 0:
                 raise BadPrime(f"the prime {prime} divides the numerator of eps", prime)
+        if self.flow and self.system is not None:
+            return ModularFlow(self.system, prime, values, self.seed)
         return ModularMap(self.map, prime, eps, values, self.seed)
 
     def map_for(self, prime: int, values: Sequence[int]) -> ModularMap:
@@ -78,7 +87,7 @@ class Laboratory:
     @property
     def eps_enters(self) -> str:
         """How eps enters formulas: "not", where it is a number, "by weight" for homogeneous f, else as a "symbol"."""
-        if self.eps is not None or not self.map.has_eps:
+        if self.eps is not None or self.flow or not self.map.has_eps:
             return "not"
         if self.system is None:
             return "symbol"
@@ -110,6 +119,8 @@ class Laboratory:
 
     def cofactors(self) -> list[Cofactor]:
         """The cofactors that polynomials are tried with."""
+        if self.flow:
+            return []
         if self.system is None:
             return list(jacobian_factors(self.map))
         context = self.system.rhs[0].context()

@@ -96,6 +96,19 @@ class ModularMap:
             longest = max(longest, len(found))
         raise NoPoint(_NO_VALUE if longest == 1 else "orbits modulo a prime meet the singular set")
 
+    def along_orbit(self, degree: int, count: int) -> tuple[list[list[int]], Point, int | None]:
+        """The values of all monomials up to a degree along an orbit: a row a point, the last point, the period.
+
+        A polynomial vanishes along the orbit if the rows annihilate its coefficients. Raises NoPoint.
+        """
+        points = self.orbit(count)
+        period = len(points) if len(points) < count else None
+        return [monomial_values(x, degree, self.prime) for x in points], points[-1], period
+
+    def moved(self, x: Point, image: Point, degree: int) -> tuple[list[int], list[int]]:
+        """The values of all monomials up to a degree at a point, and what a step makes of them."""
+        return monomial_values(x, degree, self.prime), monomial_values(image, degree, self.prime)
+
 
 @cache
 def exponents_up_to(dim: int, degree: int) -> tuple[tuple[int, ...], ...]:
@@ -104,7 +117,7 @@ def exponents_up_to(dim: int, degree: int) -> tuple[tuple[int, ...], ...]:
 
 
 @cache
-def _slopes(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
+def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
     """For each monomial (variable, exponent, place of the monomial with one factor less), of all its variables."""
     support = exponents_up_to(dim, degree)
     places = {exponent: k for k, exponent in enumerate(support)}
@@ -117,7 +130,7 @@ def _slopes(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
 def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
     """The values of all monomials of degree at most `degree` at a point modulo a prime, one product each."""
     table = [1]
-    for slopes in _slopes(len(point), degree)[1:]:
+    for slopes in monomial_tables(len(point), degree)[1:]:
         variable, _, place = slopes[-1]
         table.append(table[place] * point[variable] % prime)
     return table
@@ -127,7 +140,7 @@ def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int
     """The value and the gradient at a point of the polynomial of degree at most `degree` with these coefficients."""
     value, gradient = 0, [0] * len(point)
     powers = monomial_values(point, degree, prime)
-    for coefficient, slopes, power in zip(vector, _slopes(len(point), degree), powers, strict=True):
+    for coefficient, slopes, power in zip(vector, monomial_tables(len(point), degree), powers, strict=True):
         if coefficient:
             value += coefficient * power
             for variable, exponent, place in slopes:

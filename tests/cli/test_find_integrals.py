@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 from cli_helpers import shell
+from schema_helpers import mistakes
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.version import __version__
@@ -262,3 +265,16 @@ def test_the_help_fits_a_terminal(kahanmaps):
     assert outcome.status == 0
     assert max(map(len, outcome.out.splitlines())) <= 80
     assert outcome.out.count("kahanmaps find-integrals") >= 4
+
+
+def test_integrals_of_the_flow(kahanmaps):
+    lines = kahanmaps("find-integrals henon_heiles --flow --max-degree 3 -q").out.splitlines()
+    assert lines[0] == "find-integrals: henon_heiles, the flow x' = f(x)"
+    assert lines[1].startswith("I1\tproved\t6*q1^2*q2 - 2*q2^3")
+    record = json.loads(kahanmaps("find-integrals euler_top --flow --json -q").out)
+    assert record["flow"] is True
+    assert mistakes("find-integrals", record) == []
+    assert "flow" not in json.loads(kahanmaps("find-integrals euler_top --json -q").out)
+    for option in ("--toml", "--darboux 2", "--monomials x1,1"):
+        assert kahanmaps(f"find-integrals euler_top --flow {option}").status == 2
+    assert kahanmaps("find-integrals lyness --flow").status == 2

@@ -36,6 +36,7 @@ from kahanmaps_cli.terminal import tell
     metavar="DEGREE",
     help="Instead: all discrete Darboux polynomials up to it.",
 )
+@click.option("--flow", is_flag=True, help="Integrals of the differential equation itself.")
 @click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
 @search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
@@ -46,6 +47,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals volterra_periodic_4 --toml
       kahanmaps find-integrals lagrange_top --monomials 'm1^2+m2^2,p3^2,p3,1'
       kahanmaps find-integrals volterra_periodic_4 --darboux 2
+      kahanmaps find-integrals henon_heiles --flow
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
     Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals there are is known
@@ -60,6 +62,8 @@ def command(system: str | None, **options: Any) -> int:
     with Progress(options["quiet"]) as progress:
         file = load_system(system, options)
         symbols, eps = symbols_and_eps(options)
+        if options["flow"] and (options["sets"] or options["darboux"] is not None or options["as_toml"]):
+            raise click.UsageError("--flow goes without --monomials, --darboux and --toml, which are about the map")
         if options["sets"]:
             if options["darboux"] is not None:
                 raise click.UsageError("give --monomials or --darboux, not both")
@@ -74,6 +78,7 @@ def command(system: str | None, **options: Any) -> int:
             file,
             symbols=symbols,
             eps=eps,
+            flow=options["flow"],
             max_degree=options["max_degree"],
             seconds=options["seconds"],
             seed=options["seed"],

@@ -24,7 +24,7 @@ from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField,
 from kahanmaps.algebra.polynomials import degree_in, evaluate, ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.invariants.measures import jacobian_determinant_sides
-from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, monomial_values, null_space
+from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, null_space
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
@@ -206,7 +206,7 @@ def cofactor_space(sample: Sample, product: CofactorProduct, degree: int) -> Dar
     for (x, image), (above, below) in zip(
         sample.pairs[: points_needed(dim, degree)], sample.values(product), strict=False
     ):
-        here, there = (monomial_values(point, degree, prime) for point in (x, image))
+        here, there = sample.map.moved(x, image, degree)
         rows.append([(below * b - above * a) % prime for a, b in zip(here, there, strict=True)])
     return DarbouxSpace.spanned_by(dim, degree, null_space(rows, len(rows[0]), prime), prime)
 

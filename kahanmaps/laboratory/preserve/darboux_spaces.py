@@ -33,7 +33,6 @@ from kahanmaps.laboratory.modular_points import (
     exponents_up_to,
     gradient_values,
     integers,
-    monomial_values,
     null_space,
     product_of,
     rank,
@@ -141,8 +140,8 @@ def _values(map_: ModularMap, basis: Vectors, degree: int, count: int) -> tuple[
     prime = map_.prime
     matrix = nmod_mat(basis, prime).transpose()
     here, there = (
-        nmod_mat([monomial_values(point, degree, prime) for point in points], prime) * matrix
-        for points in zip(*map_.pairs(count), strict=True)
+        nmod_mat(list(rows), prime) * matrix
+        for rows in zip(*(map_.moved(x, image, degree) for x, image in map_.pairs(count)), strict=True)
     )
     return here, there
 

@@ -29,7 +29,6 @@ from kahanmaps.laboratory.modular_points import (
     combine,
     echelon,
     gradient_values,
-    monomial_values,
     null_space,
     rank,
 )
@@ -106,11 +105,10 @@ def relations_on_orbit(map_: ModularMap, degree: int) -> OrbitRelations:
     """
     unknowns = comb(map_.dim + degree, degree)
     count = unknowns + _SPARE
-    points = map_.orbit(count)
-    period = len(points) if len(points) < count else None
-    vectors = null_space([monomial_values(x, degree, map_.prime) for x in points], unknowns, map_.prime)
-    normals = _normals(map_, vectors, degree, points[-1])
-    return OrbitRelations(vectors, normals, rank(normals, map_.prime), period, points[-1])
+    rows, end, period = map_.along_orbit(degree, count)
+    vectors = null_space(rows, unknowns, map_.prime)
+    normals = _normals(map_, vectors, degree, end)
+    return OrbitRelations(vectors, normals, rank(normals, map_.prime), period, end)
 
 
 def span_of_relations(map_: ModularMap, degree: int, seconds: float = 30.0) -> list[list[int]]:

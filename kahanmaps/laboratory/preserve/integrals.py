@@ -31,6 +31,7 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
 from kahanmaps.laboratory.preserve.branches import Branches, Pattern, tell_apart
 from kahanmaps.laboratory.preserve.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.flow import is_conserved_by_flow
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.inherited import InheritedIntegrals, inherited_integrals
@@ -39,6 +40,7 @@ from kahanmaps.laboratory.preserve.search import AFFINE, Found, classes, may_be_
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
+_FLOW_EVIDENCE = Evidence("expansion", "f . grad I is 0, multiplied out")
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
@@ -124,6 +126,7 @@ class IntegralSearch(Displayed):
     by_theorems: int
     theorems: str
     in_time: tuple[TimedIntegral, ...] = ()
+    flow: bool = False  # whether the integrals are those of the differential equation
 
     @property
     def note(self) -> str:
@@ -170,6 +173,7 @@ class IntegralSearch(Displayed):
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
+            **({"flow": True} if self.flow else {}),
             **attributes(self, "integrals"),
             "found": len(self.integrals),
             **attributes(self, "in_time"),
@@ -219,6 +223,7 @@ def find_integrals(
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
+    flow: bool = False,
     max_degree: int | None = None,
     seconds: float = 60.0,
     seed: int = 0,
@@ -230,6 +235,7 @@ def find_integrals(
         file: the map; a differential equation stands for its Kahan map.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
         eps: an exact number, the formulas are then for this eps only; None: formulas contain eps (time step 2 eps).
+        flow: ask for the rational integrals of the differential equation instead.
         max_degree: the largest degree of relations along orbits; by default as dimension and time allow.
         seconds: the time that the search may take, about.
         seed: of everything random.
@@ -253,12 +259,12 @@ def find_integrals(
         raise InputError(f"found {seconds} seconds, expected a time above 0")
     if max_degree is not None and max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
-    laboratory = Laboratory(file, symbols, eps, seed)
+    laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
     deadline = time.monotonic() + seconds
     primes = laboratory.primes
 
     inherited: list[InheritedIntegrals] = []  # of each map; theorems speak of Kahan maps
-    if laboratory.system is not None:
+    if laboratory.system is not None and not flow:
         # Without symbols the maps have the same values, none, and one system.
         systems = {
             values: inherited_integrals(laboratory.system.at(values), seed=seed)
@@ -274,7 +280,7 @@ def find_integrals(
     def result(integrals: Sequence[FoundIntegral], profile: Profile, reason: str) -> IntegralSearch:
         values = f", at random values of {', '.join(laboratory.symbols)}" if laboratory.symbols else ""
         theorems = inherited[0].text + values if inherited else ""
-        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems, tuple(in_time))
+        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems, tuple(in_time), flow)
         return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found)
 
     empty = Profile(file.dim, (), (), None, True, False)
@@ -294,7 +300,7 @@ def find_integrals(
     integrals = _independent(laboratory, formulas, progress)
     if inherited and not laboratory.symbols:
         integrals = _by_theorems(laboratory, inherited[0], integrals, deadline)
-    if len(integrals) < file.dim - 1:
+    if len(integrals) < file.dim - 1 and not flow:
         progress("products of powers of known polynomials")
         integrals, in_time = _products(laboratory, cofactors, integrals, progress)
     done = result(integrals, profile, "")
@@ -472,7 +478,11 @@ def _independent(
         if rank([*rows, row], map_.prime) == len(rows):
             continue
         progress("verifying an integral")
-        if laboratory.system is not None and _is_affine_integral(laboratory.system, function):
+        if laboratory.system is not None and laboratory.flow:
+            verdict, evidence = Verdict.REFUTED, _FLOW_EVIDENCE
+            if is_conserved_by_flow(laboratory.system, function):
+                verdict = Verdict.PROVED
+        elif laboratory.system is not None and _is_affine_integral(laboratory.system, function):
             verdict, evidence = Verdict.PROVED, _AFFINE_EVIDENCE
         else:
             verdict, evidence = verdict_on(laboratory.map, function, laboratory.eps, laboratory.seed, is_density=False)

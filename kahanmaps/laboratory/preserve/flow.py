@@ -1,0 +1,105 @@
+"""The flow of a quadratic system in the place of a map: its integrals are found by the same searches.
+
+A solution x(t) modulo a prime is a power series, the coefficients of P(x(t)) are what the values P(x_n) are along the
+orbit of a map: P vanishes along the solution if so many of them are 0. And where a search for maps compares P at a
+point and at its image, here P + P' stands for the second, P' = f . grad P: what is linear in both, as P(x~) - P(x) and
+P(x~) Q(x) - P(x) Q(x~) are, becomes the same of P' and Q'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from flint import fmpq_mpoly, nmod_poly
+
+from kahanmaps.algebra.fields import GF, PrimeField
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.laboratory.modular_points import ModularMap, Point, monomial_tables, monomial_values
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+Terms = list[tuple[int, tuple[int, ...]]]
+
+
+def _residues(f: fmpq_mpoly, n: int, field: PrimeField, values: Sequence[Any]) -> Terms:
+    """The coefficients of f modulo a prime, the symbols having these values, with the exponents of the variables."""
+    found = []
+    for monomial, coefficient in f.terms():
+        total = field.convert(coefficient)
+        for value, exponent in zip(values, monomial[n:], strict=True):
+            total = total * value ** int(exponent)
+        found.append((int(total), tuple(int(e) for e in monomial[:n])))
+    return found
+
+
+class ModularFlow(ModularMap):
+    """The flow of a system modulo `prime`, at the residues `values` of its symbols; a step is x -> x + f(x).
+
+    Raises BadPrime where the prime divides denominators.
+    """
+
+    def __init__(self, system: QuadraticSystem, prime: int, values: Sequence[int] = (), seed: int = 0) -> None:
+        super().__init__(system, prime, 1, values, seed)
+        field = GF(prime)
+        given = [field.convert(value) for value in values]
+        self._local = system.over(field, given)
+        self._terms = [_residues(f, system.dim, field, given) for f in system.rhs]
+
+    def step(self, x: Point) -> Point:
+        """x + f(x)."""
+        f = self._local.value([self.map.field.convert(entry) for entry in x])
+        return tuple((entry + int(slope)) % self.prime for entry, slope in zip(x, f, strict=True))
+
+    def moved(self, x: Point, image: Point, degree: int) -> tuple[list[int], list[int]]:
+        """The values of all monomials P up to a degree, and of P + f . grad P."""
+        p = self.prime
+        here = monomial_values(x, degree, p)
+        f = [after - before for before, after in zip(x, image, strict=True)]
+        there = [
+            (value + sum(e * here[place] * f[k] for k, e, place in slopes)) % p
+            for value, slopes in zip(here, monomial_tables(self.dim, degree), strict=True)
+        ]
+        return here, there
+
+    def along_orbit(self, degree: int, count: int) -> tuple[list[list[int]], Point, int | None]:
+        """The Taylor coefficients of all monomials along a solution: a row an order; and where it starts."""
+        p, start = self.prime, self.random_point()
+        x = [nmod_poly([c], p) for c in start]
+        for order in range(1, count):
+            x = [
+                nmod_poly([c], p) + self._along(terms, x, order).integral()
+                for c, terms in zip(start, self._terms, strict=True)
+            ]
+        table = [nmod_poly([1], p)]
+        for slopes in monomial_tables(self.dim, degree)[1:]:
+            variable, _, place = slopes[-1]
+            table.append(table[place].mul_low(x[variable], count))
+        return [[int(series[k]) for series in table] for k in range(count)], start, None
+
+    def _along(self, terms: Terms, x: Sequence[nmod_poly], order: int) -> nmod_poly:
+        """A component of f at series, up to an order."""
+        total = nmod_poly([0], self.prime)
+        for coefficient, exponents in terms:
+            product = nmod_poly([coefficient], self.prime)
+            for series, exponent in zip(x, exponents, strict=True):
+                for _ in range(exponent):
+                    product = product.mul_low(series, order)
+            total = total + product
+        return total
+
+
+def is_conserved_by_flow(system: QuadraticSystem, function: RationalFunction) -> bool:
+    """Whether f . grad I = 0, multiplied out: for every value of the symbols; I is in (variables, symbols, eps). Exact.
+
+    >>> from kahanmaps.algebra.text import parse_rational_function
+    >>> rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
+    >>> [is_conserved_by_flow(rotation, parse_rational_function(t, ["x", "y", "eps"])) for t in ("x^2 + y^2", "x/y")]
+    [True, False]
+    """
+    P, Q = function.numerator, function.denominator
+    context = P.context()
+    images = context.gens()[: system.dim + len(system.symbols)]
+    total: fmpq_mpoly = context.constant(0)
+    for k, f in enumerate(system.rhs):
+        total += f.compose(*images, ctx=context) * (P.derivative(k) * Q - P * Q.derivative(k))
+    return bool(total.is_zero())
