@@ -18,12 +18,13 @@ import time
 from collections import Counter
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from helpers import quick
 
 from kahanmaps.errors import InputError
-from kahanmaps.experiments import cluster
+from kahanmaps.experiments import cluster, dask_client
 from kahanmaps.experiments.children import TRIES
 from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers, JobGroup, KeptJob, WorkersUnfit, record_on
 from kahanmaps.experiments.records import Job, Limits, Outcome, Task
@@ -737,3 +738,17 @@ def test_tls_is_set_up_as_dask_has_it_and_nobody_comes_in_without_a_certificate(
             assert b"Error: no dask scheduler answers at tls://" in refused.stderr, refused.stderr
         ended = run(CA_FILE="ca.pem", CLIENT__CERT="ca.pem", CLIENT__KEY="ca.key")
         assert json.loads(ended.stdout)["done"] == {"ok": 4}, ended.stderr
+
+
+def test_a_client_whose_thread_did_not_start_in_time_is_made_once_more(monkeypatch):
+    tried = []
+
+    class Client:
+        def __init__(self, *_, **__):
+            tried.append(self)
+            assert len(tried) % 2 == 0  # as distributed does where its loop is not there after ten seconds
+
+    monkeypatch.setattr(dask_client, "distributed", lambda: SimpleNamespace(Client=Client))
+    assert dask_client._connected("tcp://127.0.0.1:1", 1.0) is tried[1]
+    dask_client._SILENCE.end()
+    assert len(tried) == 2
