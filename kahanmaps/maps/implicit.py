@@ -21,7 +21,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
@@ -306,6 +306,11 @@ class BirationalMap(DisplayedAsFormula, ABC):
         return True
 
     @property
+    def image(self) -> tuple[RationalFunction, ...] | None:
+        """The coordinates of x~ as functions of the `names`, where the map is given by them; else None."""
+        return None
+
+    @property
     def kind(self) -> str:
         """What kind of map it is, with an article."""
         return f"{'an' if self.title[0] in 'aeiou' else 'a'} {self.title}"
@@ -435,10 +440,13 @@ class ImplicitMap(BirationalMap):
         equation = equation_of(self.rows, over, point)
         backward = None
         if self.backward is not None or equation.degree > 1:
-            backward = lambda: equation_of(self.inverse_rows, over, point)  # noqa: E731
+            backward = partial(self._backward, over, point)
         found = EquationMap(equation, element, backward, self.variables)
         self._last[:] = [] if values else [(over, element, found)]  # a map with symbols is not kept
         return found
+
+    def _backward(self, over: Field, point: Sequence[Any]) -> Equation:
+        return equation_of(self.inverse_rows, over, point)
 
     def __repr__(self) -> str:
         return f"ImplicitMap({self.title} in {', '.join(self.variables)})"

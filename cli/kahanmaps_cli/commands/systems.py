@@ -130,9 +130,9 @@ def _latex(file: Any) -> str:
     if file.is_quadratic:
         names = [latex_name(name) for name in file.variables]
         rows = [rf"\dot{{{x}}} &= {latex_polynomial(f)}" for x, f in zip(names, file.system.rhs, strict=True)]
-    elif (image := getattr(file.map, "image", None)) is not None:
+    elif file.map.image is not None:
         names = [latex_name(name) for name in file.variables]
-        rows = [rf"\tilde{{{x}}} &= {latex_rational_function(f)}" for x, f in zip(names, image, strict=True)]
+        rows = [rf"\tilde{{{x}}} &= {latex_rational_function(f)}" for x, f in zip(names, file.map.image, strict=True)]
     else:
         rows = [f"{latex_polynomial(equation)} &= 0" for equation in file.map.equations]
     lines = [r"\[", r"\left\{", r"\begin{aligned}", " \\\\\n".join(rows), r"\end{aligned}", r"\right.", r"\]"]

@@ -59,11 +59,11 @@ def formulas(file: SystemFile) -> list[str]:
     if file.is_quadratic:
         sides = zip(file.variables, file.system.rhs, strict=True)
         rows = [rf"{latex_name(x)}^\prime &= {latex_polynomial(f)}" for x, f in sides]
-    elif isinstance(file.map, ImplicitMap) and file.map.image is not None:
+    elif file.map.image is not None:
         images = zip(file.variables, file.map.image, strict=True)
         rows = [rf"\tilde {latex_name(x)} &= {latex_rational_function(f)}" for x, f in images]
-    else:
-        rows = [rf"{latex_polynomial(equation)} &= 0" for equation in getattr(file.map, "equations", ())]
+    elif isinstance(file.map, ImplicitMap):
+        rows = [rf"{latex_polynomial(equation)} &= 0" for equation in file.map.equations]
     found = [r"\begin{aligned}" + r" \\ ".join(rows) + r"\end{aligned}"]
     if file.hamiltonian is not None:
         found.append(f"H = {latex_polynomial(file.hamiltonian.H)}")
