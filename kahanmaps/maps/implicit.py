@@ -16,6 +16,7 @@ L = (M | -r) of forms of one degree. Where that degree is 1, exchanging the two 
 
 from __future__ import annotations
 
+import operator
 import random
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
@@ -29,6 +30,7 @@ from flint import fmpq, fmpq_mpoly, fmpz
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.matrices import det, solve
+from kahanmaps.algebra.minors import Product
 from kahanmaps.algebra.polynomials import RationalFunction, digits_of, evaluate, names_of, ring
 from kahanmaps.algebra.text import format_polynomial, format_rational_function
 from kahanmaps.displayed import DisplayedAsFormula
@@ -62,8 +64,8 @@ class Equation:
         """The degree of the forms."""
         return sum(self.exponents[0])
 
-    def monomials(self, X: Sequence[Any]) -> list[Any]:
-        """The values of the monomials at (X_1, ..., X_n, Z), elements of any ring."""
+    def monomials(self, X: Sequence[Any], times: Product = operator.mul) -> list[Any]:
+        """The values of the monomials at (X_1, ..., X_n, Z), elements of any ring that `times` multiplies."""
         if self.degree == 1:
             return list(X)
         powers: list[list[Any]] = [[None, entry] for entry in X]
@@ -72,9 +74,9 @@ class Equation:
             total = None
             for table, e in zip(powers, exponent, strict=True):
                 while len(table) <= e:
-                    table.append(table[-1] * table[1])
+                    table.append(times(table[-1], table[1]))
                 if e:
-                    total = table[e] if total is None else total * table[e]
+                    total = table[e] if total is None else times(total, table[e])
             found.append(total)
         return found
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import random
 import time
+from collections.abc import Sequence
 from functools import reduce
 from typing import NoReturn
 
@@ -23,7 +24,7 @@ from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
 
 from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import BirationalMap, MapOver
 
 _MINORS = 5  # the largest dimension in which minors are taken
 _MARGIN = 8  # terms of a series beyond those that determine the curve: each is right by chance once in 2^62
@@ -36,23 +37,35 @@ class Stopped(Exception):
         self.ended, self.message = ended, message
 
 
+def reduced(map_: BirationalMap, eps: fmpq | None, rng: random.Random) -> MapOver:
+    """The map modulo a random prime of 63 bits, at a random eps where none is given. Raises BadPrime."""
+    field = random_prime_field(rng)
+    return map_.at(field.random(rng) if eps is None else field.convert(eps), field)
+
+
 class Line:
-    """The curve t -> Phi^n(a + b t) over GF(p) as polynomials (X : Z), Z below, without common factor."""
+    """The curve t -> Phi^n(a + b t) over GF(p) as polynomials (X : Z), Z below, without common factor.
+
+    For a map over GF(p), along a random line or that which `start` gives.
+    """
 
     def __init__(
-        self, map_: BirationalMap, eps: fmpq | None, rng: random.Random, deadline: float, max_degree: int
+        self,
+        map_: MapOver,
+        rng: random.Random,
+        deadline: float,
+        max_degree: int,
+        start: Sequence[nmod_poly] | None = None,
     ) -> None:
-        field = random_prime_field(rng)
-        p, n = field.prime, map_.dim
-        self.prime = p
-        eps_p = field.random(rng) if eps is None else field.convert(eps)
-        self.eps = int(eps_p)
+        p = self.prime = map_.field.characteristic
+        self.eps = int(map_.eps)
         self._rng, self._deadline, self._max_degree = rng, deadline, max_degree
         self._context = fmpz_mod_poly_ctx(fmpz_mod_ctx(p))
-        self._equation = map_.at(eps_p, field).equation
+        self._equation = map_.equation
         self.steps = 0
         self.degree = 1
-        self._X = [*(nmod_poly([rng.randrange(p), rng.randrange(1, p)], p) for _ in range(n)), nmod_poly([1], p)]
+        drawn = (nmod_poly([rng.randrange(p), rng.randrange(1, p)], p) for _ in range(map_.dim))
+        self._X = [*drawn, nmod_poly([1], p)] if start is None else list(start)
 
     def step(self, guess: int) -> None:
         """One step on. Raises ZeroDivisionError where points of the line have no image, Stopped at a limit."""

@@ -6,8 +6,10 @@ should not, can only make a degree too small. So two lines, each with a prime an
 where they differ the larger degree stands.
 
 A recurrence of the first degrees can be that of another map: nothing is seen of a hypersurface that is contracted until
-its image meets points without a value, perhaps a hundred steps later. So the fates of these hypersurfaces are asked
-(`singularities`), and a recurrence counts where there are terms enough beyond the last thing that happens to them.
+its image meets points without a value, perhaps a hundred steps later. So these hypersurfaces are followed
+(`singularities`). Where the orders along all of them are known, the degrees for all times follow (`renewal`): they are
+explained, and the measured ones have to agree. Elsewhere a recurrence of the measured ones counts where there are terms
+enough beyond the last thing that happens to these hypersurfaces.
 
 The growth of d_n measures complexity: lim d_n^(1/n), the dynamical degree, is 1 for integrable maps as far as is
 known, and its logarithm is the algebraic entropy (bellon-viallet-1999).
@@ -19,7 +21,7 @@ import math
 import random
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -31,8 +33,10 @@ from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.text import format_number
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import BadPrime, InputError, counted
-from kahanmaps.laboratory.growth.curves import Line, Stopped
+from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
+from kahanmaps.laboratory.growth.enclosure import Enclosure, enclose
 from kahanmaps.laboratory.growth.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence
+from kahanmaps.laboratory.growth.renewal import coefficients, recurrence_of
 from kahanmaps.laboratory.singular.singularities import MAX_STEPS, Patterns
 from kahanmaps.laboratory.singular.singularities import patterns as patterns_of_map
 from kahanmaps.maps.implicit import BirationalMap
@@ -45,19 +49,22 @@ _MOST_TERMS = 10_000
 _LINES = 2
 _OFTEN, _SELDOM = 64, 8  # up to so many terms a recurrence is looked for after each, then after so many
 _ENOUGH_QUOTIENTS = 6
+_AGREEING = 12  # terms beyond the pattern of a singularity and as many again, which explained degrees agree in
+_LARGE = 2000  # a degree up to which they do
 _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to need it
 
 
 @dataclass(frozen=True)
 class DegreeGrowth(Displayed):
-    """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a Kahan map, and what they say of its complexity.
+    """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a map, and what they say of its complexity.
 
-    `eps` is None for generic eps (a random residue for each line). `ended` is "recurrence" (one was found, with
-    terms to spare), "terms" (as many as asked for), "time", "degree" (the next is over the limit), "constant" (the
-    iterate is a constant map), "singular" (the next iterate exists nowhere), "lines" (the lines do not agree) or
-    "unconfirmed" (a recurrence fits, and the patterns of the singularities are not known to the end).
-    `patterns` is what the singularities say, None where they were not asked. The degrees are measured: evidence, and no
-    proof.
+    `eps` is None for generic eps (a random residue for each line). `ended` is "recurrence" (one was found, with terms
+    to spare), "explained" (by the singularities, and enough terms agree), "terms" (as many as asked for), "time",
+    "degree" (the next is over the limit), "constant" (the iterate is a constant map), "singular" (the next iterate
+    exists nowhere), "lines" (the lines do not agree) or "unconfirmed" (a recurrence fits, and the patterns of the
+    singularities are not known to the end). `patterns` is what the singularities say, None where they were not asked.
+    The degrees are measured, and so is what explains them: evidence, and no proof. `enclosure` has bounds of the
+    dynamical degree of planar maps that are proved, the lower one above 1; None where there are none.
     """
 
     degrees: tuple[int, ...]
@@ -69,6 +76,7 @@ class DegreeGrowth(Displayed):
     residues: tuple[int, ...]
     notes: tuple[str, ...] = ()
     patterns: Patterns | None = None
+    enclosure: Enclosure | None = None
 
     @cached_property
     def fitted(self) -> Recurrence | None:
@@ -76,9 +84,28 @@ class DegreeGrowth(Displayed):
         return find_recurrence(self.degrees)
 
     @cached_property
+    def explained(self) -> Recurrence | None:
+        """The recurrence that follows from the singularities, where they are known and the measured degrees agree."""
+        if self.patterns is None or not self.patterns.series or self.disagreement is not None:
+            return None
+        return recurrence_of(self.patterns.fraction, self.degrees)
+
+    @cached_property
+    def disagreement(self) -> int | None:
+        """The first n whose measured degree is not what the singularities say; None where they agree or say nothing."""
+        if self.patterns is None or not self.patterns.series:
+            return None
+        expected = coefficients(self.patterns.fraction, len(self.degrees))
+        return next((n for n, (d, e) in enumerate(zip(self.degrees, expected, strict=True)) if d != e), None)
+
+    @cached_property
     def unconfirmed(self) -> str:
         """Why the recurrence that fits may be that of other maps; empty where there is none, or it is confirmed."""
-        if self.fitted is None or self.patterns is None:
+        if self.disagreement is not None:
+            return (
+                f"the singularities do not explain the degree of iterate {self.disagreement} (another --seed or --eps)"
+            )
+        if self.fitted is None or self.patterns is None or self.explained is not None:
             return ""
         if self.patterns.running:
             return self.patterns.running
@@ -91,11 +118,11 @@ class DegreeGrowth(Displayed):
 
     @property
     def recurrence(self) -> Recurrence | None:
-        """The shortest linear recurrence of the degrees with terms left to check it, or None.
+        """The linear recurrence of the degrees: explained, or the shortest with terms left to check it, or None.
 
         None also where it is not confirmed by terms beyond the last confinement, or singularities are undecided.
         """
-        return None if self.unconfirmed else self.fitted
+        return self.explained or (None if self.unconfirmed else self.fitted)
 
     @property
     def growth(self) -> GrowthClass:
@@ -153,14 +180,23 @@ class DegreeGrowth(Displayed):
 
     @property
     def basis(self) -> str:
-        """How the growth is known where there is a recurrence: measured, and with which limit."""
+        """How the growth is known where there is a recurrence: explained or measured, and with which limit."""
         limit = self.patterns.limit if self.patterns is not None else ""
-        return f"measured: {limit}" if limit else "measured"
+        known = "measured" if self.explained is None else "explained"
+        return f"{known}: {limit}" if limit else known
+
+    @property
+    def recurrence_text(self) -> str:
+        """The recurrence as an equation, with what speaks for it; empty without one."""
+        if self.explained is not None:
+            agree = counted(len(self.degrees) - 1, "measured degree")
+            return f"{self.explained.equation}, explained; {agree} {'agrees' if len(self.degrees) == 2 else 'agree'}"
+        return self.recurrence.text if self.recurrence is not None else ""
 
     @property
     def growth_text(self) -> str:
         """The kind of growth with its power or rate, and how far confinement was looked for: one phrase."""
-        limited = self.recurrence is not None and self.basis != "measured"
+        limited = self.recurrence is not None and self.basis not in ("measured", "explained")
         return self.kind_text + (f" ({self.basis})" if limited else "")
 
     @property
@@ -168,25 +204,31 @@ class DegreeGrowth(Displayed):
         """Lines for people, a word and a tab at the front: degrees, growth, recurrence, how it ended."""
         lines = [("degrees", ", ".join(map(str, self.degrees))), ("growth", self.growth_text)]
         if self.recurrence is not None:
-            lines.append(("recurrence", self.recurrence.text))
+            lines.append(("recurrence", self.recurrence_text))
+            lines.append(("characteristic polynomial", self.recurrence.characteristic_text))
             if self.recurrence.closed_form_text:
                 lines.append(("closed form", self.recurrence.closed_form_text))
         if self.patterns is not None:
+            if self.explained is not None:
+                lines.append(("generating function", self.patterns.series_text))
             lines.append(("singularities", self.patterns.text))
+            lines += [("contracted", told) for told in self.patterns.told]
+        if self.enclosure is not None:
+            lines.append(("proved", self.enclosure.text))
         lines += [("ended", self.message), *(("note", note) for note in self.notes)]
         return "\n".join(f"{word}\t{rest}" for word, rest in lines)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; primes are text, for they exceed what readers of JSON hold exactly."""
         lines = zip(self.primes, self.residues, strict=True)
-        names = ("growth", "growth_text", "dynamical_degree", "estimate", "looks_exponential", "recurrence")
+        names = ("growth", "growth_text", "basis", "dynamical_degree", "estimate", "looks_exponential", "recurrence")
         return {
             **attributes(self, "degrees"),
             "eps": "generic" if self.eps is None else format_number(self.eps),
             **attributes(self, "ended", "message", "seed"),
             "lines": [{"prime": str(p), "eps_residue": str(e)} for p, e in lines],
             **attributes(self, *names, singularities="patterns"),
-            **attributes(self, "unconfirmed", "notes"),
+            **attributes(self, "enclosure", "unconfirmed", "notes"),
         }
 
 
@@ -204,12 +246,12 @@ def degree_growth(
 ) -> DegreeGrowth:
     """The degrees of the iterates of a map, for one exact `eps` or generic eps; a system stands for its Kahan map.
 
-    Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare, and with terms enough
-    beyond the last confinement; with `max_terms` instead after the degrees d_1, ..., d_max_terms. Stops in any case
-    after about `seconds`, or before a degree above `max_degree`. `patterns` are those of the singularities, which are
-    followed here, for `steps` steps, where they are not given. Modulo random primes of 63 bits, so the answer is
-    measured and not proved; the same for the same `seed`, except for where the time ends it. Raises InputError for
-    wrong values.
+    Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare, and it is explained by
+    the singularities or there are terms enough beyond the last confinement; with `max_terms` instead after the degrees
+    d_1, ..., d_max_terms. Stops in any case after about `seconds`, or before a degree above `max_degree`. `patterns`
+    are those of the singularities, which are followed here, for `steps` steps, where they are not given. Modulo random
+    primes of 63 bits, so the answer is measured and not proved, but for the bounds of the dynamical degree of planar
+    maps; the same for the same `seed`, except for where the time ends it. Raises InputError for wrong values.
 
     Source: bellon-viallet-1999.
 
@@ -270,33 +312,40 @@ class _Search:
                     raise Stopped("constant", f"iterate {len(self.degrees) - 1} is a constant map")
         except Stopped as end:
             ended, message = end.ended, end.message
-        return DegreeGrowth(
-            tuple(self.degrees),
-            self._eps,
-            ended,
-            message,
-            self._seed,
-            tuple(line.prime for line in lines),
-            tuple(line.eps for line in lines),
-            tuple(self.notes),
-            self._patterns,
+        primes, residues = tuple(line.prime for line in lines), tuple(line.eps for line in lines)
+        found = replace(
+            self._so_far(), ended=ended, message=message, primes=primes, residues=residues, notes=tuple(self.notes)
         )
+        if found.growth is not GrowthClass.EXPONENTIAL and not found.looks_exponential:
+            return found
+        left = max(1.0, self._deadline - time.monotonic())
+        return replace(found, enclosure=enclose(self._map, self._eps, seed=self._seed, seconds=left, progress=progress))
+
+    def _so_far(self) -> DegreeGrowth:
+        return DegreeGrowth(tuple(self.degrees), self._eps, "", "", self._seed, (), (), (), self._patterns)
 
     def _look_at_fit(self, may_stop: bool) -> None:
-        """Follow the singularities as soon as some recurrence fits, and stop where one is certain."""
+        """Follow the singularities once the degree of the map is known, and stop where a recurrence is certain."""
         size = len(self.degrees)
-        if size > _OFTEN and size % _SELDOM:
+        if size < 2 or (size > _OFTEN and size % _SELDOM):
             return
-        found = find_recurrence(self.degrees)
-        if found is None:
-            return
-        if self._patterns is None and max(self.degrees) > 1:  # an affine map contracts nothing
+        if self._patterns is None and self.degrees[1] > 1:  # an affine map contracts nothing
             left = max(0.0, self._deadline - time.monotonic())
             self._patterns = patterns_of_map(
                 self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
             )
-        known = self._patterns
-        if not may_stop or found.checked < max(6, found.order):
+        if not may_stop:
+            return
+        known, found = self._patterns, find_recurrence(self.degrees)
+        enough = found is not None and found.checked >= max(6, found.order)
+        explained = self._so_far().explained
+        if explained is not None:
+            last = max(known.lengths, default=0) if known is not None else 0
+            same = found is not None and found.characteristic == explained.characteristic
+            if (enough and same) or size > 2 * last + _AGREEING or self.degrees[-1] > _LARGE:
+                raise Stopped("explained", "the singularities explain the degrees, and those measured agree")
+            return
+        if found is None or not enough:
             return
         if known is not None and known.running:
             raise Stopped("unconfirmed", f"a recurrence of order {found.order} fits, but {known.running}")
@@ -306,7 +355,8 @@ class _Search:
     def _line(self) -> Line:
         while True:
             try:
-                return Line(self._map, self._eps, self._rng, self._deadline, self._max_degree)
+                over = reduced(self._map, self._eps, self._rng)
+                return Line(over, self._rng, self._deadline, self._max_degree)
             except BadPrime:
                 continue
 

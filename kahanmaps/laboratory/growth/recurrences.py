@@ -176,13 +176,29 @@ class Recurrence:
         return f"{self.closed_form}, all" + after if ";" in self.closed_form else self.closed_form + after
 
     @property
+    def characteristic_text(self) -> str:
+        """The characteristic polynomial by its irreducible factors over Q.
+
+        >>> find_recurrence([2 * n * n + 1 for n in range(12)]).characteristic_text
+        '(t - 1)^3'
+        """
+        factors = [(fmpz_poly([0, 1]), self.preperiod)] * bool(self.preperiod) + list(self.factors)
+        shown = [(format_univariate(fmpq_poly(factor)), k) for factor, k in factors]
+        return " ".join(f"({text})" + (f"^{k}" if k > 1 else "") for text, k in shown) or "1"
+
+    @property
     def text(self) -> str:
         """The recurrence as an equation, with what speaks for it."""
+        return f"{self.equation}, from {self.terms} terms of which {self.checked} were not needed to find it"
+
+    @property
+    def equation(self) -> str:
+        """The recurrence as an equation."""
         terms = [f"{_signed(-self.characteristic[k])}*a(n-{self.order - k})" for k in range(self.order - 1, -1, -1)]
         terms = [term for term in terms if not term.startswith(("+0*", "-0*"))]
         right = "".join(terms).replace("+1*", "+").replace("-1*", "-").removeprefix("+") or "0"
         after = f" for n >= {self.order}"
-        return f"a(n) = {right}{after}, from {self.terms} terms of which {self.checked} were not needed to find it"
+        return f"a(n) = {right}{after}"
 
     def predict(self, n: int) -> int:
         """a_n as the recurrence continues the sequence.

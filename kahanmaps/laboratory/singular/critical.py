@@ -22,10 +22,7 @@ from kahanmaps.maps.implicit import Equation
 
 @dataclass(frozen=True)
 class CriticalPoint:
-    """A point modulo p where the differential degenerates, how often it is a zero of E, and the gradient there.
-
-    Or a pole: then E stands for det(I - eps f').
-    """
+    """A point modulo p where the differential degenerates, how often it is a zero of E, and the gradient there."""
 
     point: tuple[int, ...]
     gradient: tuple[int, ...]
@@ -53,13 +50,6 @@ def critical_points(
         return _denominator(inverse, kernel_minors(equation.rows(equation.monomials(X), zero)), zero)
 
     return _zeros(value, E, a, b, rng)
-
-
-def pole_points(equation: Equation, rng: random.Random) -> tuple[list[CriticalPoint], dict[int, int]]:
-    """The poles modulo p on a random line that are not at infinity, as `critical_points` gives critical points."""
-    a, b, line = _random_line(equation, rng)
-    value = _without(_denominator(equation, line, nmod_poly([], equation.over.characteristic)), line[-1])
-    return _zeros(value, lambda X, zero: _denominator(equation, X, zero), a, b, rng)
 
 
 def _random_line(equation: Equation, rng: random.Random) -> tuple[list[int], list[int], list[nmod_poly]]:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import islice, takewhile
+from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import Any
 
 from flint import fmpq, nmod_poly
@@ -17,22 +17,32 @@ from flint import fmpq, nmod_poly
 from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.matrices import nullspace
+from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate, gradient
-from kahanmaps.errors import BadPrime
+from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.growth.recurrences import find_recurrence
-from kahanmaps.laboratory.singular.critical import critical_points, pole_points
-from kahanmaps.laboratory.singular.jets import NotGeneric, PrecisionTooLow, Step, image_of, walk
+from kahanmaps.laboratory.singular.critical import critical_points
+from kahanmaps.laboratory.singular.jets import (
+    Function,
+    NotGeneric,
+    PrecisionTooLow,
+    Step,
+    form_order,
+    image_of,
+    walk,
+    walk_along,
+)
+from kahanmaps.laboratory.singular.orders import NO_ORDERS, NOTHING, AlongCurves, Orders, Tracked
 from kahanmaps.maps.implicit import BirationalMap, Equation
 
 _MAX_PRECISION = 4096
 _MOST_ALONG = 1024  # where series are followed far
 _TRIES = 40
 _LINES = 6  # on which critical points are looked for, and more while some have no point
-_FEW_LINES = 2
 _POINTS = 2  # each modulo a prime of its own
 _CONSTANT = 8  # so often at least is the same order repeated that goes on
 _CHECKED = 3  # so many times as many orders as their recurrence is long have to follow it
-_SAME = 3  # points of one multiplicity and one first event that are followed, where it is done briefly
+_LONGEST = 60  # characters of a polynomial in a sentence
 _FREE_STEPS = 100  # for which a hypersurface is followed that is one again
 
 FIRST_STEPS = 12  # that are shown
@@ -57,7 +67,7 @@ class Hypersurface:
 
     It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
     happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
-    cannot be said: its pattern is still running.
+    cannot be said: its pattern is still running. `orders` are those of this pattern.
     """
 
     polynomial: str
@@ -72,6 +82,28 @@ class Hypersurface:
     note: str = ""
     followed: int = 0
     settled_at: int | None = None
+    orders: Orders = field(default=NO_ORDERS, repr=False)
+
+    def told(self, at: str) -> str:
+        """A sentence: what it is (`at` which eps), when it comes back, what it costs, which of C1, C2, ... it meets."""
+        cut = self.polynomial if len(self.polynomial) <= _LONGEST else f"{self.polynomial[:_LONGEST]} ..."
+        name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{at}")
+        if self.orders.returns:
+            after, other = self.orders.returns
+            fate = f"comes back as C{other + 1} after {counted(after, 'step')}"
+        elif self.confined_at is not None:
+            fate = f"a hypersurface again after {counted(self.confined_at, 'step')}"
+        elif self.orders.recurrences:
+            fate = f"its orders repeat after {counted(self.orders.settled_at, 'step')}"
+        else:
+            fate = f"followed for {counted(self.followed, 'step')}"
+        parts = [f"{name}, degree {self.degree}{', a pole' if self.is_pole else ''}: contracted", fate]
+        return "; ".join([", ".join(parts), *self.orders.told])
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data: what is known of it beside its first steps."""
+        names = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
+        return {**attributes(self, *names, "followed", "settled_at", "note"), "orders": self.orders.to_json()}
 
 
 @dataclass(frozen=True)
@@ -80,15 +112,13 @@ class Range:
 
     Memory can only come back where the image of a hypersurface meets points without a value. Beyond the first steps
     its image is therefore followed as a point, which is cheap. Where it meets such points along series again, which is
-    not: for at most `along` steps. `end` is the time of the monotonic clock at which all of it stops. `briefly`: not
-    even the first steps where fewer tell the fate.
+    not: for at most `along` steps. `end` is the time of the monotonic clock at which all of it stops.
     """
 
     shown: int
     reach: int
     along: int
     end: float
-    briefly: bool = False
 
     @property
     def is_over(self) -> bool:
@@ -106,6 +136,7 @@ class _Fate:
     steps: tuple[Step, ...] = ()
     followed: int = 0
     settled_at: int | None = None
+    orders: Orders = NO_ORDERS
 
 
 _UNKNOWN = _Fate(UNDECIDED)
@@ -120,11 +151,14 @@ def fate_of(
     multiplicity: int | None,
     rng: random.Random,
     limits: Range,
+    forms: Sequence[tuple[Any, int]] = (),
+    critical: int = 0,
 ) -> Hypersurface:
     """The hypersurface on which a form over Q vanishes, with what becomes of it, at one exact eps (half the time step).
 
     `factor` is irreducible, in the variables (X : Z), and `text` stands for it; two points modulo two random primes are
-    followed. Source: grammaticos-ramani-papageorgiou-1991.
+    followed. The orders of the first `critical` ones of `forms` are told along it; with each form stands its exponent
+    in the factor by which the minors of the equation exceed the map. Source: grammaticos-ramani-papageorgiou-1991.
     """
     fates: list[_Fate] = []
     primes: list[int] = []
@@ -140,12 +174,18 @@ def fate_of(
         try:
             equation = map_.at(eps, field).equation
             place = _point_on(factor, field, rng)
+            tracked = Tracked(
+                tuple(form_order(form, field) for form, _ in forms),
+                tuple(k for _, k in forms),
+                tuple(int(form == factor) for form, _ in forms),
+                critical,
+            )
         except BadPrime:
             continue
         if place is None or field.prime in primes:
             continue
         try:
-            fates.append(_fate_at(equation, *place, rng, limits, len(fates[0].steps) if fates else None))
+            fates.append(_fate_at(equation, *place, rng, limits, tracked=tracked))
             primes.append(field.prime)
         except NotGeneric:
             continue
@@ -153,7 +193,7 @@ def fate_of(
             return told(_UNKNOWN, NO_TIME if limits.is_over else "the series lost all their terms")
     if len(fates) < _POINTS:
         return told(_UNKNOWN, NO_TIME)
-    one, other = ((fate.status, fate.contracted_at, fate.confined_at) for fate in fates)
+    one, other = ((fate.status, fate.contracted_at, fate.confined_at, fate.orders.known) for fate in fates)
     if one != other:
         return told(_Fate(UNDECIDED, steps=fates[0].steps), "two points tell different things")
     return told(fates[0])
@@ -170,41 +210,10 @@ def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range)
     At one exact `eps` (half the time step), on lines modulo random primes. Poles and infinity are left out. One with a
     multiplicity of which no point was found is undecided. Source: zander-2021.
     """
-    return _at_random(map_, eps, rng, limits, False, _LINES)
-
-
-def fates_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
-    """As `unwritten`, with the poles and infinity: in every dimension, without any polynomial."""
-    found = _at_random(map_, eps, rng, limits, True, _FEW_LINES)
-    found += _at_random(map_, eps, rng, limits, False, _FEW_LINES)
-    for _ in range(_TRIES):
-        field = random_prime_field(rng)
-        try:
-            equation = map_.at(eps, field).equation
-            point = [rng.randrange(field.prime) for _ in range(map_.dim)] + [0]
-            tangents = _tangents(point, [0] * map_.dim + [1], field)
-            event = _first_event(equation, point, rng, limits)
-            fate = _UNKNOWN
-            if tangents is not None:
-                fate = _fate_at(equation, point, tangents, rng, limits, event=event)
-        except (BadPrime, NotGeneric):
-            continue
-        except PrecisionTooLow:
-            fate = _UNKNOWN
-        found.append(Hypersurface("Z", 1, False, None, primes=(field.prime,), **vars(fate)))
-        break
-    return found
-
-
-def _at_random(
-    map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range, poles: bool, lines: int
-) -> list[Hypersurface]:
     found: dict[tuple[Any, ...], Hypersurface] = {}
     degrees: dict[int, int] = {}
-    seen_so: dict[tuple[int, int | None], int] = {}  # how many points of a multiplicity and a first event
-    whole = False  # whether some line met every component in points over GF(p)
-    for line in range(4 * lines):
-        if (line >= lines and set(degrees) <= {key[0] for key in found}) or (whole and limits.briefly):
+    for line in range(4 * _LINES):
+        if line >= _LINES and set(degrees) <= {key[0] for key in found}:
             break
         field = random_prime_field(rng)
         try:
@@ -212,28 +221,23 @@ def _at_random(
             equation, inverse = here.equation, here.inverse.equation
         except BadPrime:
             continue
-        points, seen = pole_points(equation, rng) if poles else critical_points(equation, inverse, rng)
+        points, seen = critical_points(equation, inverse, rng)
         degrees |= seen
-        whole = whole or sum(seen.values()) == len(points)
         for critical in points:
             tangents = _tangents(critical.point, critical.gradient, field)
             if tangents is None or limits.is_over:
                 continue
-            event = _first_event(equation, critical.point, rng, limits) if limits.briefly else None
-            seen_so[critical.multiplicity, event] = seen_so.get((critical.multiplicity, event), 0) + 1
-            if event and seen_so[critical.multiplicity, event] > _SAME:
-                continue
             try:
-                fate = _fate_at(equation, critical.point, tangents, rng, limits, event=event)
+                fate = _fate_at(equation, critical.point, tangents, rng, limits)
             except NotGeneric:
                 continue
             except PrecisionTooLow:
                 fate = _UNKNOWN
             key = (critical.multiplicity, fate.status, fate.contracted_at, fate.confined_at)
-            one = Hypersurface("?", seen[key[0]], poles, key[0], primes=(field.prime,), **vars(fate))
+            one = Hypersurface("?", seen[key[0]], False, key[0], primes=(field.prime,), **vars(fate))
             found[key] = _joined(found[key], one) if key in found else one
     for multiplicity in set(degrees) - {h.multiplicity for h in found.values()}:
-        untried = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT, **vars(_UNKNOWN))
+        untried = Hypersurface("?", degrees[multiplicity], False, multiplicity, note=NO_POINT, **vars(_UNKNOWN))
         found[(multiplicity,)] = untried
     return sorted(found.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
 
@@ -264,83 +268,119 @@ def _fate_at(
     tangents: list[list[int]],
     rng: random.Random,
     limits: Range,
-    shown: int | None = None,
-    event: int | None = None,
+    tracked: AlongCurves = NOTHING,
 ) -> _Fate:
-    """What becomes of the hypersurface with these tangents at a point.
-
-    In `shown` steps only where that is given, and in steps just beyond the first event where these tell enough.
-    """
+    """What becomes of the hypersurface with these tangents at a point, and the orders of what is tracked along it."""
     full = len(tangents)
     direction = [rng.randrange(equation.over.characteristic) for _ in point]
-
-    def followed(steps: int) -> tuple[Step, ...]:
-        run, is_whole = _walked(equation, point, direction, tangents, steps, limits.end)
-        if not is_whole:
-            raise PrecisionTooLow
-        return tuple(run)
-
-    attempts = [shown or limits.shown]
-    if event is not None and event + 2 < limits.shown:
-        attempts = [event + 2, *attempts]
-    for steps in attempts:
-        run = followed(steps)
+    run = _whole(walked(equation, point, direction, tangents, limits.shown, limits.end))
+    status, down, up = _told([step.rank for step in run], full)
+    if status == NOT_CONTRACTED:
+        return _Fate(status, down, up, run, len(run), 0)
+    if up is None:
+        orders = orders_at(equation, point, direction, tracked, (len(run), limits.reach), limits)
+    else:
+        orders = _orders_until_return(equation, point, direction, tracked, up, limits)
+    if orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
+        run = _whole(walked(equation, point, direction, tangents, orders.settled_at + 2, limits.end))
         status, down, up = _told([step.rank for step in run], full)
-        again = next((k for k, step in enumerate(run) if up is not None and k >= up and step.rank < full), None)
-        if again is not None or (up or len(run)) < len(run) or not any(step.common for step in run):
-            break
-    last = max((k for k, step in enumerate(run, 1) if step.common), default=0)
-    if status == NOT_CONTRACTED or shown is not None or again is not None:
-        # A hypersurface that comes back to one that is contracted shares the fate of that one from then on.
-        return _Fate(status, down, up, run, len(run), again if again is not None else up or 0)
-    reach = limits.reach if up is None else min(limits.reach, len(run) + _FREE_STEPS)
-    hit, reached = _next_hit(equation, run[-1].limit, len(run), reach, limits)
-    if hit is None:
-        return _Fate(status, down, up, run, reached, up or last)
-    if up is not None:
-        return _Fate(status, down, up, run, hit, hit)
-    orders, _ = _walked(
-        equation, point, direction, [], min(limits.reach, max(limits.along, 2 * hit)), limits.end, most=_MOST_ALONG
-    )
-    # What a pattern without an end meets on its way may show in the order of the denominator only.
-    known = [step.denominator for step in takewhile(lambda step: step.denominator is not None, orders)]
-    several = [_settled([step.common for step in orders[: len(known)]]), _settled([k or 0 for k in known])]
-    settled = None if None in several else max(k or 0 for k in several)
-    if settled is not None and settled + 2 > len(run) and len(orders) >= settled + 2:
-        run = followed(settled + 2)
-        status, down, up = _told([step.rank for step in run], full)
-    return _Fate(status, down, up, run, len(orders), settled)
+    settled = max(up or 0, orders.settled_at) if orders.is_settled else None
+    return _Fate(status, down, up, run, orders.followed, settled, orders)
 
 
-def _first_event(equation: Equation, point: Sequence[int], rng: random.Random, limits: Range) -> int:
-    """The first step that divides by a power of t, 0 where none of the first steps does."""
-    direction = [rng.randrange(equation.over.characteristic) for _ in point]
-    run, _ = _walked(equation, point, direction, [], limits.shown, limits.end, to_event=True)
-    return len(run) if run and run[-1].common else 0
+def _orders_until_return(
+    equation: Equation,
+    point: Sequence[int],
+    direction: Sequence[int],
+    tracked: AlongCurves,
+    up: int,
+    limits: Range,
+) -> Orders:
+    """The orders along a curve whose hypersurface is one again after the step `up`, until it is a critical one.
+
+    From then on they are those of the other.
+    """
+    steps = limits.shown
+    reach = min(limits.reach, steps + _FREE_STEPS)
+    while True:
+        run = _whole(walked(equation, point, direction, [], steps, limits.end, functions=tracked.functions))
+        rows = tracked.rows(run)
+        for t, (_, *nu) in enumerate(rows, 1):
+            if t >= up and any(nu):
+                if not tracked.functions:  # a pole is met, and nothing is asked beyond it
+                    return Orders(rows[:t], (), len(run), True)
+                if sorted(nu)[-2:] not in ([1], [0, 1]):
+                    raise NotGeneric("a point where several critical hypersurfaces meet")
+                return Orders(rows[:t], (), t, True, (t, nu.index(1)))
+        hit, reached = _next_hit(equation, run[-1].limit, len(run), reach, limits, tracked.functions)
+        if hit is None:
+            return Orders(rows[: max(up, 0)], (), reached, True)
+        steps = hit
 
 
-def _walked(
+def _whole(walked: tuple[list[Step], bool]) -> tuple[Step, ...]:
+    run, is_whole = walked
+    if not is_whole:
+        raise PrecisionTooLow
+    return tuple(run)
+
+
+def orders_at(
+    equation: Equation,
+    point: Sequence[int],
+    direction: Sequence[int],
+    tracked: AlongCurves,
+    span: tuple[int, int],
+    limits: Range,
+) -> Orders:
+    """The orders along a curve, for as many steps as it takes until they are known for all, or the limits end it.
+
+    `span` has the number of steps to begin with, and the largest one. The image may move on a critical hypersurface
+    until something happens, so that orders have to repeat for as long as curves are followed.
+    """
+    steps, reach = span
+    while True:
+        run, is_whole = walked(
+            equation, point, direction, [], steps, limits.end, most=_MOST_ALONG, functions=tracked.functions
+        )
+        rows = tracked.rows(run)
+        last = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
+        hit = None
+        if is_whole and len(rows) - last >= _CONSTANT:
+            hit, reached = _next_hit(equation, run[-1].limit, len(run), reach, limits, tracked.functions)
+            if hit is None:
+                return Orders(rows[:last], (), reached, True)
+        found = [find_recurrence(column) for column in zip(*rows, strict=True)]
+        repeats = all(one is not None and len(rows) >= max(_CONSTANT, _CHECKED * one.order) for one in found)
+        if repeats and (len(run) >= min(reach, limits.along) or not is_whole):
+            return Orders(rows, tuple(one.characteristic for one in found if one is not None), len(rows), True)
+        longest = min(reach, max(limits.along, 2 * (hit or 0)))
+        if not is_whole or steps >= longest:
+            return Orders(rows, (), len(rows), False)
+        steps = longest
+
+
+def walked(
     equation: Equation,
     point: Sequence[int],
     direction: Sequence[int],
     tangents: Sequence[Sequence[int]],
     steps: int,
     end: float,
-    to_event: bool = False,
     most: int = _MAX_PRECISION,
+    functions: Sequence[Function] = (),
 ) -> tuple[list[Step], bool]:
-    """So many steps along series as long as needed, and whether these are all: time or precision may end it.
-
-    `to_event`: only to the first step that divides by a power of t.
-    """
+    """So many steps along series as long as needed, and whether these are all: time or precision may end it."""
     precision = 8
     while True:
         run: list[Step] = []
         try:
-            for step in islice(walk(equation, point, direction, tangents, precision), steps):
+            if tangents:
+                taken = walk(equation, point, direction, tangents, precision)
+            else:
+                taken = walk_along(equation, point, direction, precision, functions)
+            for step in islice(taken, steps):
                 run.append(step)
-                if to_event and step.common:
-                    return run, True
                 if time.monotonic() > end:
                     return run, len(run) == steps
             return run, True
@@ -351,34 +391,27 @@ def _walked(
 
 
 def _next_hit(
-    equation: Equation, limit: Sequence[int], steps: int, reach: int, limits: Range
+    equation: Equation,
+    limit: Sequence[int],
+    steps: int,
+    reach: int,
+    limits: Range,
+    functions: Sequence[Function] = (),
 ) -> tuple[int | None, int]:
-    """The next step that a point of the image does not have, and the number of steps it was followed for."""
+    """The next step that a point does not have, or with a zero of a function, and for how long it was followed."""
+    p = equation.over.characteristic
     at: Sequence[int] = limit
     for step in range(steps + 1, reach + 1):
         image = image_of(equation, at)
         if image is None:
             return step, step
         at = image
+        constants = [nmod_poly([x], p) for x in at]
+        if any(function(constants, 1) is None for function in functions):
+            return step, step
         if limits.is_over:
             return None, step
     return None, reach
-
-
-def _settled(orders: Sequence[int]) -> int | None:
-    """After how many terms a sequence of orders follows from those before, by a linear recurrence, or None.
-
-    >>> _settled([0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]), _settled([0, 1, 1, 1, 1, 1, 1, 1, 1, 1])
-    (3, 2)
-    >>> _settled([0, 0, 1, 0, 1, 0, 2, 0, 2, 0, 3, 0, 3, 0, 4, 0, 4, 0]), _settled([0, 0, 0, 0, 0, 1])
-    (6, None)
-    """
-    size = len(orders)
-    change = next((k for k in range(size - 1, 0, -1) if orders[k] != orders[k - 1]), 0)
-    if size - change >= _CONSTANT:
-        return change + 1 if any(orders[change:]) else change
-    found = find_recurrence(orders)
-    return found.order if found is not None and size >= _CHECKED * found.order else None
 
 
 def _point_on(factor: Any, field: PrimeField, rng: random.Random) -> tuple[list[int], list[list[int]]] | None:

@@ -13,11 +13,11 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from math import comb
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly
+from flint import fmpq, fmpq_mpoly, fmpz_poly
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
@@ -29,6 +29,8 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
+from kahanmaps.laboratory.growth.renewal import degree_series
+from kahanmaps.laboratory.singular.contracted import Untold, contracted
 from kahanmaps.laboratory.singular.fates import (
     CONFINED,
     FIRST_STEPS,
@@ -38,10 +40,10 @@ from kahanmaps.laboratory.singular.fates import (
     Hypersurface,
     Range,
     fate_of,
-    fates_at_random,
     untold,
     unwritten,
 )
+from kahanmaps.laboratory.singular.orders import Fraction
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.projective import homogeneous_map
@@ -55,7 +57,7 @@ _FEW_DIGITS = 50
 _REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the least
 _LEAST_REACH = 100
 _ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
-_LEAST_ALONG = 30
+_LEAST_ALONG = 18
 _MOST_SHOWN = 200
 _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
@@ -168,6 +170,8 @@ def singularities(
     if is_undefined or not _is_dominant(map_, exact_eps):
         return SingularityRun(exact_eps, denominator, degree, None, (), False, is_undefined, False)
     factors: dict[str, tuple[fmpq_mpoly, bool, int | None]] = {}
+    critical_ones: dict[str, tuple[fmpq_mpoly, int]] = {}  # with exponents in the common factor
+    excess: dict[str, tuple[fmpq_mpoly, int]] = {}
     for factor, _ in (forms[-1] * common).factor()[1]:
         if not _is_infinity(factor):
             factors[str(factor)] = (factor, True, 0)
@@ -184,7 +188,11 @@ def singularities(
             for factor, multiplicity in critical.factor()[1]:
                 pole = factors.get(str(factor), (factor, False, 0))[1]
                 factors[str(factor)] = (factor, pole, int(multiplicity))
+            if not common.is_constant():
+                excess = {str(factor): (factor, int(k)) for factor, k in common.factor()[1]}
+            critical_ones = {text: (factor, 0) for text, (factor, _, multiplicity) in factors.items() if multiplicity}
     rng = random.Random(f"singularities {seed_for(seed, map_.subject, exact_eps)}")
+    forms_followed = tuple((critical_ones | excess).values())
     found, stopped = [], False
     for factor, pole, multiplicity in factors.values():
         if limits.is_over:
@@ -192,7 +200,9 @@ def singularities(
             break
         text = "Z" if _is_infinity(factor) else _affine(factor, map_)
         progress(f"following {text[:40]}")
-        found.append(fate_of(map_, exact_eps, factor, text, pole, multiplicity, rng, limits))
+        found.append(
+            fate_of(map_, exact_eps, factor, text, pole, multiplicity, rng, limits, forms_followed, len(critical_ones))
+        )
     if critical_degree is None and not stopped:
         progress("following critical points")
         if map_.at(exact_eps).equation.degree == 1:
@@ -211,13 +221,18 @@ class Patterns:
     value, so that nothing new can be seen in them before the last pattern has come to its end. `lengths` are the
     different numbers of steps after which patterns had settled, `searched` is the number of steps those were followed
     for that are not confined (None if all are), `some_confined` tells whether others are. `running` is empty, or says
-    why the patterns are not known to the end.
+    why the patterns are not known to the end. `series` are the coefficients above and below in the generating function
+    of the degrees that follow from the patterns, empty where these do not tell it, and `contracted` are the
+    hypersurfaces `at` one of the eps that were tried.
     """
 
     lengths: tuple[int, ...]
     searched: int | None
     some_confined: bool
     running: str = ""
+    series: tuple[tuple[int, ...], ...] = ()
+    contracted: tuple[Hypersurface, ...] = field(default=(), compare=False, repr=False)
+    at: str = field(default="", compare=False)
 
     def terms_needed(self, order: int) -> int:
         """The number of terms, d_0 included, from which a recurrence of this order can be told from all others.
@@ -226,6 +241,23 @@ class Patterns:
         at most 1 more than the sum of the lengths of different patterns (hypersurfaces of the same pattern count once).
         """
         return order + sum(self.lengths) + 2
+
+    @property
+    def fraction(self) -> Fraction:
+        """The generating function of the degrees, numerator and denominator, where it is known."""
+        above, below = self.series
+        return fmpz_poly(list(above)), fmpz_poly(list(below))
+
+    @property
+    def series_text(self) -> str:
+        """The generating function of the degrees as a formula in z; empty where it is not known."""
+        return " / ".join(f"({_ascending(part)})" for part in self.series)
+
+    @property
+    def told(self) -> list[str]:
+        """A sentence for each contracted hypersurface, where degrees follow: when it comes back and what it costs."""
+        at = f" at eps = {self.at}" if self.at else ""
+        return [f"C{k}: {h.told(at)}" for k, h in enumerate(self.contracted, 1) if self.series]
 
     @property
     def limit(self) -> str:
@@ -245,12 +277,37 @@ class Patterns:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return attributes(self, "lengths", "searched", "some_confined", "running", "text")
+        found = attributes(self, "lengths", "searched", "some_confined", "running", "text")
+        names = ("numerator", "denominator")
+        series = {name: [str(c) for c in part] for name, part in zip(names, self.series, strict=False)}
+        contracted = [{"text": text, **h.to_json()} for text, h in zip(self.told, self.contracted, strict=False)]
+        return {**found, "generating_function": series or None, "contracted": contracted, "eps": self.at or None}
 
 
-def patterns_of(runs: Sequence[SingularityRun]) -> Patterns:
-    """What runs at one eps, or at two that stand for all, say together."""
-    return _one_of({_refused(run.eps, run.is_dominant, run.stopped) or _patterns(run.hypersurfaces) for run in runs})
+def _ascending(coefficients: Sequence[int]) -> str:
+    """A polynomial in z, lowest powers first.
+
+    >>> _ascending([1, -2, 0, 2])
+    '1 - 2*z + 2*z^3'
+    """
+    text = ""
+    for power, c in enumerate(coefficients):
+        if c:
+            letter = "" if power == 0 else "z" if power == 1 else f"z^{power}"
+            term = "*".join(([] if abs(c) == 1 and letter else [str(abs(c))]) + ([letter] if letter else []))
+            text += f" {'-' if c < 0 else '+'} {term}" if text else f"{'-' if c < 0 else ''}{term}"
+    return text or "0"
+
+
+def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
+    """What runs at one eps, or at two that stand for all, say together; `at`: the map depends on eps."""
+    return _one_of(
+        [
+            _refused(run.eps, run.is_dominant, run.stopped)
+            or _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "")
+            for run in runs
+        ]
+    )
 
 
 def patterns(
@@ -276,21 +333,23 @@ def patterns(
         part = max(0.0, end - time.monotonic()) / len(values)
         if map_.dim <= WRITTEN_DIMENSION and all(can_be_written(map_, value, part) for value in values):
             runs = [singularities(map_, value, steps=steps, seed=seed, seconds=part) for value in values]
-            found = patterns_of(runs)
+            found = patterns_of(runs, map_.has_eps)
         else:
-            found = _one_of({_at_random(map_, value, steps, seed, part) for value in values})
+            found = _one_of([_at_random(map_, value, steps, seed, part) for value in values])
     return found
 
 
 def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, seconds: float) -> Patterns:
     limits = _range(map_.dim, steps, time.monotonic() + seconds)
-    limits = replace(limits, shown=min(limits.shown, FIRST_STEPS), briefly=True)
     if not _is_dominant(map_, eps):
         return _refused(eps, False, False) or _unknown("")
     if map_.at(eps).equation.degree > 1:
         return _unknown(f"the singularities of {map_.kind} are followed in dimension {WRITTEN_DIMENSION} at most")
-    found = fates_at_random(map_, eps, random.Random(f"patterns {seed_for(seed, map_.subject, eps)}"), limits)
-    return _refused(eps, True, limits.is_over) or _patterns(found)
+    rng = random.Random(f"patterns {seed_for(seed, map_.subject, eps)}")
+    try:
+        return _patterns(*contracted(map_, eps, rng, limits))
+    except Untold as error:
+        return _refused(eps, True, limits.is_over) or _unknown(str(error))
 
 
 def _digits(map_: BirationalMap, eps: fmpq) -> int:
@@ -308,8 +367,9 @@ def can_be_written(system: QuadraticSystem | BirationalMap, eps: fmpq, seconds: 
     return map_.dim <= MAX_DIMENSION and _digits(map_, eps) <= _most_digits(map_.dim, seconds)
 
 
-def _one_of(several: set[Patterns]) -> Patterns:
-    return several.pop() if len(several) == 1 else _unknown("the singularities at two values of eps differ (--eps)")
+def _one_of(several: Sequence[Patterns]) -> Patterns:
+    same = len(set(several)) == 1
+    return several[0] if same else _unknown("the singularities at two values of eps differ (--eps)")
 
 
 def _refused(eps: fmpq, is_dominant: bool, stopped: bool) -> Patterns | None:
@@ -322,18 +382,31 @@ def _unknown(reason: str) -> Patterns:
     return Patterns((), None, False, reason)
 
 
-def _patterns(hypersurfaces: Sequence[Hypersurface]) -> Patterns:
+def _patterns(map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = "") -> Patterns:
     # A pole of multiplicity 0 is no critical hypersurface: what it becomes lowers no degree.
-    contracted = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
-    for h in contracted:
+    critical = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
+    for h in critical:
         name = "a hypersurface" if h.polynomial == "?" else f"{h.polynomial[:60]} = 0"
         if h.status == UNDECIDED:
             return _unknown(f"what becomes of {name} is undecided: {h.note or 'its series ended'}")
         if h.settled_at is None:
             return _unknown(f"the pattern of {name} is still running after {h.followed} steps (--steps)")
-    lengths = {h.settled_at for h in contracted if h.settled_at}
-    open_ones = [h.followed for h in contracted if h.status != CONFINED]
-    return Patterns(tuple(sorted(lengths)), min(open_ones, default=None), len(open_ones) < len(contracted))
+    lengths = {h.settled_at for h in critical if h.settled_at}
+    # What repeats itself needs no further look.
+    open_ones = [h.followed for h in critical if h.status != CONFINED and not h.orders.recurrences]
+    series: tuple[tuple[int, ...], ...] = ()
+    if all(h.orders.is_settled and h.degree for h in critical) and map_degree > 0:
+        fraction = degree_series(map_degree, [(h.degree, h.orders) for h in critical])
+        series = tuple(tuple(int(c) for c in polynomial.coeffs()) for polynomial in fraction)
+    return Patterns(
+        tuple(sorted(lengths)),
+        min(open_ones, default=None),
+        any(h.status == CONFINED for h in critical),
+        "",
+        series,
+        tuple(critical),
+        at,
+    )
 
 
 def steps_by_default(dim: int) -> int:

@@ -1,0 +1,250 @@
+"""The dynamical degree of a planar birational map between two bounds, proved: is it more than 1?
+
+A birational map f of the plane acts by an isometry on a hyperbolic space of infinite dimension, which moves the class
+of a line by arccosh(deg f^n) under f^n; its translation length is log lambda, lambda the dynamical degree
+(boucksom-favre-jonsson-2008, over any algebraically closed field cantat-lamy-2013). Four points of such a space satisfy
+the inequality of hyperbolicity with log 2 (nica-spakula-2016), from which for every n
+
+    n log lambda >= arccosh(deg f^2n) - arccosh(deg f^n) - 2 log 2        (coornaert-delzant-papadopoulos-1990)
+
+as soon as the right side is positive; and lambda <= (deg f^n)^(1/n). The lower bound is computed for f_p, the map
+modulo a prime p with eps a residue: deg f_p^n <= deg f^n for every n, so that lambda(f_p) <= lambda(f). For it
+
+* deg f_p^2n is bounded below by the degree along one line, exactly;
+* deg f_p^n is bounded above by the degrees along K lines that touch a conic. On a line the degree falls by the
+  multiplicities m_i of the base points that lie on it, infinitely near ones included; no point lies on more than two of
+  the lines, and 3 (D - 1) is the sum of all m_i for D = deg f_p^n (Noether). With no degree above u that leaves
+  K (D - u) <= 6 (D - 1).
+
+Nothing here is random but the choice of p, eps and the conic. docs/mathematics.md has the proofs.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import flint
+from flint import Ordering, arb, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, nmod_mat, nmod_poly
+
+from kahanmaps.algebra.chance import seed_for
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.polynomials import degree_in
+from kahanmaps.errors import BadPrime
+from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
+from kahanmaps.laboratory.singular.jets import image_of
+from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.projective import homogeneous_map
+
+_LINES = 96  # that touch a conic
+_LARGEST = 8000  # degree along the first line
+_MOST_STEPS = 120
+_DIGITS = 6
+_TRIES = 4
+_MOST_WRITTEN = 12  # iterates
+_MOST_TERMS = 300  # of a coordinate of the last one
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """Bounds of the dynamical degree of a planar map that are proved, for generic eps or for the eps given.
+
+    `lower` and `upper` are decimal numbers, rounded down and up. `lower` is that of the map modulo `prime` at `eps`, a
+    residue, and comes from deg f^(2 steps) >= `degree_below`, deg f^steps <= `degree_above`.
+    """
+
+    lower: str
+    upper: str
+    steps: int
+    degree_below: int
+    degree_above: int
+    prime: int
+    eps: int
+
+    @property
+    def text(self) -> str:
+        """The interval and what gives its lower end."""
+        return (
+            f"dynamical degree between {self.lower} and {self.upper}: degree of iterate {2 * self.steps} at least "
+            f"{self.degree_below}, of iterate {self.steps} at most {self.degree_above}"
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; the prime and the residue are text, for they exceed what readers of JSON hold exactly."""
+        found = attributes(self, "lower", "upper", "steps", "degree_below", "degree_above")
+        return {**found, "prime": str(self.prime), "eps_residue": str(self.eps), "text": self.text}
+
+
+def enclose(
+    map_: BirationalMap,
+    eps: fmpq | None,
+    *,
+    seed: int = 0,
+    seconds: float = 10.0,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Enclosure | None:
+    """Bounds of the dynamical degree of a planar map, the lower one above 1: positive entropy, proved.
+
+    `eps` (half the time step) is exact, or None: then the bounds hold over Q(eps), which is for all eps but countably
+    many. Returns None where no lower bound above 1 was found in about `seconds` seconds. Then nothing is said: there is
+    none for an integrable map.
+
+    Source: docs/mathematics.md.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> found = enclose(load("lotka_volterra").map, None)
+    >>> found.lower, found.upper
+    ('1.571456', '2')
+    >>> enclose(load("nahm_tetrahedral").map, None) is None
+    True
+    """
+    if map_.dim != 2 or map_.symbols:
+        return None
+    rng = random.Random(f"enclosure {seed_for(seed, map_.subject, eps)}")
+    end = time.monotonic() + seconds
+    for _ in range(_TRIES):
+        try:
+            over = reduced(map_, eps, rng)
+            if not is_birational(over, rng):
+                continue
+            found = _lower(over, rng, end, progress)
+        except (BadPrime, ZeroDivisionError):
+            continue
+        if found is None:
+            return None
+        lower, steps, below, above = found
+        return Enclosure(lower, _upper(map_, eps, end), steps, below, above, over.field.characteristic, int(over.eps))
+    return None
+
+
+def is_birational(map_: MapOver, rng: random.Random) -> bool:
+    """Whether a map over GF(p) is birational, proved where the answer is yes.
+
+    The equation of the inverse, at the image of a generic point, is to annihilate that point, as forms, and nothing
+    else, which one point shows.
+    """
+    forms, _ = homogeneous_map(map_)
+    inverse = map_.inverse.equation
+    X = forms[0].context().gens()
+    zero = forms[0] * 0
+    rows = inverse.rows(inverse.monomials(forms), zero)
+    if any(not sum((entry * x for entry, x in zip(row, X, strict=True)), zero).is_zero() for row in rows):
+        return False
+    point = [rng.randrange(map_.field.characteristic) for _ in X]
+    image = image_of(map_.equation, point)
+    return image is not None and image_of(inverse, image) is not None
+
+
+def degree_above(largest: int, lines: int) -> int:
+    """The largest degree D of a birational map of the plane with no degree above `largest` along so many lines.
+
+    The lines touch a conic, and there are more than six of them. The largest D with lines (D - largest) <= 6 (D - 1).
+
+    >>> degree_above(100, 96), degree_above(1, 96), degree_above(16, 97)
+    (106, 1, 16)
+    """
+    return (lines * largest - 6) // (lines - 6)
+
+
+def lower_bound(below: int, above: int, steps: int) -> arb:
+    """A ball with the number that lambda is not less than, from the two degrees; more than 1 if it says anything.
+
+    >>> float(lower_bound(2**20, 2**10, 10)) > 1.7, float(lower_bound(3 * 99, 99, 7)) < 1
+    (True, True)
+    """
+    with flint.ctx.workprec(128):
+        return ((arb(below).acosh() - arb(above).acosh() - 2 * arb(2).log()) / steps).exp()
+
+
+def _lower(
+    map_: MapOver, rng: random.Random, end: float, progress: Callable[[str], None]
+) -> tuple[str, int, int, int] | None:
+    """The best lower bound above 1, rounded down, with n, a lower bound of deg f^2n and an upper one of deg f^n."""
+    line = Line(map_, rng, end - 0.5 * max(0.0, end - time.monotonic()), _LARGEST)
+    degrees = [1]
+    try:
+        while len(degrees) <= _MOST_STEPS:
+            line.step(0)
+            degrees.append(line.degree)
+            progress(f"dynamical degree: iterate {line.steps}, degree {line.degree}")
+    except Stopped:
+        pass
+    candidates = range(1, (len(degrees) - 1) // 2 + 1)
+    bounds = {n: lower_bound(degrees[2 * n], degree_above(degrees[n], _LINES), n) for n in candidates if degrees[n]}
+    steps = max(bounds, key=lambda n: float(bounds[n]), default=0)
+    if not steps or not bounds[steps] > 1:
+        return None
+    largest = 0
+    for start in _tangents(map_.field.characteristic, rng):
+        tangent = Line(map_, rng, end, _LARGEST, start)
+        try:
+            while tangent.steps < steps:
+                tangent.step(0)
+        except Stopped:
+            return None
+        largest = max(largest, tangent.degree)
+        progress(f"dynamical degree: tangents of a conic, degrees of iterate {steps} up to {largest}")
+    above = degree_above(largest, _LINES)
+    bound = lower_bound(degrees[2 * steps], above, steps)
+    return (_rounded(bound.lower(), down=True), steps, degrees[2 * steps], above) if bound > 1 else None
+
+
+def _tangents(p: int, rng: random.Random) -> list[list[nmod_poly]]:
+    """Lines that touch a random conic: those with the coordinates (1 : s : s^2), moved by a random matrix."""
+    while True:
+        matrix = nmod_mat(3, 3, [rng.randrange(p) for _ in range(9)], p)
+        if int(matrix.det()):
+            break
+    lines = []
+    for s in rng.sample(range(p), _LINES):
+        # X + s Y + s^2 Z = 0 at (-s - s^2 t : 1 : t)
+        points = [nmod_poly([-s, -s * s], p), nmod_poly([1], p), nmod_poly([0, 1], p)]
+        zero = nmod_poly([], p)
+        lines.append([sum((matrix[i, j] * points[j] for j in range(3)), zero) for i in range(3)])
+    return lines
+
+
+def _upper(map_: BirationalMap, eps: fmpq | None, end: float) -> str:
+    """The least (deg f^n)^(1/n), rounded up, of the iterates that are written out; over Q(eps) without eps."""
+    best: arb | None = None
+    for n, degree in enumerate(_written_degrees(map_, eps, end), 1):
+        with flint.ctx.workprec(128):
+            root = arb(degree).root(n)
+            best = root if best is None or root < best else best
+    assert best is not None
+    return _rounded(best.upper(), down=False)
+
+
+def _written_degrees(map_: BirationalMap, eps: fmpq | None, end: float) -> Iterator[int]:
+    """The degrees of f, f^2, ... from forms without common factor over Q, or Q[eps], while they are short enough."""
+    ring = fmpq_mpoly_ctx.get(("x", "y", "z", "eps"), Ordering.degrevlex)
+    *X, symbol = ring.gens()
+    value = symbol if eps is None else ring.constant(eps)
+    size = max(degree_in(entry, 2) for row in map_.rows for entry in row)
+
+    def form(entry: fmpq_mpoly) -> fmpq_mpoly:
+        terms: dict[tuple[int, ...], Any] = {(i, j, size - i - j, k): c for (i, j, k), c in entry.terms()}
+        return ring.from_dict(terms).compose(*X, value, ctx=ring)
+
+    rows = [[form(entry) for entry in row] for row in map_.rows]
+    iterate = list(X)
+    for _ in range(_MOST_WRITTEN):
+        image = kernel_minors([[entry.compose(*iterate, symbol, ctx=ring) for entry in row] for row in rows])
+        common = reduce(fmpq_mpoly.gcd, image)
+        iterate = [entry / common for entry in image]
+        yield max(degree_in(entry, 3) for entry in iterate)
+        if time.monotonic() > end or max(map(len, iterate)) > _MOST_TERMS:
+            return
+
+
+def _rounded(bound: arb, down: bool) -> str:
+    """An exact number with a few decimals, rounded down or up."""
+    scaled = bound * 10**_DIGITS
+    whole = int((scaled.floor() if down else scaled.ceil()).unique_fmpz())
+    text = f"{whole // 10**_DIGITS}.{whole % 10**_DIGITS:0{_DIGITS}d}"
+    return text.rstrip("0").rstrip(".")

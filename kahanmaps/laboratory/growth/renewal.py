@@ -1,0 +1,122 @@
+"""Degrees for all times from what happens along the contracted hypersurfaces: their renewal equation.
+
+Let C_i be the irreducible hypersurfaces that a birational map of degree d of projective space may contract, mu_i(t) the
+power that is divided out at the t-th step along a generic curve through C_i, and nu_ij(t) the order of C_j there. A
+generic line meets the strict preimage of C_i by the k-th iterate in s_i(k) points, and
+
+    d_(k+1) = d d_k - sum over i, l <= k of mu_i(k+1-l) s_i(l)
+    s_i(k)  = deg(C_i) d_k - sum over j, l < k of nu_ji(k-l) s_j(l)
+
+with d_0 = 1: what is divided out is a product of powers of the forms of these preimages, and the zeros of C_i along
+the image of the line are such preimages too. Summed up as power series in z this is a linear system over Q(z).
+docs/mathematics.md proves it. Orders along hypersurfaces are measured, all else follows exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flint import fmpz_poly
+
+from kahanmaps.laboratory.growth.recurrences import Recurrence
+from kahanmaps.laboratory.singular.orders import Fraction, Orders
+
+
+def degree_series(degree: int, hypersurfaces: Sequence[tuple[int, Orders]]) -> Fraction:
+    """The generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms.
+
+    `degree` is d_1; of each contracted hypersurface its degree and its orders are given. These are settled ones, and
+    the columns nu follow the hypersurfaces. Exact. Source: docs/mathematics.md.
+
+    >>> free = Orders((), (), 0, True)
+    >>> degree_series(2, [(1, free)])
+    (1, (-2)*x + 1)
+    >>> degree_series(3, [(2, Orders(((0, 0, 0), (0, 1, 2), (2, 0, 0)), (), 0, True)),
+    ...                   (2, Orders(((0, 0, 0), (0, 2, 1), (2, 0, 0)), (), 0, True))])
+    (3*x^2 + 1, (-1)*x^3 + 3*x^2 + (-3)*x + 1)
+    """
+    z, one, zero = fmpz_poly([0, 1]), fmpz_poly([1]), fmpz_poly([])
+    count = len(hypersurfaces)
+    # The unknowns are S_1, ..., S_n, D and 1.
+    every = [orders for _, orders in hypersurfaces]
+    table = [[_through_returns(every, i, k) for k in range(count + 1)] for i in range(count)]
+    rows = [[*(row[0] for row in table), (one - z * degree, one), (-one, one)]]
+    for i, (size, _) in enumerate(hypersurfaces):
+        nu = [row[i + 1] for row in table]
+        rows.append([*nu, (fmpz_poly([-size]), one), (zero, one)])
+        above, below = rows[-1][i]
+        rows[-1][i] = above + below, below
+    below, above = _eliminated([_cleared(row) for row in [*rows[1:], rows[0]]])
+    common = above.gcd(below)
+    above, below = above // common, below // common
+    sign = 1 if below[0] > 0 else -1
+    return above * sign, below * sign
+
+
+def recurrence_of(series: Fraction, measured: Sequence[int]) -> Recurrence:
+    """The recurrence of the coefficients of a fraction, as that of the terms that were `measured` and more.
+
+    >>> recurrence_of((fmpz_poly([1]), fmpz_poly([1, -2])), [1, 2, 4]).text
+    'a(n) = 2*a(n-1) for n >= 1, from 3 terms of which 1 were not needed to find it'
+    """
+    above, below = series
+    order = max(int(below.degree()), int(above.degree()) + 1)
+    values = coefficients(series, max(len(measured), order))
+    return Recurrence(
+        tuple(values), fmpz_poly([0] * (order - int(below.degree())) + [int(c) for c in below.coeffs()[::-1]])
+    )
+
+
+def coefficients(series: Fraction, count: int) -> list[int]:
+    """The first coefficients of a fraction of polynomials with integers, the lower one with the constant term 1."""
+    above, below = series
+    lower = [int(c) for c in below.coeffs()]
+    found: list[int] = []
+    for n in range(count):
+        earlier = sum(c * found[n - k] for k, c in enumerate(lower[1 : n + 1], 1))
+        found.append((int(above[n]) - earlier) // lower[0])
+    return found
+
+
+def _through_returns(every: Sequence[Orders], start: int, column: int) -> Fraction:
+    """The generating function of a column for one hypersurface, those that it becomes later included."""
+    z = fmpz_poly([0, 1])
+    k, shift, above = start, 0, fmpz_poly([])
+    seen: dict[int, tuple[int, fmpz_poly]] = {}
+    while k not in seen:
+        seen[k] = shift, above
+        part, below = every[k].generating_function(column)
+        returns = every[k].returns
+        if returns is None:
+            return above * below + z**shift * part, below
+        above += z**shift * part
+        shift, k = shift + returns[0], returns[1]
+    begin, before = seen[k]
+    around = 1 - z ** (shift - begin)
+    return before * around + above - before, around
+
+
+def _cleared(row: Sequence[Fraction]) -> list[fmpz_poly]:
+    common = fmpz_poly([1])
+    for _, below in row:
+        common = common * (below // common.gcd(below))
+    return [above * (common // below) for above, below in row]
+
+
+def _eliminated(rows: list[list[fmpz_poly]]) -> tuple[fmpz_poly, fmpz_poly]:
+    """The last two entries (a, -b) of the last row after elimination: a D = b; without fractions, after Bareiss.
+
+    At z = 0 the matrix in front of the S_i is diagonal, so that no pivot is zero.
+    """
+    previous = fmpz_poly([1])
+    for k in range(len(rows) - 1):
+        pivot = rows[k]
+        for row in rows[k + 1 :]:
+            factor = row[k]
+            row[k + 1 :] = [
+                (pivot[k] * entry - factor * other) // previous
+                for entry, other in zip(row[k + 1 :], pivot[k + 1 :], strict=True)
+            ]
+        previous = pivot[k]
+    a, minus_b = rows[-1][-2:]
+    return a, -minus_b

@@ -1,0 +1,248 @@
+"""The hypersurfaces that a map contracts, where none of their polynomials is written: as points, by what happens there.
+
+Let M and M' be the matrices of a map F and of its inverse, both linear in the point. A hypersurface that is contracted
+goes to where the inverse has no value. So it is a pole, a factor of det M(X), or infinity Z = 0, or a zero of
+det M'(F(X)). Of these forms only det M, det M' and their factors over Q are written, which are short. On a random line
+modulo a prime their zeros are points. Those that share all orders from the first step on stand for one hypersurface.
+
+What is known along a curve are the orders of forms, each a product of powers of hypersurfaces. The exponents are the
+orders at the points themselves, and so linear equations give the orders of the hypersurfaces and their degrees.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Any
+
+from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly_ctx, nmod_poly
+
+from kahanmaps.algebra.chance import random_prime_field
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.errors import BadPrime
+from kahanmaps.laboratory.singular.fates import CONFINED, NOT_CONFINED, Hypersurface, Range, orders_at, walked
+from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of
+from kahanmaps.laboratory.singular.orders import Orders
+from kahanmaps.maps.implicit import BirationalMap, Equation
+
+_MOST_LINES = 24  # modulo primes of their own; they end when two have points of every hypersurface
+_FIRST = 12  # steps that tell hypersurfaces apart
+_MOST_DIGITS = 1000  # in forms that are factored
+_PRECISION = 8  # of the orders at points themselves
+
+
+class Untold(ArithmeticError):
+    """Why the orders along the hypersurfaces are not known."""
+
+
+@dataclass(frozen=True)
+class _Forms:
+    """The factors over Q of det M, which count at a point, those of det M', which count at its image, and Z."""
+
+    poles: tuple[Any, ...]
+    images: tuple[Any, ...]
+    infinity: Any
+
+    @property
+    def all(self) -> tuple[Any, ...]:
+        """The forms in the order of columns; one may stand there twice."""
+        return (*self.poles, *self.images, self.infinity)
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """A curve through a point of a line where a form vanishes, and what is tracked along it.
+
+    `excess` are the exponents of the forms in the common factor of the minors of the equation, which is no part of the
+    map, `own` their orders at the point. `solved` turns orders of forms into those of hypersurfaces, exactly or not:
+    `exponents` turns them back.
+    """
+
+    equation: Equation
+    point: tuple[int, ...]
+    direction: tuple[int, ...]
+    functions: tuple[Function, ...]
+    excess: tuple[int, ...]
+    own: tuple[int, ...]
+    forms: _Forms
+    solved: fmpq_mat | None = None
+    exponents: fmpq_mat | None = None
+
+    def divided(self, run: Sequence[Step]) -> list[int]:
+        """The powers of t divided out that belong to the map."""
+        before = [self.own, *(step.orders for step in run)]
+        return [
+            step.common - sum(k * order for k, order in zip(self.excess, orders, strict=True))
+            for step, orders in zip(run, before, strict=False)
+        ]
+
+    def levels(self, run: Sequence[Step]) -> list[tuple[int, ...]]:
+        """The orders of the poles, of the factors of det M'(F(X)), and of Z, at the point and after 1, 2, ... steps."""
+        poles, found = len(self.forms.poles), []
+        orders = [self.own, *(step.orders for step in run)]
+        for mu, here, there in zip(self.divided(run), orders, orders[1:], strict=False):
+            images = zip(self.forms.images, there[poles:-1], strict=True)
+            found.append((*here[:poles], *(k + mu * int(form.total_degree()) for form, k in images), here[-1]))
+        return found
+
+    def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
+        """The rows of `Orders` for steps along the curve but the last. Raises Untold."""
+        found = []
+        for mu, level in zip(self.divided(run), self.levels(run)[1:], strict=False):
+            nu: Sequence[Any] = level
+            if self.solved is not None and self.exponents is not None:
+                column = fmpq_mat(len(level), 1, list(level))
+                solution = self.solved * column
+                nu = solution.entries()
+                if self.exponents * solution != column or any(entry.q != 1 or entry < 0 for entry in nu):
+                    raise Untold("the orders of hypersurfaces do not follow from those of forms")
+            found.append((mu, *(int(entry) for entry in nu)))
+        return tuple(found)
+
+
+def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> tuple[int, list[Hypersurface]]:
+    """The degree of a map on projective space and the hypersurfaces that it contracts, at one exact eps.
+
+    Hypersurfaces of the same orders count as one. The equation of the map and that of its inverse are linear in the
+    point. Nothing but points modulo random primes is followed. Where the forms do not suffice to tell the hypersurfaces
+    apart, their degrees are 0 and their orders those of the forms. Raises Untold.
+    """
+    here = map_.at(eps)
+    forms = _forms(here.equation, here.inverse.equation, map_.digits)
+    kinds: dict[tuple[Any, ...], list[_Curve]] = {}
+    for _ in range(_MOST_LINES):
+        if limits.is_over:
+            break
+        field = random_prime_field(rng)
+        try:
+            over = map_.at(eps, field)
+            functions = tuple(form_order(form, field) for form in forms.all)
+        except BadPrime:
+            continue
+        degree, zeros, curves = _on_line(over.equation, forms, functions, field, rng)
+        for curve in curves:
+            run = walked(curve.equation, curve.point, curve.direction, [], _FIRST, limits.end, functions=functions)[0]
+            is_contracted = image_of(over.inverse.equation, run[0].limit) is None
+            key = (is_contracted, curve.own[: len(forms.poles)], curve.own[-1], *curve.levels(run)[:1], curve.rows(run))
+            kinds.setdefault(key, []).append(curve)
+        if all(len({curve.equation.over.characteristic for curve in kind}) > 1 for kind in kinds.values()):
+            try:
+                return degree, _resolved(kinds, forms, degree, zeros, limits)
+            except Untold:
+                continue  # a hypersurface without points modulo the primes so far
+    raise Untold("the contracted hypersurfaces could not be told apart at random points")
+
+
+def _resolved(
+    kinds: dict[tuple[Any, ...], list[_Curve]], forms: _Forms, degree: int, zeros: int, limits: Range
+) -> list[Hypersurface]:
+    exponents = fmpq_mat([list(key[3]) for key in kinds]).transpose()
+    solved: fmpq_mat | None = None
+    columns, sizes = range(len(forms.all)), [0] * len(kinds)
+    if exponents.rank() == len(kinds):
+        solved = (exponents.transpose() * exponents).inv() * exponents.transpose()
+        images = range(len(forms.poles), len(forms.all) - 1)
+        total = [int(form.total_degree()) * (degree if k in images else 1) for k, form in enumerate(forms.all)]
+        column = fmpq_mat(len(total), 1, total)
+        if exponents * (solved * column) != column or sum((solved * column).entries(), fmpq(0)) != zeros:
+            raise Untold("not all hypersurfaces were met")
+        sizes = [int(entry) for entry in (solved * column).entries()]
+        columns = range(len(kinds))
+    # Orders on hypersurfaces that are not contracted have no part in what follows.
+    chosen = [k for k in columns if solved is None or list(kinds)[k][0]]
+    found = []
+    for size, (key, curves) in zip(sizes, kinds.items(), strict=True):
+        if key[0]:
+            by_prime = {curve.equation.over.characteristic: curve for curve in curves}
+            one, other = (
+                orders_at(
+                    curve.equation,
+                    curve.point,
+                    curve.direction,
+                    replace(curve, solved=solved, exponents=exponents),
+                    (_FIRST, limits.reach),
+                    limits,
+                )
+                for curve in list(by_prime.values())[:2]
+            )
+            if one.known != other.known:
+                raise Untold("two points tell different things")
+            found.append(_hypersurface(key, size, tuple(by_prime)[:2], one.of(chosen)))
+    return found
+
+
+def _hypersurface(key: tuple[Any, ...], degree: int, primes: tuple[int, ...], orders: Orders) -> Hypersurface:
+    return Hypersurface(
+        "Z" if key[2] else "?",
+        degree,
+        any(key[1]),
+        1,
+        CONFINED if any(row[0] for row in orders.rows) else NOT_CONFINED,
+        1,
+        None,
+        (),
+        primes,
+        followed=orders.followed,
+        settled_at=orders.settled_at if orders.is_settled else None,
+        orders=orders,
+    )
+
+
+def _forms(equation: Equation, inverse: Equation, digits: int) -> _Forms:
+    names = [f"x{k + 1}" for k in range(equation.dim)]
+    context = fmpq_mpoly_ctx.get((*names, "z"), Ordering.degrevlex)
+
+    def factors(one: Equation) -> tuple[Any, ...]:
+        rows = [
+            [context.from_dict({one.exponents[k]: fmpq(value) for k, value in entry}) for entry in row[:-1]] + [None]
+            for row in one.terms
+        ]
+        form = kernel_minors(rows)[-1]
+        return (form,) if digits > _MOST_DIGITS else tuple(factor for factor, _ in form.factor()[1])
+
+    return _Forms(factors(equation), factors(inverse), context.gens()[-1])
+
+
+def _on_line(
+    equation: Equation, forms: _Forms, functions: tuple[Function, ...], field: Any, rng: random.Random
+) -> tuple[int, int, list[_Curve]]:
+    """The degree of the map on a random line, the number of points over the closure where forms vanish, and those in
+    GF(p), each with the line as a curve through it."""
+    p = field.prime
+    a, b = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(2))
+    line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
+    image = kernel_minors(equation.rows(equation.monomials(line), nmod_poly([], p)))
+    common = reduce(nmod_poly.gcd, image)
+    image = [entry // common for entry in image]
+    degree = max(int(entry.degree()) for entry in image)
+    at_points = [evaluate(form, field, line) for form in (*forms.poles, forms.infinity)]
+    at_images = [evaluate(form, field, image) for form in forms.images]
+    excess = [_exponent(value, common) for value in at_points]
+    if sum(k * int(value.degree()) for k, value in zip(excess, at_points, strict=True)) != common.degree():
+        raise Untold("the minors of the equation have a common factor of another kind")
+    product = reduce(nmod_poly.__mul__, [*at_points, *at_images])
+    if product.is_zero():
+        raise Untold("the map or its inverse has no value anywhere")
+    radical = product // product.gcd(product.derivative())
+    *poles, infinity = excess
+    curves = []
+    for factor, _ in radical.factor()[1]:
+        if factor.degree() == 1:
+            s = -int(factor[0])
+            point = tuple((x + s * v) % p for x, v in zip(a, b, strict=True))
+            start = [nmod_poly([x, v], p) for x, v in zip(point, b, strict=True)]
+            own = tuple(function(start, _PRECISION) or 0 for function in functions)
+            every = (*poles, *([0] * len(forms.images)), infinity)
+            curves.append(_Curve(equation, point, b, functions, every, own, forms))
+    return degree, int(radical.degree()), curves
+
+
+def _exponent(value: nmod_poly, product: nmod_poly) -> int:
+    """How often a polynomial divides another one that is not zero."""
+    count = 0
+    while value.degree() > 0 and (product % value).is_zero():
+        product, count = product // value, count + 1
+    return count
