@@ -51,12 +51,12 @@ def conclude(found: Findings) -> Conclusion:
     integrals = _count_text(found) if found.integrals_were_counted else "the integrals were not counted"
     period = found.integrals.profile.period if found.integrals is not None else None
     is_member = isinstance(found.structure, Structure)
-    liouville = is_member and found.dim > 2
-    suffix = " It is Liouville integrable, as a member of the commuting family (proved)." if liouville else ""
-    suffix += f" All this at eps = {found.eps} only: other eps may differ." if found.eps is not None else ""
+    suffix = f" All this at eps = {found.eps} only: other eps may differ." if found.eps is not None else ""
     if found.symbols:
         parts = "integrals" if found.densities is None else "integrals and densities"
         suffix += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
+    if is_member and found.dim > 2:
+        suffix += " It is Liouville integrable, as a member of the commuting family (proved)."
 
     def verdict(kind: str, sentence: str) -> Conclusion:
         return Conclusion(kind, count, str(growth), sentence + suffix)
