@@ -122,6 +122,14 @@ SOURCES: dict[str, str] = {
         "R. Zander. On the singularity structure of Kahan discretizations of a class of quadratic vector fields. "
         "Eur. J. Math. 7 (2021), 1046-1073. arXiv:2003.01659"
     ),
+    "petrera-suris-zander-2020": (
+        "M. Petrera, Yu. B. Suris, R. Zander. How one can repair non-integrable Kahan discretizations. "
+        "J. Phys. A 53 (2020), 37LT01. arXiv:2003.12596"
+    ),
+    "schmalian-suris-tumarkin-2021": (
+        "M. Schmalian, Yu. B. Suris, Yu. Tumarkin. How one can repair non-integrable Kahan discretizations. II. A "
+        "planar system with invariant curves of degree 6. Math. Phys. Anal. Geom. 24 (2021), 40. arXiv:2106.14301"
+    ),
     "bellon-viallet-1999": "M. P. Bellon, C.-M. Viallet. Algebraic entropy. Comm. Math. Phys. 204 (1999), 425-437",
     "fatou-1906": "P. Fatou. Series trigonometriques et series de Taylor. Acta Math. 30 (1906), 335-400",
     "massey-1969": (

@@ -6,7 +6,7 @@ one all the same if linear algebra finds an A for its Hamiltonian (`hidden`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from flint import fmpq_mat
@@ -34,12 +34,19 @@ class Structure:
     declared: bool
     text: str
 
+    @property
+    def A(self) -> fmpq_mat:
+        """A in the system's own coordinates, as in `HiddenMember`."""
+        return self.form.A if self.T is None else self.T.inv().transpose() * self.form.A * self.T.transpose()
+
 
 @dataclass(frozen=True)
 class NoStructure:
-    """There is no normal form, with the reason."""
+    """There is no normal form, with the reason; of a member whose chi has a repeated root `text` and `T` as there."""
 
     reason: str
+    text: str = field(default="", compare=False)
+    T: fmpq_mat | None = field(default=None, compare=False)
 
 
 def structure_of(
@@ -65,9 +72,10 @@ def structure_of(
             return NoStructure(reason_against(hamiltonian))
         member = found.member
         T = None if found.is_standard else found.T
+    factors = "*".join(f"({one})" + f"^{one.multiplicity}" * (one.multiplicity > 1) for one in member.factors)
+    text = f"{'a' if declared else 'a hidden'} member of the family, chi = {factors}"
     try:
         form = normal_form(member)
     except HypothesisError:
-        return NoStructure("chi has a repeated root")
-    factors = "*".join(f"({factor})" for factor in member.factors)
-    return Structure(form, T, declared, f"{'a' if declared else 'a hidden'} member of the family, chi = {factors}")
+        return NoStructure("chi has a repeated root", text, T)
+    return Structure(form, T, declared, text)

@@ -12,6 +12,8 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from flint import fmpq
+
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.files import SystemFile
@@ -90,10 +92,19 @@ class Analysis(Findings, Displayed):
             **attributes(self, "densities", "poisson", "degrees", "heights"),
             "singularities": runs,
             **attributes(self, "symmetries", "commuting"),
-            "family": self.structure.text if isinstance(self.structure, Structure) else None,
+            "family": (self.structure.text or None) if self.structure is not None else None,
+            "member": self._member(),
             "skipped": self.skipped,
             "document": dict(self.file.document),
         }
+
+    def _member(self) -> dict[str, Any] | None:
+        """What a member of the family is one by, and what follows: x = centre + T y, J = T [[0, I], [-I, 0]] T^T."""
+        if not isinstance(self.structure, Structure):
+            return None
+        form = self.structure.form
+        known = {"chi": form.chi_text, "integrals_in_involution": form.m, "associated_maps": 2 ** (form.m - 1)}
+        return {**known, **attributes(self.structure, "A", "T"), **attributes(self, "centre")}
 
 
 def analyze(
@@ -163,7 +174,13 @@ def analyze(
             found.hamiltonian = constant_structures(system, seed=seed)
 
     def family() -> None:
-        if system is not None:
+        hamiltonian = None if found.hamiltonian is None else found.hamiltonian.hamiltonian
+        if hamiltonian is not None:
+            found.centre = hamiltonian.centre
+            moved = hamiltonian if found.centre is None else hamiltonian.about(found.centre)
+            found.structure = structure_of(moved.system, moved)
+        elif system is not None:
+            found.centre = (fmpq(0),) * dim
             found.structure = structure_of(system)
 
     def degrees() -> None:

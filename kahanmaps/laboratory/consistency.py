@@ -7,6 +7,7 @@ What is proved stands. Where two measurements exclude each other, neither is a f
 from __future__ import annotations
 
 from kahanmaps.errors import counted
+from kahanmaps.family.structure import Structure
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
@@ -29,6 +30,8 @@ def contradictions(found: Findings) -> list[str]:
     said = []
     if growth is GrowthClass.EXPONENTIAL and orbits_lie_on_curves(found):
         said.append("the degrees seem to grow exponentially, which they cannot where integrals leave curves only")
+    elif growth is GrowthClass.EXPONENTIAL and isinstance(found.structure, Structure):
+        said.append("the degrees seem to grow exponentially, which they cannot for a member of the commuting family")
     if period is not None and growth in (GrowthClass.EXPONENTIAL, *_POLYNOMIAL):
         said.append(f"orbits close after {counted(period, 'step')}, but the degrees seem to grow")
     return said

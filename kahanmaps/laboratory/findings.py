@@ -38,8 +38,9 @@ class Findings:
     singularities: list[SingularityRun] = field(default_factory=list)
     symmetries: Symmetries | None = None
     commuting: CommutingSystems | None = None
-    structure: Structure | NoStructure | None = None
     hamiltonian: ConstantStructures | None = None
+    structure: Structure | NoStructure | None = None  # in coordinates with the centre as origin
+    centre: tuple[fmpq, ...] | None = None
     skipped: list[str] = field(default_factory=list)
     elapsed: float = 0.0
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from flint import fmpq_mat
+
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.errors import counted
+from kahanmaps.family.skew_hamiltonian import factors_of_chi
 from kahanmaps.family.structure import Structure
 from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
 from kahanmaps.laboratory.findings import Findings
@@ -47,10 +50,13 @@ def conclude(found: Findings) -> Conclusion:
     measured = f" ({found.degrees.basis})" if found.degrees is not None else ""
     integrals = _count_text(found) if found.integrals_were_counted else "the integrals were not counted"
     period = found.integrals.profile.period if found.integrals is not None else None
+    is_member = isinstance(found.structure, Structure)
     suffix = f" All this at eps = {found.eps} only: other eps may differ." if found.eps is not None else ""
     if found.symbols:
         parts = "integrals" if found.densities is None else "integrals and densities"
         suffix += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
+    if is_member and found.dim > 2:
+        suffix += " It is Liouville integrable, as a member of the commuting family (proved)."
 
     def verdict(kind: str, sentence: str) -> Conclusion:
         return Conclusion(kind, count, str(growth), sentence + suffix)
@@ -75,10 +81,9 @@ def conclude(found: Findings) -> Conclusion:
             f"The degrees of the iterates are bounded{measured}: the map is linearisable in the sense of "
             f"complexity; {integrals}.",
         )
-    if growth is GrowthClass.UNKNOWN and orbits_lie_on_curves(found):
-        return verdict(
-            "integrable", f"Integrable: {integrals}, so that orbits lie on curves; of the degrees: {phrase}."
-        )
+    if growth is GrowthClass.UNKNOWN and (is_member or orbits_lie_on_curves(found)):
+        curves = ", so that orbits lie on curves" if orbits_lie_on_curves(found) else ""
+        return verdict("integrable", f"Integrable: {integrals}{curves}; of the degrees: {phrase}.")
     if growth is GrowthClass.EXPONENTIAL or (found.degrees is not None and found.degrees.looks_exponential):
         measured = measured if growth is GrowthClass.EXPONENTIAL else ""  # the phrase says that it is estimated
         growth = GrowthClass.EXPONENTIAL
@@ -121,9 +126,12 @@ def sections(found: Findings) -> list[tuple[str, list[Statement]]]:
 
 
 def _integral_lines(found: Findings) -> list[Statement]:
-    search = found.integrals
+    search, family = found.integrals, []
+    if isinstance(found.structure, Structure):
+        number = counted(found.structure.form.m, "independent integral")
+        family = [Statement(PROVED, f"{number}, as a member of the commuting family")]
     if search is None:
-        return []
+        return family
     lines = [Statement(str(one.verdict), f"{one.name} = {one.short_text}  [{one.origin}]") for one in search.integrals]
     lines += [
         Statement(
@@ -161,10 +169,7 @@ def _integral_lines(found: Findings) -> list[Statement]:
         lines.append(Statement(NOTE, f"the {functions[0].rstrip('0123456789')} are numbers that depend on eps only"))
     if search.reason and profile.nullities:
         lines.append(Statement(NOTE, search.reason))
-    if isinstance(found.structure, Structure):
-        m = found.structure.form.m
-        lines.append(Statement(PROVED, f"{counted(m, 'independent integral')}, as a member of the commuting family"))
-    return lines
+    return lines + family
 
 
 def _measure_lines(found: Findings) -> list[Statement]:
@@ -181,10 +186,13 @@ def _measure_lines(found: Findings) -> list[Statement]:
 
 
 def _poisson_lines(found: Findings) -> list[Statement]:
-    search = found.poisson
+    search, lines = found.poisson, []
+    if isinstance(found.structure, Structure) and found.structure.form.m > 1:
+        text = f"with {found.structure.form.m} integrals in involution, as a member of the commuting family"
+        lines.append(Statement(PROVED, f"J - eps^2 f'(x)^2 J is an invariant Poisson tensor, {text}"))
     if search is None:
-        return []
-    lines = [Statement(str(one.verdict), f"{one.name}: {one.short_text}; {one.statement}") for one in search.tensors]
+        return lines
+    lines += [Statement(str(one.verdict), f"{one.name}: {one.short_text}; {one.statement}") for one in search.tensors]
     return [*lines, *([Statement(NOTE, search.note)] if search.note else [])]
 
 
@@ -255,9 +263,11 @@ def _structure_lines(found: Findings) -> list[Statement]:
     if darboux is not None and darboux.functions:
         planes = ", ".join(format_polynomial(one.function) for one in darboux.functions)
         lines.append(Statement(PROVED, f"invariant hyperplanes of flow and map: {planes} = 0"))
+    if found.structure is not None and found.structure.text:
+        text = f"belongs to the commuting family: {found.structure.text}{_coordinates(found, found.structure.T)}"
+        lines.append(Statement(PROVED, text))
     if isinstance(found.structure, Structure):
         form = found.structure.form
-        lines.append(Statement(PROVED, f"belongs to the commuting family: {found.structure.text}"))
         lines.append(
             Statement(
                 PROVED,
@@ -268,11 +278,23 @@ def _structure_lines(found: Findings) -> list[Statement]:
     return lines
 
 
+def _coordinates(found: Findings, T: fmpq_mat | None) -> str:
+    """In which coordinates the system is a member of the family, x = centre + T y; empty where these are its own."""
+    centre = f"({', '.join(map(format_number, found.centre))})" if found.centre and any(found.centre) else ""
+    if T is None and not centre:
+        return ""
+    return f", in coordinates y with x = {' + '.join(filter(None, [centre, 'y' if T is None else 'T y']))}"
+
+
 def _commuting_lines(found: Findings) -> list[Statement]:
+    lines = []
+    if isinstance(found.structure, Structure) and (m := found.structure.form.m) > 1:
+        text = f"the Kahan maps of its {2 ** (m - 1)} associated systems, f itself among them, commute"
+        split = all(factor.degree == 1 for factor in factors_of_chi(found.structure.form.A))
+        lines.append(Statement(PROVED, text if split else f"{text} over the splitting field of chi"))
     search = found.commuting
     if search is None:
-        return []
-    lines = []
+        return lines
     if search.every_g_commutes:
         lines.append(Statement(PROVED, "the map is the identity and commutes with every other"))
     told: list[CommutingField] = []
@@ -289,6 +311,6 @@ def _commuting_lines(found: Findings) -> list[Statement]:
         )
     lines += [Statement(NOTE, text) for text in search.irrational]
     lines += [Statement(UNDECIDED, text) for text in search.undecided]
-    if not lines:
+    if not (told or search.every_g_commutes or search.families or search.irrational or search.undecided):
         lines.append(Statement(PROVED, "no g = B f with a constant rational matrix B other than 0, f and -f commutes"))
     return lines

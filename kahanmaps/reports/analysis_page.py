@@ -32,7 +32,7 @@ def analysis_page(found: Analysis, title: str, recipe: Recipe, pictures: Picture
     lead = text(", ".join(filter(None, words)))
     if found.symbols:
         lead += f"; formulas for every {text(', '.join(found.symbols))}"
-    is_member = isinstance(found.structure, Structure)
+    is_member = isinstance(found.file.structure, Structure)  # in the coordinates that the picture is made in
     orbits = invariant_curves_figure if is_member else portrait_figure
     sections = [
         _verdict(found),

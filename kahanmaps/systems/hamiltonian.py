@@ -6,12 +6,15 @@ constant skew J is admitted, singular ones and odd dimensions included.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from flint import fmpq_mat, fmpq_mpoly
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import degree, gradient, is_homogeneous, linear_combinations, names_of
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import nullspace
+from kahanmaps.algebra.polynomials import degree, evaluate, gradient, is_homogeneous, linear_combinations, names_of
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -85,6 +88,28 @@ class CubicHamiltonian(DisplayedAsFormula):
     def system(self) -> QuadraticSystem:
         """The quadratic system x' = J grad H(x)."""
         return QuadraticSystem(linear_combinations(self.J, self.gradient))
+
+    @cached_property
+    def centre(self) -> tuple[fmpq, ...] | None:
+        """A point c for which H(c + x) - H(c) is a homogeneous cubic, if there is one.
+
+        Hess H(c) = 0 are linear equations. Solutions differ by directions on which the cubic part does not depend, so
+        that grad H has the same value at all of them.
+        """
+        n, zero = self.dim, (0,) * self.dim
+        affine = [slope.derivative(j) for i, slope in enumerate(self.gradient) for j in range(i + 1)]
+        rows = [[*(entry.derivative(k)[zero] for k in range(n)), entry[zero]] for entry in affine]
+        # c = 0 where that is a solution: all but the last of the columns without pivot are zero in this vector.
+        last = next((v for v in nullspace(QQ, fmpq_mat(rows)) if v[n] != 0), None)
+        if last is None or any(evaluate(slope, QQ, last[:n]) != 0 for slope in self.gradient):
+            return None
+        return last[:n]
+
+    def about(self, point: Sequence[fmpq]) -> CubicHamiltonian:
+        """The same system in coordinates with this point as origin: H(point + x) - H(point)."""
+        context = self.H.context()
+        H = self.H.compose(*(x + c for x, c in zip(context.gens(), point, strict=True)), ctx=context)
+        return CubicHamiltonian(H - H[(0,) * self.dim], self.J)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, CubicHamiltonian):

@@ -38,6 +38,27 @@ def dot(left, right):
     return total
 
 
+# The point about which a cubic is homogeneous.
+
+
+@given(cubics(FOUR, (3,)), st.lists(rationals(6), min_size=4, max_size=4))
+def test_a_homogeneous_cubic_is_found_about_the_point_it_was_moved_to(H, point):
+    moved = CubicHamiltonian(H, standard_structure(4)).about([-c for c in point])
+    back = moved.about(moved.centre)  # not that point itself, where H does not depend on all variables
+    assert back.is_homogeneous
+    assert back.H == H
+
+
+@pytest.mark.parametrize("H", [q**3 / 3 + p**2 / 2, q**3 + p**3 + q, (q + p - 3) ** 3 + p, q**2 + p**2 + p])
+def test_other_cubics_have_no_centre(H):
+    assert CubicHamiltonian(H, standard_structure(2)).centre is None
+
+
+@pytest.mark.parametrize(("H", "centre"), [(q**3 + p**3, (0, 0)), ((q - 1) ** 3, (1, 0)), (q * 0 + 5, (0, 0))])
+def test_the_centre_is_the_origin_where_it_can_be(H, centre):
+    assert CubicHamiltonian(H, standard_structure(2)).centre == centre
+
+
 # The standard structure.
 
 

@@ -126,10 +126,11 @@ def _known_lines(file: Any) -> list[str]:
 def _latex(file: Any) -> str:
     """The system or map as displayed formulas."""
     from kahanmaps.display.latex import latex_name, latex_polynomial, latex_rational_function
+    from kahanmaps.maps.kahan import Kahan
 
-    if file.is_quadratic:
+    if isinstance(file.map, Kahan):  # with eps in its coefficients, if it is an adjusted one
         names = [latex_name(name) for name in file.variables]
-        rows = [rf"\dot{{{x}}} &= {latex_polynomial(f)}" for x, f in zip(names, file.system.rhs, strict=True)]
+        rows = [rf"\dot{{{x}}} &= {latex_polynomial(f)}" for x, f in zip(names, file.map.system.rhs, strict=True)]
     elif file.map.image is not None:
         names = [latex_name(name) for name in file.variables]
         rows = [rf"\tilde{{{x}}} &= {latex_rational_function(f)}" for x, f in zip(names, file.map.image, strict=True)]

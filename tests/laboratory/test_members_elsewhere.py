@@ -1,0 +1,172 @@
+"""Members of the commuting family in other coordinates: affine changes of variables hide them from `hidden_member_of`.
+
+Specified here: `analyze` finds A, T and the centre, says what the theorems give, and what it says holds at exact points
+in the coordinates of the system; a Hamiltonian that is no member is not taken for one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from flint import fmpq, fmpq_poly
+from helpers import random_point
+from planar_helpers import invertible, moved
+from schema_helpers import mistakes
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.matrices import rank
+from kahanmaps.algebra.text import parse_polynomial
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.family.cubics import belongs, default_variables
+from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.hidden import hidden_member_of
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.consistency import contradictions
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.preserve.hamiltonian_structure import constant_structures
+from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+t = fmpq_poly([0, 1])
+MEMBERS = {
+    "m = 2, split": draw_with_eigenvalues(["1/2", -7], 3),
+    "m = 2, irreducible": draw_with_chi(t**2 - 2, 1),
+    "m = 3, split": draw_with_eigenvalues([1, -2, 3], 2),
+    "m = 3, partly split": draw_with_chi((t - 1) * (t**2 + 1), 1),
+    "m = 3, irreducible": draw_with_chi(t**3 - t - 1, 1),
+}
+over_members = pytest.mark.parametrize("name", MEMBERS)
+
+
+def elsewhere(H, seed: int) -> QuadraticSystem:
+    """The system of H and the standard J after a random affine change of variables, of which nothing is kept."""
+    n = H.context().nvars()
+    R = invertible(n, seed) * fmpq(2, 3)
+    return moved(CubicHamiltonian(H, standard_structure(n)), R).about([fmpq(k + 1, 2) for k in range(n)]).system
+
+
+def analysed(system: QuadraticSystem):
+    """What is found at once: the structure needs no time, and the rest is not asked for here."""
+    return analyze(SystemFile.from_system(system), seconds=0.3)
+
+
+def proved(found) -> list[str]:
+    return [line.text for _, lines in found.sections for line in lines if line.status == "proved"]
+
+
+@over_members
+def test_a_member_in_other_coordinates_is_recognised_with_what_follows(name):
+    member = MEMBERS[name]
+    system = elsewhere(member.H, 5)
+    assert hidden_member_of(system) is None  # not as long as these coordinates are kept
+    found, m = analysed(system), member.m
+    lines = proved(found)
+    (line,) = (line for line in lines if line.startswith("belongs to the commuting family: a hidden member"))
+    assert line.endswith(" + T y")
+    assert f"{m} independent integrals, as a member of the commuting family" in lines
+    ending = f"{m} integrals in involution, as a member of the commuting family"
+    assert f"J - eps^2 f'(x)^2 J is an invariant Poisson tensor, with {ending}" in lines
+    split = all(factor.degree == 1 for factor in member.factors)
+    associated = f"the Kahan maps of its {2 ** (m - 1)} associated systems, f itself among them, commute"
+    assert associated + ("" if split else " over the splitting field of chi") in lines
+    assert found.integral_count >= m
+    assert found.conclusion.kind == "integrable"
+    assert "It is Liouville integrable, as a member of the commuting family (proved)." in found.conclusion.sentence
+
+
+@over_members
+def test_the_matrices_that_are_given_are_those_of_the_system(name):
+    system = elsewhere(MEMBERS[name].H, 6)
+    found = analysed(system)
+    record = found.to_json()
+    assert mistakes("analyze", record) == []
+    hamiltonian = constant_structures(system).hamiltonian
+    A, T, J = found.structure.A, found.structure.T, hamiltonian.J
+    assert J == T * standard_structure(system.dim) * T.transpose()
+    assert A.transpose() * J == J * A
+    about = hamiltonian.about(found.centre)
+    assert belongs(A, about.H)
+    assert not belongs(A + A.transpose(), about.H)
+    assert record["member"]["A"] == [[str(entry) for entry in row] for row in A.tolist()]
+    assert record["member"]["centre"] == [str(c) for c in found.centre]
+    assert (record["member"]["integrals_in_involution"], record["member"]["associated_maps"]) == (
+        system.dim // 2,
+        2 ** (system.dim // 2 - 1),
+    )
+
+
+@pytest.mark.parametrize("name", ["m = 2, irreducible", "m = 3, split"])
+def test_the_poisson_tensor_is_invariant_in_these_coordinates(name):
+    system, eps = elsewhere(MEMBERS[name].H, 7), fmpq(1, 9)
+    J, kahan, x = constant_structures(system).hamiltonian.J, KahanMap(system, eps), random_point(system.dim, 4)
+
+    def tensor(point, factor):
+        slope = system.over(QQ).jacobian(point)
+        return J - slope * slope * J * (factor * eps * eps)
+
+    change, image = kahan.jacobian(x), kahan.step(x)
+    for factor in (1, -1, 0):
+        assert (change * tensor(x, factor) * change.transpose() == tensor(image, factor)) == (factor == 1)
+
+
+@over_members
+def test_the_integrals_of_the_chain_are_found_and_in_involution(name):
+    system = elsewhere(MEMBERS[name].H, 8)
+    structures = constant_structures(system)
+    assert len(structures.forms) == system.dim // 2
+    x = random_point(system.dim, 2)
+    gradients = [[slope(*x) for slope in map(H.derivative, range(system.dim))] for H in structures.functions]
+    rows = QQ.matrix(len(gradients), system.dim, [entry for row in gradients for entry in row])
+    assert rank(QQ, rows) == system.dim // 2
+    assert all(entry == 0 for entry in (rows * structures.hamiltonian.J * rows.transpose()).entries())
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("n", [4, 6])
+def test_a_cubic_that_is_no_member_is_not_taken_for_one(n, seed):
+    names = default_variables(n)
+    text = " + ".join(
+        [*(f"{k + seed}*{x}^3" for k, x in enumerate(names)), "*".join(names[:3]), f"{names[0]}^2*{names[3]}"]
+    )
+    system = elsewhere(parse_polynomial(text, names), seed)
+    found = analysed(system)
+    assert found.structure.reason.startswith("only the multiples of I satisfy")
+    assert found.to_json()["member"] is found.to_json()["family"] is None
+    assert not any("commuting family" in line for line in proved(found))
+    assert "Liouville" not in found.conclusion.sentence
+
+
+def test_a_cubic_without_a_centre_is_none():
+    H = MEMBERS["m = 2, split"].H
+    found = analysed(elsewhere(H + H.context().gens()[0] ** 2, 3))
+    assert (found.centre, found.structure.reason) == (None, "H is not a homogeneous cubic")
+
+
+def test_a_member_with_a_repeated_root_is_said_to_be_one_and_no_more():
+    found = analysed(elsewhere(parse_polynomial("x1^2*x2", default_variables(4)), 3))
+    lines = [line for line in proved(found) if "commuting family" in line]
+    assert [line.split(", in coordinates")[0] for line in lines] == [
+        "belongs to the commuting family: a hidden member of the family, chi = (t - 1)^2"
+    ]
+    assert found.to_json()["member"] is None
+
+
+def test_a_member_in_its_own_coordinates_keeps_them():
+    found = analysed(load("paper_m2").system)
+    assert (found.structure.T, any(found.centre)) == (None, False)
+    assert found.structure.A == found.structure.form.A
+    assert any(line.endswith("a hidden member of the family, chi = (t - 1)*(t - 2)") for line in proved(found))
+
+
+def test_degrees_that_seem_exponential_do_not_go_with_a_member():
+    system = elsewhere(MEMBERS["m = 2, split"].H, 9)
+    doubling = degree_growth(load("lotka_volterra").system, max_terms=12)
+    found = replace(analysed(system), degrees=doubling)
+    assert contradictions(found) == [
+        "the degrees seem to grow exponentially, which they cannot for a member of the commuting family"
+    ]
+    assert found.conclusion.kind == "undecided"
+    assert contradictions(replace(found, structure=None)) == []
