@@ -19,6 +19,7 @@ from kahanmaps.displayed import Displayed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.structure import Structure, structure_of
+from kahanmaps.laboratory.conclusion import Conclusion, conclude
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
@@ -29,7 +30,7 @@ from kahanmaps.laboratory.preserve.hamiltonian_structure import constant_structu
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
 from kahanmaps.laboratory.preserve.sparse_relations import sparse_relations
-from kahanmaps.laboratory.report import Conclusion, Statement, conclude, sections
+from kahanmaps.laboratory.report import Statement, sections
 from kahanmaps.laboratory.singular.singularities import (
     WRITTEN_DIMENSION,
     can_be_written,
@@ -80,7 +81,7 @@ class Analysis(Findings, Displayed):
                 "integrals": final.integrals if self.integrals_were_counted else None,
                 "integrals_exact": self.count_is_exact,
                 "growth": final.growth,
-                "sentence": final.sentence,
+                **attributes(final, "sense", "ground", "sentence"),
             },
             "statements": [
                 {"section": title, **attributes(line, "status", "text")}

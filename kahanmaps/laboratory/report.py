@@ -1,4 +1,4 @@
-"""The words of a report: statements, each with how it is known, and the verdict."""
+"""The words of a report: statements, each with how it is known."""
 
 from __future__ import annotations
 
@@ -10,104 +10,26 @@ from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.errors import counted
 from kahanmaps.family.skew_hamiltonian import factors_of_chi
 from kahanmaps.family.structure import Structure
-from kahanmaps.laboratory.consistency import contradictions, doubt_of_heights, orbits_lie_on_curves
+from kahanmaps.laboratory.consistency import doubt_of_heights
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
 from kahanmaps.laboratory.symmetry.commuting import CommutingField
 
-PROVED, SUPPORTED, MEASURED, UNDECIDED, NOTE = "proved", "supported", "measured", "undecided", "note"
+PROVED, SUPPORTED, EXPLAINED, MEASURED = "proved", "supported", "explained", "measured"
+UNDECIDED, NOTE = "undecided", "note"
 _SHOWN_DEGREES = 12
 
 
 @dataclass(frozen=True)
 class Statement:
-    """One line of the report and how it is known: proved, supported, measured, undecided; or a note."""
+    """One line of the report and how it is known: proved, supported, explained, measured, undecided; or a note.
+
+    Explained is what follows exactly from the patterns of singularities, which are measured.
+    """
 
     status: str
     text: str
-
-
-@dataclass(frozen=True)
-class Conclusion:
-    """The verdict in words; `kind` is "linear", "linearisable", "integrable", "not integrable", "singular" (nowhere
-    defined) or "undecided".
-
-    `integrals` is the number of independent integrals known or shown by orbits, `growth` the kind of degree growth.
-    """
-
-    kind: str
-    integrals: int
-    growth: str
-    sentence: str
-
-
-def conclude(found: Findings) -> Conclusion:
-    """The verdict on what was found."""
-    count = found.integral_count
-    growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
-    phrase = found.degrees.kind_text if found.degrees is not None else "degrees not measured"
-    measured = f" ({found.degrees.basis})" if found.degrees is not None else ""
-    integrals = _count_text(found) if found.integrals_were_counted else "the integrals were not counted"
-    period = found.integrals.profile.period if found.integrals is not None else None
-    is_member = isinstance(found.structure, Structure)
-    suffix = f" All this at eps = {found.eps} only: other eps may differ." if found.eps is not None else ""
-    if found.symbols:
-        parts = "integrals" if found.densities is None else "integrals and densities"
-        suffix += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
-    if is_member and found.dim > 2:
-        suffix += " It is Liouville integrable, as a member of the commuting family (proved)."
-
-    def verdict(kind: str, sentence: str) -> Conclusion:
-        return Conclusion(kind, count, str(growth), sentence + suffix)
-
-    if found.degrees is not None and found.degrees.ended == "singular" and len(found.degrees.degrees) == 1:
-        return verdict("singular", f"The map is nowhere defined: {found.degrees.message}.")
-    if found.file.is_quadratic and found.file.system.degree <= 1:
-        closes = "" if period is None else f"; orbits close after {counted(period, 'step')} (measured)"
-        return verdict("linear", f"The system is linear, and so is its Kahan map; {integrals}{closes}.")
-    if said := contradictions(found):
-        return verdict(
-            "undecided", f"The findings do not agree: {'; '.join(said)}. {integrals[0].upper()}{integrals[1:]}."
-        )
-    if period is not None:
-        closes = f"Orbits close after {counted(period, 'step')} (measured)"
-        return verdict("linearisable", f"{closes}: the map is periodic there; {phrase}.")
-    if growth is GrowthClass.ZERO:
-        return verdict("linearisable", "An iterate of the map is a constant map (measured): orbits end in one point.")
-    if growth is GrowthClass.BOUNDED:
-        return verdict(
-            "linearisable",
-            f"The degrees of the iterates are bounded{measured}: the map is linearisable in the sense of "
-            f"complexity; {integrals}.",
-        )
-    if growth is GrowthClass.UNKNOWN and (is_member or orbits_lie_on_curves(found)):
-        curves = ", so that orbits lie on curves" if orbits_lie_on_curves(found) else ""
-        return verdict("integrable", f"Integrable: {integrals}{curves}; of the degrees: {phrase}.")
-    if growth is GrowthClass.EXPONENTIAL or (found.degrees is not None and found.degrees.looks_exponential):
-        measured = measured if growth is GrowthClass.EXPONENTIAL else ""  # the phrase says that it is estimated
-        growth = GrowthClass.EXPONENTIAL
-        return verdict(
-            "not integrable",
-            f"Not integrable in the sense of complexity: {phrase}{measured}"
-            + (f", although there {'is' if count == 1 else 'are'} {integrals}." if count else f"; {integrals}."),
-        )
-    if growth in (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL):
-        return verdict("integrable", f"Integrable in the sense of complexity: {phrase}{measured}; {integrals}.")
-    return verdict("undecided", f"The growth is undecided: {phrase}; {integrals}.")
-
-
-def _count_text(found: Findings) -> str:
-    """How many integrals there are; where that is a lower bound, the sentence says so."""
-    count, search = found.integral_count, found.integrals
-    where = f" in dimension {found.dim}"
-    if count == 0 and search is not None and not found.count_is_exact:
-        return f"no integral{where} up to degree {search.profile.degree} (relations along orbits)"
-    number = "no integral" if count == 0 else counted(count, "independent integral")
-    return number + where if found.count_is_exact else f"at least {number}{where}"
-
-
-# -- the statements -------------------------------------------------------------------------------------------------
 
 
 def sections(found: Findings) -> list[tuple[str, list[Statement]]]:
@@ -204,12 +126,15 @@ def _growth_lines(found: Findings) -> list[Statement]:
         if shown:
             lines.append(Statement(MEASURED, f"degrees of the iterates: {shown}{more}"))
         unknown = found.degrees.growth is GrowthClass.UNKNOWN and not found.degrees.looks_exponential
-        lines.append(Statement(UNDECIDED if unknown else MEASURED, found.degrees.growth_text))
+        known = MEASURED if found.degrees.explained is None else EXPLAINED
+        lines.append(Statement(UNDECIDED if unknown else known, found.degrees.growth_text))
         recurrence = found.degrees.recurrence
         if recurrence is not None:
-            lines.append(Statement(MEASURED, f"recurrence: {recurrence.text}"))
+            lines.append(Statement(known, f"recurrence: {found.degrees.recurrence_text}"))
             if recurrence.closed_form_text:
-                lines.append(Statement(MEASURED, f"d_n = {recurrence.closed_form_text}"))
+                lines.append(Statement(known, f"d_n = {recurrence.closed_form_text}"))
+        if found.degrees.enclosure is not None:
+            lines.append(Statement(PROVED, found.degrees.enclosure.text))
     if found.heights is not None:
         doubt = doubt_of_heights(found)
         status = UNDECIDED if doubt or found.heights.text.startswith("undecided") else MEASURED
