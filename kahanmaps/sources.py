@@ -131,6 +131,24 @@ SOURCES: dict[str, str] = {
         "planar system with invariant curves of degree 6. Math. Phys. Anal. Geom. 24 (2021), 40. arXiv:2106.14301"
     ),
     "bellon-viallet-1999": "M. P. Bellon, C.-M. Viallet. Algebraic entropy. Comm. Math. Phys. 204 (1999), 425-437",
+    "boucksom-favre-jonsson-2008": (
+        "S. Boucksom, C. Favre, M. Jonsson. Degree growth of meromorphic surface maps. "
+        "Duke Math. J. 141 (2008), 519-538"
+    ),
+    "cantat-lamy-2013": (
+        "S. Cantat, S. Lamy. Normal subgroups in the Cremona group. With an appendix by Y. de Cornulier. "
+        "Acta Math. 210 (2013), 31-94"
+    ),
+    "nica-spakula-2016": (
+        "B. Nica, J. Spakula. Strong hyperbolicity. Groups Geom. Dyn. 10 (2016), 951-964. arXiv:1406.0256"
+    ),
+    "coornaert-delzant-papadopoulos-1990": (
+        "M. Coornaert, T. Delzant, A. Papadopoulos. Geometrie et theorie des groupes: les groupes hyperboliques de "
+        "Gromov. Lecture Notes in Math. 1441, Springer 1990"
+    ),
+    "diller-favre-2001": (
+        "J. Diller, C. Favre. Dynamics of bimeromorphic maps of surfaces. Amer. J. Math. 123 (2001), 1135-1169"
+    ),
     "fatou-1906": "P. Fatou. Series trigonometriques et series de Taylor. Acta Math. 30 (1906), 335-400",
     "massey-1969": (
         "J. L. Massey. Shift-register synthesis and BCH decoding. IEEE Trans. Inform. Theory 15 (1969), 122-127"

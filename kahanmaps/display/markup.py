@@ -17,6 +17,7 @@ _WORDS = {
     "proved": ("✓", "#1a9f4b"),
     "completed": ("✓", "#1a9f4b"),
     "supported": ("≈", "#0e8fa8"),
+    "explained": ("≋", "#0e8fa8"),
     "measured": ("~", "#3f7ae0"),
     "refuted": ("✗", "#e0353f"),
     "undecided": ("?", "#b8860b"),

@@ -48,7 +48,8 @@ def conclude(found: Findings) -> Conclusion:
     if found.symbols:
         parts = "integrals" if found.densities is None else "integrals and densities"
         suffix += f" The {parts} are for every {', '.join(found.symbols)}, all else is for the given values."
-    liouville = _liouville(found)
+    linear = found.file.is_quadratic and found.file.system.degree <= 1
+    liouville = "" if linear else _liouville(found)
     if liouville:
         suffix += f" It is Liouville integrable, {liouville} (proved)."
 
@@ -58,7 +59,7 @@ def conclude(found: Findings) -> Conclusion:
     grown = EXPLAINED if degrees is not None and degrees.explained is not None else MEASURED
     if degrees is not None and degrees.ended == "singular" and len(degrees.degrees) == 1:
         return verdict("singular", f"The map is nowhere defined: {degrees.message}.")
-    if found.file.is_quadratic and found.file.system.degree <= 1:
+    if linear:
         closes = "" if period is None else f"; orbits close after {counted(period, 'step')} (measured)"
         return verdict("linear", f"The system is linear, and so is its Kahan map; {integrals}{closes}.", ground=PROVED)
     if said := contradictions(found):

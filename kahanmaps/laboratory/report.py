@@ -130,7 +130,7 @@ def _growth_lines(found: Findings) -> list[Statement]:
         lines.append(Statement(UNDECIDED if unknown else known, found.degrees.growth_text))
         recurrence = found.degrees.recurrence
         if recurrence is not None:
-            lines.append(Statement(known, f"recurrence: {found.degrees.recurrence_text}"))
+            lines.append(Statement(known, f"recurrence: {recurrence.text}"))
             if recurrence.closed_form_text:
                 lines.append(Statement(known, f"d_n = {recurrence.closed_form_text}"))
         if found.degrees.enclosure is not None:

@@ -15,7 +15,7 @@ from kahanmaps.version import __version__
 
 TOP = "analyze euler_top"
 FOUR = "analyze --vars x,y --rhs y --rhs='-x+x^2'"  # periodic at eps = 1
-STATUSES = {"proved", "supported", "measured", "undecided", "note"}
+STATUSES = {"proved", "supported", "explained", "measured", "undecided", "note"}
 
 
 def report(out):
@@ -38,7 +38,7 @@ def test_the_report_as_text(kahanmaps):
         "I1 = (x2^2*eps^2 - 1)/(2*x1^2*eps^2 + 1)  [relations of degree 2 along orbits]",
     ) in (lines)
     assert ("integrals", "measured", "along orbits x1^2 + c1*x3^2 + c2 = 0") in lines
-    assert ("growth", "measured", "d_n = 2*n^2 + 1") in lines
+    assert ("growth", "explained", "d_n = 2*n^2 + 1") in lines
     assert list(dict.fromkeys(section for section, _, _ in lines)) == [
         "integrals",
         "measure",
@@ -51,8 +51,8 @@ def test_the_report_as_text(kahanmaps):
     ]
     assert verdict == (
         "integrable",
-        "Integrable in the sense of complexity: quadratic growth, dynamical degree 1 (measured); "
-        "2 independent integrals in dimension 3.",
+        "Superintegrable (proved): 2 independent integrals in dimension 3, so that orbits lie on curves; quadratic "
+        "growth, dynamical degree 1 (explained). It is Liouville integrable, with the Poisson tensor P1 (proved).",
     )
 
 
@@ -64,7 +64,7 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
     assert found.pop("document")["name"] == "euler_top"
     statements = found.pop("statements")
     assert {line["status"] for line in statements} <= STATUSES
-    assert {"section": "growth", "status": "measured", "text": "d_n = 2*n^2 + 1"} in statements
+    assert {"section": "growth", "status": "explained", "text": "d_n = 2*n^2 + 1"} in statements
     assert [run["verdict"] for run in found.pop("singularities")] == ["confined", "confined"]
     assert found == {
         "command": "analyze",
@@ -83,9 +83,11 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
             "integrals": 2,
             "integrals_exact": True,
             "growth": "quadratic",
-            "sentence": "Integrable in the sense of complexity: quadratic growth, dynamical degree 1 (measured); "
-            "2 independent integrals in dimension 3. The integrals and densities are for every a2, all else is for the "
-            "given values.",
+            "sense": "superintegrable",
+            "ground": "proved",
+            "sentence": "Superintegrable (proved): 2 independent integrals in dimension 3, so that orbits lie on "
+            "curves; quadratic growth, dynamical degree 1 (explained). The integrals and densities are for every a2, "
+            "all else is for the given values. It is Liouville integrable, with the Poisson tensor P1 (proved).",
         },
         "hirota_kimura": ["x1^2 + c1*x3^2 + c2 = 0", "x2^2 + c3*x3^2 + c4 = 0"],
         "family": None,
@@ -99,7 +101,7 @@ def test_the_report_as_markdown(kahanmaps):
     assert out.startswith(
         "# nahm_tetrahedral, dimension 2, every eps (the time step is 2 eps)\n\n```\nx' = x^2 - y^2\n"
     )
-    assert "\ny' = -2*x*y\n```\n\n**Integrable in the sense of complexity: " in out
+    assert "\ny' = -2*x*y\n```\n\n**Integrable (proved): " in out
     assert "\n## growth\n\n* *measured*: degrees of the iterates: 2, 4, 8, 13, " in out
     # formulas are code, or their stars would be taken for emphasis
     assert "* *measured*: `along orbits x^2*y - 1/3*y^3 + c1*x^2 + c1*y^2 + c2 = 0`\n" in out

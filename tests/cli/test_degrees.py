@@ -14,10 +14,21 @@ def test_the_degrees_of_the_euler_top(kahanmaps):
         "# euler_top, generic eps, 2 random lines modulo primes of 63 bits: measured, not proved",
         "degrees\t1, 3, 9, 19, 33, 51, 73, 99, 129, 163, 201, 243",
         "growth\tquadratic growth, dynamical degree 1",
-        "recurrence\ta(n) = 3*a(n-1)-3*a(n-2)+a(n-3) for n >= 3, from 12 terms of which 6 were not needed to find it",
+        "recurrence\ta(n) = 3*a(n-1)-3*a(n-2)+a(n-3) for n >= 3, explained by the singularities; 12 measured terms "
+        "agree",
+        "characteristic polynomial\t(t - 1)^3",
         "closed form\t2*n^2 + 1",
+        "generating function\t(1 + 3*z^2) / (1 - 3*z + 3*z^2 - z^3)",
         "singularities\tnothing new after step 3",
-        "ended\ta recurrence of order 3 holds for 6 terms to spare",
+        *(
+            f"contracted\tC{k}: 128*x1^2 + 64*x2^2 {sign} 256*x1*x3 + 128*x3^2 {linear} + 121 = 0 at eps = 8/11, "
+            f"degree 2: contracted, a hypersurface again after 3 steps; costs 2 at step 3; meets {met}"
+            for k, sign, linear, met in (
+                (1, "-", "+ 176*x2", "C1 at step 2, C2 at step 2 (order 2)"),
+                (2, "+", "- 176*x2", "C1 at step 2 (order 2), C2 at step 2"),
+            )
+        ),
+        "ended\tthe singularities explain the degrees, and those measured agree",
     ]
 
 
@@ -29,7 +40,10 @@ def test_the_json_has_what_is_needed_to_run_it_again(kahanmaps):
     assert [set(line) for line in found["lines"]] == [{"prime", "eps_residue"}] * 2
     assert found["degrees"] == [1, 2, 4, 8, 16]
     assert (found["ended"], found["growth"], found["dynamical_degree"]["value"]) == ("terms", "exponential", "2")
-    assert found["recurrence"]["checked"] == 3
+    assert found["recurrence"]["checked"] == 5
+    assert found["basis"] == "explained: no confinement within 1000 steps"
+    assert found["singularities"]["generating_function"] == {"numerator": ["1"], "denominator": ["1", "-2"]}
+    assert (found["enclosure"]["upper"], float(found["enclosure"]["lower"]) > 1.5) == ("2", True)
 
 
 def test_generic_eps_is_told_as_such(kahanmaps):
@@ -39,11 +53,17 @@ def test_generic_eps_is_told_as_such(kahanmaps):
 
 
 def test_a_search_that_ends_without_a_recurrence_gives_3(kahanmaps):
-    outcome = kahanmaps("degrees henon_heiles --max-degree 100")
+    outcome = kahanmaps("degrees clebsch_first_flow --max-degree 100")
     assert outcome.status == 3
-    assert "growth\tno recurrence found in 6 terms; d_n/d_(n-1) is 2.38462 at the end, an estimate only" in outcome.out
-    assert outcome.err == "stopped early: the degree of iterate 6 is above 100\n"
-    assert kahanmaps("degrees henon_heiles --max-degree 100 -q").err == ""
+    assert "growth\tno recurrence found in 5 terms; d_n/d_(n-1) is 1.7381 at the end, an estimate only" in outcome.out
+    assert outcome.err == "stopped early: the degree of iterate 5 is above 100\n"
+    assert kahanmaps("degrees clebsch_first_flow --max-degree 100 -q").err == ""
+
+
+def test_few_terms_suffice_where_the_singularities_explain_them(kahanmaps):
+    outcome = kahanmaps("degrees henon_heiles --max-degree 100")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert "dynamical degree 2.29663026288653824570, root of t^4 - 2*t^3 - 2*t + 1\n" in outcome.out
 
 
 def test_terms_asked_for_are_enough(kahanmaps):
@@ -86,10 +106,10 @@ def test_wrong_use_gives_2(kahanmaps, command, words):
     assert words in outcome.err
 
 
-def test_a_recurrence_that_fits_without_terms_enough_beyond_the_patterns_is_undecided(kahanmaps):
+def test_a_pattern_longer_than_the_degrees_explains_them(kahanmaps):
     """The lines x, y, x + 2 y with exponents (1, 3, 3): 2^n up to n = 7, and 255 after that."""
     outcome = kahanmaps("degrees --vars x,y --rhs 3*x*(x+2*y)+6*x*y --rhs=-(y*(x+2*y)+3*x*y) --max-degree 150")
-    assert outcome.status == 3
-    assert outcome.err == "undecided: after a pattern of 8 steps 10 iterates are needed (--seconds, --max-degree)\n"
-    assert "dynamical degree" not in outcome.out
-    assert "growth\texponential growth by a factor of about 2 (estimated: after a pattern of 8 steps" in outcome.out
+    assert (outcome.status, outcome.err) == (0, "")
+    assert "characteristic polynomial\t(t - 1) (t^7 - t^6 - t^5 - t^4 - t^3 - t^2 - t - 1)\n" in outcome.out
+    assert "a hypersurface again after 8 steps; costs 1 at step 8; meets C1 at step 7, C3 at step 7\n" in outcome.out
+    assert "\nproved\tdynamical degree between 1.566299 and 2: " in outcome.out

@@ -186,14 +186,6 @@ class DegreeGrowth(Displayed):
         return f"{known}: {limit}" if limit else known
 
     @property
-    def recurrence_text(self) -> str:
-        """The recurrence as an equation, with what speaks for it; empty without one."""
-        if self.explained is not None:
-            agree = counted(len(self.degrees) - 1, "measured degree")
-            return f"{self.explained.equation}, explained; {agree} {'agrees' if len(self.degrees) == 2 else 'agree'}"
-        return self.recurrence.text if self.recurrence is not None else ""
-
-    @property
     def growth_text(self) -> str:
         """The kind of growth with its power or rate, and how far confinement was looked for: one phrase."""
         limited = self.recurrence is not None and self.basis not in ("measured", "explained")
@@ -204,7 +196,7 @@ class DegreeGrowth(Displayed):
         """Lines for people, a word and a tab at the front: degrees, growth, recurrence, how it ended."""
         lines = [("degrees", ", ".join(map(str, self.degrees))), ("growth", self.growth_text)]
         if self.recurrence is not None:
-            lines.append(("recurrence", self.recurrence_text))
+            lines.append(("recurrence", self.recurrence.text))
             lines.append(("characteristic polynomial", self.recurrence.characteristic_text))
             if self.recurrence.closed_form_text:
                 lines.append(("closed form", self.recurrence.closed_form_text))

@@ -74,7 +74,8 @@ class Recurrence:
 
     `characteristic` is monic with integer coefficients, [c_0, c_1, ..., 1] standing for
     a_{n+order} + ... + c_1 a_{n+1} + c_0 a_n = 0. A factor x^k means that the first k terms (`preperiod`) are exempt
-    from the recurrence of the others. `checked` of the terms were not needed to find it.
+    from the recurrence of the others. `checked` of the terms were not needed to find it. Where it follows from
+    something else, so many of the first values were `measured`, and the others continue them.
 
     >>> found = find_recurrence([2 * n * n + 1 for n in range(12)])
     >>> found.characteristic, found.order, found.checked, str(found.growth)
@@ -85,11 +86,12 @@ class Recurrence:
 
     values: tuple[int, ...]
     characteristic: fmpz_poly
+    measured: int | None = None
 
     @property
     def terms(self) -> int:
-        """The number of terms it was found from and tried on."""
-        return len(self.values)
+        """The number of terms it was found from, or tried on."""
+        return len(self.values) if self.measured is None else self.measured
 
     @property
     def order(self) -> int:
@@ -99,7 +101,7 @@ class Recurrence:
     @property
     def checked(self) -> int:
         """The number of terms that were not needed to find it, and satisfy it."""
-        return self.terms - 2 * self.order
+        return self.terms - 2 * self.order if self.measured is None else self.terms
 
     @cached_property
     def factors(self) -> tuple[tuple[fmpz_poly, int], ...]:
@@ -189,6 +191,8 @@ class Recurrence:
     @property
     def text(self) -> str:
         """The recurrence as an equation, with what speaks for it."""
+        if self.measured is not None:
+            return f"{self.equation}, explained by the singularities; {self.terms} measured terms agree"
         return f"{self.equation}, from {self.terms} terms of which {self.checked} were not needed to find it"
 
     @property

@@ -57,14 +57,14 @@ def recurrence_of(series: Fraction, measured: Sequence[int]) -> Recurrence:
     """The recurrence of the coefficients of a fraction, as that of the terms that were `measured` and more.
 
     >>> recurrence_of((fmpz_poly([1]), fmpz_poly([1, -2])), [1, 2, 4]).text
-    'a(n) = 2*a(n-1) for n >= 1, from 3 terms of which 1 were not needed to find it'
+    'a(n) = 2*a(n-1) for n >= 1, explained by the singularities; 3 measured terms agree'
     """
     above, below = series
     order = max(int(below.degree()), int(above.degree()) + 1)
     values = coefficients(series, max(len(measured), order))
-    return Recurrence(
-        tuple(values), fmpz_poly([0] * (order - int(below.degree())) + [int(c) for c in below.coeffs()[::-1]])
-    )
+    preperiod = [0] * (order - int(below.degree()))
+    characteristic = fmpz_poly(preperiod + [int(c) for c in below.coeffs()[::-1]])
+    return Recurrence(tuple(values), characteristic, len(measured))
 
 
 def coefficients(series: Fraction, count: int) -> list[int]:

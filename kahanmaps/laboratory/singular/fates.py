@@ -353,7 +353,9 @@ def orders_at(
         found = [find_recurrence(column) for column in zip(*rows, strict=True)]
         repeats = all(one is not None and len(rows) >= max(_CONSTANT, _CHECKED * one.order) for one in found)
         if repeats and (len(run) >= min(reach, limits.along) or not is_whole):
-            return Orders(rows, tuple(one.characteristic for one in found if one is not None), len(rows), True)
+            laws = tuple(one.characteristic for one in found if one is not None)
+            kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
+            return Orders(rows[:kept], laws, len(rows), True)
         longest = min(reach, max(limits.along, 2 * (hit or 0)))
         if not is_whole or steps >= longest:
             return Orders(rows, (), len(rows), False)

@@ -1,0 +1,144 @@
+"""Degrees by the renewal equation, against degrees measured by polynomials and gcds, and against known laws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from degree_helpers import polynomial_degrees
+from flint import fmpz_poly
+from helpers import quick
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kahanmaps.documents.catalog import load, map_names, names
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, recurrence_of
+from kahanmaps.laboratory.singular.fates import CONFINED
+from kahanmaps.laboratory.singular.orders import Orders
+from kahanmaps.laboratory.singular.singularities import default_eps, patterns, singularities
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def settled(*rows, returns=None):
+    return Orders(rows, (), 100, True, returns)
+
+
+@cache
+def explained(name):
+    map_ = load(name).map
+    return patterns(map_, None)
+
+
+WRITTEN = [name for name in (*names(), *map_names()) if load(name).dim <= 4]
+# In these two contracted hypersurfaces are zeros of one form, which random points do not tell apart.
+OPEN = ["clebsch_first_flow", "kirchhoff_case", "lagrange_top", "so4_euler_manakov", "three_wave"]
+
+
+@pytest.mark.parametrize(
+    "name", quick(WRITTEN, [name for name in WRITTEN if load(name).dim < 4 and name != "qrt_asymmetric"])
+)
+def test_the_degrees_of_the_catalogue_are_explained(name):
+    found = degree_growth(load(name).map, seconds=30, max_degree=500)
+    if found.degrees[1] > 1:
+        assert found.explained is not None
+        assert tuple(coefficients(found.patterns.fraction, len(found.degrees))) == found.degrees
+        assert found.explained.characteristic == (found.fitted or found.explained).characteristic
+
+
+@pytest.mark.parametrize(
+    "name",
+    quick(["volterra_periodic_5", "kirchhoff_generic", "paper_m3", "paper_m3_irreducible"], ["volterra_periodic_5"]),
+)
+def test_random_points_explain_degrees_in_dimension_5_and_6(name):
+    found = degree_growth(load(name).map, seconds=60, max_terms=6, patterns=explained(name))
+    assert found.explained is not None
+    assert len(found.degrees) == 7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OPEN)
+def test_where_forms_do_not_tell_hypersurfaces_apart_degrees_are_measured_only(name):
+    found = explained(name)
+    assert (found.series, found.told, found.running) == ((), [], "")
+    assert found.lengths
+    assert degree_growth(load(name).map, seconds=60, patterns=found).basis.startswith("measured")
+
+
+def test_the_generating_function_is_a_law_for_all_times():
+    found = recurrence_of(explained("nahm_tetrahedral").fraction, [1, 2])
+    assert found.closed_form == "3/4*n^2 + 1 for n = 0 mod 2; 3/4*n^2 + 5/4 for n = 1 mod 2"
+    assert [found.predict(n) for n in range(1, 31)] == polynomial_degrees(load("nahm_tetrahedral").system, 30, 7)
+
+
+@pytest.mark.parametrize(
+    ("exponents", "orbits"), [((1, 1, 1), (3, 3, 3)), ((1, 1, 2), (4, 4, 2)), ((1, 2, 3), (6, 3, 2))]
+)
+def test_three_lines_come_back_after_the_sum_of_the_exponents_over_each(exponents, orbits):
+    """zander-2021: the singularity on the i-th line is confined after n_i + 1 steps, n_i = (g1 + g2 + g3)/g_i."""
+    a, b, c = exponents
+    system = QuadraticSystem.from_text(["x", "y"], [f"{b}*x*(x+2*y)+2*{c}*x*y", f"-({a}*y*(x+2*y)+{c}*x*y)"])
+    run = singularities(system, "1/7")
+    ends = [h.confined_at for h in run.hypersurfaces if h.status == CONFINED]
+    assert sorted(ends) == sorted(n + 1 for n in orbits)
+
+
+def test_orders_that_are_wrong_explain_nothing():
+    """Each number in the orders of a map counts: changed, the degrees are not those measured."""
+    found = explained("euler_top")
+    sizes = [h.degree for h in found.contracted]
+    every = [h.orders for h in found.contracted]
+    true = degree_growth(load("euler_top").map, max_terms=8).degrees
+    assert tuple(coefficients(degree_series(3, list(zip(sizes, every, strict=True))), 9)) == true
+    for k, orders in enumerate(every):
+        for t, row in enumerate(orders.rows):
+            for column, value in enumerate(row):
+                wrong = (*row[:column], value + 1, *row[column + 1 :])
+                other = replace(orders, rows=(*orders.rows[:t], wrong, *orders.rows[t + 1 :]))
+                changed = [other if j == k else one for j, one in enumerate(every)]
+                assert tuple(coefficients(degree_series(3, list(zip(sizes, changed, strict=True))), 9)) != true
+
+
+def test_a_hypersurface_that_returns_goes_on_as_the_other():
+    """The same pattern three ways: as a return to itself, by recurrences, and written out."""
+    rows = ((0, 1), (1, 0))
+    laws = (fmpz_poly([-1, 0, 1]), fmpz_poly([-1, 0, 1]))
+    returning = settled(*rows, returns=(2, 0))
+    recurring = Orders(rows, laws, 100, True)
+    written = settled(*(rows * 10))
+    one, two, three = (coefficients(degree_series(2, [(1, orders)]), 20) for orders in (returning, recurring, written))
+    assert one == two == three
+    first = settled((0, 0, 0), (0, 1, 0), returns=(2, 0))
+    assert coefficients(degree_series(3, [(1, replace(returning, rows=((0, 1, 0), (1, 0, 0)))), (2, first)]), 12) == (
+        coefficients(
+            degree_series(
+                3,
+                [
+                    (1, settled(*((r[0], r[1], 0) for r in rows * 10))),
+                    (2, settled((0, 0, 0), (0, 1, 0), *((r[0], r[1], 0) for r in rows * 10))),
+                ],
+            ),
+            12,
+        )
+    )
+
+
+@given(st.integers(2, 5), st.integers(1, 4), st.lists(st.tuples(st.integers(0, 2), st.integers(0, 2)), max_size=5))
+def test_the_fraction_is_what_the_two_equations_give_step_by_step(degree, size, rows):
+    """One hypersurface with any orders, however absurd: s(k) and d(k) summed directly."""
+    d, s = [1], list[int]()
+    for k in range(10):
+        nu = [rows[k - l - 1][1] if k - l - 1 < len(rows) else 0 for l in range(k)]
+        s.append(size * d[k] - sum(n * other for n, other in zip(nu, s, strict=True)))
+        mu = [rows[k - l][0] if k - l < len(rows) else 0 for l in range(k + 1)]
+        d.append(degree * d[k] - sum(m * other for m, other in zip(mu, s, strict=True)))
+    assert coefficients(degree_series(degree, [(size, settled(*rows))]), 11) == d
+
+
+def test_patterns_of_two_eps_that_differ_explain_nothing():
+    system = QuadraticSystem.from_text(["x", "y"], ["1", "x*y"])
+    assert patterns(system, None).series == ((1,), (1, -2, 1))
+    late = degree_growth(system, "1/10", max_terms=4)
+    assert late.explained.closed_form_text == "102 for n >= 101"
+    assert default_eps(system, 0) != default_eps(system, 1)
