@@ -9,11 +9,13 @@ P(x~) Q(x) - P(x) Q(x~) are, becomes the same of P' and Q'.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import lcm
 from typing import Any
 
 from flint import fmpq_mpoly, nmod_poly
 
 from kahanmaps.algebra.fields import GF, PrimeField
+from kahanmaps.algebra.matrices import trace
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.laboratory.modular_points import ModularMap, Point, monomial_tables, monomial_values
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -49,6 +51,11 @@ class ModularFlow(ModularMap):
         """x + f(x)."""
         f = self._local.value([self.map.field.convert(entry) for entry in x])
         return tuple((entry + int(slope)) % self.prime for entry, slope in zip(x, f, strict=True))
+
+    def determinant(self, x: Point, image: Point) -> tuple[int, int]:
+        """1 + div f(x) and 1: as P + P' is to P for a density P."""
+        point = [self.map.field.convert(entry) for entry in x]
+        return 1 + int(trace(self._local.jacobian(point))), 1
 
     def moved(self, x: Point, image: Point, degree: int) -> tuple[list[int], list[int]]:
         """The values of all monomials P up to a degree, and of P + f . grad P."""
@@ -88,18 +95,31 @@ class ModularFlow(ModularMap):
         return total
 
 
-def is_conserved_by_flow(system: QuadraticSystem, function: RationalFunction) -> bool:
-    """Whether f . grad I = 0, multiplied out: for every value of the symbols; I is in (variables, symbols, eps). Exact.
+def is_kept_by_flow(system: QuadraticSystem, function: RationalFunction, *, is_density: bool = False) -> bool:
+    """Whether f . grad I = 0; of a density phi whether f . grad phi = phi div f, which says that dx/phi is invariant.
+
+    Multiplied out, for every value of the symbols; the function is in (variables, symbols, eps). Exact.
 
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> rotation = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
-    >>> [is_conserved_by_flow(rotation, parse_rational_function(t, ["x", "y", "eps"])) for t in ("x^2 + y^2", "x/y")]
+    >>> [is_kept_by_flow(rotation, parse_rational_function(t, ["x", "y", "eps"])) for t in ("x^2 + y^2", "x/y")]
     [True, False]
     """
     P, Q = function.numerator, function.denominator
     context = P.context()
-    images = context.gens()[: system.dim + len(system.symbols)]
-    total: fmpq_mpoly = context.constant(0)
-    for k, f in enumerate(system.rhs):
-        total += f.compose(*images, ctx=context) * (P.derivative(k) * Q - P * Q.derivative(k))
-    return bool(total.is_zero())
+    change = system.derivative(P) * Q - P * system.derivative(Q)
+    if is_density:
+        change -= P * Q * system.divergence.compose(*context.gens()[: system.dim + len(system.symbols)], ctx=context)
+    return bool(change.is_zero())
+
+
+def flow_exponents(system: QuadraticSystem, polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
+    """The coefficients of div f, and of K for each Darboux polynomial, P' = K P, as rows of integers.
+
+    A product of powers P^k is conserved if sum k K = 0, and the phi of an invariant dx/phi if that is div f.
+    """
+    functions = [system.divergence, *(system.derivative(P) / P for P in polynomials)]
+    terms = [{tuple(map(int, m))[: system.dim + len(system.symbols)]: c for m, c in K.terms()} for K in functions]
+    below = lcm(*(int(c.q) for row in terms for c in row.values()))
+    support = sorted({m for row in terms for m in row})
+    return [[int(row.get(m, 0) * below) for m in support] for row in terms]
