@@ -16,9 +16,9 @@ from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations
 from kahanmaps.documents.files import read_system
 from kahanmaps.laboratory.preserve.affine_functions import (
-    darboux_cofactor,
     affine_darboux,
     affine_integrals,
+    darboux_cofactor,
     quotient_by,
 )
 from kahanmaps.maps.kahan import KahanMap

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import lcm
+from operator import mul
 from typing import Any
 
 from flint import fmpq_mpoly, nmod_poly
@@ -20,17 +21,18 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.laboratory.modular_points import ModularMap, Point, monomial_tables, monomial_values
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-Terms = list[tuple[int, tuple[int, ...]]]
+Terms = list[tuple[int, tuple[int, int]]]
 
 
-def _residues(f: fmpq_mpoly, n: int, field: PrimeField, values: Sequence[Any]) -> Terms:
-    """The coefficients of f modulo a prime, the symbols having these values, with the exponents of the variables."""
+def _pairs(f: fmpq_mpoly, n: int, field: PrimeField, values: Sequence[Any]) -> Terms:
+    """The coefficients of f modulo a prime, at these values of the symbols, with two variables each; n stands for 1."""
     found = []
     for monomial, coefficient in f.terms():
         total = field.convert(coefficient)
         for value, exponent in zip(values, monomial[n:], strict=True):
             total = total * value ** int(exponent)
-        found.append((int(total), tuple(int(e) for e in monomial[:n])))
+        j, k = ([k for k in range(n) for _ in range(int(monomial[k]))] + [n, n])[:2]
+        found.append((int(total), (j, k)))
     return found
 
 
@@ -45,7 +47,7 @@ class ModularFlow(ModularMap):
         field = GF(prime)
         given = [field.convert(value) for value in values]
         self._local = system.over(field, given)
-        self._terms = [_residues(f, system.dim, field, given) for f in system.rhs]
+        self._terms = [_pairs(f, system.dim, field, given) for f in system.rhs]
 
     def step(self, x: Point) -> Point:
         """x + f(x)."""
@@ -71,28 +73,19 @@ class ModularFlow(ModularMap):
     def along_orbit(self, degree: int, count: int) -> tuple[list[list[int]], Point, int | None]:
         """The Taylor coefficients of all monomials along a solution: a row an order; and where it starts."""
         p, start = self.prime, self.random_point()
-        x = [nmod_poly([c], p) for c in start]
+        x = [*([c] for c in start), [1]]  # series, the last one for the constant 1
+        pairs = {pair for terms in self._terms for _, pair in terms}
         for order in range(1, count):
-            x = [
-                nmod_poly([c], p) + self._along(terms, x, order).integral()
-                for c, terms in zip(start, self._terms, strict=True)
-            ]
+            products = {(j, k): sum(map(mul, x[j], reversed(x[k]))) for j, k in pairs}
+            below = pow(order, -1, p)
+            slopes = [sum(c * products[pair] for c, pair in terms) for terms in self._terms]
+            for series, slope in zip(x, [*slopes, 0], strict=True):
+                series.append(slope * below % p)
         table = [nmod_poly([1], p)]
-        for slopes in monomial_tables(self.dim, degree)[1:]:
-            variable, _, place = slopes[-1]
-            table.append(table[place].mul_low(x[variable], count))
+        for factors in monomial_tables(self.dim, degree)[1:]:
+            variable, _, place = factors[-1]
+            table.append(table[place].mul_low(nmod_poly(x[variable], p), count))
         return [[int(series[k]) for series in table] for k in range(count)], start, None
-
-    def _along(self, terms: Terms, x: Sequence[nmod_poly], order: int) -> nmod_poly:
-        """A component of f at series, up to an order."""
-        total = nmod_poly([0], self.prime)
-        for coefficient, exponents in terms:
-            product = nmod_poly([coefficient], self.prime)
-            for series, exponent in zip(x, exponents, strict=True):
-                for _ in range(exponent):
-                    product = product.mul_low(series, order)
-            total = total + product
-        return total
 
 
 def is_kept_by_flow(system: QuadraticSystem, function: RationalFunction, *, is_density: bool = False) -> bool:

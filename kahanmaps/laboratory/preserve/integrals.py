@@ -475,7 +475,8 @@ def _independent(
             verdict, evidence = laboratory.verdict_on(function)
         if verdict.holds:
             rows.append(row)
-            found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, verdict, evidence))
+            name = f"{'F' if laboratory.flow else 'I'}{len(found) + 1}"
+            found.append(FoundIntegral(name, function, origin, verdict, evidence))
     return found
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import prod
 from typing import Any
 
@@ -29,7 +29,6 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import exponents_up_to, rank
 from kahanmaps.laboratory.preserve.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.densities import DensitySearch, FoundDensity, find_densities
-from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, IntegralSearch, find_integrals, gradient_at
 from kahanmaps.maps.kahan import Kahan
 
@@ -38,7 +37,7 @@ _ROUNDS = 5  # how often an integral is combined with others
 _MOST_UNKNOWNS = 60  # coefficients of a relation between leading terms
 _LONG, _SHOWN_TERMS = 100, 12  # of an integral of the flow, and of the second term of a series
 _DENSITY_DEGREE = 4
-_TOP = {1: 1, 2: 14, 3: 6, 4: 4}  # degrees of relations along solutions by dimension, 3 beyond
+_TOP = {1: 1, 2: 10, 3: 6, 4: 4}  # degrees of relations along solutions by dimension, 3 beyond
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class Limit:
     def text(self) -> str:
         """What it is, and what the map makes of it."""
         done = f"kept by the map ({self.kept})" if self.kept.holds else "deformed by the map"
-        return f"{self.name} = {_short(self.leading, _LONG)}, {done}: {self.series}"
+        return f"{self.name} = {_short(self.leading, _LONG)} is an integral of the flow, {done}: {self.series}"
 
     @property
     def series(self) -> str:
@@ -99,23 +98,27 @@ class FlowAndMap:
     @property
     def lost(self) -> int:
         """How many of the others, at least, no integral of the map tends to: measured."""
-        return max(0, len(self.others) - self.without_limit)
+        profile = self.map_search.profile
+        return max(0, len(self.others) - self.without_limit) if profile.nullities and profile.agree else 0
 
-    @property
-    def lines(self) -> list[tuple[str, str]]:
-        """What is known of integrals, each sentence with how it is known; then of densities and Darboux polynomials."""
+    def lines(self, *, others: bool = True) -> list[tuple[str, str]]:
+        """What is known, each sentence with how it is known; without the formulas of the others, if need be."""
         found = [("proved", one.text) for one in self.limits]
-        found += [(str(one.verdict), f"{one.name} = {one.short_text}  [{one.origin}]") for one in self.others]
+        for one in self.others if others else ():
+            found.append(
+                (str(one.verdict), f"{one.name} = {one.short_text} is an integral of the flow  [{one.origin}]")
+            )
         names = ", ".join(one.name for one in self.others)
         count, degree = self.map_search.codimension, self.map_search.profile.degree
         shown = f"it shows {counted(count, 'integral') if count else 'no integral'} up to degree {degree}"
         shown += ", of which no function tends to it" if count else ""
         if self.lost:
-            which = f"at least {self.lost} of {names}" if self.without_limit else names
+            which = names if self.lost == len(self.others) else f"at least {self.lost} of {names}"
             found.append(("measured", f"{which} lost by the map: {shown}"))
-        if self.others and self.without_limit:
-            missing = counted(self.without_limit, "integral")
-            found.append(("undecided", f"what the map makes of {names}: the limits of {missing} are not known"))
+        if self.lost < len(self.others):
+            missing = f"the limits of {counted(self.without_limit, 'integral')} are not known"
+            why = missing if self.without_limit else "its integrals were not counted"
+            found.append(("undecided", f"what the map makes of {names}: {why}"))
         if self.search is not None and self.search.profile.nullities and not self.search.is_exact:
             more = "other " * bool(self.limits or self.others)
             tried = f"relations along solutions up to degree {self.search.profile.degree}"
@@ -163,8 +166,8 @@ def flow_and_map(
         The flow beside the map, exact apart from what it says to be measured; None for other maps and for one eps.
 
     >>> from kahanmaps.documents.catalog import load
-    >>> print(*flow_and_map(find_integrals(load("weierstrass"))).lines[0])
-    proved F1 = 4*x^3 - y^2 - x, which the map deforms: I1 = F1 + eps^2*(-12*x^2*y^2 + 2*y^2) + ...
+    >>> print(*flow_and_map(find_integrals(load("weierstrass"))).lines()[0])
+    proved L1 = 4*x^3 - y^2 - 4*x is an integral of the flow, deformed by the map: (I1/3 + 1/3)/eps^2 = L1 + ...
     """
     if not isinstance(search.file.map, Kahan) or search.eps is not None:
         return None
@@ -189,7 +192,7 @@ def flow_and_map(
         row = gradient_at(modular, one.function, point)
         if rank([*rows, row], modular.prime) > len(rows):
             rows.append(row)
-            others.append(replace(one, name=f"F{len(rows)}"))
+            others.append(one)
     functions = [*(one.leading for one in limits), *(one.function for one in others)]
     density, reason = _density(laboratory, densities, seconds)
     without = max(0, search.codimension - len(limits))
@@ -203,6 +206,7 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
     field = FunctionField(laboratory.map.names, _BUDGET)
     labels = [one.name + "(x)" * (one.name in symbols) for one in search.integrals]
     formal = FunctionField((*labels, *symbols, "eps"), reduces=True)
+    map_laboratory = Laboratory(search.file, symbols, None, search.seed)
     map_ = laboratory.maps[0]
     point = map_.random_point()
     found: list[Limit] = []
@@ -226,24 +230,25 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
             if not rest.above.is_zero():
                 order, content, second = _leading(rest)
                 second = RationalFunction(second.numerator * content, second.denominator)
-        except (BudgetExceeded, _NoRelation):
+        except (BudgetExceeded, _NoLimit):
             continue
-        if laboratory.system is None or not is_kept_by_flow(laboratory.system, leading):
+        verdict, _ = laboratory.verdict_on(leading)
+        if not verdict.holds:
             continue
-        kept = one.verdict
-        if second is not None:
-            kept, _ = Laboratory(search.file, symbols, None, search.seed).verdict_on(leading)
+        kept = one.verdict if second is None else map_laboratory.verdict_on(leading)[0]
         used.append((I, name))
-        found.append(Limit(f"F{len(found) + 1}", formal.format(name), leading, order, second, kept))
+        found.append(Limit(f"L{len(found) + 1}", formal.format(name), leading, order, second, kept))
     return tuple(found)
 
 
-class _NoRelation(KahanmapsError):
-    """No polynomial relation of low degree was found."""
+class _NoLimit(KahanmapsError):
+    """No combination of an integral with others was found that has a limit independent of theirs."""
 
 
 def _leading(I: Function) -> tuple[int, fmpq, RationalFunction]:
-    """v, c and I_0 with I = c eps^v (I_0 + ...), I_0 in lowest terms, of primitive polynomials."""
+    """v, c and I_0 with I = c eps^v (I_0 + ...), I_0 in lowest terms, of primitive polynomials. Raises _NoLimit."""
+    if I.above.is_zero():
+        raise _NoLimit("an integral is a function of others")
     lowest = []
     for P in (I.above, I.below):
         order = min(int(monomial[-1]) for monomial in P.monoms())
@@ -257,7 +262,7 @@ def _leading(I: Function) -> tuple[int, fmpq, RationalFunction]:
 
 
 def _relation(functions: Sequence[RationalFunction], n: int, symbols: int) -> fmpq_mpoly:
-    """A polynomial relation of the functions and the symbols, of the least degree. Raises _NoRelation.
+    """A polynomial relation of the functions and the symbols, of the least degree. Raises _NoLimit.
 
     It is what vanishes at random points: whoever takes it for a relation has to find that it is one.
     """
@@ -269,14 +274,14 @@ def _relation(functions: Sequence[RationalFunction], n: int, symbols: int) -> fm
             break
         rows: list[list[fmpq]] = []
         while len(rows) < len(support) + 3:
-            x = [fmpq(rng.randint(2, 9999)) for _ in range(n + symbols)]
+            x = [fmpq(rng.randint(2, 999)) for _ in range(n + symbols)]
             values = [one.value(QQ, [*x, fmpq(0)]) for one in functions]
             if None not in values:
                 given = [*values, *x[n:]]
                 rows.append([prod(map(pow, given, exponents), start=fmpq(1)) for exponents in support])
         if vectors := nullspace(QQ, fmpq_mat(rows)):
             return ring([f"r{k}" for k in range(count)]).from_dict(dict(zip(support, vectors[0], strict=True)))
-    raise _NoRelation("leading terms depend on each other, but not by a relation of low degree")
+    raise _NoLimit("leading terms depend on each other, but not by a relation of low degree")
 
 
 def _density(
