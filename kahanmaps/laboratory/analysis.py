@@ -189,7 +189,11 @@ def analyze(
     def flow() -> None:
         if found.integrals is not None:
             found.flow = flow_and_map(
-                found.integrals, found.densities, seconds=share(0.03), progress=told("integrals of the flow")
+                found.integrals,
+                found.densities,
+                known=found.integral_count,
+                seconds=share(0.03),
+                progress=told("integrals of the flow"),
             )
 
     def poisson() -> None:

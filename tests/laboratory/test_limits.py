@@ -90,13 +90,13 @@ def test_a_flow_integral_that_no_integral_tends_to_is_lost_and_that_is_measured(
         found = flow_and_map(find_integrals(file))
         assert [one.text for one in found.others] == [formula]
         assert found.lost == 1
-        assert ("measured", "F1 lost by the map: it shows no integral up to degree 14") in found.lines()
+        assert ("measured", "F1 is lost: the map shows no integral up to degree 14") in found.lines()
 
 
 def test_of_two_integrals_one_is_lost():
     found = beside("zhukovski_volterra_2")
     assert len(found.limits) == len(found.others) == found.lost == 1
-    assert any(text.startswith("F2 lost by the map: it shows 1 integral up to degree") for text in told(found))
+    assert any(text.startswith("F2 is lost: the map shows 1 integral up to degree") for text in told(found))
 
 
 def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():

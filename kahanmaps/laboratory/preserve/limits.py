@@ -58,8 +58,10 @@ class Limit:
     @property
     def text(self) -> str:
         """What it is, and what the map makes of it."""
-        done = f"kept by the map ({self.kept})" if self.kept.holds else "deformed by the map"
-        return f"{self.name} = {_short(self.leading, _LONG)} is an integral of the flow, {done}: {self.series}"
+        done = "one of the map tends to"
+        if self.kept.holds or self.kept is Verdict.REFUTED:
+            done = f"the map keeps ({self.kept})" if self.kept.holds else "the map deforms"
+        return f"{self.name} = {_short(self.leading, _LONG)} is an integral of the flow that {done}: {self.series}"
 
     @property
     def series(self) -> str:
@@ -81,14 +83,15 @@ class FlowAndMap:
     """The flow beside its map.
 
     Integrals of the flow are those that integrals of the map tend to, `limits`, and `others`, all independent;
-    `without_limit` counts the integrals of the map of which no limit is known. `search` is that of the flow, None where
-    there can be no more than the limits. `density` is a phi of the flow, where there is none `reason` says so;
-    `polynomials` are those of its Darboux polynomials above degree 1 that are known and no integrals.
+    `without_limit` counts the integrals of the map of which no limit is known, of `count` that it has. `search` is that
+    of the flow, None where there can be no more than the limits. `density` is a phi of the flow, where there is none
+    `reason` says so; `polynomials` are those of its Darboux polynomials above degree 1 that are known and no integrals.
     """
 
     limits: tuple[Limit, ...]
     others: tuple[FoundIntegral, ...]
     without_limit: int
+    count: int
     map_search: IntegralSearch
     search: IntegralSearch | None
     density: FoundDensity | None
@@ -109,12 +112,12 @@ class FlowAndMap:
                 (str(one.verdict), f"{one.name} = {one.short_text} is an integral of the flow  [{one.origin}]")
             )
         names = ", ".join(one.name for one in self.others)
-        count, degree = self.map_search.codimension, self.map_search.profile.degree
-        shown = f"it shows {counted(count, 'integral') if count else 'no integral'} up to degree {degree}"
-        shown += ", of which no function tends to it" if count else ""
+        shown = counted(self.count, "integral") if self.count else "no integral"
+        shown = f"the map shows {shown} up to degree {self.map_search.profile.degree}"
         if self.lost:
             which = names if self.lost == len(self.others) else f"at least {self.lost} of {names}"
-            found.append(("measured", f"{which} lost by the map: {shown}"))
+            limits = ", and no function of them tends there" if self.count else ""
+            found.append(("measured", f"{which} {'is' if self.lost == 1 else 'are'} lost: {shown}{limits}"))
         if self.lost < len(self.others):
             missing = f"the limits of {counted(self.without_limit, 'integral')} are not known"
             why = missing if self.without_limit else "its integrals were not counted"
@@ -129,7 +132,7 @@ class FlowAndMap:
             found.append(("measured" if "no polynomial" in self.reason else "undecided", f"of the flow: {self.reason}"))
         if self.polynomials:
             told = ", ".join(map(format_polynomial, self.polynomials))
-            found.append(("proved", f"Darboux polynomials of the flow besides the hyperplanes: {told}"))
+            found.append(("proved", f"Darboux polynomials of the flow, apart from affine ones: {told}"))
         return found
 
     def to_json(self) -> dict[str, Any]:
@@ -149,6 +152,7 @@ def flow_and_map(
     densities: DensitySearch | None = None,
     flow: IntegralSearch | None = None,
     *,
+    known: int = 0,
     seconds: float = 10.0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> FlowAndMap | None:
@@ -159,7 +163,8 @@ def flow_and_map(
         densities: those of the map, if they are known.
         flow: the integrals of the flow; by default they are sought, up to a low degree, where the limits of those of
             the map are not all there can be.
-        seconds: for that, about.
+        known: how many integrals the map is known to have, if that is more than `search` tells.
+        seconds: for the search, about.
         progress: is told what is being tried.
 
     Returns:
@@ -167,7 +172,7 @@ def flow_and_map(
 
     >>> from kahanmaps.documents.catalog import load
     >>> print(*flow_and_map(find_integrals(load("weierstrass"))).lines()[0])
-    proved L1 = 4*x^3 - y^2 - 4*x is an integral of the flow, deformed by the map: (I1/3 + 1/3)/eps^2 = L1 + ...
+    proved L1 = 4*x^3 - y^2 - 4*x is an integral of the flow that the map deforms: (I1/3 + 1/3)/eps^2 = L1 + ...
     """
     if not isinstance(search.file.map, Kahan) or search.eps is not None:
         return None
@@ -195,9 +200,10 @@ def flow_and_map(
             others.append(one)
     functions = [*(one.leading for one in limits), *(one.function for one in others)]
     density, reason = _density(laboratory, densities, seconds)
-    without = max(0, search.codimension - len(limits))
+    count = max(known, search.codimension)
+    without = max(0, count - len(limits))
     polynomials = _polynomials(laboratory, [*functions, *([] if density is None else [density.function])])
-    return FlowAndMap(limits, tuple(others), without, search, flow, density, reason, polynomials)
+    return FlowAndMap(limits, tuple(others), without, count, search, flow, density, reason, polynomials)
 
 
 def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
@@ -213,6 +219,7 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
     used: list[tuple[Function, Function]] = []  # the integrals of the map, and how they are made
     for one, name in zip(search.integrals, formal.variables, strict=False):
         I = Function(field, one.function.numerator, one.function.denominator)
+        R = None
         rows = [gradient_at(map_, limit.leading, point) for limit in found]
         try:
             for _ in range(_ROUNDS):
@@ -235,7 +242,7 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
         verdict, _ = laboratory.verdict_on(leading)
         if not verdict.holds:
             continue
-        kept = one.verdict if second is None else map_laboratory.verdict_on(leading)[0]
+        kept = one.verdict if second is None and R is None else map_laboratory.verdict_on(leading)[0]
         used.append((I, name))
         found.append(Limit(f"L{len(found) + 1}", formal.format(name), leading, order, second, kept))
     return tuple(found)
