@@ -116,7 +116,7 @@ class FlowAndMap:
         shown = f"the map shows {shown} up to degree {self.map_search.profile.degree}"
         if self.lost:
             which = names if self.lost == len(self.others) else f"at least {self.lost} of {names}"
-            limits = ", and no function of them tends there" if self.count else ""
+            limits = f", with limits independent of {names}" if self.count else ""
             found.append(("measured", f"{which} {'is' if self.lost == 1 else 'are'} lost: {shown}{limits}"))
         if self.lost < len(self.others):
             missing = f"the limits of {counted(self.without_limit, 'integral')} are not known"
