@@ -99,6 +99,13 @@ def test_of_two_integrals_one_is_lost():
     assert any(text.startswith("F2 is lost: the map shows 1 integral up to degree") for text in told(found))
 
 
+def test_of_the_integrable_henon_heiles_systems_one_keeps_both_integrals():
+    """c = -1 is separable, and the map with it; for c = -6 the integral of degree 4 is lost."""
+    for c, lost in (("-1", 0), ("-6", 1)):
+        found = flow_and_map(find_integrals(load("henon_heiles", {"c": c}), max_degree=4))
+        assert (len(found.limits), len(found.others), found.lost) == (2 - lost, lost, lost)
+
+
 def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():
     search = find_integrals(load("euler_top"))
     known = flow_and_map(replace(search, integrals=search.integrals[:1]))
@@ -108,6 +115,21 @@ def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():
     uncounted = flow_and_map(replace(search, integrals=(), profile=uncounted, by_theorems=0))
     assert (len(uncounted.others), uncounted.lost) == (2, 0)
     assert ("undecided", "what the map makes of F1, F2: its integrals were not counted") in uncounted.lines()
+
+
+def test_integrals_that_depend_on_time_are_told_from_others():
+    found = flow_and_map(find_integrals(parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x", "2*y"]')))
+    assert [one.text for one in found.others] == ["x^2/y"]
+    assert ("measured", "F1 is lost: the map shows no integral free of n up to degree 14") in found.lines()
+
+
+def test_integrals_of_the_flow_without_a_formula_are_counted():
+    search = find_integrals(load("zander_120"))
+    flow = replace(find_integrals(load("zander_120"), flow=True), integrals=())
+    assert flow_and_map(search, None, flow).lines()[0] == (
+        "measured",
+        "solutions show 1 independent integral of the flow, 1 without a formula",
+    )
 
 
 def test_a_transcendental_integral_is_neither_seen_nor_lost():

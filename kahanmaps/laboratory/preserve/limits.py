@@ -61,15 +61,11 @@ class Limit:
         done = "one of the map tends to"
         if self.kept.holds or self.kept is Verdict.REFUTED:
             done = f"the map keeps ({self.kept})" if self.kept.holds else "the map deforms"
-        return f"{self.name} = {_short(self.leading, _LONG)} is an integral of the flow that {done}: {self.series}"
-
-    @property
-    def series(self) -> str:
-        """The integral of the map with its leading terms."""
-        if self.second is None:
-            return f"{self.combination} = {self.name}"
-        power = "eps" if self.order == 1 else f"eps^{self.order}"
-        return f"{self.combination} = {self.name} + {power}*({_short(self.second, _SHOWN_TERMS)}) + ..."
+        series = f"{self.combination} = {self.name}"
+        if self.second is not None:
+            power = "eps" if self.order == 1 else f"eps^{self.order}"
+            series += f" + {power}*({_short(self.second, _SHOWN_TERMS)}) + ..."
+        return f"{self.name} = {_short(self.leading, _LONG)} is an integral of the flow that {done}: {series}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -113,6 +109,7 @@ class FlowAndMap:
             )
         names = ", ".join(one.name for one in self.others)
         shown = counted(self.count, "integral") if self.count else "no integral"
+        shown += " free of n" if self.map_search.in_time else ""  # others depend on the number of the point
         shown = f"the map shows {shown} up to degree {self.map_search.profile.degree}"
         if self.lost:
             which = names if self.lost == len(self.others) else f"at least {self.lost} of {names}"
@@ -122,7 +119,11 @@ class FlowAndMap:
             missing = f"the limits of {counted(self.without_limit, 'integral')} are not known"
             why = missing if self.without_limit else "its integrals were not counted"
             found.append(("undecided", f"what the map makes of {names}: {why}"))
-        if self.search is not None and self.search.profile.nullities and not self.search.is_exact:
+        missing_formulas = 0 if self.search is None else self.search.codimension - len(self.limits) - len(self.others)
+        if self.search is not None and missing_formulas > 0:
+            number = counted(self.search.codimension, "independent integral")
+            found.append(("measured", f"solutions show {number} of the flow, {missing_formulas} without a formula"))
+        elif self.search is not None and self.search.profile.nullities and not self.search.is_exact:
             more = "other " * bool(self.limits or self.others)
             tried = f"relations along solutions up to degree {self.search.profile.degree}"
             found.append(("measured", f"no {more}rational integral of the flow shows in {tried}"))
