@@ -77,6 +77,7 @@ from kahanmaps.laboratory.preserve.hirota_kimura import hirota_kimura_basis as h
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile as orbit_profile
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch as IntegralSearch
 from kahanmaps.laboratory.preserve.integrals import find_integrals as find_integrals
+from kahanmaps.laboratory.preserve.limits import flow_and_map as flow_and_map
 from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch as PoissonSearch
 from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson as find_poisson
 from kahanmaps.laboratory.singular.singularities import SingularityRun as SingularityRun

@@ -28,6 +28,7 @@ from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
 from kahanmaps.laboratory.preserve.hamiltonian_structure import constant_structures
 from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.limits import flow_and_map
 from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
 from kahanmaps.laboratory.preserve.sparse_relations import sparse_relations
 from kahanmaps.laboratory.report import Statement, sections
@@ -90,7 +91,7 @@ class Analysis(Findings, Displayed):
             ],
             **attributes(self, "integrals"),
             "hirota_kimura": [relation.text for relation in self.relations],
-            **attributes(self, "densities", "poisson", "degrees", "heights"),
+            **attributes(self, "densities", "flow", "poisson", "degrees", "heights"),
             "singularities": runs,
             **attributes(self, "symmetries", "commuting"),
             "family": (self.structure.text or None) if self.structure is not None else None,
@@ -203,6 +204,16 @@ def analyze(
             bare, symbols=symbols, eps=found.eps, seconds=share(0.25), seed=seed, progress=told("densities")
         )
 
+    def flow() -> None:
+        if found.integrals is not None:
+            found.flow = flow_and_map(
+                found.integrals,
+                found.densities,
+                known=found.integral_count,
+                seconds=share(0.03),
+                progress=told("integrals of the flow"),
+            )
+
     def poisson() -> None:
         if dim in _TENSORS:
             known = found.integrals.integrals if found.integrals is not None else ()
@@ -244,6 +255,7 @@ def analyze(
         ("degrees", degrees),
         ("integrals", integrals),
         ("densities", densities),
+        ("the flow", flow),
         ("Poisson tensors", poisson),
         ("symmetries", symmetries),
         ("commuting systems", commuting),

@@ -13,6 +13,7 @@ from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.laboratory.preserve.densities import DensitySearch
 from kahanmaps.laboratory.preserve.hamiltonian_structure import ConstantStructures
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
+from kahanmaps.laboratory.preserve.limits import FlowAndMap
 from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch
 from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
 from kahanmaps.laboratory.singular.singularities import SingularityRun
@@ -32,6 +33,7 @@ class Findings:
     integrals: IntegralSearch | None = None
     relations: tuple[SparseRelation, ...] = ()
     densities: DensitySearch | None = None
+    flow: FlowAndMap | None = None
     poisson: PoissonSearch | None = None
     degrees: DegreeGrowth | None = None
     heights: HeightSurvey | None = None

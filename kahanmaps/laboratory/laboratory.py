@@ -7,25 +7,35 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from flint import fmpq
+
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.polynomials import RationalFunction, substitute
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
-from kahanmaps.laboratory.preserve.affine_functions import affine_cofactor, affine_darboux
+from kahanmaps.laboratory.preserve.affine_functions import affine_darboux, darboux_cofactor
 from kahanmaps.laboratory.preserve.closed_forms import ClosedForms, Spaces, closed_forms
 from kahanmaps.laboratory.preserve.cofactors import Cofactor, cofactor_of_affine, determinant_factors, jacobian_factors
-from kahanmaps.laboratory.preserve.flow import ModularFlow
+from kahanmaps.laboratory.preserve.flow import ModularFlow, is_kept_by_flow
+from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.maps.kahan import Kahan
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+_INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
+_DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
 
 
 class Laboratory:
     """The maps on which a file's map is examined: two primes, each with its own eps and its own values of the symbols.
 
-    With `eps` (exact; the time step is 2 eps) all maps are at that eps; with `flow` they are flows. `system` is there
-    if the map is the Kahan map of a system without eps in its coefficients: what theorems say of these is known then.
+    With `eps` (exact; the time step is 2 eps) all maps are at that eps. With `flow` they are flows, of an adjusted
+    Kahan map that of the field at eps = 0. `system` is there if the map is the Kahan map of a system without eps in its
+    coefficients: what theorems say of these is known then.
     Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
@@ -45,6 +55,10 @@ class Laboratory:
         if self.eps is not None and "eps" in symbols:
             raise InputError("found eps both as a number and as a symbol, expected one of the two")
         self.map = map_with_symbols(file, self.symbols)
+        if flow and isinstance(self.map, Kahan) and self.map.system.symbols == ("eps",):
+            rhs = tuple(substitute(polynomial, {"eps": fmpq(0)}) for polynomial in self.map.system.rhs)
+            self.file = SystemFile.from_system(QuadraticSystem(rhs), file.name)
+            self.map = self.file.map
         self.system = None
         if isinstance(self.map, Kahan) and "eps" not in self.map.system.symbols:
             self.system = self.map.system
@@ -119,19 +133,30 @@ class Laboratory:
 
     def cofactors(self) -> list[Cofactor]:
         """The cofactors that polynomials are tried with."""
-        if self.flow:
-            return []
         if self.system is None:
             return list(jacobian_factors(self.map))
+        return [] if self.flow else [*self.affine_cofactors(), *determinant_factors(self.map)]
+
+    def affine_cofactors(self) -> list[Cofactor]:
+        """Those of affine Darboux functions of the system, which is there."""
+        assert self.system is not None
         context = self.system.rhs[0].context()
         gens = context.gens()[: self.system.dim]
-        affine = [
+        return [
             cofactor_of_affine(one.function, self.system)
             for one in affine_darboux(self.file.system).functions
             # l is to divide l' with the symbols free, not only at the values that the file gives them
-            if affine_cofactor(self.system, one.function.compose(*gens, ctx=context)) is not None
+            if darboux_cofactor(self.system, one.function.compose(*gens, ctx=context)) is not None
         ]
-        return [*affine, *determinant_factors(self.map)]
+
+    def verdict_on(
+        self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
+    ) -> tuple[Verdict, Evidence]:
+        """Whether the map, or the flow, keeps I or dx/phi, as identities.verdict_on has it; of a flow by expansion."""
+        if self.system is not None and self.flow:
+            kept = is_kept_by_flow(self.system, function, is_density=is_density)
+            return (Verdict.PROVED if kept else Verdict.REFUTED), _DENSITY if is_density else _INTEGRAL
+        return verdict_on(self.map, function, self.eps, self.seed, is_density=is_density, factor=factor)
 
     def formulas(self, model: Spaces, spaces_on: Callable[[ModularMap], Spaces | None], deadline: float) -> ClosedForms:
         """The polynomials that span spaces known modulo primes: `model` on the first map, `spaces_on(map)` on others.

@@ -37,6 +37,7 @@ def sections(found: Findings) -> list[tuple[str, list[Statement]]]:
     return [
         ("integrals", _integral_lines(found)),
         ("measure", _measure_lines(found)),
+        ("the flow", [] if found.flow is None else [Statement(*line) for line in found.flow.lines()]),
         ("Poisson tensors", _poisson_lines(found)),
         ("growth", _growth_lines(found)),
         ("singularities", _singularity_lines(found)),

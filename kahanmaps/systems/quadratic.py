@@ -144,6 +144,18 @@ class QuadraticSystem(DisplayedAsFormula):
         """The trace of f'(x), a polynomial of degree at most 1."""
         return sum((p.derivative(i) for i, p in enumerate(self.rhs)), self.rhs[0].context().constant(0))
 
+    def derivative(self, function: fmpq_mpoly) -> fmpq_mpoly:
+        """f . grad P, how P changes along solutions; P is in the variables and symbols and, if need be, in eps.
+
+        >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "x"])
+        >>> [system.derivative(x) for x in system.rhs[0].context().gens()]
+        [x*y, x]
+        """
+        context = function.context()
+        images = context.gens()[: self.dim + len(self.symbols)]
+        slopes = (p.compose(*images, ctx=context) * function.derivative(i) for i, p in enumerate(self.rhs))
+        return sum(slopes, context.constant(0))
+
     @property
     def is_divergence_free(self) -> bool:
         """Whether the flow preserves the volume."""

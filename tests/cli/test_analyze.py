@@ -42,6 +42,7 @@ def test_the_report_as_text(kahanmaps):
     assert list(dict.fromkeys(section for section, _, _ in lines)) == [
         "integrals",
         "measure",
+        "the flow",
         "Poisson tensors",
         "growth",
         "singularities",
@@ -58,7 +59,7 @@ def test_the_report_as_text(kahanmaps):
 
 def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
     found = kahanmaps(f"{TOP} --json --seed 5 --symbolic a2,eps --seconds 20").json
-    parts = ("integrals", "densities", "poisson", "degrees", "heights", "symmetries", "commuting")
+    parts = ("integrals", "densities", "flow", "poisson", "degrees", "heights", "symmetries", "commuting")
     for part in parts:
         assert isinstance(found.pop(part), dict)
     assert found.pop("document")["name"] == "euler_top"

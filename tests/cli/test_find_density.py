@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from schema_helpers import mistakes
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.version import __version__
@@ -110,6 +111,14 @@ def test_a_map_that_is_periodic_at_this_eps_is_told(kahanmaps):
     assert "every eps" not in outcome.out
 
 
+def test_a_density_of_the_flow(kahanmaps):
+    lines = kahanmaps("find-density zander_120 --flow -q").out.splitlines()
+    assert lines[:2] == ["find-density: zander_120, the flow x' = f(x)", "phi\tproved\tx^2*y + 2*x*y^2"]
+    record = kahanmaps("find-density zander_120 --flow --json -q").json
+    assert record["flow"] is True
+    assert mistakes("find-density", record) == []
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -121,6 +130,8 @@ def test_a_map_that_is_periodic_at_this_eps_is_told(kahanmaps):
         ("euler_top --toml --latex", "give one of --toml, --latex and --json"),
         ("--vars x,y --rhs x/a --rhs x -p a=1 --symbolic a", "a division by something with variables in it"),
         ("", "missing SYSTEM"),
+        ("lyness --flow", "found an explicit map, expected a quadratic vector field"),
+        ("lotka_volterra --flow --toml", "--flow goes without --toml"),
     ],
 )
 def test_wrong_use_gives_2(kahanmaps, options, words):

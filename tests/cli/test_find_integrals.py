@@ -270,9 +270,10 @@ def test_the_help_fits_a_terminal(kahanmaps):
 def test_integrals_of_the_flow(kahanmaps):
     lines = kahanmaps("find-integrals henon_heiles --flow --max-degree 3 -q").out.splitlines()
     assert lines[0] == "find-integrals: henon_heiles, the flow x' = f(x)"
-    assert lines[1].startswith("I1\tproved\t6*q1^2*q2 - 2*q2^3")
+    assert lines[1].startswith("F1\tproved\t6*q1^2*q2 - 2*q2^3")
     record = json.loads(kahanmaps("find-integrals euler_top --flow --json -q").out)
     assert record["flow"] is True
+    assert [one["combination"] for one in record["beside_map"]["limits"]] == ["(I1 + 1)/eps^2", "(-I2/2 + 1/2)/eps^2"]
     assert mistakes("find-integrals", record) == []
     assert "flow" not in json.loads(kahanmaps("find-integrals euler_top --json -q").out)
     for option in ("--toml", "--darboux 2", "--monomials x1,1"):

@@ -16,9 +16,9 @@ from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import evaluate, linear_combinations
 from kahanmaps.documents.files import read_system
 from kahanmaps.laboratory.preserve.affine_functions import (
-    affine_cofactor,
     affine_darboux,
     affine_integrals,
+    darboux_cofactor,
     quotient_by,
 )
 from kahanmaps.maps.kahan import KahanMap
@@ -96,8 +96,8 @@ def test_a_hyperplane_of_equilibria() -> None:
 def test_cofactors_are_those_of_the_flow() -> None:
     x, y = QuadraticSystem.from_text(["x", "y"], ["x*y", "y^2 - 1"]).rhs[0].context().gens()
     system = QuadraticSystem([x * y, y**2 - 1])
-    assert affine_cofactor(system, y - 1) == y + 1
-    assert affine_cofactor(system, x + y) is None
+    assert darboux_cofactor(system, y - 1) == y + 1
+    assert darboux_cofactor(system, x + y) is None
 
 
 @st.composite

@@ -28,6 +28,7 @@ PARTS = (
     "degrees",
     "integrals",
     "densities",
+    "the flow",
     "Poisson tensors",
     "symmetries",
     "commuting systems",

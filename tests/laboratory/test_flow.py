@@ -15,7 +15,7 @@ from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import exponents_up_to
-from kahanmaps.laboratory.preserve.flow import ModularFlow, is_conserved_by_flow
+from kahanmaps.laboratory.preserve.flow import ModularFlow, is_kept_by_flow
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 
 PRIME = 2**61 - 1
@@ -76,7 +76,7 @@ def test_what_a_flow_conserves_is_decided_by_multiplying_out(text):
     rotation = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["y", "-x"]')
     function = parse_rational_function(text, ["x", "y", "eps"])
     conserved = derivative(rotation, function, (fmpq(2), fmpq(1, 3))) == 0
-    assert is_conserved_by_flow(rotation.system, function) == conserved == (text != "x/y")
+    assert is_kept_by_flow(rotation.system, function) == conserved == (text != "x/y")
 
 
 def test_the_series_of_a_solution_solve_the_equation():

@@ -13,6 +13,7 @@ from kahanmaps_cli.search import print_search, require_one_form, search_options,
 
 @click.command("find-density")
 @system_options
+@click.option("--flow", is_flag=True, help="Densities of the differential equation itself.")
 @click.option("--max-degree", type=click.IntRange(0, 20), metavar="D", help="Largest degree of phi.")
 @search_options("density")
 def command(system: str | None, **options: Any) -> int:
@@ -22,6 +23,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-density lotka_volterra
       kahanmaps find-density euler_top --symbolic a1,a2,a3
       kahanmaps find-density nahm_tetrahedral --toml
+      kahanmaps find-density zander_120 --flow
 
     Products of powers of known polynomials are of any degree, exponents of either sign. What is found is verified as
     an identity.
@@ -34,10 +36,13 @@ def command(system: str | None, **options: Any) -> int:
     with Progress(options["quiet"]) as progress:
         file = load_system(system, options)
         symbols, eps = symbols_and_eps(options)
+        if options["flow"] and options["as_toml"]:
+            raise click.UsageError("--flow goes without --toml, which is about the map")
         found = find_densities(
             file,
             symbols=symbols,
             eps=eps,
+            flow=options["flow"],
             max_degree=options["max_degree"],
             seconds=options["seconds"],
             seed=options["seed"],

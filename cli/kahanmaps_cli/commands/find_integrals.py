@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import click
@@ -36,7 +37,7 @@ from kahanmaps_cli.terminal import tell
     metavar="DEGREE",
     help="Instead: all discrete Darboux polynomials up to it.",
 )
-@click.option("--flow", is_flag=True, help="Integrals of the differential equation itself.")
+@click.option("--flow", is_flag=True, help="Integrals of the differential equation, and what the map makes of them.")
 @click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
 @search_options("integrals")
 def command(system: str | None, **options: Any) -> int:
@@ -51,12 +52,14 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
     Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals there are is known
-    from theorems, and from orbits, measured modulo primes; every formula is verified as an identity.
+    from theorems, and from orbits, measured modulo primes; every formula is verified as an identity. --flow adds
+    which integrals of the differential equation those of the map tend to as eps -> 0, and which are lost.
 
     Exit status: 0 every integral that theorems give or orbits show has a formula, 2 wrong use, 3 some have none,
     orbits were not measured, or the time was too short.
     """
     from kahanmaps.laboratory.preserve.integrals import find_integrals
+    from kahanmaps.laboratory.preserve.limits import flow_and_map
 
     require_one_form(options)
     with Progress(options["quiet"]) as progress:
@@ -74,21 +77,29 @@ def command(system: str | None, **options: Any) -> int:
             if options["as_toml"] or options["as_latex"]:
                 raise click.UsageError("--darboux goes with --json, not with --toml and --latex")
             return _darboux(file, symbols, eps, options, progress)
-        found = find_integrals(
+        search = partial(
+            find_integrals,
             file,
             symbols=symbols,
             eps=eps,
-            flow=options["flow"],
             max_degree=options["max_degree"],
-            seconds=options["seconds"],
+            seconds=options["seconds"] / (1 + options["flow"]),
             seed=options["seed"],
             progress=progress,
         )
+        found = search(flow=options["flow"])
+        beside = flow_and_map(search(), None, found) if options["flow"] else None
+    if beside is not None and options["as_json"]:
+        both = {**heading("find-integrals", found), **found.to_json(), "beside_map": beside.to_json()}
+        print_json({**both, "document": dict(file.document)})
+        return 3 if found.reason else 0
     named = [(one.name, one, f"{one.origin}: ") for one in found.integrals]
     print_search("find-integrals", found, options, named, _count(found))
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for one in found.in_time:
             tell(f"{one.name}\t{one.integral.verdict}\t{formula(one.text)}\n\tof the n-th point: depends on time")
+        for status, text in () if beside is None else beside.lines(others=False):
+            tell(f"{status}\t{formula(text)}")
     return 3 if found.reason else 0
 
 

@@ -233,23 +233,21 @@ def _factors_that_are(system: QuadraticSystem, normals: Sequence[Sequence[fmpq]]
         for factor, _ in component.factor()[1]:
             if degree(factor) == 1:
                 function = primitive_part(factor)[1]
-                cofactor = affine_cofactor(system, function)
+                cofactor = darboux_cofactor(system, function)
                 if cofactor is not None and not cofactor.is_zero():
                     found[str(function)] = AffineDarboux(function, cofactor)
     return tuple(sorted(found.values(), key=lambda d: _coefficients(d.function), reverse=True))
 
 
-def affine_cofactor(system: QuadraticSystem, function: fmpq_mpoly) -> fmpq_mpoly | None:
-    """The polynomial L with l' = l L along the flow for an affine l = `function`, or None. Exact.
+def darboux_cofactor(system: QuadraticSystem, function: fmpq_mpoly) -> fmpq_mpoly | None:
+    """The polynomial L with l' = l L along the flow for a polynomial l = `function`, not 0, or None. Exact.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "x"])
     >>> x, y = system.rhs[1].context().gens()
-    >>> affine_cofactor(system, x), affine_cofactor(system, y)
+    >>> darboux_cofactor(system, x), darboux_cofactor(system, y)
     (y, None)
     """
-    slope = fmpq_mat([_coefficients(function)[: system.dim]])
-    (derivative,) = linear_combinations(slope, system.rhs)
-    quotient, remainder = divmod(derivative, function)
+    quotient, remainder = divmod(system.derivative(function), function)
     return quotient if remainder.is_zero() else None
 
 

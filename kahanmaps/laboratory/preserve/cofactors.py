@@ -59,6 +59,8 @@ class Cofactor:
 
     def sides(self, map_: ModularMap, x: Point, image: Point) -> tuple[int, int]:
         """The same at a point modulo a prime."""
+        if self.polynomial is None:
+            return map_.determinant(x, image)
         field = map_.map.field
         given = ([field.convert(c) for c in entries] for entries in (x, image, map_.values))
         above, below = self.over(map_.map, *given)

@@ -35,7 +35,6 @@ from kahanmaps.laboratory.preserve.cofactors import (
 )
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION, constant_structures
-from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.integrals import closing_note, toml_comment
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 
@@ -88,6 +87,7 @@ class DensitySearch(Displayed):
     seed: int
     period: int | None = None
     turning: FoundDensity | None = None
+    flow: bool = False  # whether the densities are those of the differential equation
 
     @property
     def note(self) -> str:
@@ -101,7 +101,11 @@ class DensitySearch(Displayed):
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         more = attributes(self, "period", "note", "reason", "primes")
-        return {**attributes(self, "densities", degree_tried="degree"), **more}
+        return {
+            **({"flow": True} if self.flow else {}),
+            **attributes(self, "densities", degree_tried="degree"),
+            **more,
+        }
 
     def toml_section(self) -> str:
         """The first density as a section [density] of a system file, which `check-measure` accepts.
@@ -118,6 +122,7 @@ def find_densities(
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
+    flow: bool = False,
     max_degree: int | None = None,
     seconds: float = 30.0,
     seed: int = 0,
@@ -129,6 +134,7 @@ def find_densities(
         file: the map; a differential equation stands for its Kahan map.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
         eps: an exact number, or None for formulas that contain eps (the time step is 2 eps).
+        flow: ask for those of the differential equation instead, div(f/phi) = 0.
         max_degree: of phi; by default as the number of unknowns allows, at most 12.
         seconds: the time that the search may take, about.
         seed: of everything random.
@@ -151,11 +157,11 @@ def find_densities(
         raise InputError(f"found {seconds} seconds, expected a time above 0")
     if max_degree is not None and max_degree < 0:
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")
-    laboratory = Laboratory(file, symbols, eps, seed)
+    laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
     densities, tried, reason, period = list[FoundDensity](), -1, laboratory.defect, None
     product = turning = None
     if not reason:
-        period = _period(laboratory)
+        period = None if flow else _period(laboratory)
         deadline = time.monotonic() + seconds
         theorem, dim = _theorem(laboratory), laboratory.map.dim
         if theorem is not None and (max_degree is None or theorem.degree(dim) <= max_degree):
@@ -175,6 +181,7 @@ def find_densities(
         seed,
         period,
         turning,
+        flow,
     )
 
 
@@ -220,9 +227,7 @@ def _products(laboratory: Laboratory, max_degree: int | None) -> tuple[FoundDens
     phi = None if found is None else found.function
     if found is None or phi is None:
         return None, None
-    verdict, evidence = verdict_on(
-        laboratory.map, phi, laboratory.eps, laboratory.seed, is_density=True, factor=found.constant
-    )
+    verdict, evidence = laboratory.verdict_on(phi, is_density=True, factor=found.constant)
     one = FoundDensity(phi, verdict, evidence, found.text)
     if not verdict.holds or (max_degree is not None and one.degree(laboratory.map.dim) > max_degree):
         return None, None
@@ -231,7 +236,7 @@ def _products(laboratory: Laboratory, max_degree: int | None) -> tuple[FoundDens
 
 def _theorem(laboratory: Laboratory) -> FoundDensity | None:
     """det(I - eps f') of a Hamiltonian system with numbers for parameters, made primitive; None for others."""
-    if laboratory.symbols or laboratory.system is None or laboratory.system.dim > MAX_DIMENSION:
+    if laboratory.symbols or laboratory.flow or laboratory.system is None or laboratory.system.dim > MAX_DIMENSION:
         return None
     if constant_structures(laboratory.system).hamiltonian is None:
         return None
@@ -275,7 +280,7 @@ def _formulas(
     found = []
     for P in forms.bases[0]:
         phi = RationalFunction(P, P.context().constant(1))
-        verdict, evidence = verdict_on(laboratory.map, phi, laboratory.eps, laboratory.seed, is_density=True)
+        verdict, evidence = laboratory.verdict_on(phi, is_density=True)
         if verdict.holds:
             found.append(FoundDensity(phi, verdict, evidence))
     return found, f"a density of degree {degree} that was found modulo primes did not pass as an identity"

@@ -31,16 +31,14 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
 from kahanmaps.laboratory.preserve.branches import Branches, Pattern, tell_apart
 from kahanmaps.laboratory.preserve.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
-from kahanmaps.laboratory.preserve.flow import is_conserved_by_flow
+from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
-from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.inherited import InheritedIntegrals, inherited_integrals
 from kahanmaps.laboratory.preserve.products import candidates, products_of
 from kahanmaps.laboratory.preserve.search import AFFINE, Found, classes, may_be_conjugate, repeat, search
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_FLOW_EVIDENCE = Evidence("expansion", "f . grad I is 0, multiplied out")
 _AFFINE_EVIDENCE = Evidence("theorem", "v.f(x) = 0, so v.(x~ - x) = 0: v.x is conserved")
 _SHOWN_TERMS = 500
 _CONJUGATE_PRIMES = 4  # an irrational pencil splits modulo all of them and the first with a probability of 1/32
@@ -300,7 +298,7 @@ def find_integrals(
     integrals = _independent(laboratory, formulas, progress)
     if inherited and not laboratory.symbols:
         integrals = _by_theorems(laboratory, inherited[0], integrals, deadline)
-    if len(integrals) < file.dim - 1 and not flow:
+    if len(integrals) < file.dim - 1:
         progress("products of powers of known polynomials")
         integrals, in_time = _products(laboratory, cofactors, integrals, progress)
     done = result(integrals, profile, "")
@@ -432,22 +430,15 @@ def _products(
     in_time: list[TimedIntegral] = []
     map_ = laboratory.maps[0]
     point = map_.random_point()
-    rows = [_gradient(map_, one.function, point) for one in found]
+    rows = [gradient_at(map_, one.function, point) for one in found]
     for product in products.in_time:
         function = product.function
         if function is None or len(found) + len(in_time) >= laboratory.map.dim:
             continue
-        row = _gradient(map_, function, point)
+        row = gradient_at(map_, function, point)
         if rank([*rows, row], map_.prime) == len(rows):
             continue
-        verdict, evidence = verdict_on(
-            laboratory.map,
-            function,
-            laboratory.eps,
-            laboratory.seed,
-            is_density=False,
-            factor=product.constant,
-        )
+        verdict, evidence = laboratory.verdict_on(function, factor=product.constant)
         if verdict.holds:
             rows.append(row)
             name = f"T{len(in_time) + 1}"
@@ -466,7 +457,7 @@ def _independent(
     map_ = laboratory.maps[0]
     point = map_.random_point()
     found = list(known)
-    rows = [_gradient(map_, one.function, point) for one in known]
+    rows = [gradient_at(map_, one.function, point) for one in known]
 
     # By size, then by monomials: the order must not depend on the primes.
     def size(P: fmpq_mpoly) -> tuple[int, int, list[list[int]]]:
@@ -474,21 +465,18 @@ def _independent(
 
     by_size = sorted(formulas, key=lambda pair: size(pair[0].numerator))
     for function, origin in by_size:
-        row = _gradient(map_, function, point)
+        row = gradient_at(map_, function, point)
         if rank([*rows, row], map_.prime) == len(rows):
             continue
         progress("verifying an integral")
-        if laboratory.system is not None and laboratory.flow:
-            verdict, evidence = Verdict.REFUTED, _FLOW_EVIDENCE
-            if is_conserved_by_flow(laboratory.system, function):
-                verdict = Verdict.PROVED
-        elif laboratory.system is not None and _is_affine_integral(laboratory.system, function):
+        if not laboratory.flow and laboratory.system is not None and _is_affine_integral(laboratory.system, function):
             verdict, evidence = Verdict.PROVED, _AFFINE_EVIDENCE
         else:
-            verdict, evidence = verdict_on(laboratory.map, function, laboratory.eps, laboratory.seed, is_density=False)
+            verdict, evidence = laboratory.verdict_on(function)
         if verdict.holds:
             rows.append(row)
-            found.append(FoundIntegral(f"I{len(found) + 1}", function, origin, verdict, evidence))
+            name = f"{'F' if laboratory.flow else 'I'}{len(found) + 1}"
+            found.append(FoundIntegral(name, function, origin, verdict, evidence))
     return found
 
 
@@ -496,16 +484,11 @@ def _is_affine_integral(system: QuadraticSystem, function: RationalFunction) -> 
     """Whether the function is v.x with v.f = 0; v may contain the symbols."""
     if not function.is_polynomial:
         return False
-    n = system.dim
-    context = function.numerator.context()
-    rhs = [polynomial.compose(*context.gens()[: n + len(system.symbols)], ctx=context) for polynomial in system.rhs]
-    slopes = [function.numerator.derivative(k) for k in range(n)]
-    if any(int(e) for slope in slopes for m in slope.monoms() for e in (*m[:n], m[-1])):
-        return False  # not affine in x, or with eps
-    return bool(sum((v * f for v, f in zip(slopes, rhs, strict=True)), context.constant(0)).is_zero())
+    is_affine = all(sum(map(int, m[: system.dim])) <= 1 and not m[-1] for m in function.numerator.monoms())
+    return is_affine and is_kept_by_flow(system, function)
 
 
-def _gradient(map_: ModularMap, function: RationalFunction, point: Sequence[int]) -> list[int]:
+def gradient_at(map_: ModularMap, function: RationalFunction, point: Sequence[int]) -> list[int]:
     """A multiple of the gradient of P/Q with respect to the variables, modulo the prime."""
     field = GF(map_.prime)
     at = [field.convert(c) for c in (*point, *map_.values, map_.eps)]
@@ -525,7 +508,7 @@ def _by_theorems(
     """The integrals of the theorems that do not depend on the known ones, as far as they can be written out."""
     map_ = laboratory.maps[0]
     point = map_.random_point()
-    rows = [_gradient(map_, one.function, point) for one in known]
+    rows = [gradient_at(map_, one.function, point) for one in known]
     found = list(known)
     affine = len(inherited.quotient.integrals)
     for k, row in enumerate(inherited.gradients(map_, point)):

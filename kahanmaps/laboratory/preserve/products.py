@@ -41,6 +41,7 @@ from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.cofactors import Cofactor
+from kahanmaps.laboratory.preserve.flow import flow_exponents
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
 _MAX_CANDIDATES = 60
@@ -103,8 +104,11 @@ def candidates(laboratory: Laboratory, cofactors: Sequence[Cofactor]) -> list[fm
     """Irreducible polynomials over Q in (variables, symbols, eps) that integrals and densities may be products of.
 
     They are the variables, the polynomials of the cofactors (affine Darboux functions of a system, and factors of
-    Jacobi determinants), and the factors of det dPhi and det dPhi^-1, as far as these are not too long.
+    Jacobi determinants), and the factors of det dPhi and det dPhi^-1, as far as these are not too long; for a flow
+    the affine Darboux functions.
     """
+    if laboratory.flow:
+        return [one.polynomial for one in laboratory.affine_cofactors() if one.polynomial is not None]
     n, context = laboratory.map.dim, ring(laboratory.map.names)
     known = [one.polynomial for one in cofactors if one.polynomial is not None]
     found: dict[str, fmpq_mpoly] = {}
@@ -295,20 +299,26 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
     >>> products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density.function.numerator
     x*y
     """
-    line = _Line(laboratory.maps[0])
-    n = laboratory.map.dim
+    if laboratory.system is not None and laboratory.flow:
+        rows = flow_exponents(laboratory.system, polynomials)
+    else:
+        rows = _exponents_on_line(laboratory.maps[0], polynomials)
+    weights = [_FIRST, *map(len, polynomials)]  # short formulas before long ones
+    return _sorted_by_constant(laboratory, polynomials, _reduced(relations(rows), weights), weights)
+
+
+def _exponents_on_line(map_: ModularMap, polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
+    """det dPhi and the C_i on a random line, as vectors over a coprime basis. Raises NoPoint."""
+    line, n = _Line(map_), map_.dim
     here = [line.along(g, line.here) for g in polynomials]
     there = [line.along(g, line.there) for g in polynomials]
     base = coprime_base([*here, *there, line.there[-1], line.above, line.below])
     Z, N, M = (_exponents(P, base) for P in (line.there[-1], line.above, line.below))
     rows = [[a - b - n * c for a, b, c in zip(N, M, Z, strict=True)]]  # of det dPhi
-    weights = [_FIRST]
     for g, P, Q in zip(polynomials, here, there, strict=True):
         d = degree_in(g, n)
         rows.append([b - a - d * c for a, b, c in zip(_exponents(P, base), _exponents(Q, base), Z, strict=True)])
-        weights.append(len(g))  # short formulas before long ones
-    vectors = _reduced(relations(rows), weights)
-    return _sorted_by_constant(laboratory, polynomials, vectors, weights)
+    return rows
 
 
 def _sorted_by_constant(
@@ -355,6 +365,8 @@ def _constants(
     """The numbers that the products of the vectors are, functions of the symbols and eps; None where not found."""
     context = ring(laboratory.map.names)
     one = RationalFunction(context.constant(1), context.constant(1))
+    if laboratory.flow:
+        return [one] * len(vectors)
 
     def constants(map_: ModularMap) -> list[int]:
         return [_constant(map_, polynomials, vector) for vector in vectors]

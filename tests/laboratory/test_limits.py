@@ -1,0 +1,225 @@
+"""What a map makes of the integrals of its differential equation: keeps, deforms, loses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from kahanmaps.algebra.functions import FunctionField
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.text import format_rational_function, parse_rational_function
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.limits import flow_and_map
+
+THREE_LINES = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["3*x*(x+2*y) + 6*x*y", "-(y*(x+2*y) + 3*x*y)"]')
+
+SUM, PRODUCT = "(x1 + x2 + x3)", "(x1*x2*x3)"
+
+
+def beside(name, **options):
+    return flow_and_map(find_integrals(load(name), **options))
+
+
+def told(found):
+    return [text for _, text in found.lines()]
+
+
+def order_in_eps(function):
+    above, below = (min(int(m[-1]) for m in part.monoms()) for part in (function.above, function.below))
+    return above - below
+
+
+def with_integrals(search, *texts):
+    """The search with these functions for integrals."""
+    [model, *_] = search.integrals
+    names = [*search.file.variables, "eps"]
+    made = [replace(model, name=f"I{k}", function=parse_rational_function(t, names)) for k, t in enumerate(texts, 1)]
+    return replace(search, integrals=tuple(made))
+
+
+@pytest.mark.parametrize(
+    ("name", "leading", "kept"),
+    [
+        ("euler_top", ["2*x1^2 + x2^2", "x1^2 - x3^2"], [False, False]),  # the energies
+        ("nahm_tetrahedral", ["3*x^2*y - y^3"], [False]),  # H
+        ("nahm_octahedral", ["2*x^3*y - x^2*y^2 - 4*x*y^3 + 3*y^4"], [False]),
+        ("volterra_periodic_3", ["x1 + x2 + x3", "x1*x2*x3"], [True, False]),  # an affine integral is kept
+        ("volterra_periodic_4", ["x1 + x2 + x3 + x4", "x1*x3", "x2*x4"], [True, False, False]),
+        ("zander_111", ["x^2*y + 2*x*y^2"], [False]),
+        ("harmonic", ["x^2 + y^2"], [True]),
+    ],
+)
+def test_integrals_of_the_map_tend_to_integrals_of_the_flow(name, leading, kept):
+    found = beside(name)
+    assert [format_rational_function(one.leading) for one in found.limits] == leading
+    assert [one.kept.holds for one in found.limits] == kept
+    assert (found.others, found.lost, found.without_limit) == ((), 0, 0)
+    system = load(name).system
+    assert all(is_kept_by_flow(system, one.leading) for one in found.limits)
+
+
+@pytest.mark.parametrize("name", ["euler_top", "weierstrass", "volterra_periodic_3"])
+def test_the_combination_has_the_series_that_is_told(name):
+    """combination - leading - eps^k second, by rational functions, is of a higher order in eps than k."""
+    search = find_integrals(load(name))
+    names = [*search.file.variables, "eps"]
+    field = FunctionField(names, reduces=True)
+    for one in flow_and_map(search).limits:
+        formula = parse_rational_function(one.combination, [*(each.name for each in search.integrals), "eps"])
+        values = [field.parse(each.text) for each in search.integrals]
+        above, below = (
+            evaluate(part, field, [*values, field.variables[-1]]) for part in (formula.numerator, formula.denominator)
+        )
+        rest = above / below - field.parse(format_rational_function(one.leading))
+        if one.second is None:
+            assert field.is_zero(rest)
+            continue
+        assert order_in_eps(rest) == one.order
+        rest = rest - field.variables[-1] ** one.order * field.parse(format_rational_function(one.second))
+        assert field.is_zero(rest) or order_in_eps(rest) > one.order
+
+
+def test_a_flow_integral_that_no_integral_tends_to_is_lost_and_that_is_measured():
+    for file, formula in ((THREE_LINES, "x^4*y^3 + 6*x^3*y^4 + 12*x^2*y^5 + 8*x*y^6"), (load("zander_120"), "x*y^2")):
+        found = flow_and_map(find_integrals(file))
+        assert [one.text for one in found.others] == [formula]
+        assert found.lost == 1
+        assert ("measured", "F1 is lost: the map shows no integral up to degree 14") in found.lines()
+
+
+def test_of_two_integrals_one_is_lost():
+    found = beside("zhukovski_volterra_2")
+    assert len(found.limits) == len(found.others) == found.lost == 1
+    assert any(text.startswith("F2 is lost: the map shows 1 integral up to degree") for text in told(found))
+
+
+def test_of_the_integrable_henon_heiles_systems_one_keeps_both_integrals():
+    """c = -1 is separable, and the map with it; for c = -6 the integral of degree 4 is lost."""
+    for c, lost in (("-1", 0), ("-6", 1)):
+        found = flow_and_map(find_integrals(load("henon_heiles", {"c": c}), max_degree=4))
+        assert (len(found.limits), len(found.others), found.lost) == (2 - lost, lost, lost)
+
+
+def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():
+    search = find_integrals(load("euler_top"))
+    known = flow_and_map(replace(search, integrals=search.integrals[:1]))
+    assert (len(known.limits), len(known.others), known.without_limit, known.lost) == (1, 1, 1, 0)
+    assert ("undecided", "what the map makes of F2: the limits of 1 integral are not known") in known.lines()
+    uncounted = replace(search.profile, nullities=(), codimensions=(), with_known=0)
+    uncounted = flow_and_map(replace(search, integrals=(), profile=uncounted, by_theorems=0))
+    assert (len(uncounted.others), uncounted.lost) == (2, 0)
+    assert ("undecided", "what the map makes of F1, F2: its integrals were not counted") in uncounted.lines()
+
+
+def test_integrals_that_depend_on_time_are_told_from_others():
+    found = flow_and_map(find_integrals(parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x", "2*y"]')))
+    assert [one.text for one in found.others] == ["x^2/y"]
+    assert ("measured", "F1 is lost: the map shows no integral free of n up to degree 14") in found.lines()
+
+
+def test_integrals_of_the_flow_without_a_formula_are_counted():
+    search = find_integrals(load("zander_120"))
+    flow = replace(find_integrals(load("zander_120"), flow=True), integrals=())
+    assert flow_and_map(search, None, flow).lines()[0] == (
+        "measured",
+        "solutions show 1 independent integral of the flow, 1 without a formula",
+    )
+
+
+def test_a_transcendental_integral_is_neither_seen_nor_lost():
+    found = beside("lotka_volterra")
+    assert (found.limits, found.others, found.lost) == ((), (), 0)
+    assert not any("lost" in text for text in told(found))
+    assert found.lines()[0] == (
+        "measured",
+        "no rational integral of the flow shows in relations along solutions up to degree 10",
+    )
+
+
+@pytest.mark.parametrize(
+    "second",
+    [
+        f"{SUM}^2 + 3*{SUM} + eps^3*{PRODUCT}",
+        f"({SUM} + eps*{PRODUCT})/(1 + {SUM})",
+        f"5 + eps*{SUM} + eps^2*{SUM}^2 + eps^4*{PRODUCT}",
+    ],
+)
+def test_leading_terms_that_depend_on_each_other_are_combined(second):
+    search = with_integrals(find_integrals(load("volterra_periodic_3")), f"1 + eps*{SUM}", second)
+    found = flow_and_map(search)
+    assert format_rational_function(found.limits[0].leading) == "x1 + x2 + x3"
+    assert (len(found.limits), found.others, found.without_limit) == (2, (), 0)
+
+
+def test_leading_terms_that_stay_dependent_are_left_out():
+    """The second is a function of the first: no combination tends to anything else."""
+    search = with_integrals(find_integrals(load("volterra_periodic_3")), SUM, f"{SUM}^2")
+    found = flow_and_map(search)
+    assert (len(found.limits), len(found.others), found.without_limit, found.lost) == (1, 1, 1, 0)
+
+
+def test_a_function_that_is_no_integral_has_no_limit_among_those_of_the_flow():
+    search = with_integrals(find_integrals(load("harmonic")), "x + eps*y")
+    found = flow_and_map(search)
+    assert found.limits == ()
+    assert found.without_limit == 1
+
+
+def test_an_integral_that_contains_eps_may_be_kept():
+    search = with_integrals(find_integrals(load("harmonic")), "(x^2 + y^2)/(1 + eps^2*(x^2 + y^2))")
+    [one] = flow_and_map(search).limits
+    assert (str(one.kept), one.order) == ("proved", 2)
+
+
+def test_symbols_stay_in_the_limits():
+    [one, two] = beside("euler_top", symbols=["a1", "a2", "a3"]).limits
+    assert format_rational_function(one.leading) == "x2^2*a1*a3 - x1^2*a2*a3"
+    assert format_rational_function(two.leading) == "x3^2*a1*a2 - x1^2*a2*a3"
+
+
+def test_the_density_of_the_map_tends_to_one_of_the_flow():
+    for name, phi in (("zander_120", "x^2*y + 2*x*y^2"), ("euler_top", "1"), ("lotka_volterra", "x*y")):
+        search, densities = find_integrals(load(name)), find_densities(load(name))
+        assert flow_and_map(search, densities).density.text == phi
+        assert find_densities(load(name), flow=True).densities[0].text == phi
+    assert flow_and_map(find_integrals(load("lorenz"))).density is None
+
+
+def test_what_density_a_flow_keeps_is_decided_by_multiplying_out():
+    system = load("lotka_volterra").system
+    for text, expected in (("x*y", True), ("x*y^2", False), ("1", False)):
+        function = parse_rational_function(text, ["x", "y", "eps"])
+        assert is_kept_by_flow(system, function, is_density=True) is expected
+
+
+def test_products_of_darboux_polynomials_of_a_flow_are_found_by_their_exponents():
+    [one] = find_integrals(THREE_LINES, flow=True, max_degree=4).integrals
+    assert (one.text, str(one.verdict)) == ("(x + 2*y)^3*x*y^3", "proved")
+    # div f is a multiple of the cofactor of no product of the lines with whole exponents, but of degree 3
+    assert find_densities(THREE_LINES, flow=True, max_degree=2).densities == ()
+
+
+def test_an_adjusted_map_has_the_flow_of_the_field_at_eps_0():
+    file = parse_system('variables = ["x", "y"]\n[system]\nrhs = ["y + eps^2*x*y", "-x + eps^2*x^2"]')
+    [one] = find_integrals(file, flow=True).integrals
+    assert one.text == "x^2 + y^2"
+    assert flow_and_map(find_integrals(file)).lost == 1
+
+
+@pytest.mark.parametrize(("name", "eps"), [("lyness", None), ("duffing_polarised", None), ("harmonic", "1/10")])
+def test_without_a_flow_there_is_no_line(name, eps):
+    assert flow_and_map(find_integrals(load(name), eps=eps)) is None
+
+
+def test_the_report_has_the_flow_and_its_map():
+    found = analyze(load("zander_120"), seconds=8)
+    [lines] = [lines for title, lines in found.sections if title == "the flow"]
+    assert [line.status for line in lines] == ["proved", "measured", "proved"]
+    assert found.to_json()["flow"]["lost"] == 1
+    assert analyze(load("harmonic"), eps="1/3", seconds=8).to_json()["flow"] is None
