@@ -22,7 +22,8 @@ from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.growth.recurrences import find_recurrence
 from kahanmaps.laboratory.singular.critical import critical_points, pole_points
 from kahanmaps.laboratory.singular.jets import NotGeneric, PrecisionTooLow, Step, image_of, walk
-from kahanmaps.maps.implicit import BirationalMap, Equation
+from kahanmaps.maps.equation import Equation
+from kahanmaps.maps.implicit import BirationalMap
 
 _MAX_PRECISION = 4096
 _MOST_ALONG = 1024  # where series are followed far
@@ -138,14 +139,14 @@ def fate_of(
             break
         field = random_prime_field(rng)
         try:
-            equation = map_.at(eps, field).equation
+            equations = map_.at(eps, field).equations
             place = _point_on(factor, field, rng)
         except BadPrime:
             continue
         if place is None or field.prime in primes:
             continue
         try:
-            fates.append(_fate_at(equation, *place, rng, limits, len(fates[0].steps) if fates else None))
+            fates.append(_fate_at(equations, *place, rng, limits, len(fates[0].steps) if fates else None))
             primes.append(field.prime)
         except NotGeneric:
             continue
@@ -180,13 +181,13 @@ def fates_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: 
     for _ in range(_TRIES):
         field = random_prime_field(rng)
         try:
-            equation = map_.at(eps, field).equation
+            equations = map_.at(eps, field).equations
             point = [rng.randrange(field.prime) for _ in range(map_.dim)] + [0]
             tangents = _tangents(point, [0] * map_.dim + [1], field)
-            event = _first_event(equation, point, rng, limits)
+            event = _first_event(equations, point, rng, limits)
             fate = _UNKNOWN
             if tangents is not None:
-                fate = _fate_at(equation, point, tangents, rng, limits, event=event)
+                fate = _fate_at(equations, point, tangents, rng, limits, event=event)
         except (BadPrime, NotGeneric):
             continue
         except PrecisionTooLow:
@@ -209,22 +210,22 @@ def _at_random(
         field = random_prime_field(rng)
         try:
             here = map_.at(eps, field)
-            equation, inverse = here.equation, here.inverse.equation
+            equations, inverses = here.equations, here.inverse.equations[::-1]
         except BadPrime:
             continue
-        points, seen = pole_points(equation, rng) if poles else critical_points(equation, inverse, rng)
+        points, seen = pole_points(equations, rng) if poles else critical_points(equations, inverses, rng)
         degrees |= seen
         whole = whole or sum(seen.values()) == len(points)
         for critical in points:
             tangents = _tangents(critical.point, critical.gradient, field)
             if tangents is None or limits.is_over:
                 continue
-            event = _first_event(equation, critical.point, rng, limits) if limits.briefly else None
+            event = _first_event(equations, critical.point, rng, limits) if limits.briefly else None
             seen_so[critical.multiplicity, event] = seen_so.get((critical.multiplicity, event), 0) + 1
             if event and seen_so[critical.multiplicity, event] > _SAME:
                 continue
             try:
-                fate = _fate_at(equation, critical.point, tangents, rng, limits, event=event)
+                fate = _fate_at(equations, critical.point, tangents, rng, limits, event=event)
             except NotGeneric:
                 continue
             except PrecisionTooLow:
@@ -259,7 +260,7 @@ def _told(ranks: Sequence[int], full: int) -> tuple[str, int | None, int | None]
 
 
 def _fate_at(
-    equation: Equation,
+    equations: Sequence[Equation],
     point: Sequence[int],
     tangents: list[list[int]],
     rng: random.Random,
@@ -272,10 +273,10 @@ def _fate_at(
     In `shown` steps only where that is given, and in steps just beyond the first event where these tell enough.
     """
     full = len(tangents)
-    direction = [rng.randrange(equation.over.characteristic) for _ in point]
+    direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
 
     def followed(steps: int) -> tuple[Step, ...]:
-        run, is_whole = _walked(equation, point, direction, tangents, steps, limits.end)
+        run, is_whole = _walked(equations, point, direction, tangents, steps, limits.end)
         if not is_whole:
             raise PrecisionTooLow
         return tuple(run)
@@ -294,13 +295,13 @@ def _fate_at(
         # A hypersurface that comes back to one that is contracted shares the fate of that one from then on.
         return _Fate(status, down, up, run, len(run), again if again is not None else up or 0)
     reach = limits.reach if up is None else min(limits.reach, len(run) + _FREE_STEPS)
-    hit, reached = _next_hit(equation, run[-1].limit, len(run), reach, limits)
+    hit, reached = _next_hit(equations, run[-1].limit, len(run), reach, limits)
     if hit is None:
         return _Fate(status, down, up, run, reached, up or last)
     if up is not None:
         return _Fate(status, down, up, run, hit, hit)
     orders, _ = _walked(
-        equation, point, direction, [], min(limits.reach, max(limits.along, 2 * hit)), limits.end, most=_MOST_ALONG
+        equations, point, direction, [], min(limits.reach, max(limits.along, 2 * hit)), limits.end, most=_MOST_ALONG
     )
     # What a pattern without an end meets on its way may show in the order of the denominator only.
     known = [step.denominator for step in takewhile(lambda step: step.denominator is not None, orders)]
@@ -312,15 +313,15 @@ def _fate_at(
     return _Fate(status, down, up, run, len(orders), settled)
 
 
-def _first_event(equation: Equation, point: Sequence[int], rng: random.Random, limits: Range) -> int:
+def _first_event(equations: Sequence[Equation], point: Sequence[int], rng: random.Random, limits: Range) -> int:
     """The first step that divides by a power of t, 0 where none of the first steps does."""
-    direction = [rng.randrange(equation.over.characteristic) for _ in point]
-    run, _ = _walked(equation, point, direction, [], limits.shown, limits.end, to_event=True)
+    direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
+    run, _ = _walked(equations, point, direction, [], limits.shown, limits.end, to_event=True)
     return len(run) if run and run[-1].common else 0
 
 
 def _walked(
-    equation: Equation,
+    equations: Sequence[Equation],
     point: Sequence[int],
     direction: Sequence[int],
     tangents: Sequence[Sequence[int]],
@@ -337,7 +338,7 @@ def _walked(
     while True:
         run: list[Step] = []
         try:
-            for step in islice(walk(equation, point, direction, tangents, precision), steps):
+            for step in islice(walk(equations, point, direction, tangents, precision), steps):
                 run.append(step)
                 if to_event and step.common:
                     return run, True
@@ -351,12 +352,12 @@ def _walked(
 
 
 def _next_hit(
-    equation: Equation, limit: Sequence[int], steps: int, reach: int, limits: Range
+    equations: Sequence[Equation], limit: Sequence[int], steps: int, reach: int, limits: Range
 ) -> tuple[int | None, int]:
     """The next step that a point of the image does not have, and the number of steps it was followed for."""
     at: Sequence[int] = limit
     for step in range(steps + 1, reach + 1):
-        image = image_of(equation, at)
+        image = image_of(equations, at)
         if image is None:
             return step, step
         at = image

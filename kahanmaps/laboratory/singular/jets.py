@@ -13,7 +13,7 @@ from typing import Any
 from flint import nmod, nmod_mat, nmod_poly
 
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.maps.implicit import Equation
+from kahanmaps.maps.equation import Equation
 
 
 class PrecisionTooLow(ArithmeticError):
@@ -85,7 +85,7 @@ class Step:
 
 
 def walk(
-    equation: Equation,
+    equations: Sequence[Equation],
     point: Sequence[int],
     direction: Sequence[int],
     tangents: Sequence[Sequence[int]],
@@ -93,10 +93,10 @@ def walk(
 ) -> Iterator[Step]:
     """The steps of the curve point + t direction and of its neighbours point + d_i tangent_i + t direction; exact.
 
-    The equation of the map is one over GF(p), points and vectors are residues (X : Z). Step after step without an end;
-    raises PrecisionTooLow and NotGeneric.
+    The equations of the factors of the map are over GF(p), points and vectors are residues (X : Z). Step after step
+    without an end; raises PrecisionTooLow and NotGeneric. Of several factors `common` and `denominator` are sums.
     """
-    prime = equation.over.characteristic
+    prime = equations[0].over.characteristic
     X = [
         Jet(
             nmod_poly([x, v], prime).truncate(precision),
@@ -107,27 +107,36 @@ def walk(
     ]
     zero = nmod_poly([], prime)
     while True:
-        nothing = Jet(zero, [zero] * len(tangents), X[0].precision)
-        minors = kernel_minors(equation.rows(equation.monomials(X), None))
-        image = [nothing if jet is None else jet for jet in minors]
-        known = min(jet.precision for jet in image)
-        sizes = [valuation(jet.value, known) for jet in image]
-        denominator = sizes[-1]
-        seen = [size for size in sizes if size is not None]
-        if not seen or min(seen) + 1 > known - 1:
-            raise PrecisionTooLow
-        common = min(seen)
-        X = [jet.over_power(common) for jet in image]
-        pole = None if denominator is None else denominator - common
-        yield Step(common, pole, denominator, _rank(X, prime), tuple(int(jet.value[0]) for jet in X))
+        divided, denominators = 0, list[int | None]()
+        for equation in equations:
+            nothing = Jet(zero, [zero] * len(tangents), X[0].precision)
+            minors = kernel_minors(equation.rows(equation.monomials(X), None))
+            image = [nothing if jet is None else jet for jet in minors]
+            known = min(jet.precision for jet in image)
+            sizes = [valuation(jet.value, known) for jet in image]
+            seen = [size for size in sizes if size is not None]
+            if not seen or min(seen) + 1 > known - 1:
+                raise PrecisionTooLow
+            common = min(seen)
+            X = [jet.over_power(common) for jet in image]
+            divided += common
+            denominators.append(sizes[-1])
+        pole = None if sizes[-1] is None else sizes[-1] - common
+        orders = [order for order in denominators if order is not None]
+        denominator = sum(orders) if len(orders) == len(denominators) else None
+        yield Step(divided, pole, denominator, _rank(X, prime), tuple(int(jet.value[0]) for jet in X))
 
 
-def image_of(equation: Equation, point: Sequence[int]) -> list[int] | None:
+def image_of(equations: Sequence[Equation], point: Sequence[int]) -> list[int] | None:
     """The image of a point of projective space modulo p; None where all minors vanish: there only curves have one."""
-    prime = equation.over.characteristic
-    rows = equation.rows(equation.monomials([nmod(x, prime) for x in point]), nmod(0, prime))
-    kernel, nullity = nmod_mat(rows, prime).nullspace()
-    return [int(kernel[k, 0]) for k in range(len(point))] if nullity == 1 else None
+    prime, X = equations[0].over.characteristic, list(point)
+    for equation in equations:
+        rows = equation.rows(equation.monomials([nmod(x, prime) for x in X]), nmod(0, prime))
+        kernel, nullity = nmod_mat(rows, prime).nullspace()
+        if nullity != 1:
+            return None
+        X = [int(kernel[k, 0]) for k in range(len(X))]
+    return X
 
 
 def _rank(X: Sequence[Jet], prime: int) -> int:
