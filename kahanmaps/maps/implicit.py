@@ -94,13 +94,17 @@ class MapOver(ABC):
             return image.rationals()
         return self.generic_step(x)
 
-    def integer_step(self, point: IntegerPoint) -> IntegerPoint | None:
-        """The image of an integer point, for maps over QQ; None where the map has no value."""
-        image: IntegerPoint | None = point
+    def integer_step(self, point: IntegerPoint, max_bits: int | None = None) -> IntegerPoint | None:
+        """The image of an integer point, for maps over QQ; None where the map has no value.
+
+        What has more than `max_bits` after a factor goes no further: it is returned as it is.
+        """
         for one in self.factors:
-            if image is not None:
-                image = one.integer_steps.step(image)
-        return image
+            image = one.integer_steps.step(point)
+            if image is None or (max_bits is not None and image.exceeding(max_bits)):
+                return image
+            point = image
+        return point
 
     def generic_step(self, x: tuple[Any, ...]) -> tuple[Any, ...]:
         """The image of a point, by one linear system over the field for each factor, whatever the field is."""

@@ -114,10 +114,13 @@ def _zeros(
         return [], {}
     p = value.modulus()
     found, degrees = [], dict[int, int]()
-    for factor, exponent in value.factor()[1]:
+    t = nmod_poly([0, 1], p)
+    for part, exponent in value.factor_squarefree()[1]:
         power = int(exponent)
-        degrees[power] = degrees.get(power, 0) + int(factor.degree())
-        if factor.degree() == 1:
+        degrees[power] = degrees.get(power, 0) + int(part.degree())
+        # Only zeros in GF(p) are of use: a whole factorization would take a hundred times as long at high degrees.
+        linear = part.gcd(t.pow_mod(p, part) - t) if part.degree() > 1 else part
+        for factor, _ in linear.factor()[1]:
             s = -int(factor[0])
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
             gradient = _gradient(function, point, power, p, rng)

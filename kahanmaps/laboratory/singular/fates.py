@@ -176,8 +176,9 @@ def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range)
 
 def fates_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
     """As `unwritten`, with the poles and infinity: in every dimension, without any polynomial."""
-    found = _at_random(map_, eps, rng, limits, True, _FEW_LINES)
-    found += _at_random(map_, eps, rng, limits, False, _FEW_LINES)
+    lines = _FEW_LINES if limits.briefly else _LINES
+    found = _at_random(map_, eps, rng, limits, True, lines)
+    found += _at_random(map_, eps, rng, limits, False, lines)
     for _ in range(_TRIES):
         field = random_prime_field(rng)
         try:

@@ -375,7 +375,8 @@ def _range(dim: int, steps: int | None, end: float) -> Range:
 def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[str, int]] | None:
     """The irreducible factors over Q of det M(x), for Kahan maps det(I - eps f'(x)), in x and eps, with multiplicities.
 
-    Exact. None above dimension 4, where it may be long, and where a variable is called eps.
+    Exact. None above dimension 4, where it may be long, for compositions too large to be multiplied out, and where a
+    variable is called eps.
 
     >>> symbolic_denominator(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]))
     [('12*x*eps^2 - 1', 1)]
@@ -383,7 +384,10 @@ def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[
     map_ = as_map(system)
     if map_.dim > 4 or "eps" in map_.variables:
         return None
-    rows = [[*row, row[0] * 0] for row in map_.matrix]
+    try:
+        rows = [[*row, row[0] * 0] for row in map_.matrix]
+    except TooLarge:
+        return None
     return [(format_polynomial(factor), int(power)) for factor, power in kernel_minors(rows)[-1].factor()[1]]
 
 
