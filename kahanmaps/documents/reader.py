@@ -180,6 +180,7 @@ class PartReader:
 
 
 def json_like(value: Any) -> Any:
+    """Plain data with long integers as text."""
     if isinstance(value, dict):
         return {key: json_like(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -190,6 +191,7 @@ def json_like(value: Any) -> Any:
 
 
 def plain_number(value: Any) -> Any:
+    """The value of a parameter. Raises InputError for what is no number by its kind."""
     if isinstance(value, bool) or not isinstance(value, int | str | fmpq):
         if isinstance(value, list | dict):
             raise InputError(f"found {show(value)}, expected a number")
@@ -202,6 +204,7 @@ def _plain_text(value: int | str) -> str:
 
 
 def show(value: Any) -> str:
+    """A value for a message, cut where it is long."""
     try:
         text = repr(value)
     except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
