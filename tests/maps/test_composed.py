@@ -193,6 +193,7 @@ def test_long_words_are_stepped_and_refused_where_formulas_are_asked_for():
             getattr(word, what)
     assert str(word).startswith("4 maps one after the other, too large to be multiplied out:\nthe Kahan map in q1")
     assert len(word.written()["composition"]) == 4
+    assert "4 maps one after the other" in word._repr_latex_()
     with pytest.raises(InputError, match="found a map with the symbol a"):
         composed_map(parse_symbolic(), symbols=())
 
