@@ -6,6 +6,7 @@ from kahanmaps.display import markup
 from kahanmaps.display.latex import latex_aligned, latex_cut, latex_name, latex_number
 from kahanmaps.display.systems import CHARACTERS, system_latex
 from kahanmaps.displayed import html_form, latex_form
+from kahanmaps.maps.composed import ComposedMap
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
 from kahanmaps.maps.kahan import Kahan, KahanMap
 from kahanmaps.maps.normal_form.periods import OrbitPeriod
@@ -45,7 +46,9 @@ def birational_latex(map_: BirationalMap) -> str:
     """The equations between a point and its image; of a Kahan map the differential equation that it belongs to."""
     if isinstance(map_, Kahan):
         return system_latex(map_.system)
-    assert isinstance(map_, ImplicitMap)
+    if isinstance(map_, ComposedMap) and not map_.is_small:
+        return latex_aligned([(r"\widetilde{x}", rf"\text{{{len(map_.parts)} maps one after the other}}")])
+    assert isinstance(map_, ImplicitMap | ComposedMap)
     shown = map_.equations[: _EQUATIONS + 1]
     return latex_aligned([(latex_cut(equation, CHARACTERS), "0") for equation in shown], _EQUATIONS)
 

@@ -14,13 +14,13 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.numerals import check_names
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, substitute
-from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomial, parse_rational_function
+from kahanmaps.algebra.text import format_number, parse_polynomial
+from kahanmaps.documents.composition import CompositionReader
 from kahanmaps.documents.equations import without_left_sides
-from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
+from kahanmaps.documents.reader import KINDS, json_like, plain_number, show
 from kahanmaps.documents.structured_facts import read_structured_facts
-from kahanmaps.errors import InputError, SystemFileError, counted, quoted, suggestion
+from kahanmaps.errors import InputError, SystemFileError, quoted, suggestion
 from kahanmaps.maps.bilinear import bilinear_map
-from kahanmaps.maps.composed import composed_map, is_involution
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, why_no_map
 from kahanmaps.maps.kahan import Kahan
@@ -32,21 +32,7 @@ from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
-KINDS = ("system", "hamiltonian", "family", "bilinear", "map", "composition")
-_MOST_FACTORS = 64  # of a composition, those of its parts counted too
 _LONGEST_NAME = 1000
-_KEYS = {
-    "": {"name", "variables", "parameters", *KINDS, "integrals", "density", "catalog"},
-    "system": {"rhs", "discretization", "degree"},
-    "hamiltonian": {"H", "J"},
-    "family": {"A", "H", "signs"},
-    "bilinear": {"new", "equations"},
-    "map": {"image", "inverse"},
-    "composition": {"of"},
-    "composition.of": {"file", "system", "map", "power", "inverse", "parameters", "involution"},
-    "density": {"phi"},
-    "catalog": {"title", "sources", "convention", "facts", *STRUCTURED_KEYS},
-}
 
 
 def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> Kahan:
@@ -79,43 +65,8 @@ class Contents(NamedTuple):
     document: Mapping[str, Any]
 
 
-_EXPECTED = {
-    ("system", "rhs"): "a list of polynomials of degree at most 2 in quotes, one for each variable",
-    ("bilinear", "equations"): "a list of equations in quotes, linear in the old point and in the new one",
-    ("composition", "of"): 'a list of maps, each with one of file = "...", system = "..." and map = { ... }',
-    ("map", "image"): "a list of rational functions in quotes, one for each variable",
-    ("hamiltonian", "H"): "a polynomial of degree at most 3 in quotes",
-    ("hamiltonian", "J"): '"standard", which is [[0, I], [-I, 0]], or the rows of a skew matrix',
-    ("family", "A"): "the rows of a skew-Hamiltonian matrix",
-    ("family", "H"): "a homogeneous cubic in quotes",
-    ("density", "phi"): "a rational function of the variables and eps in quotes",
-}
-
-
-class DocumentReader:
+class DocumentReader(CompositionReader):
     """One pass over a document: every part is read as far as it can be, mistakes are collected."""
-
-    def __init__(
-        self,
-        document: dict[str, Any],
-        where: str,
-        overrides: Mapping[str, Any],
-        other: Callable[[str, str], tuple[dict[str, Any], str, Any]] | None = None,
-    ) -> None:
-        """`other` gives the document that a part of a composition names, by "file" or "system" and its value, with a
-        name that no other file has, and the `other` for the parts of it.
-        """
-        self.document = document
-        self.where = where
-        self.overrides = overrides
-        self.other = other
-        self.inside: tuple[str, ...] = ()  # the files whose compositions this document is part of
-        self.parts = [0]  # how many were read in all
-        self.mistakes: list[tuple[str, str]] = []
-        self.parameters: dict[str, fmpq] = {}
-        self.unsure = False  # some parameter has no value: what depends on values is not judged
-        self.variables: tuple[str, ...] | None = None
-        self.symbols: tuple[str, ...] = ()  # parameters that the map is to contain as symbols
 
     def read(self) -> Contents:
         """The contents. Raises SystemFileError with every mistake of the document."""
@@ -136,7 +87,7 @@ class DocumentReader:
         if not isinstance(name, str) or not name.isprintable() or len(name) > _LONGEST_NAME:
             # It stands in the first line of many outputs, where nothing may break the line or colour the terminal.
             self._mistake(
-                "name", f"found {_show(name)}, expected printable text on one line, at most {_LONGEST_NAME} characters"
+                "name", f"found {show(name)}, expected printable text on one line, at most {_LONGEST_NAME} characters"
             )
         kind = kinds[0] if len(kinds) == 1 else ""
         self._read_variables(kind)
@@ -166,12 +117,18 @@ class DocumentReader:
         return Contents(name, kind, self.parameters, map_, hamiltonian, member, integrals, density, self._normalised())
 
     def read_map(self, kind: str, symbols: Sequence[str]) -> BirationalMap:
-        """The map of a section other than [hamiltonian] and [family], with these parameters as symbols."""
+        """The map of a section with these parameters as symbols. Raises InputError for a [family]."""
+        if kind == "family":
+            raise InputError(
+                f"found the symbols {', '.join(symbols)} in a [family] file, expected numbers: "
+                "write the system as [hamiltonian]"
+            )
         self._read_parameters()
         self._read_variables(kind)
         self.symbols = tuple(symbols)
         self.parameters = {name: value for name, value in self.parameters.items() if name not in symbols}
-        map_ = self._read_given(kind, self.document[kind])
+        section = self.document[kind]
+        map_ = self._read_field(section) if kind == "hamiltonian" else self._read_given(kind, section)
         if map_ is None or self.mistakes:
             raise SystemFileError(f"{self.where} with {', '.join(symbols)} as symbols", self.mistakes)
         return map_
@@ -182,25 +139,6 @@ class DocumentReader:
         if kind == "composition":
             return self._read_composition(section)
         return self._read_bilinear(section) if kind == "bilinear" else self._read_map(section)
-
-    def _mistake(self, key: str, sentence: str) -> None:
-        # Keys come from the file: nothing in them may reach a terminal as an escape sequence.
-        self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
-
-    def _unknown_keys(self, section: str, table: Mapping[str, Any]) -> None:
-        known = _KEYS[section]
-        for key in table:
-            if key not in known:
-                path = f"{section}.{key}" if section else key
-                hint = " (a batch spec is for kahanmaps batch run)" if path == "experiments" else ""
-                self._mistake(path, f"unknown key, expected one of {', '.join(sorted(known))}{hint}")
-
-    def _table(self, key: str) -> dict[str, Any] | None:
-        value = self.document.get(key, {})
-        if isinstance(value, dict):
-            return value
-        self._mistake(key, f"found {_show(value)}, expected a table [{key}]")
-        return None
 
     def _default_name(self) -> str:
         name = Path(self.where).stem if self.where.endswith(".toml") else self.where
@@ -218,7 +156,7 @@ class DocumentReader:
                 self._mistake(path, str(error))
                 continue
             try:
-                self.parameters[name] = rational(_plain_number(self.overrides.get(name, value)))
+                self.parameters[name] = rational(plain_number(self.overrides.get(name, value)))
             except InputError as error:
                 self._mistake(path, str(error))
                 self.parameters[name] = fmpq(1)  # or every use of it would be a mistake of its own
@@ -243,7 +181,7 @@ class DocumentReader:
                 self._mistake("variables", 'missing, expected a list of names, e.g. ["x", "y"]')
             return
         if not isinstance(given, list) or not given or not all(isinstance(name, str) for name in given):
-            self._mistake("variables", f'found {_show(given)}, expected a list of names, e.g. ["x", "y"]')
+            self._mistake("variables", f'found {show(given)}, expected a list of names, e.g. ["x", "y"]')
             return
         if len(given) > MAX_DIMENSION:
             self._mistake("variables", f"found {len(given)} variables, expected at most {MAX_DIMENSION}")
@@ -261,95 +199,16 @@ class DocumentReader:
         else:
             self.variables = tuple(given)
 
-    def _text(self, path: str, value: Any) -> str | None:
-        if isinstance(value, int | str) and not isinstance(value, bool):
-            try:
-                return _plain_text(value)
-            except InputError as error:
-                self._mistake(path, str(error))
-                return None
-        self._mistake(path, f"found {_show(value)}, expected an expression in quotes")
-        return None
-
-    def _polynomial(
-        self, path: str, value: Any, at_most: int, more: Sequence[str] = (), *, of_map: bool = True
-    ) -> fmpq_mpoly | None:
-        """A polynomial in the variables, `more` names and, of a map, the symbols and eps; its degree in the variables
-        is bounded.
-        """
-        text = self._text(path, value)
-        if text is None or self.variables is None:
-            return None
-        try:
-            tail = (*self.symbols, "eps") if of_map else ()
-            polynomial = parse_polynomial(text, (*self.variables, *more, *tail), self.parameters)
-        except InputError as error:
-            self._mistake(path, str(error))
-            return None
-        found = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
-        if found > at_most and not self.unsure:
-            self._mistake(path, f"found a polynomial of degree {found}, expected at most {at_most}")
-            return None
-        return polynomial
-
-    def _matrix(self, path: str, value: Any, size: int | None) -> fmpq_mat | None:
-        if not isinstance(value, list) or not value or not all(isinstance(row, list) for row in value):
-            self._mistake(path, f'found {_show(value)}, expected rows of numbers, e.g. [["0", "1"], ["-1", "0"]]')
-            return None
-        expected = size or len(value)
-        if expected > MAX_DIMENSION:
-            self._mistake(path, f"found {expected} rows, expected at most {MAX_DIMENSION}")
-            return None
-        bad = False
-        if len(value) != expected:
-            self._mistake(path, f"found {len(value)} rows, expected {expected}")
-            bad = True
-        entries: list[fmpq] = []
-        for i, row in enumerate(value):
-            if len(row) != expected:
-                self._mistake(f"{path}[{i + 1}]", f"found {len(row)} entries, expected {expected}")
-                bad = True
-            for j, entry in enumerate(row):
-                text = self._text(f"{path}[{i + 1}][{j + 1}]", entry)
-                try:
-                    entries.append(parse_constant(text, self.parameters) if text is not None else fmpq(0))
-                    bad = bad or text is None
-                except InputError as error:
-                    self._mistake(f"{path}[{i + 1}][{j + 1}]", str(error))
-                    bad = True
-        return None if bad else fmpq_mat(expected, expected, entries)
-
-    def _required(self, section: str, table: Mapping[str, Any], key: str) -> Any:
-        if key not in table:
-            self._mistake(f"{section}.{key}", f"missing, expected {_EXPECTED[section, key]}")
-        return table.get(key)
-
-    def _list(self, section: str, key: str, value: Any, what: str) -> list[Any] | None:
-        """A list with one entry for each variable; None, and a mistake, where it is another or missing."""
-        path = f"{section}.{key}"
-        if value is None:
-            return None
-        if not isinstance(value, list):
-            self._mistake(path, f"found {_show(value)}, expected {_EXPECTED.get((section, key), 'a list')}")
-            return None
-        if self.variables is None:
-            return None
-        if len(value) != len(self.variables):
-            count = len(self.variables)
-            self._mistake(path, f"found {counted(len(value), what)}, expected {count}, one for each variable")
-            return None
-        return value
-
     def _read_system(self, section: Mapping[str, Any]) -> BirationalMap | None:
         method = section.get("discretization", "kahan")
         if method not in _DISCRETIZATIONS:
             words = ", ".join(f'"{name}"' for name in _DISCRETIZATIONS)
-            self._mistake("system.discretization", f"found {_show(method)}, expected one of {words}")
+            self._mistake("system.discretization", f"found {show(method)}, expected one of {words}")
             return None
         make, usual, largest = _DISCRETIZATIONS[method]
         degree = section.get("degree", usual)
         if type(degree) is not int or not 2 <= degree <= largest:
-            self._mistake("system.degree", f"found {_show(degree)}, expected a number from 2 to {largest}")
+            self._mistake("system.degree", f"found {show(degree)}, expected a number from 2 to {largest}")
             return None
         given = self._required("system", section, "rhs")
         found = [
@@ -384,7 +243,7 @@ class DocumentReader:
             path = f"bilinear.equations[{i + 1}]"
             sides = (self._text(path, value) or "").split("=")
             if len(sides) != 2:
-                self._mistake(path, f'found {_show(value)}, expected LEFT = RIGHT, e.g. "X - x = 2*eps*x*X"')
+                self._mistake(path, f'found {show(value)}, expected LEFT = RIGHT, e.g. "X - x = 2*eps*x*X"')
                 continue
             left, right = (self._polynomial(path, side, 1, new) for side in sides)
             if left is not None and right is not None:
@@ -406,109 +265,6 @@ class DocumentReader:
         if image is None or self.variables is None or self.unsure or ("inverse" in section and inverse is None):
             return None
         return self._sound(explicit_map, "map", self.variables, image, inverse)
-
-    def _read_composition(self, section: Mapping[str, Any]) -> BirationalMap | None:
-        """The composition; what its parts name is put in their places, so that the document says all by itself."""
-        if self.symbols:
-            raise InputError(
-                f"found the symbols {', '.join(self.symbols)} in a [composition] file, expected numbers: "
-                "write its formulas as [map]"
-            )
-        given = self._required("composition", section, "of")
-        if not isinstance(given, list) or not given:
-            if given is not None:
-                self._mistake("composition.of", f"found {_show(given)}, expected {_EXPECTED['composition', 'of']}")
-            return None
-        parts = [self._part(f"composition.of[{k + 1}]", entry) for k, entry in enumerate(given)]
-        known = [part for part in parts if part is not None]
-        if len(known) < len(parts) or self.unsure:
-            return None
-        if sum(abs(power) for _, power, _ in known) > _MOST_FACTORS:
-            self._mistake("composition.of", f"found more than {_MOST_FACTORS} steps, expected at most so many")
-            return None
-        self.document = {**self.document, "composition": {"of": [plain for _, _, plain in known]}}
-        try:
-            return composed_map(*((map_, power) for map_, power, _ in known), variables=self.variables)
-        except InputError as error:
-            self._mistake("composition.of", str(error))
-            return None
-
-    def _part(self, path: str, entry: Any) -> tuple[BirationalMap, int, dict[str, Any]] | None:
-        """A map of a composition, its power, and the entry with the map as a table."""
-        if not isinstance(entry, dict):
-            self._mistake(path, f'found {_show(entry)}, expected a table, e.g. {{ file = "f.toml", power = 2 }}')
-            return None
-        before = len(self.mistakes)
-        for key in entry:
-            if key not in _KEYS["composition.of"]:
-                expected = ", ".join(sorted(_KEYS["composition.of"]))
-                self._mistake(f"{path}.{key}", f"unknown key, expected one of {expected}")
-        named = [key for key in ("file", "system", "map") if key in entry]
-        if len(named) != 1:
-            self._mistake(path, f"found {' and '.join(named) or 'none'} of file, system and map, expected exactly one")
-            return None
-        (key,) = named
-        power, inverse = entry.get("power", 1), entry.get("inverse", False)
-        if type(power) is not int or power == 0:
-            self._mistake(f"{path}.power", f"found {_show(power)}, expected an integer other than 0")
-        for name in ("inverse", "involution"):
-            if not isinstance(entry.get(name, False), bool):
-                self._mistake(f"{path}.{name}", f"found {_show(entry[name])}, expected true or false")
-        parameters: dict[str, fmpq] = {}
-        given = entry.get("parameters", {})
-        if not isinstance(given, dict):
-            self._mistake(f"{path}.parameters", f"found {_show(given)}, expected a table of numbers")
-            return None
-        for name, value in given.items():
-            text = self._text(f"{path}.parameters.{name}", value)
-            try:
-                parameters[name] = parse_constant(text, self.parameters) if text is not None else fmpq(1)
-            except InputError as error:
-                self._mistake(f"{path}.parameters.{name}", str(error))
-        if len(self.mistakes) > before:
-            return None
-        try:
-            reader = self._other_reader(key, entry[key], parameters)
-            map_ = reader.read().map
-        except InputError as error:
-            self._mistake(f"{path}.{key}", str(error))
-            return None
-        if entry.get("involution") and not is_involution(map_):
-            self._mistake(f"{path}.involution", "found a map whose square is not the identity, expected an involution")
-            return None
-        plain = {name: value for name, value in entry.items() if name not in named}
-        found = dict(reader.document)
-        if key != "map":
-            found.setdefault("parameters", {})  # so that, as a table, it knows no others
-        elif "parameters" not in entry[key]:
-            del found["parameters"]
-        return map_, -power if inverse else power, {"map": _json_like(found), **plain}
-
-    def _other_reader(self, key: str, value: Any, parameters: Mapping[str, fmpq]) -> DocumentReader:
-        """What reads a part of a composition."""
-        self.parts[0] += 1
-        if self.parts[0] > _MOST_FACTORS:
-            raise InputError(f"found more than {_MOST_FACTORS} maps in one composition, expected at most so many")
-        name, place, other = "map", "", self.other
-        if key == "map":
-            if not isinstance(value, dict):
-                raise InputError(f"found {_show(value)}, expected a table like a system file")
-            # A table without parameters of its own knows those of the file that it stands in.
-            outer = {name: format_number(number) for name, number in self.parameters.items()}
-            document = {"parameters": outer, **value}
-        elif not isinstance(value, str):
-            raise InputError(f"found {_show(value)}, expected a name in quotes")
-        elif self.other is None:
-            raise InputError(f"found {quoted(value)}, expected map = {{ ... }}: files are not looked up here")
-        else:
-            name = value
-            document, place, other = self.other(key, value)
-            if key == "file" and place in self.inside:
-                raise InputError(f"found {quoted(name)} as a part of itself")
-        document = {part: data for part, data in document.items() if part not in ("catalog", "integrals", "density")}
-        reader = DocumentReader(document, name, parameters, other)
-        reader.inside, reader.parts = (*self.inside, place), self.parts
-        return reader
 
     def _sound(self, make: Callable[..., ImplicitMap], path: str, *given: Any) -> ImplicitMap | None:
         """The map made of what is given, if it has values, and an inverse where one is given."""
@@ -536,7 +292,7 @@ class DocumentReader:
             except InputError as error:
                 self._mistake("hamiltonian.J", str(error))
         elif isinstance(given, str):
-            self._mistake("hamiltonian.J", f'found {_show(given)}, expected "standard" or a skew matrix')
+            self._mistake("hamiltonian.J", f'found {show(given)}, expected "standard" or a skew matrix')
         else:
             J = self._matrix("hamiltonian.J", given, n)
         if J is None or self.variables is None or self.unsure:
@@ -549,6 +305,22 @@ class DocumentReader:
             return None
         return hamiltonian if H is not None else None
 
+    def _read_field(self, section: Mapping[str, Any]) -> BirationalMap | None:
+        """The Kahan map of J grad H, where both may contain symbols."""
+        H, n = self._polynomial("hamiltonian.H", section["H"], 3), len(self.variables or ())
+        given = standard_structure(n).tolist() if section["J"] == "standard" else section["J"]
+        J = [
+            [self._polynomial(f"hamiltonian.J[{i + 1}][{j + 1}]", str(e), 0) for j, e in enumerate(row)]
+            for i, row in enumerate(given)
+        ]
+        if H is None or self.mistakes:
+            return None
+        rhs = []
+        for row in J:
+            products = (entry * H.derivative(k) for k, entry in enumerate(row) if entry is not None)
+            rhs.append(sum(products, H * 0))
+        return _kahan(rhs, 2)
+
     def _read_member(self, section: Mapping[str, Any]) -> FamilyMember | None:
         given, value = self._required("family", section, "A"), self._required("family", section, "H")
         size = len(self.variables) if self.variables is not None else None
@@ -557,7 +329,7 @@ class DocumentReader:
         signs = section.get("signs", [])
         signs_are_good = isinstance(signs, list) and all(type(sign) is int and sign in (1, -1) for sign in signs)
         if not signs_are_good:
-            self._mistake("family.signs", f"found {_show(signs)}, expected a list of 1 and -1")
+            self._mistake("family.signs", f"found {show(signs)}, expected a list of 1 and -1")
         if A is None or H is None or self.unsure:
             return None
         try:
@@ -568,16 +340,6 @@ class DocumentReader:
             message = str(error)
             key = "A" if message.startswith("A is") else "signs" if "signs" in message.split(",")[0] else "H"
             self._mistake(f"family.{key}", message)
-            return None
-
-    def _claim(self, path: str, value: Any) -> RationalFunction | None:
-        text = self._text(path, value)
-        if text is None or self.variables is None:
-            return None
-        try:
-            return parse_rational_function(text, (*self.variables, *self.symbols, "eps"), self.parameters)
-        except InputError as error:
-            self._mistake(path, str(error))
             return None
 
     def _read_integrals(self) -> dict[str, RationalFunction]:
@@ -612,53 +374,23 @@ class DocumentReader:
         self._unknown_keys("catalog", section)
         for key in ("title", "convention"):
             if not isinstance(section.get(key, ""), str):
-                self._mistake(f"catalog.{key}", f"found {_show(section[key])}, expected text")
+                self._mistake(f"catalog.{key}", f"found {show(section[key])}, expected text")
         for key in ("sources", "facts"):
             value = section.get(key, [])
             if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-                self._mistake(f"catalog.{key}", f"found {_show(value)}, expected a list of texts")
+                self._mistake(f"catalog.{key}", f"found {show(value)}, expected a list of texts")
             elif key == "sources":
                 for item in value:
                     if item not in SOURCES:
                         self._mistake(
                             "catalog.sources", f"unknown source {quoted(str(item))}, expected a key of sources.py"
                         )
-        read_structured_facts(section, self.variables, self._mistake, _show)
+        read_structured_facts(section, self.variables, self._mistake, show)
 
     def _normalised(self) -> dict[str, Any]:
         """The document with its name and the parameters that hold, long integers as text (JSON needs them so)."""
-        document = {key: _json_like(value) for key, value in self.document.items() if key not in ("name", "parameters")}
+        document = {key: json_like(value) for key, value in self.document.items() if key not in ("name", "parameters")}
         document = {"name": self.document.get("name", self._default_name()), **document}
         if self.parameters:
             document["parameters"] = {name: format_number(value) for name, value in self.parameters.items()}
         return document
-
-
-def _json_like(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _json_like(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_json_like(item) for item in value]
-    if isinstance(value, int) and value.bit_length() > 1000:
-        return format_number(fmpq(value))
-    return value
-
-
-def _plain_number(value: Any) -> Any:
-    if isinstance(value, bool) or not isinstance(value, int | str | fmpq):
-        if isinstance(value, list | dict):
-            raise InputError(f"found {_show(value)}, expected a number")
-        return value
-    return value
-
-
-def _plain_text(value: int | str) -> str:
-    return value if isinstance(value, str) else format_number(fmpq(value))
-
-
-def _show(value: Any) -> str:
-    try:
-        text = repr(value)
-    except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
-        return "a value too large to show"
-    return text if len(text) <= 60 else f"{text[:40]}...{text[-15:]}"

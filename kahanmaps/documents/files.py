@@ -21,7 +21,8 @@ from flint import fmpq, fmpq_mat
 from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
-from kahanmaps.documents.document import KINDS, DocumentReader
+from kahanmaps.documents.document import DocumentReader
+from kahanmaps.documents.reader import KINDS
 from kahanmaps.documents.toml_text import to_toml
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
 from kahanmaps.family.structure import NoStructure, Structure, structure_of

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
-from kahanmaps.algebra.polynomials import ring
-from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, quoted
@@ -18,7 +15,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> BirationalMap:
     """The map of a file, the parameters named in `symbols` without values, the others with theirs.
 
-    Raises InputError as `with_symbols` does, for maps that are no Kahan maps only where a name is no parameter.
+    Raises InputError as `with_symbols` does, for another map only where a name is no parameter.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lyness = 'variables = ["x", "y"]\\nparameters.a = 2\\n[map]\\nimage = ["y", "(a + y)/x"]'
@@ -26,8 +23,6 @@ def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> Birationa
     x~ = y
     y~ = (y + a)/x
     """
-    if file.is_quadratic:
-        return Kahan(with_symbols(file, symbols))
     symbols = _parameters(file, symbols)
     if not symbols:
         return file.map
@@ -53,29 +48,10 @@ def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSyst
     >>> with_symbols(load("euler_top"), ["a1"]).rhs
     (x2*x3*a1, -2*x1*x3, x1*x2)
     """
-    system, symbols = file.system, _parameters(file, symbols)
-    names = (*file.variables, *symbols)
-    if not symbols:
-        return system
-    constants = {name: value for name, value in file.parameters.items() if name not in symbols}
-    section = file.document[file.kind]
-    if file.kind == "system":
-        return QuadraticSystem(tuple(parse_polynomial(str(text), names, constants) for text in section["rhs"]), symbols)
-    if file.kind == "family":
-        raise InputError(
-            f"found the symbols {', '.join(symbols)} in a [family] file, expected numbers: "
-            "write the system as [hamiltonian]"
-        )
-    H = parse_polynomial(str(section["H"]), names, constants)
-    gradient = [H.derivative(k) for k in range(len(file.variables))]
-    if isinstance(section["J"], str):
-        assert file.hamiltonian is not None
-        J: list[list[Any]] = [[ring(names).constant(entry) for entry in row] for row in file.hamiltonian.J.tolist()]
-    else:
-        J = [[parse_polynomial(str(entry), names, constants) for entry in row] for row in section["J"]]
-    zero = ring(names).constant(0)
-    rhs = tuple(sum((a * g for a, g in zip(row, gradient, strict=True)), zero) for row in J)
-    return QuadraticSystem(rhs, symbols)
+    _ = file.system  # of another map there is none
+    found = map_with_symbols(file, symbols)
+    assert isinstance(found, Kahan)
+    return found.system
 
 
 def _parameters(file: SystemFile, symbols: Sequence[str]) -> tuple[str, ...]:

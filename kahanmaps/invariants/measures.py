@@ -7,6 +7,8 @@ For Hamiltonian f with constant J the density is phi = det(I - eps f'(x)). Sourc
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
+from operator import mul
 from typing import Any
 
 from flint import fmpq
@@ -89,5 +91,15 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None) -> str:
 
 
 def jacobian_determinant_sides(kahan: MapOver, x: Sequence[Any], image: Sequence[Any]) -> tuple[Any, Any]:
-    """Numerator and denominator of det dPhi(x): for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x))."""
-    return det(kahan.numerator_matrix(x, image)), kahan.determinant(x)
+    """Numerator and denominator of det dPhi(x): for Kahan maps det(I + eps f'(x~)) and det(I - eps f'(x)).
+
+    Of a map with several factors the products of theirs.
+    """
+    factors, points = zip(*kahan.stages(x), strict=True)
+    above = [
+        det(one.numerator_matrix(here, there))
+        for one, here, there in zip(factors, points, (*points[1:], image), strict=True)
+    ]
+    below = [one.determinant(here) for one, here in zip(factors, points, strict=True)]
+    with kahan.field.working():
+        return reduce(mul, above), reduce(mul, below)

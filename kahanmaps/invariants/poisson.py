@@ -224,13 +224,19 @@ def transformation_sides(
 ) -> tuple[Any, Any] | None:
     """Both sides of the transformation law above, at x = `point` and x~ = `image`; None at a pole of the tensor.
 
-    `values` are those of the symbols.
+    `values` are those of the symbols. Of a map with several factors it is the law of the last one, for what the others
+    make of P(x).
     """
     field, eps = map_.field, map_.eps
     here, there = (tensor.value(field, eps, (*place, *values)) for place in (point, image))
     if here is None or there is None:
         return None
-    forward, backward = map_.numerator_matrix(point, image), map_.denominator_matrix(point)
+    *before, (last, at) = map_.stages(point)
+    for one, x in before:
+        slopes = one.jacobian(x)
+        with field.working():
+            here = slopes * here * slopes.transpose()
+    forward, backward = last.numerator_matrix(at, image), last.denominator_matrix(at)
     with field.working():
         return forward * here * forward.transpose(), backward * there * backward.transpose()
 

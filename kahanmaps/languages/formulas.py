@@ -18,8 +18,7 @@ from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
-from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
-from kahanmaps.maps.inverse import inverse_rows
+from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan
 
 # The closed form of the map, all components together, before common factors are removed.
@@ -150,8 +149,7 @@ class Formulas:
 
     def inverse_form(self) -> list[RationalFunction]:
         """The components of the inverse of a map that is not Kahan's. Raises InputError where it is not found."""
-        rows = self.map.inverse_rows if isinstance(self.map, ImplicitMap) else inverse_rows(self.map.rows)
-        return self._solved([[*row[:-1], -row[-1]] for row in rows])
+        return self._solved([[*row[:-1], -row[-1]] for row in self.map.inverse_rows])
 
     def closed_form(self) -> list[RationalFunction]:
         """The components of the map as rational functions of the names and eps, in lowest terms, exact.

@@ -1,37 +1,201 @@
-"""Compositions of maps and of their inverses, multiplied out: given by rational functions then, as others are."""
+"""Compositions of maps and of their inverses, which are stepped factor by factor.
+
+A composition has no value where one of its steps has none, even if its formulas, multiplied out, have one there. They
+are multiplied out only to be written down.
+"""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
+from flint import fmpq_mpoly
+
 from kahanmaps.algebra.chance import random_prime_field, seed_for
+from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
-from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.errors import BadPrime, InputError, SingularStep
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.implicit import BirationalMap, ImplicitMap
+from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, MapOver, StepOver, nonzero_eps
+from kahanmaps.maps.inverse import Rows, TooLarge
 
 _BUDGET = 20_000_000  # products of terms
 _TRIES = 20
 
 
+class ComposedMapOver(MapOver):
+    """Maps over one field at one eps, one after the other."""
+
+    def __init__(self, parts: Sequence[MapOver], eps: Any, variables: tuple[str, ...]) -> None:
+        self.parts, self.eps, self.variables = tuple(parts), eps, variables
+        self.field, self.dim = parts[0].field, parts[0].dim
+
+    @cached_property
+    def factors(self) -> tuple[StepOver, ...]:
+        return tuple(one for part in self.parts for one in part.factors)
+
+    @cached_property
+    def inverse(self) -> ComposedMapOver:
+        """The inverses in the opposite order."""
+        return ComposedMapOver([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
+
+    def __repr__(self) -> str:
+        return f"ComposedMapOver({', '.join(self.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A map of a composition, or its inverse; `values` are those of its symbols, functions of the composition's."""
+
+    map: BirationalMap
+    is_inverse: bool
+    values: tuple[RationalFunction, ...] = ()
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        """All that determines it."""
+        return (int(self.is_inverse), *self.map_and_values)
+
+    @property
+    def map_and_values(self) -> tuple[Any, ...]:
+        """The same without its direction."""
+        return (self.map.subject, self.values)
+
+    def at(self, eps: Any, over: Field, symbols: Sequence[Any]) -> MapOver:
+        """The map over a field. Raises BadPrime, and InputError where a value of a symbol is a pole."""
+        values = [function.value(over, symbols) for function in self.values]
+        if any(value is None for value in values):
+            if over.characteristic:
+                raise BadPrime(f"modulo {over.characteristic} a parameter has no value", over.characteristic)
+            raise InputError("found a parameter of a part that has no value where the symbols have these")
+        found = self.map.at(eps, over, values)
+        return found.inverse if self.is_inverse else found
+
+
+class ComposedMap(BirationalMap):
+    """The map that takes one step of each part after the other; `composed_map` makes it."""
+
+    title = "composition"
+    has_time_step = False
+
+    def __init__(self, variables: tuple[str, ...], parts: Sequence[Part], symbols: tuple[str, ...]) -> None:
+        self.variables, self.parts, self._symbols = variables, tuple(parts), symbols
+        self._last: tuple[Field, Any, ComposedMapOver] | None = None
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        return self._symbols
+
+    @cached_property
+    def has_eps(self) -> bool:
+        """Whether eps occurs in a part."""
+        return any(part.map.has_eps for part in self.parts)
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return (self.variables, self.symbols, [part.subject for part in self.parts])
+
+    @property
+    def digits(self) -> int:
+        return sum(part.map.digits for part in self.parts)
+
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> ComposedMapOver:
+        """The map over a field, at eps. Raises InputError for eps = 0, BadPrime where a part has no reduction."""
+        element = nonzero_eps(eps, over) if self.has_eps else over.convert(eps)
+        if self._last is None or values or self._last[0] is not over or self._last[1] is not element:
+            parts = [part.at(element, over, values) for part in self.parts]
+            self._last = (over, None if values else element, ComposedMapOver(parts, element, self.variables))
+        return self._last[2]
+
+    @cached_property
+    def _multiplied_out(self) -> ImplicitMap | None:
+        image = _formulas(self.names, self.parts)
+        return None if image is None else explicit_map(self.variables, image)
+
+    @property
+    def is_small(self) -> bool:
+        """Whether the formulas of the map are short enough to be multiplied out."""
+        return self._multiplied_out is not None
+
+    @property
+    def multiplied_out(self) -> ImplicitMap:
+        """The same map by its formulas, without its inverse. Raises InputError (TooLarge) where they are long."""
+        if self._multiplied_out is None:
+            raise TooLarge(_too_large(self.parts))
+        return self._multiplied_out
+
+    @property
+    def image(self) -> tuple[RationalFunction, ...] | None:
+        """The coordinates of x~ as functions of the names. Raises InputError where they are long."""
+        return self.multiplied_out.image
+
+    @property
+    def rows(self) -> Rows:  # type: ignore[override]  # nobody writes it
+        """Those of the map multiplied out. Raises InputError where they are long."""
+        return self.multiplied_out.rows
+
+    @cached_property
+    def inverse_rows(self) -> Rows:
+        """Those of the inverses multiplied out. Raises InputError where they are long."""
+        backward = _reversed(self.parts)
+        image = _formulas(self.names, backward)
+        if image is None:
+            raise TooLarge(_too_large(backward))
+        return explicit_map(self.variables, image).rows
+
+    @property
+    def equations(self) -> tuple[fmpq_mpoly, ...]:
+        """Those of the map multiplied out. Raises InputError where they are long."""
+        return self.multiplied_out.equations
+
+    def written(self) -> dict[str, Any]:
+        if self.is_small:
+            return self.multiplied_out.written()
+        return {
+            "composition": [
+                {"variables": list(part.map.variables), **part.map.written(), "inverse": part.is_inverse}
+                for part in self.parts
+            ]
+        }
+
+    def __str__(self) -> str:
+        if self.is_small:
+            return str(self.multiplied_out)
+        lines = [f"{counted(len(self.parts), 'map')} one after the other, too large to be multiplied out:"]
+        for part in self.parts:
+            of = "inverse of the " * part.is_inverse + part.map.title
+            lines.append(f"the {of} in {', '.join(part.map.variables)}")
+            lines += [f"  {line}" for line in str(part.map).split("\n")]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"ComposedMap({counted(len(self.parts), 'map')} in {', '.join(self.variables)})"
+
+
 def composed_map(
-    *maps: tuple[BirationalMap, int] | BirationalMap, variables: Sequence[str] | None = None
-) -> ImplicitMap:
+    *maps: tuple[BirationalMap, int] | BirationalMap,
+    variables: Sequence[str] | None = None,
+    symbols: Sequence[str] | None = None,
+    values: Sequence[Mapping[str, RationalFunction]] = (),
+) -> ComposedMap:
     """The map that takes one step of each map after the other, all with the same eps.
 
     Args:
         maps: in the order in which they are applied; with a power, (map, power), which may be negative.
         variables: names for the coordinates, by default those of the first map; the others are matched by position.
+        symbols: those of the composition, by default all those of the maps; equal names mean the same.
+        values: for each map those of its symbols, rational functions of `symbols`, where they are not these themselves.
 
     Returns:
         The map, exact; its inverse is known if all the maps have one.
 
     Raises:
-        InputError: for maps of different dimensions, or with the same variables in another order, for a negative power
-            of a map without inverse, and where the formulas grow too large.
+        InputError: for maps of different dimensions, or with the same variables in another order, and for a negative
+            power of a map without inverse.
 
     >>> from kahanmaps.maps.kahan import Kahan
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
@@ -40,43 +204,53 @@ def composed_map(
     >>> conjugate.step(["1/9"]), g.at("1/2").inverse.step(f.at("1/2").step(g.at("1/2").step(["1/9"])))
     ((1/6,), (1/6,))
     """
-    steps = [
-        (one, 1 if power > 0 else -1)
-        for one, power in (given if isinstance(given, tuple) else (given, 1) for given in maps)
-        for _ in range(abs(power))
-    ]
-    if not steps:
+    powers = [given if isinstance(given, tuple) else (given, 1) for given in maps]
+    if symbols is None:
+        symbols = tuple(dict.fromkeys(name for one, _ in powers for name in one.symbols))
+    context = ring(symbols)
+    parts = []
+    for k, (one, power) in enumerate(powers):
+        known = values[k] if values else {}
+        own = [known.get(name) or _symbol(context, name) for name in one.symbols]
+        parts += [Part(one, power < 0, tuple(own))] * abs(power)
+    if not parts:
         raise InputError("found no map to compose, expected at least one")
-    first = steps[0][0]
-    steps = _without_inverses(steps) or [steps[0], (first, -steps[0][1])]
-    if any(one.dim != first.dim for one, _ in steps):
-        raise InputError(f"found maps of the dimensions {', '.join(str(one.dim) for one, _ in steps)}, expected one")
-    for one, _ in steps:
-        if set(one.variables) == set(first.variables) and one.variables != first.variables:
-            orders = f"{', '.join(first.variables)} and {', '.join(one.variables)}"
+    first = parts[0].map
+    parts = _without_inverses(parts) or [*parts[:1], *_reversed(parts[:1])]
+    if any(part.map.dim != first.dim for part in parts):
+        dimensions = ", ".join(str(part.map.dim) for part in parts)
+        raise InputError(f"found maps of the dimensions {dimensions}, expected one")
+    for part in parts:
+        if set(part.map.variables) == set(first.variables) and part.map.variables != first.variables:
+            orders = f"{', '.join(first.variables)} and {', '.join(part.map.variables)}"
             raise InputError(f"found the variables in two orders, {orders}, expected one order")
+        if part.is_inverse:
+            _ = part.map.at(1, QQ, [QQ.one for _ in part.values]).inverse  # raises InputError where there is none
     variables = first.variables if variables is None else tuple(variables)
     if len(variables) != first.dim:
         raise InputError(f"found {len(variables)} variables for maps of dimension {first.dim}, expected as many")
-    names = (*variables, *first.names[first.dim :])
-    if any(one.symbols != steps[0][0].symbols for one, _ in steps):
-        raise InputError("found maps with different symbols, expected the same for all")
-    image = _formulas(names, steps)
-    try:
-        inverse = _formulas(names, [(one, -sign) for one, sign in reversed(steps)])
-    except InputError:
-        inverse = None
-    return explicit_map(variables, image, inverse)
+    return ComposedMap(tuple(variables), parts, tuple(symbols))
 
 
-def _without_inverses(steps: Sequence[tuple[BirationalMap, int]]) -> list[tuple[BirationalMap, int]]:
-    """The steps without those that their neighbours undo."""
-    left: list[tuple[BirationalMap, int]] = []
-    for one, sign in steps:
-        if left and left[-1][1] == -sign and (left[-1][0] is one or left[-1][0].subject == one.subject):
+def _symbol(context: Any, name: str) -> RationalFunction:
+    if name not in context.names():
+        raise InputError(f"found a map with the symbol {name}, expected its value, or a composition with that symbol")
+    return RationalFunction(context.gen(context.names().index(name)), context.constant(1))
+
+
+def _reversed(parts: Sequence[Part]) -> list[Part]:
+    """The inverses in the opposite order."""
+    return [Part(part.map, not part.is_inverse, part.values) for part in reversed(parts)]
+
+
+def _without_inverses(parts: Sequence[Part]) -> list[Part]:
+    """The parts without those that their neighbours undo."""
+    left: list[Part] = []
+    for part in parts:
+        if left and left[-1].is_inverse != part.is_inverse and left[-1].map_and_values == part.map_and_values:
             left.pop()
         else:
-            left.append((one, sign))
+            left.append(part)
     return left
 
 
@@ -98,16 +272,25 @@ def is_involution(map_: BirationalMap) -> bool:
     return False
 
 
-def _formulas(names: Sequence[str], steps: Sequence[tuple[BirationalMap, int]]) -> list[RationalFunction]:
-    """The coordinates of the image of (x_1, ..., x_n) as functions of the names, eps last, in lowest terms."""
+def _formulas(names: Sequence[str], parts: Sequence[Part]) -> list[RationalFunction] | None:
+    """The coordinates of the image of (x_1, ..., x_n) as functions of the names, eps last, in lowest terms.
+
+    None where they take too many products of terms.
+    """
     field = FunctionField(names, _BUDGET, reduces=True)
-    n = steps[0][0].dim
+    n = parts[0].map.dim
     *values, eps = field.variables[n:]
     point: tuple[Any, ...] = tuple(field.variables[:n])
     try:
-        for one, sign in steps:
-            over = one.at(eps, field, values)
-            point = (over if sign > 0 else over.inverse).step(point)
-    except BudgetExceeded as error:
-        raise InputError("found a composition with formulas too large to be multiplied out") from error
+        for part in parts:
+            point = part.at(eps, field, values).step(point)
+    except BudgetExceeded:
+        return None
     return [RationalFunction(entry.above, entry.below) for entry in point]
+
+
+def _too_large(parts: Sequence[Part]) -> str:
+    return (
+        f"found a composition of {counted(len(parts), 'map')} whose formulas are too large to be multiplied out, "
+        "expected a shorter one: what is asked for is about formulas"
+    )

@@ -5,10 +5,10 @@ by rational functions has for M the diagonal of their denominators; discretizati
 have it as they stand. Three values say it all, and everything else asks them:
 
 * `BirationalMap` is the map over Q, eps and all. A new discretization is a function that returns an `ImplicitMap`.
-* `MapOver` is the map over one field at one eps: images, the inverse map, Jacobi matrices.
-* `Equation` has the coefficients of M and r over that field. The evaluators start from it: integers over one
-  denominator (integer_steps.py), residues (residues/ensemble.py), machine numbers (floats/steps.py), curves and forms
-  in projective space (projective.py), and the generic one here, over any field.
+* `MapOver` is the map over one field at one eps: images, the inverse map, Jacobi matrices. It is made of factors
+  (composed.py), most maps of one: a `StepOver`, that has an equation.
+* `Equation` has the coefficients of M and r over that field (equation.py). The evaluators go from factor to factor and
+  start from their equations; the generic one, over any field, is here.
 
 In homogeneous coordinates (X : Z), x = X/Z, the equation says that L(X, Z) (X~ : Z~) = 0 for an n x (n + 1) matrix
 L = (M | -r) of forms of one degree. Where that degree is 1, exchanging the two points gives the inverse map.
@@ -16,13 +16,13 @@ L = (M | -r) of forms of one degree. Where that degree is 1, exchanging the two 
 
 from __future__ import annotations
 
-import operator
 import random
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
+from operator import mul
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
@@ -30,83 +30,20 @@ from flint import fmpq, fmpq_mpoly, fmpz
 from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.matrices import det, solve
-from kahanmaps.algebra.minors import Product
-from kahanmaps.algebra.polynomials import RationalFunction, digits_of, evaluate, names_of, ring
+from kahanmaps.algebra.polynomials import RationalFunction, digits_of, names_of, ring
 from kahanmaps.algebra.text import format_polynomial, format_rational_function
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
+from kahanmaps.maps.equation import Equation, equation_of
 from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
-from kahanmaps.maps.inverse import inverse_rows, why_not_birational
-
-Exponents = tuple[int, ...]
-Terms = tuple[tuple[int, Any], ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Equation:
-    """The matrix L = (M | -r) over a field, its entries forms of one degree in (X_1, ..., X_n, Z).
-
-    `exponents` lists monomials of that degree in X_1, ..., X_n, Z; entry (i, j) of L is the sum of c times monomial k
-    over the pairs (k, c) of `terms[i][j]`. In degree 1 the monomials are X_1, ..., X_n, Z in this order.
-    """
-
-    over: Field
-    exponents: tuple[Exponents, ...]
-    terms: tuple[tuple[Terms, ...], ...]
-
-    @property
-    def dim(self) -> int:
-        """n."""
-        return len(self.terms)
-
-    @cached_property
-    def degree(self) -> int:
-        """The degree of the forms."""
-        return sum(self.exponents[0])
-
-    def monomials(self, X: Sequence[Any], times: Product = operator.mul) -> list[Any]:
-        """The values of the monomials at (X_1, ..., X_n, Z), elements of any ring that `times` multiplies."""
-        if self.degree == 1:
-            return list(X)
-        powers: list[list[Any]] = [[None, entry] for entry in X]
-        found = []
-        for exponent in self.exponents:
-            total = None
-            for table, e in zip(powers, exponent, strict=True):
-                while len(table) <= e:
-                    table.append(times(table[-1], table[1]))
-                if e:
-                    total = table[e] if total is None else times(total, table[e])
-            found.append(total)
-        return found
-
-    def rows(self, monomials: Sequence[Any], zero: Any) -> list[list[Any]]:
-        """L at the point where the monomials have these values."""
-        return [
-            [sum((monomials[k] * c for k, c in entry[1:]), monomials[entry[0][0]] * entry[0][1]) if entry else zero
-             for entry in row]
-            for row in self.terms
-        ]  # fmt: skip
-
-    def transposed(self) -> Equation:
-        """The equation with x and x~ exchanged (and another sign), that of the inverse map; in degree 1 only."""
-        if self.degree != 1:
-            raise InputError(f"found an equation of degree {self.degree} in the point, expected degree 1")
-        n = self.dim
-        terms = []
-        for row in self.terms:
-            columns: list[list[tuple[int, Any]]] = [[] for _ in range(n + 1)]
-            for j, entry in enumerate(row):
-                for k, coefficient in entry:
-                    columns[k].append((j, -coefficient))
-            terms.append(tuple(tuple(column) for column in columns))
-        return Equation(self.over, self.exponents, tuple(terms))
+from kahanmaps.maps.inverse import Rows, inverse_rows, why_not_birational
 
 
 class MapOver(ABC):
     """A birational map over a field, at one eps (an element of the field).
 
-    A map has to give `denominator_matrix` M(x), `right_side` r(x), `numerator_matrix`, `inverse` and `equation`.
+    A map has to give its `inverse` and its `factors`: the maps with an equation whose steps, one after the other, are a
+    step of it. Most have one factor, themselves. Evaluators go through the factors.
     """
 
     field: Field
@@ -114,17 +51,10 @@ class MapOver(ABC):
     dim: int
     variables: tuple[str, ...] = ()
 
+    @property
     @abstractmethod
-    def denominator_matrix(self, point: Sequence[Any]) -> Any:
-        """The matrix M(x)."""
-
-    @abstractmethod
-    def right_side(self, x: tuple[Any, ...]) -> Any:
-        """r(x), a column."""
-
-    @abstractmethod
-    def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
-        """The matrix N(x, x~) = d(r - M x~)/dx at fixed x~, with dPhi(x) = M(x)^{-1} N(x, x~)."""
+    def factors(self) -> tuple[StepOver, ...]:
+        """The maps of which this one takes a step of each, the first one first."""
 
     @property
     @abstractmethod
@@ -132,9 +62,14 @@ class MapOver(ABC):
         """The inverse map. Raises InputError where it is not known."""
 
     @property
-    @abstractmethod
-    def equation(self) -> Equation:
-        """The equation of a step."""
+    def equations(self) -> tuple[Equation, ...]:
+        """Those of the factors."""
+        return tuple(one.equation for one in self.factors)
+
+    @property
+    def is_bilinear(self) -> bool:
+        """Whether all the equations are linear in the old point, as they are in the new one."""
+        return all(equation.degree == 1 for equation in self.equations)
 
     def denominator_name(self, backward: bool = False) -> str:
         """What the matrix M(x) is called, for the map or, seen from it, for its inverse."""
@@ -153,23 +88,96 @@ class MapOver(ABC):
         """The image x~ of a point. Raises SingularStep where det M(x) = 0."""
         x = self.point(point)
         if self.field is QQ:
-            image = self.integer_steps.step(IntegerPoint.from_rationals(x))
+            image = self.integer_step(IntegerPoint.from_rationals(x))
             if image is None:
                 raise self._singular(x)
             return image.rationals()
         return self.generic_step(x)
 
+    def integer_step(self, point: IntegerPoint, max_bits: int | None = None) -> IntegerPoint | None:
+        """The image of an integer point, for maps over QQ; None where the map has no value.
+
+        What has more than `max_bits` after a factor goes no further: it is returned as it is.
+        """
+        for one in self.factors:
+            image = one.integer_steps.step(point)
+            if image is None or (max_bits is not None and image.exceeding(max_bits)):
+                return image
+            point = image
+        return point
+
     def generic_step(self, x: tuple[Any, ...]) -> tuple[Any, ...]:
-        """The image of a point, by one linear system over the field, whatever the field is."""
-        with self.field.working():
-            try:
-                return tuple(solve(self.denominator_matrix(x), self.right_side(x)).entries())
-            except SingularMatrix as error:
-                raise self._singular(x) from error
+        """The image of a point, by one linear system over the field for each factor, whatever the field is."""
+        image = x
+        for one in self.factors:
+            with self.field.working():
+                try:
+                    image = tuple(solve(one.denominator_matrix(image), one.right_side(image)).entries())
+                except SingularMatrix as error:
+                    raise self._singular(x) from error
+        return image
 
     def inverse_step(self, point: Sequence[Any]) -> tuple[Any, ...]:
         """The preimage of a point. Raises SingularStep where the inverse map has no value there."""
         return self.inverse.step(point)
+
+    def stages(self, point: Sequence[Any]) -> Iterator[tuple[StepOver, tuple[Any, ...]]]:
+        """Every factor with the point that it is applied to. Raises SingularStep."""
+        x = self.point(point)
+        for k, one in enumerate(self.factors):
+            x = self.factors[k - 1].step(x) if k else x
+            yield one, x
+
+    def determinant(self, point: Sequence[Any]) -> Any:
+        """det M(x), the denominator of the map; of several factors the product at the points on the way."""
+        first, *others = (one.determinant(x) for one, x in self.stages(point))
+        with self.field.working():
+            return reduce(mul, others, first)
+
+    def jacobian(self, point: Sequence[Any]) -> Any:
+        """The Jacobi matrix dPhi(x), M(x)^{-1} N(x, x~) for one factor. Raises SingularStep."""
+        slopes = [one.jacobian(x) for one, x in self.stages(point)]
+        with self.field.working():
+            return reduce(lambda total, slope: slope * total, slopes)
+
+    def _singular(self, point: tuple[Any, ...]) -> SingularStep:
+        shown = ",".join(self.field.format(entry) for entry in point)
+        if len(shown) > 200:
+            shown = f"{shown[:100]}...{shown[-80:]}"
+        return SingularStep(
+            f"{det_of(self.denominator_name())} = 0 at the point {shown} for eps = {self.field.format(self.eps)}: "
+            "the map has no value there",
+            point,
+            self.eps,
+        )
+
+
+class StepOver(MapOver):
+    """A map over a field with an equation M(x) x~ = r(x).
+
+    It has to give `denominator_matrix` M(x), `right_side` r(x), `numerator_matrix`, `inverse` and `equation`.
+    """
+
+    @property
+    def factors(self) -> tuple[StepOver, ...]:
+        return (self,)
+
+    @abstractmethod
+    def denominator_matrix(self, point: Sequence[Any]) -> Any:
+        """The matrix M(x)."""
+
+    @abstractmethod
+    def right_side(self, x: tuple[Any, ...]) -> Any:
+        """r(x), a column."""
+
+    @abstractmethod
+    def numerator_matrix(self, point: Sequence[Any], image: Sequence[Any]) -> Any:
+        """The matrix N(x, x~) = d(r - M x~)/dx at fixed x~, with dPhi(x) = M(x)^{-1} N(x, x~)."""
+
+    @property
+    @abstractmethod
+    def equation(self) -> Equation:
+        """The equation of a step."""
 
     def determinant(self, point: Sequence[Any]) -> Any:
         """det M(x), the denominator of the map."""
@@ -191,17 +199,6 @@ class MapOver(ABC):
         equation = self.equation
         return IntegerSteps(equation.exponents, equation.terms)
 
-    def _singular(self, point: tuple[Any, ...]) -> SingularStep:
-        shown = ",".join(self.field.format(entry) for entry in point)
-        if len(shown) > 200:
-            shown = f"{shown[:100]}...{shown[-80:]}"
-        return SingularStep(
-            f"{det_of(self.denominator_name())} = 0 at the point {shown} for eps = {self.field.format(self.eps)}: "
-            "the map has no value there",
-            point,
-            self.eps,
-        )
-
 
 def det_of(name: str) -> str:
     """The determinant of a matrix with this name, in words.
@@ -212,7 +209,7 @@ def det_of(name: str) -> str:
     return f"det({name})" if " " in name else f"det {name}"
 
 
-class EquationMap(MapOver):
+class EquationMap(StepOver):
     """The map of an equation over a field; `backward` gives the equation of its inverse when that is asked for.
 
     Without it the equation is to be of degree 1, so that exchanging the two points gives the inverse.
@@ -334,7 +331,12 @@ class BirationalMap(DisplayedAsFormula, ABC):
         `values` are those of the symbols, elements of the field.
         """
 
-    rows: tuple[tuple[fmpq_mpoly, ...], ...]  # of (M | -r), polynomials in the `names`
+    rows: Rows  # of (M | -r), polynomials in the `names`
+
+    @property
+    def inverse_rows(self) -> Rows:
+        """The rows of the inverse map, found by elimination. Raises InputError where they are not."""
+        return inverse_rows(self.rows)
 
     @property
     def matrix(self) -> list[list[fmpq_mpoly]]:
@@ -342,7 +344,7 @@ class BirationalMap(DisplayedAsFormula, ABC):
         return [list(row[:-1]) for row in self.rows]
 
     @abstractmethod
-    def written(self) -> dict[str, list[str]]:
+    def written(self) -> dict[str, Any]:
         """The map as text, for records."""
 
 
@@ -362,10 +364,10 @@ class ImplicitMap(BirationalMap):
     """
 
     variables: tuple[str, ...]
-    rows: tuple[tuple[fmpq_mpoly, ...], ...]
+    rows: Rows
     title: str
     has_time_step: bool = False
-    backward: tuple[tuple[fmpq_mpoly, ...], ...] | None = None
+    backward: Rows | None = None
     _last: list[tuple[Field, Any, EquationMap]] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -389,7 +391,7 @@ class ImplicitMap(BirationalMap):
         return (self.variables, *(entry for row in self.rows for entry in row))
 
     @cached_property
-    def inverse_rows(self) -> tuple[tuple[fmpq_mpoly, ...], ...]:
+    def inverse_rows(self) -> Rows:
         """The rows of the inverse map, those given or found by elimination. Raises InputError where they are not."""
         return inverse_rows(self.rows) if self.backward is None else self.backward
 
@@ -452,39 +454,6 @@ class ImplicitMap(BirationalMap):
 
     def __repr__(self) -> str:
         return f"ImplicitMap({self.title} in {', '.join(self.variables)})"
-
-
-def equation_of(rows: Iterable[Sequence[fmpq_mpoly]], over: Field, point: Sequence[Any]) -> Equation:
-    """The equation of (M | -r) over a field, at values of what stands behind the variables, eps last.
-
-    Raises BadPrime.
-    """
-    rows = list(rows)
-    n = len(rows)
-    context = ring(names_of(rows[0][-1])[n:])
-    by_monomial: list[list[dict[Exponents, Any]]] = []
-    for row in rows:
-        found: list[dict[Exponents, Any]] = []
-        for entry in row:
-            collected: dict[Exponents, dict[tuple[int, ...], fmpq]] = {}
-            for monomial, coefficient in entry.terms():
-                collected.setdefault(tuple(monomial[:n]), {})[tuple(monomial[n:])] = coefficient
-            with over.working():
-                found.append({m: evaluate(context.from_dict(c), over, point) for m, c in collected.items()})
-        by_monomial.append(found)
-    degree = max((sum(m) for row in by_monomial for entry in row for m in entry), default=0)
-    if degree <= 1:
-        exponents = [tuple(int(i == k) for i in range(n + 1)) for k in range(n + 1)]
-    else:
-        seen = dict.fromkeys(m for row in by_monomial for entry in row for m in entry)
-        exponents = [(*m, degree - sum(m)) for m in seen]
-    droppable = over is QQ or over.characteristic > 0  # elsewhere a zero may be uncertain
-    place = {exponent[:n]: k for k, exponent in enumerate(exponents)}
-    terms = tuple(
-        tuple(tuple((place[m], c) for m, c in entry.items() if not droppable or c != 0) for entry in row)
-        for row in by_monomial
-    )
-    return Equation(over, tuple(exponents), terms)
 
 
 def nonzero_eps(eps: Any, over: Field) -> Any:

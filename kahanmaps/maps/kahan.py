@@ -23,11 +23,12 @@ from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
-from kahanmaps.maps.implicit import BirationalMap, Equation, MapOver, nonzero_eps
+from kahanmaps.maps.equation import Equation
+from kahanmaps.maps.implicit import BirationalMap, StepOver, nonzero_eps
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
 
 
-class KahanMapOver(MapOver):
+class KahanMapOver(StepOver):
     """The map Phi(., eps) of a system that is given over any field, with eps an element of it; time step 2 eps.
 
     M and r are computed from the tensor f'', which over most fields is faster than to go by the equation.

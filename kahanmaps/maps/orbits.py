@@ -193,7 +193,7 @@ class Orbit(Displayed):
             point: IntegerPoint | None = IntegerPoint.from_rationals(self.start)
             while point is not None:
                 yield point
-                point = self.map.integer_steps.step(point)
+                point = self.map.integer_step(point, _bits(self.max_digits))
         else:
             value = self.start
             while True:

@@ -1,24 +1,30 @@
 """A map on projective space: (X : Z), x = X/Z, goes to the kernel of the matrix L of its equation.
 
-The n x (n + 1) matrix L of forms of degree d in (X : Z) (implicit.py) has n + 1 signed maximal minors, which are forms
-of degree n d; what they have in common may be divided out. Source: petrera-suris-2016, eq. (eq: Phi gen).
+The n x (n + 1) matrix L of forms of degree d in (X : Z) (equation.py) has n + 1 signed maximal minors, which are forms
+of degree n d; what they have in common may be divided out. The forms of several factors are put into each
+other. Source: petrera-suris-2016, eq. (eq: Phi gen).
 """
 
 from __future__ import annotations
 
-from typing import Any
+from math import comb
+from typing import Any, NamedTuple
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx, nmod_mpoly_ctx
 
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.errors import InputError
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.equation import Equation
+from kahanmaps.maps.implicit import MapOver, StepOver
+from kahanmaps.maps.inverse import TooLarge
 
 Forms = list[list[list[Any]]]
 
+_MOST_TERMS = 3_000  # of a form of several factors, before a common one is divided out
 
-def linear_forms(map_over: MapOver) -> Forms:
+
+def linear_forms(map_over: StepOver) -> Forms:
     """The coefficients L[i][j][k] of L where it is linear: its entry (i, j) is the sum of L[i][j][k] X_k, X_n being Z.
 
     Exact over exact fields. Raises InputError where the forms are of a higher degree.
@@ -40,18 +46,49 @@ def linear_forms(map_over: MapOver) -> Forms:
     return forms
 
 
-def homogeneous_map(map_over: MapOver) -> tuple[list[Any], Any]:
-    """The forms without common factor that give the map on projective space, and the factor that was divided out.
+class HomogeneousMap(NamedTuple):
+    """The `forms` without common factor that give a map on projective space, and the `factor` that was divided out
+    of its minors, of several factors of their minors put into each other.
 
-    For maps over QQ or GF(p) with p < 2^63; exact. The variables of the forms are named x1, ..., xn, z. Returns (forms,
-    factor); a last form that is zero says that the map is singular everywhere.
+    `denominator` is up to its sign that of the map, det M(x) made homogeneous: of several factors the product of
+    theirs. A last form that is zero says that the map is singular everywhere.
+    """
+
+    forms: list[Any]
+    factor: Any
+    denominator: Any
+
+    @property
+    def degree(self) -> int:
+        """The degree of the forms."""
+        return max((int(form.total_degree()) for form in self.forms if not form.is_zero()), default=0)
+
+
+def homogeneous_map(map_over: MapOver) -> HomogeneousMap:
+    """The forms of a map over QQ or GF(p) with p < 2^63; exact. Their variables are named x1, ..., xn, z.
+
+    Raises TooLarge where those of several factors have too many terms, put into each other.
 
     >>> from kahanmaps.maps.kahan import KahanMap
     >>> from kahanmaps.systems.quadratic import QuadraticSystem
-    >>> homogeneous_map(KahanMap(QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"]), 1))
-    ([x1*x2 + x1*z, -2*x1^2 - x2^2 + x2*z, 2*x1^2 - x2*z + z^2], 1)
+    >>> homogeneous_map(KahanMap(QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"]), 1)).forms
+    [x1*x2 + x1*z, -2*x1^2 - x2^2 + x2*z, 2*x1^2 - x2*z + z^2]
     """
-    equation = map_over.equation
+    first, *others = map_over.equations
+    found = _of_equation(first)
+    for equation in others:
+        next_one = _of_equation(equation)
+        size, degree = equation.dim, found.degree * next_one.degree
+        if comb(degree + size, size) > _MOST_TERMS:
+            raise TooLarge(f"the composition of {len(others) + 1} maps is too large for forms on projective space")
+        moved, common = _without_common_factor([form.compose(*found.forms) for form in next_one.forms])
+        factor, denominator = (part.compose(*found.forms) for part in (next_one.factor, next_one.denominator))
+        below = found.factor ** (equation.dim * equation.degree)
+        found = HomogeneousMap(moved, below * factor * common, found.denominator * denominator)
+    return found
+
+
+def _of_equation(equation: Equation) -> HomogeneousMap:
     names = (*(f"x{k + 1}" for k in range(equation.dim)), "z")
     context: Any
     if isinstance(equation.over, PrimeField):
@@ -63,7 +100,13 @@ def homogeneous_map(map_over: MapOver) -> tuple[list[Any], Any]:
         [context.from_dict({equation.exponents[k]: scalar(value) for k, value in entry}) for entry in row]
         for row in equation.terms
     ]
-    forms = kernel_minors(rows)
+    minors = kernel_minors(rows)
+    return HomogeneousMap(*_without_common_factor(minors), minors[-1])
+
+
+def _without_common_factor(forms: list[Any]) -> tuple[list[Any], Any]:
+    """The forms divided by their common factor, and that; 1 where it is a number."""
+    context = forms[0].context()
     common = context.constant(0)
     for form in forms:
         common = common.gcd(form)

@@ -10,7 +10,7 @@ import pytest
 from cli_helpers import Outcome
 from schema_helpers import mistakes
 
-from kahanmaps.documents import document
+from kahanmaps.documents import reader
 from kahanmaps.documents.files import SystemFileError, parse_system
 from kahanmaps.experiments.options import FAMILY, VOCABULARY
 from kahanmaps.experiments.registry import task_kinds
@@ -25,9 +25,9 @@ CATALOG = ROOT / "kahanmaps" / "documents" / "catalog"
 def test_a_system_file_has_the_same_keys_for_the_schema_and_for_the_reader() -> None:
     parts = schema("system-file")["$defs"]
     found = {"": parts["system_file"], "catalog": parts["catalog_section"]}
-    found |= {key: parts["system_file"]["properties"][key] for key in (*document.KINDS, "density")}
+    found |= {key: parts["system_file"]["properties"][key] for key in (*reader.KINDS, "density")}
     found["composition.of"] = parts["composition_part"]
-    assert {key: set(part["properties"]) for key, part in found.items()} == document._KEYS
+    assert {key: set(part["properties"]) for key, part in found.items()} == reader.KEYS
 
 
 @pytest.mark.parametrize("path", sorted(CATALOG.glob("*.toml")), ids=lambda path: path.stem)

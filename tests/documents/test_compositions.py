@@ -91,7 +91,6 @@ def test_variables_may_be_named_anew(tmp_path):
         ('{ file = "field.toml" }, { system = "euler_top" }', "dimensions 2, 3"),
         ('{ file = "field.toml" }, { map = { variables = ["y", "x"], map = { image = ["x", "y"] } } }', "two orders"),
         ('{ map = { variables = ["x", "y"], map = { image = ["x^2", "y"] } } }', "at least 2 preimages"),
-        ('{ system = "henon_heiles", power = 4 }', "too large to be multiplied out"),
     ],
 )
 def test_a_wrong_composition_says_what_is_wrong(tmp_path, of, sentence):
@@ -134,10 +133,48 @@ def test_compositions_in_each_other_come_to_an_end(tmp_path):
         read_system(tmp_path / "c0.toml")
 
 
-def test_symbols_are_for_formulas(tmp_path):
-    file = read_system(written(tmp_path, '{ file = "field.toml", parameters = { a = "b" } }', "parameters.b = 5"))
-    with pytest.raises(InputError, match=r"in a \[composition\] file, expected numbers"):
+# Parts that share the symbol b, and such as have a b of their own.
+WITHOUT = (
+    '{ map = { variables = ["x", "y"], map = { image = ["b*y + c", "x"] } }, parameters = { b = "c" } }',
+    '{ map = { variables = ["x", "y"], parameters = { b = 7 }, map = { image = ["b*y", "x"] } } }',
+)
+SHARED = (
+    '{ file = "field.toml", parameters = { a = "b/(b + 1)" } }',
+    '{ system = "lyness", inverse = true, parameters = { a = "b^2" } }',
+    '{ map = { variables = ["x", "y"], map = { image = ["b*y + c", "x"] } } }',
+    '{ file = "inner.toml", parameters = { d = "b - 1" } }',
+)
+
+
+@pytest.mark.parametrize("of", [*WITHOUT, *SHARED, ", ".join(WITHOUT + SHARED)])
+def test_parts_share_a_symbol_and_are_given_functions_of_it(tmp_path, of):
+    part = '{ map = { variables = ["x", "y"], map = { image = ["d*y", "x + c*d"] } } }'
+    written(tmp_path, part, "[parameters]\nc = 3\nd = 1", name="inner.toml")
+    path = written(tmp_path, of, "[parameters]\nb = 5\nc = 2")
+    file = read_system(path)
+    map_ = map_with_symbols(file, ["b"])
+    assert map_.symbols == ("b",)
+    for b in ("5", "-2/7"):
+        number = fmpq(*map(int, b.split("/")))
+        one = read_system(path, {"b": b}).map.at(EPS)
+        assert map_.at(EPS, values=[number]).step(START) == one.step(START)
+        assert map_.at(EPS, values=[number]).inverse.step(START) == one.inverse.step(START)
+        if of not in WITHOUT:
+            assert one.step(START) != map_.at(EPS, values=[number + 1]).step(START)
+
+
+def test_a_symbol_that_a_part_cannot_have_is_refused(tmp_path):
+    with pytest.raises(SystemFileError, match="division by 0"):
+        read_system(written(tmp_path, '{ system = "lyness", parameters = { a = "1/(b - b)" } }', "parameters.b = 5"))
+    family = '[family]\nA = [["p", "0"], ["0", "p"]]\nH = "x1^3"\n[parameters]\np = 2\n'
+    (tmp_path / "member.toml").write_text(family)
+    file = read_system(written(tmp_path, '{ file = "member.toml", parameters = { p = "b" } }', "parameters.b = 5"))
+    with pytest.raises(InputError, match=r"found the symbols p in a \[family\] file, expected numbers"):
         map_with_symbols(file, ["b"])
+    of = '{ system = "lyness", parameters = { a = "1/b" } }'
+    map_ = map_with_symbols(read_system(written(tmp_path, of, "parameters.b = 5")), ["b"])
+    with pytest.raises(InputError, match="no value where the symbols have these"):
+        map_.at(1, values=[fmpq(0)])
 
 
 def test_a_map_is_no_involution_by_chance():

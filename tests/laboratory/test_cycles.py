@@ -38,7 +38,7 @@ def all_points(n: int, p: int):
 
 
 def by_hand(system: QuadraticSystem, eps: str, p: int) -> dict[tuple[int, ...], tuple[int, ...] | None]:
-    forms, _ = homogeneous_map(KahanMap(system, eps, GF(p)))
+    forms = homogeneous_map(KahanMap(system, eps, GF(p))).forms
     image: dict[tuple[int, ...], tuple[int, ...] | None] = {}
     for point in all_points(system.dim, p):
         values = [

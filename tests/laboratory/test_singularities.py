@@ -251,7 +251,7 @@ def test_critical_points_on_a_line_are_neither_at_infinity_nor_poles():
     system = load("weierstrass").system
     forms, back = (KahanMap(system, eps, field).equation for eps in ("1/2", "-1/2"))
     phi = KahanMap(system, "1/2", field)
-    points, number = critical_points(forms, back, rng)
+    points, number = critical_points([forms], [back], rng)
     assert (number, len(points)) == ({1: 1}, 1)
     for one in points:
         x, y, z = (field.convert(entry) for entry in one.point)

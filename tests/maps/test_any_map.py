@@ -5,6 +5,7 @@ The generic step solves M(x) x~ = r(x) as it stands; it is compared with indepen
 
 from __future__ import annotations
 
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,7 @@ MAPS = {
 }
 SQUARES = explicit_map(["x", "y"], [parse_rational_function(f"{name}^2", ["x", "y", "eps"]) for name in "xy"])
 MAPS["composed"] = composed_map(MAPS["bilinear"], (MAPS["explicit"], -1))
+MAPS["word"] = composed_map(MAPS["kahan"], (MAPS["bilinear"], -2), MAPS["odd"])
 
 
 def has_inverse(map_):
@@ -66,9 +68,10 @@ def has_inverse(map_):
 
 
 WITH_INVERSE = [name for name, map_ in MAPS.items() if has_inverse(map_)]
-LINEAR = [name for name in MAPS if MAPS[name].at(1).equation.degree == 1]
+LINEAR = [name for name in MAPS if MAPS[name].at(1).is_bilinear]
 P = 1009
 every_map = pytest.mark.parametrize("name", MAPS)
+SINGLE = [name for name in MAPS if len(MAPS[name].at(1).factors) == 1]
 
 
 def start_of(map_):
@@ -99,12 +102,12 @@ def test_integers_over_one_denominator_step_as_rationals_do(name):
                 over.step(x)
             return
         assert over.step(x) == image
-        assert over.determinant(x) == det(over.denominator_matrix(x))
+        assert over.determinant(x) == prod(det(one.denominator_matrix(here)) for one, here in over.stages(x))
 
     compare()
 
 
-@every_map
+@pytest.mark.parametrize("name", SINGLE)
 def test_the_equation_is_that_of_the_matrices(name):
     over = MAPS[name].at("2/7")
     x, n = tuple(start_of(MAPS[name])), MAPS[name].dim
@@ -231,7 +234,7 @@ def test_a_denominator_that_almost_vanishes_is_told_at_any_scale_of_the_coeffici
 @every_map
 def test_forms_without_common_factor_have_the_image_for_their_values(name):
     over = MAPS[name].at("1/10")
-    forms, _ = homogeneous_map(over)
+    forms = homogeneous_map(over).forms
     x = start_of(MAPS[name])
     *above, below = [evaluate(form, QQ, [*x, QQ.one]) for form in forms]
     assert tuple(entry / below for entry in above) == over.generic_step(tuple(x))
@@ -318,8 +321,8 @@ def test_what_cannot_be_composed_is_refused():
         composed_map(MAPS["kahan"], MAPS["adjusted"])
     with pytest.raises(InputError, match="not birational"):
         composed_map((SQUARES, -1))
-    with pytest.raises(InputError, match="too large to be multiplied out"):
-        composed_map((MAPS["quartic"], 5))
+    with pytest.raises(InputError, match="5 maps whose formulas are too large to be multiplied out"):
+        _ = composed_map((MAPS["quartic"], 5)).rows
     with pytest.raises(InputError, match="not birational"):
         _ = composed_map((SQUARES, 2)).at(1).inverse
 

@@ -9,7 +9,6 @@ from kahanmaps.display.latex import latex_name, latex_number, latex_polynomial, 
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.structured_facts import relations
-from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps_docs.literature import KEY, link
 from kahanmaps_docs.markdown import code, plain, table
@@ -63,7 +62,7 @@ def formulas(file: SystemFile) -> list[str]:
     elif file.map.image is not None:
         images = zip(file.variables, file.map.image, strict=True)
         rows = [rf"\tilde {latex_name(x)} &= {latex_rational_function(f)}" for x, f in images]
-    elif isinstance(file.map, ImplicitMap):
+    else:
         rows = [rf"{latex_polynomial(equation)} &= 0" for equation in file.map.equations]
     found = [r"\begin{aligned}" + r" \\ ".join(rows) + r"\end{aligned}"]
     if file.hamiltonian is not None:

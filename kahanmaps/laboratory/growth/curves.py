@@ -1,7 +1,8 @@
 """The curve t -> Phi^n(a + b t) that a birational map makes of a random line over GF(p), exactly.
 
-The curve is kept as dim + 1 polynomials without a common factor. The next one is the kernel of the n x (n + 1) matrix
-of forms in them that is the equation of the map (maps/implicit.py), and there are two ways to it:
+The curve is kept as dim + 1 polynomials without a common factor. A map has one or several factors, and what each makes
+of the curve is the kernel of the n x (n + 1) matrix of forms in its polynomials that is the equation of the factor
+(maps/equation.py). There are two ways to it:
 
     minors  up to dimension 5: the maximal minors, and the gcd of two random combinations of them divided out;
     series  above it, where minors are many: M(x) x~ = r(x) in power series in t, to as
@@ -24,6 +25,7 @@ from flint import fmpq, fmpz_mod_ctx, fmpz_mod_poly_ctx, nmod, nmod_poly
 
 from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, MapOver
 
 _MINORS = 5  # the largest dimension in which minors are taken
@@ -61,7 +63,7 @@ class Line:
         self.eps = int(map_.eps)
         self._rng, self._deadline, self._max_degree = rng, deadline, max_degree
         self._context = fmpz_mod_poly_ctx(fmpz_mod_ctx(p))
-        self._equation = map_.equation
+        self._equations = map_.equations
         self.steps = 0
         self.degree = 1
         drawn = (nmod_poly([rng.randrange(p), rng.randrange(1, p)], p) for _ in range(map_.dim))
@@ -69,15 +71,16 @@ class Line:
 
     def step(self, guess: int) -> None:
         """One step on. Raises ZeroDivisionError where points of the line have no image, Stopped at a limit."""
-        curve = self._by_minors() if self._equation.dim <= _MINORS else self._by_series(guess)
-        degree = max(0, *(int(entry.degree()) for entry in curve))
-        if degree > self._max_degree:
-            self._raise_degree()
-        self._X, self.degree = curve, degree
+        for equation in self._equations:
+            curve = self._by_minors(equation) if equation.dim <= _MINORS else self._by_series(equation, guess)
+            degree = max(0, *(int(entry.degree()) for entry in curve))
+            if degree > self._max_degree:
+                self._raise_degree()
+            self._X, self.degree = curve, degree
         self.steps += 1
 
-    def _by_minors(self) -> list[nmod_poly]:
-        rows = self._equation.rows(self._equation.monomials(self._X), nmod_poly([0], self.prime))
+    def _by_minors(self, equation: Equation) -> list[nmod_poly]:
+        rows = equation.rows(equation.monomials(self._X), nmod_poly([0], self.prime))
         *above, below = kernel_minors(rows, self._times)
         if below.is_zero():
             raise ZeroDivisionError("no point of the line has an image")
@@ -104,12 +107,12 @@ class Line:
     def _raise_degree(self) -> NoReturn:
         raise Stopped("degree", f"the degree of iterate {self.steps + 1} is above {self._max_degree}")
 
-    def _by_series(self, guess: int) -> list[nmod_poly]:
+    def _by_series(self, equation: Equation, guess: int) -> list[nmod_poly]:
         most = 2 * self._max_degree + _MARGIN + 1
         length = min(2 * guess + _MARGIN + 1, most)
         while True:
             self._require_time()
-            curve = self._curve(self._image(length), length)
+            curve = self._curve(self._image(equation, length), length)
             if curve is not None:
                 return curve
             if length == most:
@@ -120,11 +123,11 @@ class Line:
         if time.monotonic() > self._deadline:
             raise Stopped("time", f"the time was over at iterate {self.steps + 1}")
 
-    def _image(self, length: int) -> list[nmod_poly]:
-        """The coordinates of the next iterate as power series, to `length` terms."""
+    def _image(self, equation: Equation, length: int) -> list[nmod_poly]:
+        """The coordinates of the next curve as power series, to `length` terms."""
         X = [entry.truncate(length) for entry in self._X]
-        values = [entry.truncate(length) for entry in self._equation.monomials(X)]
-        rows = self._equation.rows(values, nmod_poly([0], self.prime))
+        values = [entry.truncate(length) for entry in equation.monomials(X)]
+        rows = equation.rows(values, nmod_poly([0], self.prime))
         n = len(rows)
         for column in range(n):
             candidates = [i for i in range(column, n) if int(rows[i][column][0])]

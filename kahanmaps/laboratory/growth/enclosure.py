@@ -26,6 +26,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import reduce
+from math import prod
 from typing import Any
 
 import flint
@@ -38,7 +39,8 @@ from kahanmaps.algebra.polynomials import degree_in
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.singular.jets import image_of
-from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.implicit import BirationalMap, MapOver, StepOver
+from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.projective import homogeneous_map
 
 _LINES = 96  # that touch a conic
@@ -125,19 +127,22 @@ def enclose(
 def is_birational(map_: MapOver, rng: random.Random) -> bool:
     """Whether a map over GF(p) is birational, proved where the answer is yes.
 
-    The equation of the inverse, at the image of a generic point, is to annihilate that point, as forms, and nothing
-    else, which one point shows.
+    Of every factor: the equation of its inverse, at the image of a generic point, is to annihilate that point, as
+    forms, and nothing else, which one point shows.
     """
-    forms, _ = homogeneous_map(map_)
+    return all(_is_birational(factor, rng) for factor in map_.factors)
+
+
+def _is_birational(map_: StepOver, rng: random.Random) -> bool:
+    forms = homogeneous_map(map_).forms
     inverse = map_.inverse.equation
     X = forms[0].context().gens()
     zero = forms[0] * 0
     rows = inverse.rows(inverse.monomials(forms), zero)
     if any(not sum((entry * x for entry, x in zip(row, X, strict=True)), zero).is_zero() for row in rows):
         return False
-    point = [rng.randrange(map_.field.characteristic) for _ in X]
-    image = image_of(map_.equation, point)
-    return image is not None and image_of(inverse, image) is not None
+    image = image_of([map_.equation], [rng.randrange(map_.field.characteristic) for _ in X])
+    return image is not None and image_of([inverse], image) is not None
 
 
 def degree_above(largest: int, lines: int) -> int:
@@ -225,7 +230,12 @@ def _written_degrees(map_: BirationalMap, eps: fmpq | None, end: float) -> Itera
     ring = fmpq_mpoly_ctx.get(("x", "y", "z", "eps"), Ordering.degrevlex)
     *X, symbol = ring.gens()
     value = symbol if eps is None else ring.constant(eps)
-    size = max(degree_in(entry, 2) for row in map_.rows for entry in row)
+    try:
+        size = max(degree_in(entry, 2) for row in map_.rows for entry in row)
+    except TooLarge:  # a composition: the product of the degrees of its factors
+        equations = map_.at(fmpq(1) if eps is None else eps).equations
+        yield prod(2 * equation.degree for equation in equations)
+        return
 
     def form(entry: fmpq_mpoly) -> fmpq_mpoly:
         terms: dict[tuple[int, ...], Any] = {(i, j, size - i - j, k): c for (i, j, k), c in entry.terms()}

@@ -27,6 +27,7 @@ from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.modular_points import ModularMap, Point, exponents_up_to, null_space
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 
 _SPARE = 8
@@ -86,7 +87,7 @@ def determinant_polynomial(map_: BirationalMap) -> fmpq_mpoly | None:
     try:
         entries = [Function(field, entry, one) for row in map_.matrix for entry in row]
         D: fmpq_mpoly = FunctionMatrix(field, n, n, entries).det().above
-    except BudgetExceeded:
+    except (BudgetExceeded, TooLarge):
         return None
     return D
 

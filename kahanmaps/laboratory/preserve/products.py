@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from math import prod
+from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz, fmpz_mat, nmod_poly
 
@@ -42,6 +43,7 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.flow import flow_exponents
+from kahanmaps.maps.implicit import StepOver
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
 _MAX_CANDIDATES = 60
@@ -147,36 +149,45 @@ class _Line:
     """
 
     def __init__(self, map_: ModularMap) -> None:
-        p, n = map_.prime, map_.dim
+        p = map_.prime
         self.prime, self.map = p, map_
         start, slope = map_.random_point(), map_.random_point()
         self.here = [*(nmod_poly([c, d], p) for c, d in zip(start, slope, strict=True)), nmod_poly([1], p)]
-        top = max(1, map_.map.equation.degree)
+        self.there, self.above, self.below = self.here, nmod_poly([1], p), nmod_poly([1], p)
+        for one in map_.map.factors:
+            self._step(one)
 
-        def step(t: int) -> tuple[tuple[int, ...], list[int], int]:
-            """A point of the line, its image and det M."""
-            x = tuple((c + t * d) % p for c, d in zip(start, slope, strict=True))
-            image = map_.step(x)
-            if image is None:
-                raise SingularStep("the map has no value at a point of a line", x, map_.eps)
-            return x, list(image), int(map_.map.determinant(x))
+    def _step(self, one: StepOver) -> None:
+        """One factor further: det of it is its numerator times Z^n over its denominator times Z~^n."""
+        p, n, curve = self.prime, one.dim, self.there
+        top, size = max(1, one.equation.degree), max(int(entry.degree()) for entry in curve)
+
+        def step(t: int) -> tuple[tuple[Any, ...], tuple[Any, ...], int]:
+            """A point of the curve, its image and Z."""
+            *X, Z = (one.field.convert(int(entry(t))) for entry in curve)
+            if Z == 0:
+                raise SingularStep("a point of a curve is at infinity", (), one.eps)
+            x = tuple(c / Z for c in X)
+            return x, one.step(x), int(Z)
 
         def homogeneous(t: int) -> list[int]:
-            _, image, below = step(t)
-            return [*(c * below % p for c in image), below]
+            x, image, Z = step(t)
+            below = int(one.determinant(x)) * pow(Z, n * top, p)
+            return [*(int(c) * below % p for c in image), below % p]
 
-        raw = _interpolated(homogeneous, n * top, p)
+        raw = _interpolated(homogeneous, n * top * size, p)
         common = reduce(nmod_poly.gcd, raw)
         self.there = [entry // common for entry in raw]
-        self.below = raw[-1]
-        Z = self.there[-1]
+        self.below = self.below * raw[-1]
+        after = self.there[-1]
 
         def numerator(t: int) -> list[int]:
-            x, image, _ = step(t)
-            return [int(det(map_.map.numerator_matrix(x, image))) * pow(int(Z(t)), n, p) % p]
+            x, image, Z = step(t)
+            return [int(det(one.numerator_matrix(x, image))) * pow(Z, n * (top - 1), p) * pow(int(after(t)), n, p) % p]
 
         reach = max(int(entry.degree()) for entry in self.there)
-        [self.above] = _interpolated(numerator, n * (top - 1 + reach), p)
+        [above] = _interpolated(numerator, n * ((top - 1) * size + reach), p)
+        self.above = self.above * above
 
     def along(self, g: fmpq_mpoly, place: Sequence[nmod_poly]) -> nmod_poly:
         """g on the line, or the numerator Z^deg g(X/Z) of g on its image."""

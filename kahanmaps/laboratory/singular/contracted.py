@@ -26,7 +26,8 @@ from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.singular.fates import CONFINED, NOT_CONFINED, Hypersurface, Range, orders_at, walked
 from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of
 from kahanmaps.laboratory.singular.orders import Orders
-from kahanmaps.maps.implicit import BirationalMap, Equation
+from kahanmaps.maps.equation import Equation
+from kahanmaps.maps.implicit import BirationalMap
 
 _MOST_LINES = 24  # modulo primes of their own; they end when two have points of every hypersurface
 _FIRST = 12  # steps that tell hypersurfaces apart
@@ -111,7 +112,7 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
     apart, their degrees are 0 and their orders those of the forms. Raises Untold.
     """
     here = map_.at(eps)
-    forms = _forms(here.equation, here.inverse.equation, map_.digits)
+    forms = _forms(here.equations[0], here.inverse.equations[0], map_.digits)
     kinds: dict[tuple[Any, ...], list[_Curve]] = {}
     for _ in range(_MOST_LINES):
         if limits.is_over:
@@ -122,10 +123,10 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
             functions = tuple(form_order(form, field) for form in forms.all)
         except BadPrime:
             continue
-        degree, zeros, curves = _on_line(over.equation, forms, functions, field, rng)
+        degree, zeros, curves = _on_line(over.equations[0], forms, functions, field, rng)
         for curve in curves:
-            run = walked(curve.equation, curve.point, curve.direction, [], _FIRST, limits.end, functions=functions)[0]
-            is_contracted = image_of(over.inverse.equation, run[0].limit) is None
+            run = walked([curve.equation], curve.point, curve.direction, [], _FIRST, limits.end, functions=functions)[0]
+            is_contracted = image_of(over.inverse.equations, run[0].limit) is None
             key = (is_contracted, curve.own[: len(forms.poles)], curve.own[-1], *curve.levels(run)[:1], curve.rows(run))
             kinds.setdefault(key, []).append(curve)
         if all(len({curve.equation.over.characteristic for curve in kind}) > 1 for kind in kinds.values()):
@@ -159,7 +160,7 @@ def _resolved(
             by_prime = {curve.equation.over.characteristic: curve for curve in curves}
             one, other = (
                 orders_at(
-                    curve.equation,
+                    [curve.equation],
                     curve.point,
                     curve.direction,
                     replace(curve, solved=solved, exponents=exponents),

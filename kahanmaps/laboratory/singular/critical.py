@@ -11,18 +11,22 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
+from itertools import pairwise
 from typing import Any
 
 from flint import nmod_poly
 
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.laboratory.singular.jets import Jet
-from kahanmaps.maps.implicit import Equation
+from kahanmaps.maps.equation import Equation
 
 
 @dataclass(frozen=True)
 class CriticalPoint:
-    """A point modulo p where the differential degenerates, how often it is a zero of E, and the gradient there."""
+    """A point modulo p where the differential degenerates, how often it is a zero of E, and the gradient there.
+
+    Or a pole: then E stands for det(I - eps f').
+    """
 
     point: tuple[int, ...]
     gradient: tuple[int, ...]
@@ -30,32 +34,64 @@ class CriticalPoint:
 
 
 def critical_points(
-    equation: Equation, inverse: Equation, rng: random.Random
+    equations: Sequence[Equation], inverses: Sequence[Equation], rng: random.Random
 ) -> tuple[list[CriticalPoint], dict[int, int]]:
     """The critical points modulo p on a random line that are neither poles nor at infinity; exact.
 
-    `equation` is that of the map over the field, linear in the point, and `inverse` that of its inverse. Returns the
-    points and, for each multiplicity, the number of zeros of E over the closure of GF(p): there may be zeros without
-    points in GF(p).
+    `equations` are those of the factors of the map over the field, linear in the point, and `inverses` those of their
+    inverses; of several factors the product of their E is meant. Returns the points and, for each multiplicity, the
+    number of zeros of E over the closure of GF(p): there may be zeros without points in GF(p).
     """
-    a, b, line = _random_line(equation, rng)
-    p = equation.over.characteristic
-    image = kernel_minors(equation.rows(equation.monomials(line), nmod_poly([], p)))
-    common = reduce(nmod_poly.gcd, image)
-    if common.degree() > 0:
-        image = [entry // common for entry in image]
-    value = _without(_denominator(inverse, image, nmod_poly([], p)), image[-1] * common, line[-1])
+    a, b, line = _random_line(equations[0], rng)
+    one = line[-1] * 0 + 1
+    value, poles = one, one
+    for equation, inverse in zip(equations, inverses, strict=True):
+        image, common = _image(equation, line)
+        value = value * _denominator(inverse, image, one * 0)
+        poles = poles * image[-1] * common * line[-1]
+        line = image
 
     def E(X: Sequence[Any], zero: Any) -> Any:
-        return _denominator(inverse, kernel_minors(equation.rows(equation.monomials(X), zero)), zero)
+        total = None
+        for equation, inverse in zip(equations, inverses, strict=True):
+            X = kernel_minors(equation.rows(equation.monomials(X), zero))
+            found = _denominator(inverse, X, zero)
+            total = found if total is None else total * found
+        return total
 
-    return _zeros(value, E, a, b, rng)
+    return _zeros(_without(value, poles), E, a, b, rng)
+
+
+def pole_points(equations: Sequence[Equation], rng: random.Random) -> tuple[list[CriticalPoint], dict[int, int]]:
+    """The poles modulo p on a random line that are not at infinity, as `critical_points` gives critical points."""
+    a, b, line = _random_line(equations[0], rng)
+    infinity, value = line[-1], line[-1] * 0 + 1
+    for k, equation in enumerate(equations):
+        value = value * _denominator(equation, line, infinity * 0)
+        if k + 1 < len(equations):
+            line, _ = _image(equation, line)
+
+    def determinants(X: Sequence[Any], zero: Any) -> Any:
+        total = _denominator(equations[0], X, zero)
+        for before, equation in pairwise(equations):
+            X = kernel_minors(before.rows(before.monomials(X), zero))
+            total = total * _denominator(equation, X, zero)
+        return total
+
+    return _zeros(_without(value, infinity), determinants, a, b, rng)
 
 
 def _random_line(equation: Equation, rng: random.Random) -> tuple[list[int], list[int], list[nmod_poly]]:
     p = equation.over.characteristic
     a, b = ([rng.randrange(p) for _ in range(equation.dim + 1)] for _ in range(2))
     return a, b, [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
+
+
+def _image(equation: Equation, curve: Sequence[nmod_poly]) -> tuple[list[nmod_poly], nmod_poly]:
+    """The image of a curve without common factor, and the factor that was divided out."""
+    image = kernel_minors(equation.rows(equation.monomials(curve), curve[-1] * 0))
+    common = reduce(nmod_poly.gcd, image)
+    return ([entry // common for entry in image] if common.degree() > 0 else image), common
 
 
 def _without(value: nmod_poly, *others: nmod_poly) -> nmod_poly:
@@ -78,10 +114,13 @@ def _zeros(
         return [], {}
     p = value.modulus()
     found, degrees = [], dict[int, int]()
-    for factor, exponent in value.factor()[1]:
+    t = nmod_poly([0, 1], p)
+    for part, exponent in value.factor_squarefree()[1]:
         power = int(exponent)
-        degrees[power] = degrees.get(power, 0) + int(factor.degree())
-        if factor.degree() == 1:
+        degrees[power] = degrees.get(power, 0) + int(part.degree())
+        # Only zeros in GF(p) are of use: a whole factorization would take a hundred times as long at high degrees.
+        linear = part.gcd(t.pow_mod(p, part) - t) if part.degree() > 1 else part
+        for factor, _ in linear.factor()[1]:
             s = -int(factor[0])
             point = [(x + s * v) % p for x, v in zip(a, b, strict=True)]
             gradient = _gradient(function, point, power, p, rng)

@@ -21,7 +21,7 @@ from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.growth.recurrences import find_recurrence
-from kahanmaps.laboratory.singular.critical import critical_points
+from kahanmaps.laboratory.singular.critical import critical_points, pole_points
 from kahanmaps.laboratory.singular.jets import (
     Function,
     NotGeneric,
@@ -33,7 +33,8 @@ from kahanmaps.laboratory.singular.jets import (
     walk_along,
 )
 from kahanmaps.laboratory.singular.orders import NO_ORDERS, NOTHING, AlongCurves, Orders, Tracked
-from kahanmaps.maps.implicit import BirationalMap, Equation
+from kahanmaps.maps.equation import Equation
+from kahanmaps.maps.implicit import BirationalMap
 
 _MAX_PRECISION = 4096
 _MOST_ALONG = 1024  # where series are followed far
@@ -172,7 +173,7 @@ def fate_of(
             break
         field = random_prime_field(rng)
         try:
-            equation = map_.at(eps, field).equation
+            equations = map_.at(eps, field).equations
             place = _point_on(factor, field, rng)
             tracked = Tracked(
                 tuple(form_order(form, field) for form, _ in forms),
@@ -185,7 +186,7 @@ def fate_of(
         if place is None or field.prime in primes:
             continue
         try:
-            fates.append(_fate_at(equation, *place, rng, limits, tracked=tracked))
+            fates.append(_fate_at(equations, *place, rng, limits, tracked=tracked))
             primes.append(field.prime)
         except NotGeneric:
             continue
@@ -210,6 +211,28 @@ def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range)
     At one exact `eps` (half the time step), on lines modulo random primes. Poles and infinity are left out. One with a
     multiplicity of which no point was found is undecided. Source: zander-2021.
     """
+    return _at_random(map_, eps, rng, limits, False)
+
+
+def fates_at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> list[Hypersurface]:
+    """As `unwritten`, with the poles and infinity: without any polynomial."""
+    found = _at_random(map_, eps, rng, limits, True) + _at_random(map_, eps, rng, limits, False)
+    for _ in range(_TRIES):
+        field = random_prime_field(rng)
+        try:
+            equations = map_.at(eps, field).equations
+            point = [rng.randrange(field.prime) for _ in range(map_.dim)] + [0]
+            tangents = _tangents(point, [0] * map_.dim + [1], field)
+            fate = _UNKNOWN if tangents is None else _fate_at(equations, point, tangents, rng, limits)
+        except (BadPrime, NotGeneric):
+            continue
+        except PrecisionTooLow:
+            fate = _UNKNOWN
+        return [*found, Hypersurface("Z", 1, False, None, primes=(field.prime,), **vars(fate))]
+    return found
+
+
+def _at_random(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range, poles: bool) -> list[Hypersurface]:
     found: dict[tuple[Any, ...], Hypersurface] = {}
     degrees: dict[int, int] = {}
     for line in range(4 * _LINES):
@@ -218,26 +241,26 @@ def unwritten(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range)
         field = random_prime_field(rng)
         try:
             here = map_.at(eps, field)
-            equation, inverse = here.equation, here.inverse.equation
+            equations, inverses = here.equations, here.inverse.equations[::-1]
         except BadPrime:
             continue
-        points, seen = critical_points(equation, inverse, rng)
+        points, seen = pole_points(equations, rng) if poles else critical_points(equations, inverses, rng)
         degrees |= seen
         for critical in points:
             tangents = _tangents(critical.point, critical.gradient, field)
             if tangents is None or limits.is_over:
                 continue
             try:
-                fate = _fate_at(equation, critical.point, tangents, rng, limits)
+                fate = _fate_at(equations, critical.point, tangents, rng, limits)
             except NotGeneric:
                 continue
             except PrecisionTooLow:
                 fate = _UNKNOWN
             key = (critical.multiplicity, fate.status, fate.contracted_at, fate.confined_at)
-            one = Hypersurface("?", seen[key[0]], False, key[0], primes=(field.prime,), **vars(fate))
+            one = Hypersurface("?", seen[key[0]], poles, key[0], primes=(field.prime,), **vars(fate))
             found[key] = _joined(found[key], one) if key in found else one
     for multiplicity in set(degrees) - {h.multiplicity for h in found.values()}:
-        untried = Hypersurface("?", degrees[multiplicity], False, multiplicity, note=NO_POINT, **vars(_UNKNOWN))
+        untried = Hypersurface("?", degrees[multiplicity], poles, multiplicity, note=NO_POINT, **vars(_UNKNOWN))
         found[(multiplicity,)] = untried
     return sorted(found.values(), key=lambda h: (h.multiplicity, h.status, h.confined_at or 0))
 
@@ -263,7 +286,7 @@ def _told(ranks: Sequence[int], full: int) -> tuple[str, int | None, int | None]
 
 
 def _fate_at(
-    equation: Equation,
+    equations: Sequence[Equation],
     point: Sequence[int],
     tangents: list[list[int]],
     rng: random.Random,
@@ -272,24 +295,24 @@ def _fate_at(
 ) -> _Fate:
     """What becomes of the hypersurface with these tangents at a point, and the orders of what is tracked along it."""
     full = len(tangents)
-    direction = [rng.randrange(equation.over.characteristic) for _ in point]
-    run = _whole(walked(equation, point, direction, tangents, limits.shown, limits.end))
+    direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
+    run = _whole(walked(equations, point, direction, tangents, limits.shown, limits.end))
     status, down, up = _told([step.rank for step in run], full)
     if status == NOT_CONTRACTED:
         return _Fate(status, down, up, run, len(run), 0)
     if up is None:
-        orders = orders_at(equation, point, direction, tracked, (len(run), limits.reach), limits)
+        orders = orders_at(equations, point, direction, tracked, (len(run), limits.reach), limits)
     else:
-        orders = _orders_until_return(equation, point, direction, tracked, up, limits)
+        orders = _orders_until_return(equations, point, direction, tracked, up, limits)
     if orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
-        run = _whole(walked(equation, point, direction, tangents, orders.settled_at + 2, limits.end))
+        run = _whole(walked(equations, point, direction, tangents, orders.settled_at + 2, limits.end))
         status, down, up = _told([step.rank for step in run], full)
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
     return _Fate(status, down, up, run, orders.followed, settled, orders)
 
 
 def _orders_until_return(
-    equation: Equation,
+    equations: Sequence[Equation],
     point: Sequence[int],
     direction: Sequence[int],
     tracked: AlongCurves,
@@ -303,7 +326,7 @@ def _orders_until_return(
     steps = limits.shown
     reach = min(limits.reach, steps + _FREE_STEPS)
     while True:
-        run = _whole(walked(equation, point, direction, [], steps, limits.end, functions=tracked.functions))
+        run = _whole(walked(equations, point, direction, [], steps, limits.end, functions=tracked.functions))
         rows = tracked.rows(run)
         for t, (_, *nu) in enumerate(rows, 1):
             if t >= up and any(nu):
@@ -312,7 +335,7 @@ def _orders_until_return(
                 if sorted(nu)[-2:] not in ([1], [0, 1]):
                     raise NotGeneric("a point where several critical hypersurfaces meet")
                 return Orders(rows[:t], (), t, True, (t, nu.index(1)))
-        hit, reached = _next_hit(equation, run[-1].limit, len(run), reach, limits, tracked.functions)
+        hit, reached = _next_hit(equations, run[-1].limit, len(run), reach, limits, tracked.functions)
         if hit is None:
             return Orders(rows[: max(up, 0)], (), reached, True)
         steps = hit
@@ -326,7 +349,7 @@ def _whole(walked: tuple[list[Step], bool]) -> tuple[Step, ...]:
 
 
 def orders_at(
-    equation: Equation,
+    equations: Sequence[Equation],
     point: Sequence[int],
     direction: Sequence[int],
     tracked: AlongCurves,
@@ -341,13 +364,13 @@ def orders_at(
     steps, reach = span
     while True:
         run, is_whole = walked(
-            equation, point, direction, [], steps, limits.end, most=_MOST_ALONG, functions=tracked.functions
+            equations, point, direction, [], steps, limits.end, most=_MOST_ALONG, functions=tracked.functions
         )
         rows = tracked.rows(run)
         last = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
         hit = None
         if is_whole and len(rows) - last >= _CONSTANT:
-            hit, reached = _next_hit(equation, run[-1].limit, len(run), reach, limits, tracked.functions)
+            hit, reached = _next_hit(equations, run[-1].limit, len(run), reach, limits, tracked.functions)
             if hit is None:
                 return Orders(rows[:last], (), reached, True)
         found = [find_recurrence(column) for column in zip(*rows, strict=True)]
@@ -363,7 +386,7 @@ def orders_at(
 
 
 def walked(
-    equation: Equation,
+    equations: Sequence[Equation],
     point: Sequence[int],
     direction: Sequence[int],
     tangents: Sequence[Sequence[int]],
@@ -378,9 +401,9 @@ def walked(
         run: list[Step] = []
         try:
             if tangents:
-                taken = walk(equation, point, direction, tangents, precision)
+                taken = walk(equations, point, direction, tangents, precision)
             else:
-                taken = walk_along(equation, point, direction, precision, functions)
+                taken = walk_along(equations, point, direction, precision, functions)
             for step in islice(taken, steps):
                 run.append(step)
                 if time.monotonic() > end:
@@ -393,7 +416,7 @@ def walked(
 
 
 def _next_hit(
-    equation: Equation,
+    equations: Sequence[Equation],
     limit: Sequence[int],
     steps: int,
     reach: int,
@@ -401,10 +424,10 @@ def _next_hit(
     functions: Sequence[Function] = (),
 ) -> tuple[int | None, int]:
     """The next step that a point does not have, or with a zero of a function, and for how long it was followed."""
-    p = equation.over.characteristic
+    p = equations[0].over.characteristic
     at: Sequence[int] = limit
     for step in range(steps + 1, reach + 1):
-        image = image_of(equation, at)
+        image = image_of(equations, at)
         if image is None:
             return step, step
         at = image

@@ -14,7 +14,7 @@ from flint import Ordering, nmod, nmod_mat, nmod_mpoly_ctx, nmod_poly
 
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.maps.implicit import Equation
+from kahanmaps.maps.equation import Equation
 
 # The order in t at the point with these coordinates, known below t^precision; None where it is not seen there.
 Function = Callable[[Sequence[nmod_poly], int], int | None]
@@ -75,7 +75,8 @@ def valuation(series: nmod_poly, precision: int) -> int | None:
 class Step:
     """What is found after one step: valuations in t (None: not below the precision), and the rank of the differential.
 
-    `common` is the power of t divided out of all coordinates, `pole` the valuation of Z at the image when the least of
+    `common` is the power of t divided out of all coordinates, of several factors that of their minors put into each
+    other; `pole` the valuation of Z at the image when the least of
     all coordinates is 0 (the order of the pole), `denominator` that of det(I - eps f') at the point before the step,
     `rank` the rank of the differential of the map from the hypersurface to the limits of its points, `limit` such a
     point after the step, `orders` the valuations at the image of the functions that were asked for.
@@ -90,7 +91,7 @@ class Step:
 
 
 def walk(
-    equation: Equation,
+    equations: Sequence[Equation],
     point: Sequence[int],
     direction: Sequence[int],
     tangents: Sequence[Sequence[int]],
@@ -101,7 +102,7 @@ def walk(
     The equation of the map is one over GF(p), points and vectors are residues (X : Z). Step after step without an end;
     raises PrecisionTooLow and NotGeneric.
     """
-    prime = equation.over.characteristic
+    prime = equations[0].over.characteristic
     X = [
         Jet(
             nmod_poly([x, v], prime).truncate(precision),
@@ -112,18 +113,23 @@ def walk(
     ]
     zero = nmod_poly([], prime)
     while True:
-        nothing = Jet(zero, [zero] * len(tangents), X[0].precision)
-        minors = kernel_minors(equation.rows(equation.monomials(X), None))
-        image = [nothing if jet is None else jet for jet in minors]
-        known = min(jet.precision for jet in image)
-        common, denominator = _divided([jet.value for jet in image], known)
-        X = [jet.over_power(common) for jet in image]
+        divided, denominators = 0, list[int | None]()
+        for equation in equations:
+            nothing = Jet(zero, [zero] * len(tangents), X[0].precision)
+            minors = kernel_minors(equation.rows(equation.monomials(X), None))
+            image = [nothing if jet is None else jet for jet in minors]
+            known = min(jet.precision for jet in image)
+            common, denominator = _divided([jet.value for jet in image], known)
+            X = [jet.over_power(common) for jet in image]
+            divided = divided * equation.dim * equation.degree + common
+            denominators.append(denominator)
         pole = None if denominator is None else denominator - common
-        yield Step(common, pole, denominator, _rank(X, prime), tuple(int(jet.value[0]) for jet in X))
+        limit = tuple(int(jet.value[0]) for jet in X)
+        yield Step(divided, pole, _product(denominators), _rank(X, prime), limit)
 
 
 def walk_along(
-    equation: Equation,
+    equations: Sequence[Equation],
     point: Sequence[int],
     direction: Sequence[int],
     precision: int,
@@ -133,24 +139,34 @@ def walk_along(
 
     As `walk` else. Raises PrecisionTooLow.
     """
-    prime = equation.over.characteristic
+    prime = equations[0].over.characteristic
     zero = nmod_poly([], prime)
     X = [nmod_poly([x, v], prime).truncate(precision) for x, v in zip(point, direction, strict=True)]
     while True:
+        divided, denominators = 0, list[int | None]()
+        for equation in equations:
 
-        def times(left: nmod_poly, right: nmod_poly, known: int = precision) -> nmod_poly:
-            return left.mul_low(right, known)
+            def times(left: nmod_poly, right: nmod_poly, known: int = precision) -> nmod_poly:
+                return left.mul_low(right, known)
 
-        image = kernel_minors(equation.rows(equation.monomials(X, times), zero), times)
-        common, denominator = _divided(image, precision)
-        precision -= common
-        X = [entry.right_shift(common).truncate(precision) for entry in image]
+            image = kernel_minors(equation.rows(equation.monomials(X, times), zero), times)
+            common, denominator = _divided(image, precision)
+            precision -= common
+            X = [entry.right_shift(common).truncate(precision) for entry in image]
+            divided = divided * equation.dim * equation.degree + common
+            denominators.append(denominator)
         pole = None if denominator is None else denominator - common
         orders = [function(X, precision) for function in functions]
         if None in orders:
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in X)
-        yield Step(common, pole, denominator, 0, limit, tuple(order or 0 for order in orders))
+        yield Step(divided, pole, _product(denominators), 0, limit, tuple(order or 0 for order in orders))
+
+
+def _product(valuations: Sequence[int | None]) -> int | None:
+    """The valuation of a product."""
+    known = [valuation for valuation in valuations if valuation is not None]
+    return sum(known) if len(known) == len(valuations) else None
 
 
 def _divided(image: Sequence[nmod_poly], known: int) -> tuple[int, int | None]:
@@ -186,12 +202,16 @@ def form_order(form: Any, field: PrimeField) -> Function:
     return order
 
 
-def image_of(equation: Equation, point: Sequence[int]) -> list[int] | None:
+def image_of(equations: Sequence[Equation], point: Sequence[int]) -> list[int] | None:
     """The image of a point of projective space modulo p; None where all minors vanish: there only curves have one."""
-    prime = equation.over.characteristic
-    rows = equation.rows(equation.monomials([nmod(x, prime) for x in point]), nmod(0, prime))
-    kernel, nullity = nmod_mat(rows, prime).nullspace()
-    return [int(kernel[k, 0]) for k in range(len(point))] if nullity == 1 else None
+    prime, X = equations[0].over.characteristic, list(point)
+    for equation in equations:
+        rows = equation.rows(equation.monomials([nmod(x, prime) for x in X]), nmod(0, prime))
+        kernel, nullity = nmod_mat(rows, prime).nullspace()
+        if nullity != 1:
+            return None
+        X = [int(kernel[k, 0]) for k in range(len(X))]
+    return X
 
 
 def _rank(X: Sequence[Jet], prime: int) -> int:

@@ -29,6 +29,7 @@ from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
+from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.renewal import degree_series
 from kahanmaps.laboratory.singular.contracted import Untold, contracted
 from kahanmaps.laboratory.singular.fates import (
@@ -40,11 +41,13 @@ from kahanmaps.laboratory.singular.fates import (
     Hypersurface,
     Range,
     fate_of,
+    fates_at_random,
     untold,
     unwritten,
 )
 from kahanmaps.laboratory.singular.orders import Fraction
 from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -62,6 +65,7 @@ _MOST_SHOWN = 200
 _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
 _POINTS = 3  # random ones, where det dPhi is looked at
+_MAX_DEGREE = 20_000  # of a composition
 _MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
 
 
@@ -69,10 +73,10 @@ _MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expande
 class SingularityRun(Displayed):
     """The singularities of a Kahan map at one exact eps, half the time step.
 
-    `denominator` is det(I - eps f'(x)) as text; `critical_degree` the degree of the Jacobian determinant of the
-    homogeneous map (None where it was too large to expand: contracted hypersurfaces are then known by random points).
-    The map is not dominant where that determinant vanishes identically: its image lies in a hypersurface, and none is
-    followed.
+    `denominator` is det(I - eps f'(x)) as text, "?" for a composition of which it is too large; `critical_degree` the
+    degree of the Jacobian determinant of the homogeneous map (None where it was too large to expand: contracted
+    hypersurfaces are then known by random points). The map is not dominant where that determinant vanishes identically:
+    its image lies in a hypersurface, and none is followed.
     """
 
     eps: fmpq
@@ -162,17 +166,21 @@ def singularities(
     if steps is not None and not 1 <= steps <= MAX_STEPS:
         raise InputError(f"found {steps} steps, expected 1 to {MAX_STEPS}")
     limits = _range(map_.dim, steps, time.monotonic() + seconds)
-    forms, common = homogeneous_map(map_.at(exact_eps))
+    over = map_.at(exact_eps)
+    try:
+        forms, common, below = homogeneous_map(over)
+    except TooLarge:
+        return _without_forms(map_, exact_eps, seed, limits)
     degree = max(0, *(int(form.total_degree()) for form in forms))
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
-    denominator = _affine(forms[-1] * common * (-1) ** map_.dim, map_)
-    is_undefined = bool(forms[-1].is_zero())  # det(I - eps f'(x)) = 0 for all x
+    denominator = _affine(below * (-1) ** (map_.dim * len(over.factors)), map_)
+    is_undefined = bool(below.is_zero())  # det(I - eps f'(x)) = 0 for all x
     if is_undefined or not _is_dominant(map_, exact_eps):
         return SingularityRun(exact_eps, denominator, degree, None, (), False, is_undefined, False)
     factors: dict[str, tuple[fmpq_mpoly, bool, int | None]] = {}
     critical_ones: dict[str, tuple[fmpq_mpoly, int]] = {}  # with exponents in the common factor
     excess: dict[str, tuple[fmpq_mpoly, int]] = {}
-    for factor, _ in (forms[-1] * common).factor()[1]:
+    for factor, _ in below.factor()[1]:
         if not _is_infinity(factor):
             factors[str(factor)] = (factor, True, 0)
     critical_degree: int | None = 0
@@ -205,12 +213,31 @@ def singularities(
         )
     if critical_degree is None and not stopped:
         progress("following critical points")
-        if map_.at(exact_eps).equation.degree == 1:
+        if over.is_bilinear:
             found += unwritten(map_, exact_eps, rng, limits)
         else:
             found.append(untold("the hypersurfaces that this map contracts are too large to be written down"))
         stopped = limits.is_over
     return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
+
+
+def _without_forms(map_: BirationalMap, eps: fmpq, seed: int, limits: Range) -> SingularityRun:
+    """The same for a composition whose forms are too large: hypersurfaces are told by random points."""
+    if not map_.at(eps).is_bilinear:
+        raise InputError(
+            "found a composition whose forms on projective space are too large, expected a shorter one, or one of maps "
+            "with equations that are linear in both points: of these the singularities are known by random points"
+        )
+    rng = random.Random(f"singularities {seed_for(seed, map_.subject, eps)}")
+    try:
+        line = Line(reduced(map_, eps, rng), rng, limits.end, _MAX_DEGREE)
+        line.step(1)
+    except Stopped as stopped:
+        raise InputError(f"found a composition that is too long here: {stopped.message}") from stopped
+    if not _is_dominant(map_, eps):
+        return SingularityRun(eps, "?", line.degree, None, (), False, False, False)
+    found = fates_at_random(map_, eps, rng, limits)
+    return SingularityRun(eps, "?", line.degree, None, tuple(found), limits.is_over, False, True)
 
 
 @dataclass(frozen=True)
@@ -343,9 +370,12 @@ def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, sec
     limits = _range(map_.dim, steps, time.monotonic() + seconds)
     if not _is_dominant(map_, eps):
         return _refused(eps, False, False) or _unknown("")
-    if map_.at(eps).equation.degree > 1:
+    if not map_.at(eps).is_bilinear:
         return _unknown(f"the singularities of {map_.kind} are followed in dimension {WRITTEN_DIMENSION} at most")
     rng = random.Random(f"patterns {seed_for(seed, map_.subject, eps)}")
+    if len(map_.at(eps).factors) > 1:
+        found = fates_at_random(map_, eps, rng, limits)
+        return _refused(eps, True, limits.is_over) or _patterns(0, found)
     try:
         return _patterns(*contracted(map_, eps, rng, limits))
     except Untold as error:
@@ -422,7 +452,8 @@ def _range(dim: int, steps: int | None, end: float) -> Range:
 def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[str, int]] | None:
     """The irreducible factors over Q of det M(x), for Kahan maps det(I - eps f'(x)), in x and eps, with multiplicities.
 
-    Exact. None above dimension 4, where it may be long, and where a variable is called eps.
+    Exact. None above dimension 4, where it may be long, for compositions too large to be multiplied out, and where a
+    variable is called eps.
 
     >>> symbolic_denominator(QuadraticSystem.from_text(["x", "y"], ["y", "6*x^2 - 2"]))
     [('12*x*eps^2 - 1', 1)]
@@ -430,7 +461,10 @@ def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[
     map_ = as_map(system)
     if map_.dim > 4 or "eps" in map_.variables:
         return None
-    rows = [[*row, row[0] * 0] for row in map_.matrix]
+    try:
+        rows = [[*row, row[0] * 0] for row in map_.matrix]
+    except TooLarge:
+        return None
     return [(format_polynomial(factor), int(power)) for factor, power in kernel_minors(rows)[-1].factor()[1]]
 
 

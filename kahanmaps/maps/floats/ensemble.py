@@ -71,6 +71,26 @@ class Engine(Protocol):
         """Take all lanes `steps` steps from the index `first`, recording and sampling at multiples."""
 
 
+class WordEngine:
+    """Advances lanes by several engines one after the other, each for a step."""
+
+    def __init__(self, engines: Sequence[Engine]) -> None:
+        self.engines = engines
+
+    def advance(
+        self, lanes: Lanes, first: int, steps: int, every: int, sampled: int, record: FloatArray | None
+    ) -> None:
+        """Take all lanes `steps` steps from the index `first`."""
+        row = 0
+        for index in range(first, first + steps):
+            for engine in self.engines:
+                engine.advance(lanes, index, 1, 0, sampled, None)
+            if record is not None and every and (index + 1) % every == 0:
+                record[row] = lanes.z
+                record[row][:, lanes.status != RUNNING] = np.nan
+                row += 1
+
+
 class Stepping:
     """A map, eps and a method, with the kernel that advances lanes: what orbits and ensembles are made of.
 
@@ -111,15 +131,21 @@ class Stepping:
         self._engine = self._made()
 
     def _made(self) -> Engine:
+        equations = [] if self.blocks is not None else [generic_equation(one) for one in self._map.factors]
+        engines: list[Engine]
         if self.compiled:
             from kahanmaps.maps.floats.numba_kernel import GenericNumba, PlanarNumba
 
             if self.blocks is not None:
                 return PlanarNumba(self.blocks, self.threads)
-            return GenericNumba(generic_equation(self._map), self.threads)
-        from kahanmaps.maps.floats.numpy_kernel import GenericNumpy, PlanarNumpy
+            engines = [GenericNumba(equation, self.threads) for equation in equations]
+        else:
+            from kahanmaps.maps.floats.numpy_kernel import GenericNumpy, PlanarNumpy
 
-        return PlanarNumpy(self.blocks) if self.blocks is not None else GenericNumpy(generic_equation(self._map))
+            if self.blocks is not None:
+                return PlanarNumpy(self.blocks)
+            engines = [GenericNumpy(equation) for equation in equations]
+        return engines[0] if len(engines) == 1 else WordEngine(engines)
 
     def lanes(self, starts: FloatArray) -> Lanes:
         """Lanes at the starts, an array (n, dim) of finite numbers."""
@@ -149,7 +175,7 @@ class Stepping:
         """How many steps of n lanes take about a tenth of a second."""
         # row steps a second, roughly, of one core
         speed = 1e10 if self.compiled and self.blocks else 8e8 if self.compiled else 1e8 if n > 64 else 1e6
-        work = n * self.dim * (1 if self.blocks else self.dim**2 / 8)
+        work = n * self.dim * (1 if self.blocks else len(self._map.factors) * self.dim**2 / 8)
         return max(1, int(0.1 * speed * self.threads / work))
 
 

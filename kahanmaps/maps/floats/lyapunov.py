@@ -10,7 +10,7 @@ Source: benettin-1980 for the method, petrera-suris-2016, eq. (Jac), for the tan
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import rational
 from kahanmaps.errors import InputError
+from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.floats.doubles import FloatArray, to_float
-from kahanmaps.maps.implicit import BirationalMap, Equation
+from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -117,7 +118,7 @@ def lyapunov_exponents(
         raise InputError(f"found starts of the shape {x.shape}, expected rows of {n} finite numbers, at least one")
     if len(x) * n * n > MAX_NUMBERS:
         raise InputError(f"found {len(x)} starts, expected at most {MAX_NUMBERS // (n * n)} in dimension {n}")
-    walk = _Walk(map_.at(rational(eps)).equation, x)
+    walk = _Walk([_Step(equation) for equation in map_.at(rational(eps)).equations], x)
     end = time.monotonic() + seconds
     done = counted = half_at = 0
     half = walk.sums.copy()
@@ -151,10 +152,10 @@ def lyapunov_exponents(
     )
 
 
-class _Walk:
-    """Points, frames and sums of logarithms of all orbits; `lanes` are those still going."""
+class _Step:
+    """The matrices of the equation of a factor at many points."""
 
-    def __init__(self, equation: Equation, x: FloatArray) -> None:
+    def __init__(self, equation: Equation) -> None:
         n = equation.dim
         self._exponents = np.array(equation.exponents, dtype=np.int64)[:, :n]
         self._coefficients = np.zeros((n, n + 1, len(equation.exponents)))
@@ -162,6 +163,31 @@ class _Walk:
             for j, entry in enumerate(row):
                 for k, coefficient in entry:
                     self._coefficients[i, j, k] = to_float(coefficient)
+
+    def matrices(self, x: FloatArray) -> FloatArray:
+        """(M | -r) at the points."""
+        monomials = np.prod(x[:, None, :] ** self._exponents, axis=2)
+        found: FloatArray = np.tensordot(monomials, self._coefficients, axes=(1, 2))
+        return found
+
+    def numerators(self, x: FloatArray, image: FloatArray) -> FloatArray:
+        """N = -(d/dx)(M x~ - r) at fixed x~."""
+        slopes = np.zeros((len(x), *self._exponents.shape))  # of each monomial by each variable
+        for k, exponents in enumerate(self._exponents.T):
+            less = self._exponents.copy()
+            less[:, k] -= exponents > 0
+            slopes[:, :, k] = exponents * np.prod(x[:, None, :] ** less, axis=2)
+        after = np.concatenate([image, np.ones((len(image), 1))], axis=1)
+        found: FloatArray = -(np.einsum("ijk,bj->bik", self._coefficients, after) @ slopes)
+        return found
+
+
+class _Walk:
+    """Points, frames and sums of logarithms of all orbits; `lanes` are those still going."""
+
+    def __init__(self, factors: Sequence[_Step], x: FloatArray) -> None:
+        n = x.shape[1]
+        self._factors = factors
         self._x = x
         self._frames = np.broadcast_to(np.eye(n), (len(x), n, n)).copy()
         self.sums = np.zeros((len(x), n))
@@ -173,34 +199,21 @@ class _Walk:
         self.sums[:] = 0.0
         self.volumes[:] = 0.0
 
-    def _matrices(self, x: FloatArray) -> FloatArray:
-        """(M | -r) at the points."""
-        monomials = np.prod(x[:, None, :] ** self._exponents, axis=2)
-        found: FloatArray = np.tensordot(monomials, self._coefficients, axes=(1, 2))
-        return found
-
-    def _numerators(self, x: FloatArray, image: FloatArray) -> FloatArray:
-        """N = -(d/dx)(M x~ - r) at fixed x~."""
-        slopes = np.zeros((len(x), *self._exponents.shape))  # of each monomial by each variable
-        for k, exponents in enumerate(self._exponents.T):
-            less = self._exponents.copy()
-            less[:, k] -= exponents > 0
-            slopes[:, :, k] = exponents * np.prod(x[:, None, :] ** less, axis=2)
-        after = np.concatenate([image, np.ones((len(image), 1))], axis=1)
-        found: FloatArray = -(np.einsum("ijk,bj->bik", self._coefficients, after) @ slopes)
-        return found
-
     def step(self) -> None:
         """One step of all orbits; those without an image, or with one out of range, end."""
+        for one in self._factors:
+            self._step(one)
+
+    def _step(self, one: _Step) -> None:
         x = self._x
         with np.errstate(all="ignore"):
-            rows = self._matrices(x)
+            rows = one.matrices(x)
             below, right = rows[:, :, :-1], -rows[:, :, -1]
             sound: NDArray[Any] = np.asarray(np.isfinite(rows).all(axis=(1, 2)))
             sound[sound] = np.linalg.det(below[sound]) != 0.0
             image = np.full_like(x, np.nan)
             image[sound] = _solved(below[sound], right[sound][:, :, None])[:, :, 0]
-            above = self._numerators(x, image)
+            above = one.numerators(x, image)
             sound &= np.isfinite(above).all(axis=(1, 2))
             below, above = below[sound], above[sound]
             frames = _solved(below, above @ self._frames[sound])

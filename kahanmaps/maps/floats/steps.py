@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.blocks import LINES, PlanarBlocks
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.maps.implicit import MapOver
+from kahanmaps.maps.implicit import StepOver
 from kahanmaps.maps.kahan import KahanMapOver
 
 IntArray = NDArray[np.int64]
@@ -188,7 +188,7 @@ class GenericEquation(NamedTuple):
         return len(self.constants)
 
 
-def generic_equation(map_over: MapOver) -> GenericEquation:
+def generic_equation(map_over: StepOver) -> GenericEquation:
     """The equation of a step of a map over QQ, each number rounded once. Raises InputError where one is out of range.
 
     A row of a Kahan map is of the size of 1 where eps is small, that of another map is divided by its largest

@@ -21,7 +21,7 @@ from kahanmaps.algebra.fields import GF, PrimeField
 from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.floats.blocks import require_same_system
-from kahanmaps.maps.implicit import BirationalMap, MapOver
+from kahanmaps.maps.implicit import BirationalMap, StepOver
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.normal_form.splitting import Splitting
@@ -173,7 +173,7 @@ class ModularEnsemble:
         map_ = as_map(system)
         forward = map_.at(eps, field)
         chosen = forward.inverse if backward else forward
-        if chosen.equation.degree > 1:
+        if not chosen.is_bilinear:
             if kernel == "numba":
                 raise InputError("the kernel numba is for equations that are linear in the old point: take numpy")
             self.kernel = "numpy"
@@ -182,9 +182,10 @@ class ModularEnsemble:
         if form is not None:
             require_same_system(form, map_)
         splitting = _split(form, field, chosen.eps)
-        self._walker: _Planes | _General
+        self._walker: _Planes | _General | _Word
         if splitting is None:
-            self._walker = _General(chosen, self.arithmetic, self.kernel)
+            walkers = [_General(one, self.arithmetic, self.kernel) for one in chosen.factors]
+            self._walker = walkers[0] if len(walkers) == 1 else _Word(walkers)
         else:
             self._walker = _Planes(splitting, self.arithmetic, self.kernel)
         self.steps = 0
@@ -361,7 +362,7 @@ class _General:
 
     method = "elimination"
 
-    def __init__(self, map_over: MapOver, arithmetic: Arithmetic, kernel: str) -> None:
+    def __init__(self, map_over: StepOver, arithmetic: Arithmetic, kernel: str) -> None:
         equation = map_over.equation
         assert map_over.field.characteristic == arithmetic.prime
         self.arithmetic, self.compiled = arithmetic, kernel == "numba"
@@ -467,3 +468,26 @@ class _General:
         if len(lanes):
             rows = column + np.argmax(M[column:, column, lanes] != 0, axis=0)
             M[rows, :, lanes], M[column, :, lanes] = M[column, :, lanes].T.copy().T, M[rows, :, lanes].copy()
+
+
+class _Word:
+    """Steps of several factors one after the other; the state is that of each."""
+
+    method = "elimination"
+
+    def __init__(self, factors: Sequence[_General]) -> None:
+        self._factors = factors
+        self.enter, self.leave = factors[0].enter, factors[0].leave
+
+    def walk(self, state: Residues, steps: int, first: int, singular_at: Integers) -> None:
+        """Steps in place; an orbit that ends stays where it was before its step."""
+        by_lane = self._factors[0].compiled
+        for step in range(first, first + steps):
+            before = state.copy()
+            for one in self._factors:
+                one.walk(state, 1, step, singular_at)
+            ended = singular_at == step
+            if by_lane:
+                state[ended] = before[ended]
+            else:
+                state[:, ended] = before[:, ended]

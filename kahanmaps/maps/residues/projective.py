@@ -8,8 +8,9 @@ where it vanishes, the forms without common factor decide, and where those vanis
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from math import isqrt
+from math import isqrt, prod
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,15 @@ from numpy.typing import NDArray
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.errors import InputError
+from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.kahan import as_map
-from kahanmaps.maps.projective import homogeneous_map
+from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Integers = NDArray[np.int64]
+ReducedForms = list[list[tuple[tuple[int, ...], int]]]
 
 MAX_PRIME = 1 << 29  # a sum of a few residues times a residue stays below 2^63
 MAX_DIMENSION = 12  # the minors are 2^(n + 1) arrays
@@ -34,8 +38,9 @@ _CHUNK = 1 << 15
 class ProjectiveMap:
     """A map at one exact eps on P^n over GF(p), 2 < p < 2^29; a system stands for its Kahan map. Exact.
 
-    `factor` is the common factor of the n + 1 forms as text ("1": there is none), None where it was not looked for;
-    `degree` the degree of the forms without it; `is_undefined` says that det M(x) vanishes identically.
+    `factor` is the common factor of the n + 1 forms as text ("1": there is none), None where it was not looked for or
+    forms of several factors are too large; `degree` the degree of the forms without it. A map with several factors has
+    no value where a step of one has none; `is_undefined` says that det M(x) vanishes identically.
     Raises InputError for a prime or dimension out of range, BadPrime where eps or the system have no reduction.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "-x^2"])
@@ -55,18 +60,17 @@ class ProjectiveMap:
             raise InputError(f"found a map of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
         self.prime, self.dim = prime, map_.dim
         over = map_.at(eps, field)
-        self._equation = over.equation
+        self._factors: list[tuple[Equation, ReducedForms | None]] = [(one, None) for one in over.equations]
         self.factor: str | None = None
-        self.degree = map_.dim * self._equation.degree
+        self.degree = prod(map_.dim * equation.degree for equation in over.equations)
         self.is_undefined = False
-        self._reduced: list[list[tuple[tuple[int, ...], int]]] | None = None
         if map_.dim <= MAX_FACTORED:
-            forms, factor = homogeneous_map(over)
-            self.factor = str(factor)
-            self.is_undefined = bool(forms[-1].is_zero())
-            self.degree = max((int(form.total_degree()) for form in forms if not form.is_zero()), default=0)
-            if not factor.is_constant():
-                self._reduced = [[(tuple(m), int(c)) for m, c in form.terms()] for form in forms]
+            forms = [homogeneous_map(one) for one in over.factors]
+            self._factors = [(one, _reduced(form)) for one, form in zip(over.equations, forms, strict=True)]
+            with suppress(TooLarge):
+                found = homogeneous_map(over) if len(forms) > 1 else forms[0]
+                self.factor, self.degree = str(found.factor), found.degree
+                self.is_undefined = bool(found.denominator.is_zero())
 
     @property
     def count(self) -> int:
@@ -79,27 +83,29 @@ class ProjectiveMap:
         found = np.empty_like(points)
         for low in range(0, points.shape[1], _CHUNK):
             X = points[:, low : low + _CHUNK]
-            monomials = [self._monomial(X, exponents) for exponents in self._equation.exponents]
-            rows: list[list[Integers]] = []
-            for row in self._equation.terms:
-                entries = []
-                for entry in row:
-                    total = np.zeros(X.shape[1], dtype=np.int64)
-                    for k, coefficient in entry:
-                        total = (total + int(coefficient) * monomials[k]) % p
-                    entries.append(total)
-                rows.append(entries)
-            image = np.stack([entry % p for entry in kernel_minors(rows, lambda a, b: a * b % p)])
-            if self._reduced is not None:
-                lost = np.flatnonzero(~image.any(axis=0))
-                image[:, lost] = self._values(X[:, lost])
-            found[:, low : low + _CHUNK] = self.normalised(image)
+            for equation, reduced in self._factors:
+                monomials = [self._monomial(X, exponents) for exponents in equation.exponents]
+                rows: list[list[Integers]] = []
+                for row in equation.terms:
+                    entries = []
+                    for entry in row:
+                        total = np.zeros(X.shape[1], dtype=np.int64)
+                        for k, coefficient in entry:
+                            total = (total + int(coefficient) * monomials[k]) % p
+                        entries.append(total)
+                    rows.append(entries)
+                image = np.stack([entry % p for entry in kernel_minors(rows, lambda a, b: a * b % p)])
+                if reduced is not None:
+                    lost = np.flatnonzero(~image.any(axis=0) & X.any(axis=0))
+                    image[:, lost] = self._values(reduced, X[:, lost])
+                X = self.normalised(image)
+            found[:, low : low + _CHUNK] = X
         return found
 
-    def _values(self, X: Integers) -> Integers:
+    def _values(self, forms: ReducedForms, X: Integers) -> Integers:
         """The forms without common factor at the columns of X."""
         values = np.zeros_like(X)
-        for i, terms in enumerate(self._reduced or []):
+        for i, terms in enumerate(forms):
             for exponents, coefficient in terms:
                 values[i] = (values[i] + coefficient * self._monomial(X, exponents)) % self.prime
         return values
@@ -171,6 +177,11 @@ class ProjectiveMap:
                 image[i] = total
             found[low : low + _CHUNK] = self.numbers(self.normalised(image))
         return found
+
+
+def _reduced(one: HomogeneousMap) -> ReducedForms | None:
+    """The terms of the forms without what they have in common; None where that is nothing."""
+    return None if one.factor.is_constant() else [[(tuple(m), int(c)) for m, c in form.terms()] for form in one.forms]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,212 @@
+"""How the parts of a system file are read: tables, texts, polynomials, matrices, and the mistakes that are found.
+
+What is read goes by the names that hold there: the variables, the parameters with their values, and the symbols.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomial, parse_rational_function
+from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
+from kahanmaps.errors import InputError, counted, quoted
+from kahanmaps.systems.quadratic import MAX_DIMENSION
+
+KINDS = ("system", "hamiltonian", "family", "bilinear", "map", "composition")
+KEYS = {
+    "": {"name", "variables", "parameters", *KINDS, "integrals", "density", "catalog"},
+    "system": {"rhs", "discretization", "degree"},
+    "hamiltonian": {"H", "J"},
+    "family": {"A", "H", "signs"},
+    "bilinear": {"new", "equations"},
+    "map": {"image", "inverse"},
+    "composition": {"of"},
+    "composition.of": {"file", "system", "map", "power", "inverse", "parameters", "involution"},
+    "density": {"phi"},
+    "catalog": {"title", "sources", "convention", "facts", *STRUCTURED_KEYS},
+}
+EXPECTED = {
+    ("system", "rhs"): "a list of polynomials of degree at most 2 in quotes, one for each variable",
+    ("bilinear", "equations"): "a list of equations in quotes, linear in the old point and in the new one",
+    ("composition", "of"): 'a list of maps, each with one of file = "...", system = "..." and map = { ... }',
+    ("map", "image"): "a list of rational functions in quotes, one for each variable",
+    ("hamiltonian", "H"): "a polynomial of degree at most 3 in quotes",
+    ("hamiltonian", "J"): '"standard", which is [[0, I], [-I, 0]], or the rows of a skew matrix',
+    ("family", "A"): "the rows of a skew-Hamiltonian matrix",
+    ("family", "H"): "a homogeneous cubic in quotes",
+    ("density", "phi"): "a rational function of the variables and eps in quotes",
+}
+
+
+# Gives the document that a part of a composition names, by "file" or "system" and its value, with a name that no other
+# file has, and the same for the parts of it.
+Other = Callable[[str, str], tuple[dict[str, Any], str, Any]]
+
+
+class PartReader:
+    """A document with the names that hold in it and the mistakes found so far; what its parts are read with."""
+
+    def __init__(
+        self,
+        document: dict[str, Any],
+        where: str,
+        overrides: Mapping[str, Any],
+        other: Other | None = None,
+    ) -> None:
+        """`other` looks up what parts of compositions name."""
+        self.document = document
+        self.where = where
+        self.overrides = overrides
+        self.other = other
+        self.inside: tuple[str, ...] = ()  # the files whose compositions this document is part of
+        self.parts = [0]  # how many were read in all
+        self.mistakes: list[tuple[str, str]] = []
+        self.parameters: dict[str, fmpq] = {}
+        self.unsure = False  # some parameter has no value: what depends on values is not judged
+        self.variables: tuple[str, ...] | None = None
+        self.symbols: tuple[str, ...] = ()  # parameters that the map is to contain as symbols
+
+    def _mistake(self, key: str, sentence: str) -> None:
+        # Keys come from the file: nothing in them may reach a terminal as an escape sequence.
+        self.mistakes.append((key if key.isprintable() and len(key) <= 100 else quoted(key, 100), sentence))
+
+    def _unknown_keys(self, section: str, table: Mapping[str, Any]) -> None:
+        known = KEYS[section]
+        for key in table:
+            if key not in known:
+                path = f"{section}.{key}" if section else key
+                hint = " (a batch spec is for kahanmaps batch run)" if path == "experiments" else ""
+                self._mistake(path, f"unknown key, expected one of {', '.join(sorted(known))}{hint}")
+
+    def _table(self, key: str) -> dict[str, Any] | None:
+        value = self.document.get(key, {})
+        if isinstance(value, dict):
+            return value
+        self._mistake(key, f"found {show(value)}, expected a table [{key}]")
+        return None
+
+    def _text(self, path: str, value: Any) -> str | None:
+        if isinstance(value, int | str) and not isinstance(value, bool):
+            try:
+                return _plain_text(value)
+            except InputError as error:
+                self._mistake(path, str(error))
+                return None
+        self._mistake(path, f"found {show(value)}, expected an expression in quotes")
+        return None
+
+    def _polynomial(
+        self, path: str, value: Any, at_most: int, more: Sequence[str] = (), *, of_map: bool = True
+    ) -> fmpq_mpoly | None:
+        """A polynomial in the variables, `more` names and, of a map, the symbols and eps; its degree in the variables
+        is bounded.
+        """
+        text = self._text(path, value)
+        if text is None or self.variables is None:
+            return None
+        try:
+            tail = (*self.symbols, "eps") if of_map else ()
+            polynomial = parse_polynomial(text, (*self.variables, *more, *tail), self.parameters)
+        except InputError as error:
+            self._mistake(path, str(error))
+            return None
+        found = max((sum(m[: len(self.variables)]) for m in polynomial.monoms()), default=-1)
+        if found > at_most and not self.unsure:
+            self._mistake(path, f"found a polynomial of degree {found}, expected at most {at_most}")
+            return None
+        return polynomial
+
+    def _matrix(self, path: str, value: Any, size: int | None) -> fmpq_mat | None:
+        if not isinstance(value, list) or not value or not all(isinstance(row, list) for row in value):
+            self._mistake(path, f'found {show(value)}, expected rows of numbers, e.g. [["0", "1"], ["-1", "0"]]')
+            return None
+        expected = size or len(value)
+        if expected > MAX_DIMENSION:
+            self._mistake(path, f"found {expected} rows, expected at most {MAX_DIMENSION}")
+            return None
+        bad = False
+        if len(value) != expected:
+            self._mistake(path, f"found {len(value)} rows, expected {expected}")
+            bad = True
+        entries: list[fmpq] = []
+        for i, row in enumerate(value):
+            if len(row) != expected:
+                self._mistake(f"{path}[{i + 1}]", f"found {len(row)} entries, expected {expected}")
+                bad = True
+            for j, entry in enumerate(row):
+                text = self._text(f"{path}[{i + 1}][{j + 1}]", entry)
+                try:
+                    entries.append(parse_constant(text, self.parameters) if text is not None else fmpq(0))
+                    bad = bad or text is None
+                except InputError as error:
+                    self._mistake(f"{path}[{i + 1}][{j + 1}]", str(error))
+                    bad = True
+        return None if bad else fmpq_mat(expected, expected, entries)
+
+    def _required(self, section: str, table: Mapping[str, Any], key: str) -> Any:
+        if key not in table:
+            self._mistake(f"{section}.{key}", f"missing, expected {EXPECTED[section, key]}")
+        return table.get(key)
+
+    def _list(self, section: str, key: str, value: Any, what: str) -> list[Any] | None:
+        """A list with one entry for each variable; None, and a mistake, where it is another or missing."""
+        path = f"{section}.{key}"
+        if value is None:
+            return None
+        if not isinstance(value, list):
+            self._mistake(path, f"found {show(value)}, expected {EXPECTED.get((section, key), 'a list')}")
+            return None
+        if self.variables is None:
+            return None
+        if len(value) != len(self.variables):
+            count = len(self.variables)
+            self._mistake(path, f"found {counted(len(value), what)}, expected {count}, one for each variable")
+            return None
+        return value
+
+    def _claim(self, path: str, value: Any) -> RationalFunction | None:
+        text = self._text(path, value)
+        if text is None or self.variables is None:
+            return None
+        try:
+            return parse_rational_function(text, (*self.variables, *self.symbols, "eps"), self.parameters)
+        except InputError as error:
+            self._mistake(path, str(error))
+            return None
+
+
+def json_like(value: Any) -> Any:
+    """Plain data with long integers as text."""
+    if isinstance(value, dict):
+        return {key: json_like(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [json_like(item) for item in value]
+    if isinstance(value, int) and value.bit_length() > 1000:
+        return format_number(fmpq(value))
+    return value
+
+
+def plain_number(value: Any) -> Any:
+    """The value of a parameter. Raises InputError for what is no number by its kind."""
+    if isinstance(value, bool) or not isinstance(value, int | str | fmpq):
+        if isinstance(value, list | dict):
+            raise InputError(f"found {show(value)}, expected a number")
+        return value
+    return value
+
+
+def _plain_text(value: int | str) -> str:
+    return value if isinstance(value, str) else format_number(fmpq(value))
+
+
+def show(value: Any) -> str:
+    """A value for a message, cut where it is long."""
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
+        return "a value too large to show"
+    return text if len(text) <= 60 else f"{text[:40]}...{text[-15:]}"

@@ -1,0 +1,95 @@
+"""Compositions too large to be multiplied out: every command steps them, or says in one line that it needs formulas."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from schema_helpers import mistakes
+
+WORDS = {
+    "four": '[composition]\nof = [{ system = "henon_heiles", power = 4 }]\n'
+    '[density]\nphi = "(1 + eps^2)^2 - 4*eps^4*(q1^2 + q2^2)"\n[integrals]\nI = "q1"',
+    "three tops": 'variables = ["a", "b", "c", "d", "e", "f"]\n[composition]\nof = [{ system = "kirchhoff_case" }, '
+    '{ system = "clebsch_first_flow" }, { system = "lagrange_top" }]\n[density]\nphi = "1"\n[integrals]\nI = "a"',
+    "ten letters": 'variables = ["x", "y"]\n[composition]\nof = ['
+    + ", ".join(['{ system = "lotka_volterra" }, { system = "weierstrass", inverse = true }'] * 5)
+    + ']\n[density]\nphi = "x*y"\n[integrals]\nI = "x"',
+}
+STARTS = {"four": "1/2,1/3,1/5,1/7", "three tops": "1/2,1/3,1/5,1/7,1/9,1/11", "ten letters": "1/2,1/3"}
+
+
+@pytest.fixture
+def word(tmp_path):
+    def written(name):
+        path = tmp_path / "word.toml"
+        path.write_text(WORDS[name])
+        return path
+
+    return written
+
+
+@pytest.mark.parametrize("name", WORDS)
+@pytest.mark.parametrize("arithmetic", ["exact", "mod:10007", "float", "ball:auto"])
+def test_orbits_are_stepped(kahanmaps, word, name, arithmetic):
+    line = f"orbit {word(name)} --start {STARTS[name]} --eps 1/10 --steps 1 --arithmetic {arithmetic} --format jsonl -q"
+    found = kahanmaps(line)
+    records = [json.loads(text) for text in found.out.splitlines()]
+    assert [mistakes("orbit", record) for record in records] == [[]] * 4
+    assert (found.status, records[-1]["status"]) == (0, "completed")
+    assert len(records[0]["composition"]) == {"four": 4, "three tops": 3, "ten letters": 10}[name]
+
+
+@pytest.mark.parametrize("name", WORDS)
+@pytest.mark.parametrize(
+    ("line", "schema"),
+    [
+        ("check-measure {}", "check"),
+        ("check-integrals {}", "check"),
+        ("degrees {} --terms 1", "degrees"),
+        ("find-density {} --seconds 5", "find-density"),
+        ("find-integrals {} --seconds 5", "find-integrals"),
+        ("cycles {} --prime 11 --samples 5 --steps 5", "cycles"),
+        ("lyapunov {} --eps 1/50 --steps 20", "lyapunov"),
+        ("systems {}", "systems"),
+    ],
+)
+def test_commands_go_through_the_factors(kahanmaps, word, name, line, schema):
+    quiet = "" if schema == "systems" else " -q"
+    found = kahanmaps(f"{line.format(word(name))} --json{quiet}")
+    record = json.loads(found.out)
+    assert mistakes(schema, record) == []
+    if line.startswith("check"):
+        is_density = name == "four" and "measure" in line
+        assert (record["verdict"], found.status) == (("supported", 0) if is_density else ("refuted", 1))
+    if line.startswith("find-density") and name == "four":
+        assert record["densities"]
+
+
+def test_singularities_are_told_by_random_points(kahanmaps, word):
+    found = kahanmaps(f"singularities {word('four')} --eps 1/3 --steps 4 --json -q")
+    record = json.loads(found.out)
+    assert mistakes("singularities", record) == []
+    (run,) = record["runs"]
+    assert (run["denominator"], run["map_degree"], run["critical_degree"]) == ("?", 39, None)
+    assert {h["status"] for h in run["hypersurfaces"]} >= {"confined"}
+
+
+@pytest.mark.parametrize("line", ["systems {} --latex", "convert {} --to sympy", "convert {} --to c"])
+@pytest.mark.parametrize("name", WORDS)
+def test_formulas_are_refused_in_one_line(kahanmaps, word, name, line):
+    found = kahanmaps(line.format(word(name)))
+    assert found.status == 2
+    (error,) = found.err.strip().splitlines()
+    assert "formulas are too large to be multiplied out" in error
+
+
+def test_what_is_preserved_for_all_values_of_a_shared_symbol(kahanmaps, tmp_path):
+    path = tmp_path / "shared.toml"
+    part = '{{ system = "lyness", power = {}, parameters = {{ a = "a" }} }}'
+    path.write_text(f"parameters.a = 3\n[composition]\nof = [{part.format(1)}, {part.format(2)}]")
+    found = kahanmaps(f"find-integrals {path} --symbolic a --json -q")
+    record = json.loads(found.out)
+    assert mistakes("find-integrals", record) == []
+    assert (record["symbols"], [one["verdict"] for one in record["integrals"]]) == (["a"], ["proved"])
+    assert "x*a" in record["integrals"][0]["integral"]
