@@ -43,7 +43,7 @@ class Equation:
     @cached_property
     def degree(self) -> int:
         """The degree of the forms."""
-        return sum(self.exponents[0])
+        return int(sum(self.exponents[0]))
 
     def monomials(self, X: Sequence[Any], times: Product = operator.mul) -> list[Any]:
         """The values of the monomials at (X_1, ..., X_n, Z), elements of any ring that `times` multiplies."""

@@ -14,7 +14,7 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.singular.critical import critical_points
+from kahanmaps.laboratory.singular.critical import critical_points, pole_points
 from kahanmaps.laboratory.singular.fates import CONFINED, NOT_CONFINED
 from kahanmaps.laboratory.singular.jets import (
     Jet,
@@ -40,7 +40,7 @@ def runs(name: str, **options):
 def test_the_forms_are_those_of_the_map():
     for name in ("lorenz", "weierstrass", "henon_heiles", "paper_m2"):
         system = load(name).system
-        forms, _ = homogeneous_map(KahanMap(system, "1/7", QQ))
+        forms = homogeneous_map(KahanMap(system, "1/7", QQ)).forms
         point = [fmpq(2, k + 3) for k in range(system.dim)]
         values = [form(*point, fmpq(1)) for form in forms]
         assert tuple(value / values[-1] for value in values[:-1]) == KahanMap(system, "1/7").step(point)
@@ -245,12 +245,18 @@ def test_large_dimensions_are_refused():
         singularities(QuadraticSystem.from_text(names, [f"{name}^2" for name in names]), "1/7")
 
 
-def test_critical_points_on_a_line_are_neither_at_infinity_nor_poles():
-    """x' = y, y' = 6 x^2 - 2 with eps = 1/2: det(I - eps f') = 1 - 3 x is zero at the image."""
+def test_poles_and_critical_points_on_a_line_are_neither_at_infinity_nor_of_the_other_kind():
+    """x' = y, y' = 6 x^2 - 2 with eps = 1/2: det(I - eps f') = 1 - 3 x at a point and at its image."""
     field, rng = GF(PRIME), random.Random(3)
     system = load("weierstrass").system
     forms, back = (KahanMap(system, eps, field).equation for eps in ("1/2", "-1/2"))
     phi = KahanMap(system, "1/2", field)
+    poles, number = pole_points([forms], rng)
+    assert number == {1: 1}
+    ((x, _, z),) = [pole.point for pole in poles]
+    assert (z - 3 * x) % PRIME == 0
+    a, b, c = poles[0].gradient
+    assert ((a + 3 * c) % PRIME, b, c != 0) == (0, 0, True)
     points, number = critical_points([forms], [back], rng)
     assert (number, len(points)) == ({1: 1}, 1)
     for one in points:
@@ -262,7 +268,7 @@ def test_critical_points_on_a_line_are_neither_at_infinity_nor_poles():
 
 
 def follow(equation, point, direction, tangents, steps, precision):
-    return list(islice(walk(equation, point, direction, tangents, precision), steps))
+    return list(islice(walk([equation], point, direction, tangents, precision), steps))
 
 
 def test_a_generic_point_loses_no_rank_and_follows_the_map():
@@ -310,7 +316,7 @@ def test_a_series_divides_as_rational_numbers_at_a_large_prime_do(name, eps, poi
     system, field = load(name).system, GF(PRIME)
     start, direction = [*map(fmpq, point), fmpq(1)], [*range(1, system.dim + 1), 0]
     X = [x + PRIME * v for x, v in zip(start, direction, strict=True)]
-    forms, _ = homogeneous_map(KahanMap(system, eps, QQ))
+    forms = homogeneous_map(KahanMap(system, eps, QQ)).forms
     residues = [int(field.convert(x)) for x in start]
     for step in follow(KahanMap(system, eps, field).equation, residues, direction, [], steps, 32):
         image = [form(*X) for form in forms]
@@ -327,14 +333,14 @@ def test_a_series_divides_as_rational_numbers_at_a_large_prime_do(name, eps, poi
 def test_a_point_has_the_image_of_the_map_and_none_where_all_minors_vanish():
     system = load("lorenz").system
     forms = KahanMap(system, "1/7", GF(PRIME)).equation
-    image = image_of(forms, [3, 5, 7, 1])
+    image = image_of([forms], [3, 5, 7, 1])
     inverse = pow(image[-1], -1, PRIME)
     expected = KahanMap(system, "1/7", GF(PRIME)).step([GF(PRIME).convert(c) for c in (3, 5, 7)])
     assert [c * inverse % PRIME for c in image[:-1]] == [int(c) for c in expected]
     # x' = x^2, y' = x y at eps = 1: x (Z - x) : y (Z - x) : (Z - 2 x) (Z - x), 0 on a line where curves have images
     special = KahanMap(QuadraticSystem.from_text(["x", "y"], ["x^2", "x*y"]), 1, GF(PRIME)).equation
-    assert [image_of(special, [1, y, 1]) for y in (0, 5)] == [None, None]
-    assert image_of(special, [0, 5, 1]) is not None
+    assert [image_of([special], [1, y, 1]) for y in (0, 5)] == [None, None]
+    assert image_of([special], [0, 5, 1]) is not None
 
 
 def test_jets_keep_the_lower_precision_and_lose_what_is_divided_out():

@@ -135,7 +135,7 @@ def is_birational(map_: MapOver, rng: random.Random) -> bool:
 
 def _is_birational(map_: StepOver, rng: random.Random) -> bool:
     forms = homogeneous_map(map_).forms
-    inverse = map_.inverse.equation
+    (inverse,) = map_.inverse.equations
     X = forms[0].context().gens()
     zero = forms[0] * 0
     rows = inverse.rows(inverse.monomials(forms), zero)
