@@ -51,9 +51,13 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 63 bits, two of
     each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
 
-    A recurrence is accepted where it holds for at least 2 terms more than determine it, how many is told, and where
-    there are terms enough beyond the last confinement: singularities are followed, and as long as they may lower
-    degrees later on there is an estimate only. "no confinement" is said with the number of steps that were tried.
+    The hypersurfaces that the map contracts are followed, and explain the degrees for all times: generating function,
+    recurrence, dynamical degree. A line for each of them says when it comes back, and what it costs. Where they explain
+    nothing, a recurrence is accepted that holds for at least 2 terms more than determine it, with terms enough beyond
+    the last confinement, and else there is an estimate only. "no confinement" is said with the number of steps that
+    were tried.
+
+    In the plane a dynamical degree above 1 is proved: its bounds are then exact.
 
     Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
     vary; 2 wrong use; 3 undecided, or stopped early.

@@ -184,9 +184,9 @@ class Recurrence:
         >>> find_recurrence([2 * n * n + 1 for n in range(12)]).characteristic_text
         '(t - 1)^3'
         """
-        factors = [(fmpz_poly([0, 1]), self.preperiod)] * bool(self.preperiod) + list(self.factors)
-        shown = [(format_univariate(fmpq_poly(factor)), k) for factor, k in factors]
-        return " ".join(f"({text})" + (f"^{k}" if k > 1 else "") for text, k in shown) or "1"
+        shown = [(f"({format_univariate(fmpq_poly(factor))})", k) for factor, k in self.factors]
+        shown = [("t", self.preperiod)] * bool(self.preperiod) + shown
+        return " ".join(text + (f"^{k}" if k > 1 else "") for text, k in shown) or "1"
 
     @property
     def text(self) -> str:
