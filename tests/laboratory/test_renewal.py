@@ -84,6 +84,23 @@ def test_three_lines_come_back_after_the_sum_of_the_exponents_over_each(exponent
     assert sorted(ends) == sorted(n + 1 for n in orbits)
 
 
+@pytest.mark.parametrize(
+    ("m", "name"),
+    quick(
+        [(1, "planar_cubic_hamiltonian"), (2, "paper_m2"), (3, "paper_m3")],
+        [(1, "planar_cubic_hamiltonian"), (2, "paper_m2")],
+    ),
+)
+def test_the_degrees_of_the_family_are_those_of_m_planes(m, name):
+    """docs/mathematics.md: 3 m n^2/4 + 1 for even n, m (3 n^2 + 5)/4 for odd n, from a recursion in the plane."""
+    planar = [1, 2]
+    for n in range(1, 40):
+        planar.append(2 * planar[n] - planar[n - 1] + (1 if n % 2 else 2))
+    law = [m * D - (m - 1) * (n % 2 == 0) for n, D in enumerate(planar)]
+    assert law == [m * (3 * n * n + 5) // 4 if n % 2 else 3 * m * n * n // 4 + 1 for n in range(41)]
+    assert coefficients(explained(name).fraction, 41) == law
+
+
 def test_orders_that_are_wrong_explain_nothing():
     """Each number in the orders of a map counts: changed, the degrees are not those measured."""
     found = explained("euler_top")
