@@ -13,6 +13,8 @@ from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.singular.fates import CONFINED
 
 PROVED, EXPLAINED, MEASURED, ESTIMATED = "proved", "explained", "measured", "estimated"
+# Of a map of the plane that keeps each curve of a pencil: diller-favre-2001.
+_CURVES = {GrowthClass.LINEAR: "rational curves", GrowthClass.QUADRATIC: "elliptic curves, of genus 1"}
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,8 @@ def conclude(found: Findings) -> Conclusion:
         )
     if _orbits_on_curves_proved(found):
         sense = "superintegrable" if found.dim > 2 else "integrable"
-        sentence = f"{sense.capitalize()} (proved): {integrals}, so that orbits lie on curves; {phrase}{known}."
+        curves = _CURVES.get(growth, "curves") if found.dim == 2 else "curves"
+        sentence = f"{sense.capitalize()} (proved): {integrals}, so that orbits lie on {curves}; {phrase}{known}."
         return verdict("integrable", sentence, sense, PROVED)
     if growth is GrowthClass.UNKNOWN and (liouville or orbits_lie_on_curves(found)):
         curves = ", so that orbits lie on curves" if orbits_lie_on_curves(found) else ""

@@ -8,6 +8,7 @@ from typing import Any
 from kahanmaps.algebra.text import parse_number
 from kahanmaps.errors import InputError, printable
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.growth.enclosure import Enclosure
 from kahanmaps.laboratory.singular.singularities import Patterns
 
 _MOST_TERMS = 10_000
@@ -45,6 +46,7 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
             tuple(int(line["prime"]) for line in record["lines"]),
             tuple(int(line["eps_residue"]) for line in record["lines"]),
             patterns=_patterns(record.get("singularities")),
+            enclosure=_enclosure(record.get("enclosure")),
         )
         return printable(str(record["system"])), growth
     except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
@@ -54,10 +56,21 @@ def degrees_of_record(record: Any, where: str = "record") -> tuple[str, DegreeGr
 def _patterns(record: Any) -> Patterns | None:
     if record is None:
         return None
-    searched = record["searched"]
+    searched, known = record["searched"], record.get("generating_function") or {}
+    series = tuple(tuple(int(c) for c in known[part]) for part in ("numerator", "denominator") if known)
+    if series and not (len(series[0]) <= _MOST_TERMS and len(series[1]) <= _MOST_TERMS and series[1][:1] == (1,)):
+        raise InputError("no generating function with a short denominator that begins with 1")
     return Patterns(
         tuple(int(length) for length in record["lengths"]),
         None if searched is None else int(searched),
         bool(record["some_confined"]),
         str(record["running"]),
+        series,
     )
+
+
+def _enclosure(record: Any) -> Enclosure | None:
+    if record is None:
+        return None
+    numbers = (int(record[name]) for name in ("steps", "degree_below", "degree_above", "prime", "eps_residue"))
+    return Enclosure(str(record["lower"]), str(record["upper"]), *numbers)

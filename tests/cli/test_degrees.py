@@ -41,7 +41,7 @@ def test_the_json_has_what_is_needed_to_run_it_again(kahanmaps):
     assert found["degrees"] == [1, 2, 4, 8, 16]
     assert (found["ended"], found["growth"], found["dynamical_degree"]["value"]) == ("terms", "exponential", "2")
     assert found["recurrence"]["checked"] == 5
-    assert found["basis"] == "explained: no confinement within 1000 steps"
+    assert found["basis"] == "explained: no confinement within 400 steps"
     assert found["singularities"]["generating_function"] == {"numerator": ["1"], "denominator": ["1", "-2"]}
     assert (found["enclosure"]["upper"], float(found["enclosure"]["lower"]) > 1.5) == ("2", True)
 

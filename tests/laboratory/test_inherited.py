@@ -17,7 +17,7 @@ from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import rank
 from kahanmaps.laboratory.preserve.inherited import inherited_integrals
-from kahanmaps.laboratory.preserve.integrals import _gradient, find_integrals
+from kahanmaps.laboratory.preserve.integrals import find_integrals, gradient_at
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -91,7 +91,7 @@ def test_gradients_are_those_of_the_functions_written_out(file):
     inherited, map_ = inherited_integrals(file.system), Laboratory(file).maps[0]
     point = map_.random_point()
     rows = inherited.gradients(map_, point)
-    written = [_gradient(map_, one.function, point) for one in found.integrals]
+    written = [gradient_at(map_, one.function, point) for one in found.integrals]
     assert rank(rows, map_.prime) == rank([*rows, *written], map_.prime) == rank(written, map_.prime) == len(rows)
     assert all(one.verdict is Verdict.PROVED for one in found.integrals)
 

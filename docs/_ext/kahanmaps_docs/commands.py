@@ -12,7 +12,7 @@ from kahanmaps_docs.markdown import block, code, plain, table
 
 def commands() -> str:
     """A section for every command, under the headings and in the order of `kahanmaps --help`."""
-    main = click.Context(cli, info_name="kahanmaps")
+    main = click.Context(cli, info_name="kahanmaps", **cli.context_settings)  # click keeps the help option it makes
     pieces = []
     for heading, names in SECTIONS.items():
         pieces.append(f"## {plain(heading)}\n")

@@ -36,7 +36,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import degree_in
-from kahanmaps.errors import BadPrime
+from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.singular.jets import image_of
 from kahanmaps.maps.implicit import BirationalMap, MapOver, StepOver
@@ -127,10 +127,13 @@ def enclose(
 def is_birational(map_: MapOver, rng: random.Random) -> bool:
     """Whether a map over GF(p) is birational, proved where the answer is yes.
 
-    Of every factor: the equation of its inverse, at the image of a generic point, is to annihilate that point, as
-    forms, and nothing else, which one point shows.
+    It is not where the inverse is not known. Of every factor: the equation of its inverse, at the image of a generic
+    point, is to annihilate that point, as forms, and nothing else, which one point shows.
     """
-    return all(_is_birational(factor, rng) for factor in map_.factors)
+    try:
+        return all(_is_birational(factor, rng) for factor in map_.factors)
+    except InputError:
+        return False
 
 
 def _is_birational(map_: StepOver, rng: random.Random) -> bool:

@@ -378,7 +378,7 @@ def orders_at(
         if repeats and (len(run) >= min(reach, limits.along) or not is_whole):
             laws = tuple(one.characteristic for one in found if one is not None)
             kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
-            return Orders(rows[:kept], laws, len(rows), True)
+            return Orders(rows[:kept], laws, len(run), True)
         longest = min(reach, max(limits.along, 2 * (hit or 0)))
         if not is_whole or steps >= longest:
             return Orders(rows, (), len(rows), False)

@@ -422,8 +422,7 @@ def _patterns(map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = 
         if h.settled_at is None:
             return _unknown(f"the pattern of {name} is still running after {h.followed} steps (--steps)")
     lengths = {h.settled_at for h in critical if h.settled_at}
-    # What repeats itself needs no further look.
-    open_ones = [h.followed for h in critical if h.status != CONFINED and not h.orders.recurrences]
+    open_ones = [h.followed for h in critical if h.status != CONFINED]
     series: tuple[tuple[int, ...], ...] = ()
     if all(h.orders.is_settled and h.degree for h in critical) and map_degree > 0:
         fraction = degree_series(map_degree, [(h.degree, h.orders) for h in critical])
