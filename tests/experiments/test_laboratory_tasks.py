@@ -119,7 +119,7 @@ def test_the_whole_report_is_kept_if_asked_for(name):
 def test_the_growth_of_degrees_is_known(system, growth, rate, power):
     found = perform("degrees", system)
     assert (found["growth"], found["dynamical_degree"], found["power"]) == (growth, rate, power)
-    assert found["status"] == "explained"
+    assert found["status"] == ("explained" if found["degrees"][1] > 1 else "recurrence")
     assert found["degrees"] == list(degree_growth(system.system).degrees)
     assert found["reached"] == len(found["degrees"]) - 1
 
@@ -143,8 +143,8 @@ def test_degrees_end_where_they_are_told_to(asked, status, degrees):
 
 
 def test_a_result_that_the_time_cut_short_says_so():
-    found = perform("degrees", of_catalogue("clebsch_first_flow"), seconds=0.3, max_degree=10**6)
-    assert (found["status"], found["growth"]) == ("time", "unknown")
+    found = perform("degrees", of_catalogue("paper_m3"), seconds=1, terms=400)
+    assert (found["status"], len(found["degrees"]) < 400) == ("time", True)
 
 
 def test_growth_without_a_recurrence_is_estimated_and_not_more():
