@@ -489,11 +489,15 @@ def test_random_elements_are_determined_by_the_seed(field):
     assert draws(1) != draws(2)
 
 
-def test_random_rationals_stay_below_the_height():
+def test_random_rationals_reach_the_height_and_no_more():
     rng = random.Random(0)
     drawn = [QQ.random(rng, 5) for _ in range(200)]
-    assert max(abs(number.p) for number in drawn) <= 5
-    assert max(number.q for number in drawn) <= 5
+    assert (min(x.p for x in drawn), max(x.p for x in drawn), max(x.q for x in drawn)) == (-5, 5, 5)
+
+
+@pytest.mark.parametrize("field", [QQ, RR(64), CC(64)], ids=repr)
+def test_the_height_of_random_elements_is_10_where_none_is_given(field):
+    assert all(str(field.random(random.Random(k))) == str(field.random(random.Random(k), 10)) for k in range(20))
 
 
 @pytest.mark.parametrize("prime", [2, 7])

@@ -295,7 +295,11 @@ def test_residues_without_simple_numbers() -> None:
 
 def test_chinese_remainders() -> None:
     assert chinese([2, 0], 3, [3, 4], 5) == [8, 9]
-    assert random_prime(random.Random(1), 2) in (2, 3)
+
+
+@pytest.mark.parametrize(("bits", "primes"), [(2, {2, 3}), (3, {5, 7}), (5, {17, 19, 23, 29, 31})])
+def test_random_primes_are_all_those_of_so_many_bits(bits: int, primes: set[int]) -> None:
+    assert {random_prime(random.Random(k), bits) for k in range(60)} == primes
 
 
 @pytest.mark.parametrize("prime", [7, 101, 2**61 - 1])

@@ -100,6 +100,7 @@ def test_point_and_slopes():
 @pytest.mark.parametrize(
     ("equations", "expected"),
     [
+        ([x**2 * fmpq(1, 4) + y**2 * fmpq(1, 9) - 5, x * y - 12, z], {(2, 6, 0), (4, 3, 0), (-2, -6, 0), (-4, -3, 0)}),
         ([x**2 + y**2 - 5, x * y - 2, z - x - y], {(1, 2, 3), (2, 1, 3), (-1, -2, -3), (-2, -1, -3)}),
         ([x + y + z - 6, x * y + y * z + z * x - 11, x * y * z - 6], set(itertools.permutations((1, 2, 3)))),
         ([x**2 - y, y**2 - z, z**2 - x], {(0, 0, 0), (1, 1, 1)}),  # x^8 = x: two rational solutions and six others
