@@ -15,7 +15,7 @@ from functools import cache
 import pytest
 from flint import fmpq_mat, fmpq_poly
 from helpers import LORENZ, quick
-from paper.members import LARGE_SPECTRA, SPECTRA, file, member
+from paper.members import LARGE_SPECTRA, SPECTRA, file, member, point
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.text import parse_polynomial
@@ -505,3 +505,26 @@ def test_a_quadratic_system_without_structure_is_drawn_with_terms_of_all_degrees
     drawn, homogeneous = objects.arbitrary_system(), objects.arbitrary_system(homogeneous=True)
     zero = objects.vector("x") * objects.number(0)
     assert drawn.value(zero.entries()) != homogeneous.value(zero.entries())
+
+
+@pytest.mark.parametrize("m", [6, 7, 9])
+def test_of_many_sign_vectors_all_single_flips_are_tried_and_up_to_four_others(m):
+    samples = [realise.sign_sample(m, random.Random(seed)) for seed in range(20)]
+    if m == 6:
+        assert samples == [None] * 20
+        return
+    flips = tuple(tuple(-1 if j == i else 1 for j in range(m)) for i in range(m))
+    assert {sample[:m] for sample in samples} == {flips}
+    assert max(len(sample) for sample in samples) == m + 4
+    for others in (sample[m:] for sample in samples):
+        assert len({*others, *flips}) == m + len(others)
+        assert all(len(signs) == m and signs[0] == 1 and set(signs) == {1, -1} for signs in others)
+
+
+def test_a_claim_that_is_not_defined_does_not_hold():
+    def nowhere(objects):
+        raise ZeroDivisionError
+
+    claim, objects = claims()[0], point("m=2, split")
+    assert verify_module._holds(claim, objects)
+    assert not verify_module._holds(replace(claim, function=nowhere), objects)
