@@ -45,7 +45,8 @@ from trials import ROOT, Copy, is_compiled
 
 KEPT = ROOT / ".mutants"
 FOLDERS = ("algebra", "maps", "invariants", "checks", "laboratory", "paper", "family", "systems", "documents")
-TESTS = [*(f"tests/{folder}" for folder in FOLDERS), "kahanmaps", "tests/cli", "tests/frozen"]
+LIMITS = "tests/test_limits.py"
+TESTS = [*(f"tests/{folder}" for folder in FOLDERS), "kahanmaps", "tests/cli", "tests/frozen", LIMITS]
 ENOUGH = 0.95
 
 SWAPPED: dict[type[ast.AST], tuple[str, str]] = {
@@ -281,7 +282,7 @@ class Coverage:
         tests = set()
         for context in contexts:
             tests |= {context} if context in self.seconds else set(self.by_file.get(context, ()))
-        own = f"tests/{mutant.path.split('/')[1]}/", mutant.path  # its folder of tests, and its own docstrings
+        own = f"tests/{mutant.path.split('/')[1]}/", mutant.path, LIMITS  # its folder of tests, its own docstrings
         order = sorted(tests, key=lambda test: (not test.startswith(own), self.seconds[test]))
         # What one test computed and another finds in a cache is on record for the first alone.
         files = {test.partition("::")[0] for test in order if test.startswith(own)}
