@@ -167,10 +167,10 @@ class Changes(ast.NodeVisitor):
             self.inside(node)
 
     def is_no_mathematics(self, node: ast.AST) -> bool:
-        """Clocks, work, random numbers, words; private numbers of a module, which are limits of effort and sizes."""
+        """Clocks, work, random numbers, words; private numbers of a module and MAX_..., limits of effort and sizes."""
         if isinstance(node, ast.Assign) and not self.names and isinstance(node.targets[0], ast.Name):
-            private = node.targets[0].id.startswith(("_", "DEFAULT_")) and isinstance(node.value, ast.Constant)
-            return private or bool(NO_MATHEMATICS_IN.search(self.code(node)))
+            limit = node.targets[0].id.startswith(("_", "DEFAULT_", "MAX_")) and _is_number(node.value)
+            return limit or bool(NO_MATHEMATICS_IN.search(self.code(node)))
         kinds = (ast.BinOp, ast.Compare, ast.Assign, ast.Expr)
         return isinstance(node, kinds) and bool(NO_MATHEMATICS_IN.search(self.code(node)))
 
@@ -234,6 +234,13 @@ LEAVES = (ast.Raise, ast.Return, ast.Continue, ast.Break)
 
 def _end(node: ast.stmt) -> int:
     return node.end_lineno or node.lineno
+
+
+def _is_number(node: ast.AST) -> bool:
+    """Whether it is a positive number, also written as a power or a product."""
+    if isinstance(node, ast.BinOp):
+        return isinstance(node.op, (ast.Pow, ast.Mult, ast.LShift)) and _is_number(node.left) and _is_number(node.right)
+    return isinstance(node, ast.Constant) and not isinstance(node.value, bool)
 
 
 def _is_text(node: ast.AST) -> bool:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
+from math import comb
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from kahanmaps.algebra.fields import GF, RR
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.small_systems import solve_system
 from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
+from kahanmaps.checks import expand
 from kahanmaps.checks.commute import check_commute, commutativity
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.expand import expansion
@@ -22,7 +25,10 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import KahanmapsError
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.invariants.phase_functions import where
+from kahanmaps.laboratory import analysis
+from kahanmaps.laboratory.growth import degrees
 from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve import darboux_spaces, densities, hamiltonian_structure, hirota_kimura, search
 from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
 from kahanmaps.laboratory.preserve.cofactors import determinant_polynomial
 from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
@@ -31,6 +37,8 @@ from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
 from kahanmaps.laboratory.preserve.identities import verdict_on
 from kahanmaps.laboratory.preserve.inherited import inherited_integrals
 from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
+from kahanmaps.laboratory.singular import singularities
+from kahanmaps.laboratory.symmetry import symmetries
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.commuting_space import commuting_space
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
@@ -273,3 +281,45 @@ def test_a_limit_is_the_largest_size_that_is_tried(name, least, search, told, mo
     assert told not in search()
     monkeypatch.setattr(import_module(module), limit, least - 1)
     assert told in search()
+
+
+LABORATORY = (Path(__file__).parents[1] / "docs" / "laboratory.md").read_text(encoding="utf-8")
+EVERY = range(1, 9)  # dimensions; 8 stands for all above
+
+
+def test_the_degrees_that_are_tried_in_each_dimension_are_those_of_the_documentation():
+    table = {row[1][:12]: row[2:-1] for row in (line.split("|") for line in LABORATORY.splitlines()) if len(row) == 11}
+    found = {name.strip(): [int(cell.split()[0]) for cell in row] for name, row in list(table.items())[2:]}
+    fits = [[d for d in range(densities._MAX_DEGREE + 1) if comb(n + d, d) <= densities._MAX_UNKNOWNS] for n in EVERY]
+    assert found == {
+        "relations a": [hirota_kimura._MAX_DEGREE.get(n, 4) for n in EVERY],
+        "polynomials": [search._COFACTOR_DEGREE.get(n, 2) for n in EVERY],
+        "φ, degree (": [max(degrees) for degrees in fits],
+    }
+
+
+@pytest.mark.parametrize(
+    "promise",
+    [
+        f"at most {hirota_kimura.MAX_UNKNOWNS} monomials",
+        f"(at most {densities._MAX_DEGREE}, and {densities._MAX_UNKNOWNS} monomials)",
+        f"Where they span more than {darboux_spaces.LARGEST_SPAN} dimensions",
+        f"multiplied out up to dimension {expand.MAX_DIMENSION} within",
+        f"Degrees end at {degrees.DEFAULT_MAX_DEGREE} ",
+        f"`analyze` goes to {analysis._MAX_DEGREE}.",
+        f"Above dimension {singularities.WRITTEN_DIMENSION} `degrees` takes random points",
+        f"`singularities` goes up to dimension {singularities.MAX_DIMENSION}",
+        f"signed permutations up to dimension {symmetries.MAX_SIGNED}",
+        f"constant Hamiltonian structures are sought up to dimension {hamiltonian_structure.MAX_DIMENSION}",
+        f"in dimension at most {symmetries.MAX_GENERAL} all rational matrices",
+        f"by default {analysis._SECONDS[2]:.0f} in dimension 2, {analysis._MOST_SECONDS:.0f} from dimension 6",
+        "followed for {1} steps in the plane ({2}, {3}, {0} in".format(
+            singularities._LEAST_REACH, *(singularities._REACH[n] for n in (2, 3, 4))
+        ),
+        "{1}, {2}, {3}, {0} where they meet".format(
+            singularities._LEAST_ALONG, *(singularities._ALONG[n] for n in (2, 3, 4))
+        ),
+    ],
+)
+def test_a_limit_that_the_documentation_names_is_the_one_in_force(promise):
+    assert promise in LABORATORY

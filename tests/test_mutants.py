@@ -67,6 +67,8 @@ def test_a_change_is_one_of_the_mathematics(source: str, mutants: list[str]) -> 
         "Pattern = tuple[bool, ...]",
         "@cache(maxsize=3)\ndef f(): ...",
         "_MOST_TERMS = 2000",
+        "_CYCLE = 2 * 10**6",
+        "MAX_POINTS = 1 << 20",
         "DEFAULT_STEPS = 60",
     ],
 )
