@@ -292,7 +292,7 @@ class Coverage:
         own = f"tests/{mutant.path.split('/')[1]}/", mutant.path, LIMITS  # its folder of tests, its own docstrings
         order = sorted(tests, key=lambda test: (not test.startswith(own), self.seconds[test]))
         # What one test computed and another finds in a cache is on record for the first alone.
-        files = {test.partition("::")[0] for test in order if test.startswith(own)}
+        files = {LIMITS} | {test.partition("::")[0] for test in order if test.startswith(own)}
         others = sorted((t for file in files for t in self.by_file[file] if t not in tests), key=self.seconds.get)
         return order + others
 
