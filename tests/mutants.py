@@ -75,7 +75,7 @@ TURNED: dict[type[ast.AST], list[tuple[str, str]]] = {
     ast.NotIn: [("not in", "in")],
 }
 PRINTS = re.compile(r"__repr__|__str__|_repr_\w+_|to_json|\w*_html")
-NO_MATHEMATICS = {"seed", "seconds", "progress", "maxsize", "strict", "repr"}  # arguments by these names
+NO_MATHEMATICS = {"seed", "seconds", "progress", "maxsize", "strict", "repr", "init", "kw_only"}  # arguments by these names
 NO_MATHEMATICS_IN = re.compile(
     r"\b(seconds|deadline|monotonic|get_close_matches|progress|randint|randrange|Random|spend)\b"
 )
@@ -399,10 +399,12 @@ def main() -> int:
             tests.sort(key=lambda test: -kills[*place, test] / record.seconds[test])
             source = (ROOT / mutant.path).read_text(encoding="utf-8")
             source = source[: mutant.begin] + mutant.new + source[mutant.end :]
-            copy, start = copies.get(), time.monotonic()
             before = record.is_run_before(mutant)
-            seen = copy.tried(mutant.path, source, mutant.line, tests, record.seconds, again=before)
-            copies.put(copy)
+            copy, start = copies.get(), time.monotonic()
+            try:
+                seen = copy.tried(mutant.path, source, mutant.line, tests, record.seconds, again=before)
+            finally:
+                copies.put(copy)
             seen_by.add(seen)
             kills[*place, seen] += 1
             took = f"{time.monotonic() - start:.0f} s"
@@ -454,7 +456,10 @@ def pytest_fixture_setup(fixturedef: Any, request: pytest.FixtureRequest) -> Ite
 def pytest_sessionfinish() -> None:
     """Write down how long each test took, beside what is known of others."""
     known = KEPT / "seconds.json"
-    known.write_text(json.dumps((json.loads(known.read_text()) if known.exists() else {}) | _seconds))
+    files = {test.partition("::")[0] for test in _seconds}
+    before = json.loads(known.read_text()) if known.exists() else {}
+    kept = {test: seconds for test, seconds in before.items() if test.partition("::")[0] not in files}
+    known.write_text(json.dumps(kept | _seconds))
 
 
 def _switch(context: str) -> None:
