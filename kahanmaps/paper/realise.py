@@ -179,7 +179,7 @@ def split_prime_field(chi: fmpq_poly, rng: random.Random, tries: int) -> tuple[P
 
 
 def point_over(
-    member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, eps: fmpq | None, rng: random.Random, order: int = 3
+    member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, eps: fmpq | None, rng: random.Random, order: int
 ) -> MemberObjects:
     """A member at a random point over QQ or GF(p), eps random where it is not given."""
     value = K.convert(eps) if eps is not None else K.zero
@@ -189,7 +189,7 @@ def point_over(
     return MemberObjects.at(member, K, value, random_draw(K, member.dim, rng), roots, signs, order)
 
 
-def random_objects(m: int, K: Field, rng: random.Random, order: int = 3) -> PaperObjects:
+def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObjects:
     """A, H, x, eps at random over GF(p): roots and planar cubics at random, hidden by a random symplectic matrix.
 
     The matrix is a product of five symmetric shears, upper and lower in turn, which reach every symplectic matrix.
@@ -285,7 +285,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
 
 
 def member_functions(
-    member: FamilyMember, vectors: Sequence[str], eps: fmpq | None, budget: int, order: int = 3
+    member: FamilyMember, vectors: Sequence[str], eps: fmpq | None, budget: int, order: int
 ) -> MemberObjects:
     """A given member with indeterminate x (and eps, where it is not given) over the rational functions."""
     n = member.dim
@@ -363,7 +363,7 @@ def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq 
 # ---- bounds ----------------------------------------------------------------------------------------------------
 
 
-def bound_objects(member: FamilyMember, eps: fmpq | None, order: int = 3) -> PaperObjects:
+def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperObjects:
     """Bounds for a given member: x and all vectors are variables, eps as well unless it is given."""
     K = BoundField()
     n = member.dim

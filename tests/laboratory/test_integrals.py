@@ -21,7 +21,13 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.identities import verdict_on
-from kahanmaps.laboratory.preserve.integrals import IntegralSearch, _is_affine_integral, closing_note, find_integrals
+from kahanmaps.laboratory.preserve.integrals import (
+    IntegralSearch,
+    _affine,
+    _is_affine_integral,
+    closing_note,
+    find_integrals,
+)
 
 integral_verdict = partial(verdict_on, is_density=False)
 PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
@@ -470,3 +476,8 @@ def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
         2,
         "what was found at one eps was not found at another",
     )
+
+
+def test_an_affine_integral_is_written_with_its_coefficients():
+    function, origin, _ = _affine(Laboratory(load("euler_top")), [3, 0, -5])
+    assert (str(function.numerator), str(function.denominator), origin) == ("3*x1 - 5*x3", "1", "v.x with v.f(x) = 0")

@@ -493,7 +493,7 @@ def test_the_witness_of_the_misprint_in_the_two_forms_is_a_rational_point_with_b
 
 def test_a_control_that_makes_all_systems_f_replaces_given_matrices_too():
     """Objects for derivatives are given the matrices B_i; drawn ones have none and compute them from the sign."""
-    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1))
+    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1), 3)
     trivial = CONTROLS["B=I"].function
     given = objects.changed(associate_matrices=(objects.I * objects.number(5),))
     assert trivial(given).associate_matrices == (objects.I,)
@@ -501,7 +501,7 @@ def test_a_control_that_makes_all_systems_f_replaces_given_matrices_too():
 
 
 def test_a_quadratic_system_without_structure_is_drawn_with_terms_of_all_degrees():
-    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1))
+    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1), 3)
     drawn, homogeneous = objects.arbitrary_system(), objects.arbitrary_system(homogeneous=True)
     zero = objects.vector("x") * objects.number(0)
     assert drawn.value(zero.entries()) != homogeneous.value(zero.entries())
