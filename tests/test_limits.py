@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from math import comb
+from math import comb, log2
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +42,8 @@ from kahanmaps.laboratory.symmetry import symmetries
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.commuting_space import commuting_space
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
+from kahanmaps.maps import orbits
+from kahanmaps.maps.floats import ensemble, steps
 from kahanmaps.maps.floats.lyapunov import lyapunov_exponents
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.maps.orbit import orbit
@@ -283,7 +285,8 @@ def test_a_limit_is_the_largest_size_that_is_tried(name, least, search, told, mo
     assert told in search()
 
 
-LABORATORY = (Path(__file__).parents[1] / "docs" / "laboratory.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[1] / "docs"
+LABORATORY = (DOCS / "laboratory.md").read_text(encoding="utf-8")
 EVERY = range(1, 9)  # dimensions; 8 stands for all above
 
 
@@ -323,3 +326,15 @@ def test_the_degrees_that_are_tried_in_each_dimension_are_those_of_the_documenta
 )
 def test_a_limit_that_the_documentation_names_is_the_one_in_force(promise):
     assert promise in LABORATORY
+
+
+@pytest.mark.parametrize(
+    ("page", "promise"),
+    [
+        ("orbits.md", f"that has lost {-log2(steps.NEAR):.0f} of its 53 bits counts as near-singular"),
+        ("orbits.md", f"a start of more than {orbits.LONGEST_INPUT:,} digits is refused"),
+        ("cli.md", f"block integrals of the normal form, looked at every {ensemble.SAMPLED} steps"),
+    ],
+)
+def test_so_are_those_of_orbits(page, promise):
+    assert promise in (DOCS / page).read_text(encoding="utf-8")

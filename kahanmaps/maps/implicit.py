@@ -134,7 +134,7 @@ class MapOver(ABC):
     def equation(self) -> Equation:
         """The equation of a step."""
 
-    def denominator_name(self, backward: bool = False) -> str:
+    def denominator_name(self, backward: bool) -> str:
         """What the matrix M(x) is called, for the map or, seen from it, for its inverse."""
         return "M'(x)" if backward else "M(x)"
 
@@ -194,7 +194,7 @@ class MapOver(ABC):
         if len(shown) > 200:
             shown = f"{shown[:100]}...{shown[-80:]}"
         return SingularStep(
-            f"{det_of(self.denominator_name())} = 0 at the point {shown} for eps = {self.field.format(self.eps)}: "
+            f"{det_of(self.denominator_name(False))} = 0 at the point {shown} for eps = {self.field.format(self.eps)}: "
             "the map has no value there",
             point,
             self.eps,
