@@ -19,10 +19,10 @@ def has_numba() -> bool:
         return False
 
 
-def choose_kernel(wish: str | None, long: bool = True) -> str:
+def choose_kernel(wish: str | None, long: bool) -> str:
     """The wish, or numba where it is installed and `long` says that loading it pays. Raises InputError for another.
 
-    >>> choose_kernel("numpy"), choose_kernel(None, long=False)
+    >>> choose_kernel("numpy", long=True), choose_kernel(None, long=False)
     ('numpy', 'numpy')
     """
     if wish not in (None, *KERNELS):

@@ -268,6 +268,7 @@ def test_the_zero_system(names):
     zero = system(names, *["0"] * len(names.split()))
     linear, quadratic = commuting_systems(zero), commuting_systems(zero, "quadratic")
     assert ([g.trivial for g in linear.solutions], linear.complete, linear.every_g_commutes) == (["0"], True, False)
+    assert linear.order == 2  # no equations at eps^4 and beyond are needed
     assert (quadratic.every_g_commutes, quadratic.dimension) == (True, [0, 3, 12][len(names.split())])
 
 

@@ -133,6 +133,10 @@ def test_the_formulas_themselves_specialise():
     assert (a - c) * (f - h) == (b - d) * (e - g)
 
 
+def test_integrals_are_those_of_the_map_unless_the_flow_is_asked_for():
+    assert not find_integrals(load("riccati")).flow
+
+
 def test_a_number_for_eps():
     found = find_integrals(load("euler_top"), symbols=["a1"], eps="1/3")
     assert [one.text for one in found.integrals] == ["(x2^2*a1 - 9)/(2*x1^2 + 9)", "(2*x3^2*a1 + 9)/(2*x1^2 + 9)"]

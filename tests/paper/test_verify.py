@@ -213,6 +213,10 @@ def test_at_one_eps_everything_holds_as_well():
         assert by_key(report)[key].witness.eps == "1/10"
 
 
+def test_series_go_to_the_third_order_unless_asked_for_more():
+    assert verify(file("m=1"), options=VerifyOptions(sections=(6,))).context["order"] == 3
+
+
 @pytest.mark.parametrize("order", [1, 3, 6])
 def test_the_series_of_the_integrals_is_proved_to_the_order_asked_for(order):
     report = verify(file("m=2, split"), options=VerifyOptions(sections=(7,), order=order))
@@ -239,6 +243,8 @@ def test_a_claim_that_no_control_refutes_is_told(monkeypatch):
     # The control "eps" without its effect: the claim that only it refutes is no check any more.
     monkeypatch.setitem(CONTROLS, "eps", replace(CONTROLS["eps"], function=lambda o: o.changed()))
     report = verify(file("m=2, split"), options=VerifyOptions(sections=(6,), controls=True))
+    assert verify_module.NOTE_ON_PROOFS not in report.notes
+    assert verify_module.NOTE_ON_PROOFS in verify(file("m=2, split"), options=SIXTH).notes
     assert report.verdict is UNDECIDED
     assert report.findings[-1].evidence.summary == "no control refutes jacobians-at-the-images"
 
