@@ -21,7 +21,7 @@ from kahanmaps.errors import BadPrime, SingularStep
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.normal_form import level_curves
+from kahanmaps.maps.normal_form import level_curves, periods
 from kahanmaps.maps.normal_form.level_curves import (
     Jacobian,
     LevelCubic,
@@ -294,6 +294,21 @@ def test_the_trace_of_frobenius_modulo_small_primes_gives_the_number_of_points(p
         curve.a2, curve.a4 = a2, a4
         assert curve.multiple(points, (x, (((x + a2) * x + a4) * x + a6).sqrt())) is None
         assert abs(points - field.q - 1) <= 2 * field.q**0.5
+
+
+def test_in_characteristic_3_an_orbit_is_walked_to_its_end_or_as_far_as_allowed(monkeypatch):
+    lengths = set()
+    for block, point in blocks(Small(3), random.Random(3), 60):
+        found = plane_period(block, point, 3)
+        if found.kind is not Kind.STEPPED or found.status != "periodic":
+            continue
+        lengths.add(found.period)
+        monkeypatch.setattr(periods, "_WALK", found.period)
+        assert plane_period(block, point, 3) == found
+        monkeypatch.setattr(periods, "_WALK", found.period - 1)
+        assert plane_period(block, point, 3).status == "undecided"
+        monkeypatch.undo()
+    assert len(lengths) > 2
 
 
 @pytest.mark.parametrize("field", [Small(10_007), Small(37, 2)], ids=repr)
