@@ -22,6 +22,7 @@ from kahanmaps.checks.expand import expansion
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.structured_facts import relation_functions
 from kahanmaps.errors import KahanmapsError
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.invariants.phase_functions import where
@@ -130,6 +131,18 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         len("where a is not 0"),
         lambda: where(1, ring(["x", "a", "eps"]).gens()[1]),
         "where it has a value",
+    ),
+    (
+        "documents.structured_facts.MAX_MONOMIALS",
+        10,
+        lambda: refused(lambda: relation_functions("degree <= 3", ["x", "y"])),
+        "which is 10 monomials, expected at most 9",
+    ),
+    (
+        "documents.structured_facts.MAX_MONOMIALS",
+        2,
+        lambda: refused(lambda: relation_functions(["x", "1"], ["x", "y"])),
+        "found 2 functions, expected at most 1",
     ),
     ("checks.settings.MAX_STEPS", 5, lambda: refused(lambda: Settings(steps=5)), "found 5 steps, expected 0 to 4"),
     (
