@@ -202,6 +202,12 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "degrees above 2 were not tried: polynomials in dimension 3 have too many terms",
     ),
     (
+        "laboratory.preserve.darboux._MOST_PRODUCTS",
+        10,
+        lambda: darboux_polynomials(load("lotka_volterra"), 2).reason,
+        "10 products of cofactors, of which the first 9 were tried",
+    ),
+    (
         "laboratory.preserve.affine_functions.MAX_EXTACTIC_DIMENSION",
         2,
         lambda: affine_darboux(LOTKA_VOLTERRA).reason,
