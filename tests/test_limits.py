@@ -21,7 +21,7 @@ from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.expand import expansion
 from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.catalog import load
-from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.documents.structured_facts import relation_functions
 from kahanmaps.errors import KahanmapsError
 from kahanmaps.family.draw import draw_with_eigenvalues
@@ -55,6 +55,8 @@ from kahanmaps.paper.verify import verify, verify_universal
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 MEMBER = SystemFile.from_member(draw_with_eigenvalues([1, 2], 1), "pair")
+PLANE = 'variables = ["x", "y"]\n[system]\nrhs = ["x*y", "y"]\n'
+STEP = '{map = {variables = ["x"], system = {rhs = ["x^2"]}}, power = 3}'
 ROTATION = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
 SQUARES = QuadraticSystem.from_text(["x", "y"], ["x^2", "2*y^2"])  # commutes with a x^2, b y^2
 
@@ -131,6 +133,30 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         len("where a is not 0"),
         lambda: where(1, ring(["x", "a", "eps"]).gens()[1]),
         "where it has a value",
+    ),
+    (
+        "documents.document._LONGEST_NAME",
+        4,
+        lambda: refused(lambda: parse_system(f'name = "pair"\n{PLANE}')),
+        "at most 3 characters",
+    ),
+    (
+        "documents.document.MAX_DIMENSION",
+        2,
+        lambda: refused(lambda: parse_system(PLANE)),
+        "found 2 variables, expected at most 1",
+    ),
+    (
+        "documents.document.MAX_DIMENSION",
+        2,
+        lambda: refused(lambda: parse_system('[family]\nA = [[1, 0], [0, 1]]\nH = "x1^3"\n')),
+        "found 2 rows, expected at most 1",
+    ),
+    (
+        "documents.document._MOST_FACTORS",
+        3,
+        lambda: refused(lambda: parse_system(f"[composition]\nof = [{STEP}]\n")),
+        "found more than 2 steps",
     ),
     (
         "documents.structured_facts.MAX_MONOMIALS",
