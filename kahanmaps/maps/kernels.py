@@ -13,10 +13,7 @@ KERNELS = ("numpy", "numba")
 @cache
 def has_numba() -> bool:
     """Whether numba is installed (it is not loaded)."""
-    try:
-        return find_spec("numba") is not None
-    except ValueError:  # somebody has put None into sys.modules to keep it out
-        return False
+    return find_spec("numba") is not None
 
 
 def choose_kernel(wish: str | None, long: bool) -> str:
