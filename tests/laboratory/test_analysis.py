@@ -516,3 +516,8 @@ def test_singularities_come_before_degrees_and_help_them_up_to_a_dimension(most,
 def test_constant_structures_are_looked_for_up_to_a_dimension(most, looked_for, monkeypatch):
     monkeypatch.setattr(module, "MAX_HAMILTONIAN_DIMENSION", most)
     assert (analyze(load("riccati")).hamiltonian is not None) == looked_for
+
+
+def test_commuting_systems_are_sought_for_every_eps_only():
+    assert analyze(load("riccati")).commuting is not None
+    assert analyze(load("riccati"), eps="1/3").commuting is None
