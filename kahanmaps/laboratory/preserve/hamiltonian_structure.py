@@ -127,8 +127,6 @@ def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.R
         products = [K * by_y for K in forms]
         conditions = fmpq_mat([[P[i, j] - P[j, i] for P in products] for i, j in pairs])
         forms = [combination_of(vector, forms) for vector in nullspace(QQ, conditions)]
-    if not forms:
-        return ()
     echelon, _ = fmpq_mat([[K[i, j] for i, j in pairs] for K in forms]).rref()
     rows = (primitive_integers(tuple(row)) for row in echelon.tolist())
     return tuple(_skew(m, dict(zip(pairs, row, strict=True))) for row in rows)
