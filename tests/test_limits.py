@@ -84,31 +84,51 @@ def notes(report) -> str:
 
 
 LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
-    # what is limited, the least limit that leaves nothing out, a search, and what it says under a limit one smaller
-    ("algebra.small_systems.MAX_PARTS", 2, lambda: solved("x^3 - x", "y").reason, "there are more than 1 parts"),
+    # what is limited, the least limit that leaves nothing out, a search, and what it says under a smaller one alone
+    ("algebra.small_systems.MAX_PARTS", 2, lambda: solved("x^3 - x", "y").reason, "there are more than"),
     (
         "algebra.small_systems.MAX_QUOTIENT",
         4,
         lambda: solved("x^2 + y^2 - 5", "x*y - 2").reason,
         "there are 4 solutions",
     ),
-    ("algebra.fields.MAX_PRIME_BITS", 61, lambda: refused(lambda: GF.__wrapped__(2**61 - 1)), "at most 60"),
-    ("algebra.fields.MAX_BALL_BITS", 64, lambda: refused(lambda: RR.__wrapped__(64)), "63"),
-    ("systems.quadratic.MAX_DIMENSION", 1, lambda: refused(lambda: QuadraticSystem.from_text(["x"], ["x"])), "0"),
+    (
+        "algebra.fields.MAX_PRIME_BITS",
+        61,
+        lambda: refused(lambda: GF.__wrapped__(2**61 - 1)),
+        "found a modulus of 61 bits",
+    ),
+    ("algebra.fields.MAX_BALL_BITS", 64, lambda: refused(lambda: RR.__wrapped__(64)), "found the precision 64"),
+    (
+        "systems.quadratic.MAX_DIMENSION",
+        1,
+        lambda: refused(lambda: QuadraticSystem.from_text(["x"], ["x"])),
+        "found a system of dimension 1",
+    ),
     (
         "maps.polarised.MAX_DEGREE",
         3,
         lambda: refused(lambda: polarised_map([parse_polynomial("x^3", ["x", "eps"])])),
-        "found the degree 3, expected 2 to 2",
+        "found the degree 3",
     ),
-    ("maps.residues.projective.MAX_PRIME", 8, lambda: refused(lambda: ProjectiveMap(EULER_TOP, 1, 7)), "from 3 to 7"),
-    ("maps.residues.projective.MAX_DIMENSION", 3, lambda: refused(lambda: ProjectiveMap(EULER_TOP, 1, 7)), "at most 2"),
+    (
+        "maps.residues.projective.MAX_PRIME",
+        8,
+        lambda: refused(lambda: ProjectiveMap(EULER_TOP, 1, 7)),
+        "found the prime 7",
+    ),
+    (
+        "maps.residues.projective.MAX_DIMENSION",
+        3,
+        lambda: refused(lambda: ProjectiveMap(EULER_TOP, 1, 7)),
+        "found a map of dimension 3",
+    ),
     ("maps.residues.projective.MAX_FACTORED", 3, lambda: str(ProjectiveMap(EULER_TOP, 1, 7).factor), "None"),
     (
         "maps.floats.lyapunov.MAX_NUMBERS",
         18,
         lambda: refused(lambda: lyapunov_exponents(LORENZ, "1/100", np.ones((2, 3)), 3)),
-        "found 2 starts, expected at most 1 in dimension 3",
+        "found 2 starts",
     ),
     (
         "maps.orbit._TOO_FAR",
@@ -138,39 +158,39 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "documents.document._LONGEST_NAME",
         4,
         lambda: refused(lambda: parse_system(f'name = "pair"\n{PLANE}')),
-        "at most 3 characters",
+        "expected printable text",
     ),
     (
         "documents.document.MAX_DIMENSION",
         2,
         lambda: refused(lambda: parse_system(PLANE)),
-        "found 2 variables, expected at most 1",
+        "found 2 variables",
     ),
     (
         "documents.document.MAX_DIMENSION",
         2,
         lambda: refused(lambda: parse_system('[family]\nA = [[1, 0], [0, 1]]\nH = "x1^3"\n')),
-        "found 2 rows, expected at most 1",
+        "found 2 rows",
     ),
     (
         "documents.document._MOST_FACTORS",
         3,
         lambda: refused(lambda: parse_system(f"[composition]\nof = [{STEP}]\n")),
-        "found more than 2 steps",
+        "found more than",
     ),
     (
         "documents.structured_facts.MAX_MONOMIALS",
         10,
         lambda: refused(lambda: relation_functions("degree <= 3", ["x", "y"])),
-        "which is 10 monomials, expected at most 9",
+        "which is 10 monomials",
     ),
     (
         "documents.structured_facts.MAX_MONOMIALS",
         2,
         lambda: refused(lambda: relation_functions(["x", "1"], ["x", "y"])),
-        "found 2 functions, expected at most 1",
+        "found 2 functions",
     ),
-    ("checks.settings.MAX_STEPS", 5, lambda: refused(lambda: Settings(steps=5)), "found 5 steps, expected 0 to 4"),
+    ("checks.settings.MAX_STEPS", 5, lambda: refused(lambda: Settings(steps=5)), "found 5 steps"),
     (
         "checks.commute.MAX_FACTORS",
         2,
@@ -193,13 +213,13 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "paper.verify.MAX_M",
         2,
         lambda: refused(lambda: verify(MEMBER, options=VerifyOptions(sections=(6,)))),
-        "m = 2, expected m <= 1",
+        "found a member with m = 2",
     ),
     (
         "paper.verify.MAX_M",
         1,
         lambda: refused(lambda: verify_universal(1, options=VerifyOptions(sections=(6,)))),
-        "found m = 1, expected 1 <= m <= 0",
+        "found m = 1",
     ),
     (
         "laboratory.preserve.identities.MAX_DIMENSION",
@@ -231,13 +251,13 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "laboratory.preserve.darboux._MOST_PRODUCTS",
         10,
         lambda: darboux_polynomials(load("lotka_volterra"), 2).reason,
-        "10 products of cofactors, of which the first 9 were tried",
+        "10 products of cofactors",
     ),
     (
         "laboratory.preserve.affine_functions.MAX_EXTACTIC_DIMENSION",
         2,
         lambda: affine_darboux(LOTKA_VOLTERRA).reason,
-        "more than 1 variables: only factors of the right-hand sides were tried",
+        "variables: only factors of the right-hand sides were tried",
     ),
     (
         "laboratory.preserve.affine_functions.LONG_COEFFICIENTS",
@@ -274,13 +294,13 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "laboratory.symmetry.symmetries.MAX_LINEAR",
         3,
         lambda: undecided(linear_symmetries(EULER_TOP)),
-        "infinitesimal symmetries are computed up to dimension 2, found 3",
+        "infinitesimal symmetries are computed up to dimension",
     ),
     (
         "laboratory.symmetry.symmetries.MAX_SIGNED",
         3,
         lambda: undecided(linear_symmetries(EULER_TOP)),
-        "signed permutations are tried up to dimension 2, found 3",
+        "signed permutations are tried up to dimension",
     ),
     (
         "laboratory.symmetry.symmetries.LONG_COEFFICIENTS",
@@ -298,7 +318,7 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "laboratory.symmetry.commuting.MAX_UNKNOWNS",
         4,
         lambda: undecided(commuting_systems(LOTKA_VOLTERRA, "linear")),
-        "g has 4 unknown coefficients, and at most 3 are tried",
+        "g has 4 unknown coefficients",
     ),
     (
         "laboratory.symmetry.commuting.LONG_COEFFICIENTS",
@@ -310,7 +330,7 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "laboratory.symmetry.commuting.MAX_SPACE",
         2,
         lambda: undecided(commuting_systems(SQUARES, "linear")),
-        "have dimension 2, and equations are solved up to 1",
+        "have dimension 2, and equations are solved up to",
     ),
     (
         "laboratory.symmetry.commuting_space.MAX_DIMENSION",

@@ -36,6 +36,7 @@ from kahanmaps.systems.quadratic import SystemOver
 
 Draw = Callable[[str], Any]
 
+_SHEARS = 5  # symmetric ones, upper and lower in turn: with so many they reach every symplectic matrix
 # Above so many sign vectors a sample is taken: all single flips, and random ones.
 MAX_SIGN_VECTORS = 32
 
@@ -192,13 +193,13 @@ def point_over(
 def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObjects:
     """A, H, x, eps at random over GF(p): roots and planar cubics at random, hidden by a random symplectic matrix.
 
-    The matrix is a product of five symmetric shears, upper and lower in turn, which reach every symplectic matrix.
+    The matrix is a product of five symmetric shears, upper and lower in turn.
     """
     n = 2 * m
     roots = tuple(K.random(rng) for _ in range(m))
     cubics = [[K.random(rng) for _ in range(4)] for _ in range(m)]
     S, S_inverse = K.identity(n), K.identity(n)
-    for k in range(5):
+    for k in range(_SHEARS):
         entries = {}
         for i in range(m):
             for j in range(i, m):
@@ -395,8 +396,8 @@ def universal_bound_objects(m: int, order: int) -> PaperObjects:
     """Bounds for `random_objects`: roots, cubics, shears, x and eps are variables."""
     K = BoundField()
     n = 2 * m
-    # Five shears, each with entries of degree 1: entries of S and S^{-1} have degree 5, the sum of m^4 monomials.
-    S = K.polynomial(5, 4 * math.log2(m) + 5.0)
+    # Shears with entries of degree 1: entries of S and S^{-1} have degree 5, the sum of m^4 monomials.
+    S = K.polynomial(_SHEARS, (_SHEARS - 1) * math.log2(m) + _SHEARS)
     root, cubic = K.variable(), K.variable()
     A = K.matrix(n, n, [S * S * root * K.convert(n * n)] * (n * n))
     third = K.matrix(n * n, n, [S * S * S * cubic * K.convert(6 * n**3)] * n**3)
