@@ -4,10 +4,11 @@
 
 A mutant is one change to one line: another operator, a sign or `not` or transpose dropped, a number one larger or
 smaller, a comparison turned round or moved by its boundary, and for or, indices swapped, a guard that never closes. It
-is written into a copy of the project in a temporary folder, and the tests that execute the line run there: those of its
-own folder first, quick ones first, no slow ones but those marked thorough. One that fails, or takes far too long, has
-seen the change. Which test executes what is measured once, which takes a quarter of an hour, and kept in .mutants: it
-is done again where the code has changed, and for new tests by --measure tests/NEW.py.
+is written into a copy of the project in a temporary folder, and the tests that execute the line run there: those that
+saw another change to the function, those of its own folder, quick ones first, no slow ones but those marked thorough.
+One that fails, or takes far too long, has seen the change. Which test executes what is measured once, which takes a
+quarter of an hour, and kept in .mutants: it is done again where the code has changed, and for new tests by
+--measure tests/NEW.py.
 
 Lines are drawn first, then one of the changes to each. Changes that no test can see, for they change nothing that is
 promised, are listed with their reasons in tests/mutants.toml. The exit status is 1 if tests see fewer than 95 of 100 of
@@ -18,15 +19,12 @@ from __future__ import annotations
 
 import argparse
 import ast
-import contextlib
 import hashlib
 import json
 import os
 import random
 import re
-import resource
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -36,19 +34,20 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
 import coverage
 import pytest
+from trials import ROOT, Copy, is_compiled
 
-ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / ".mutants"
 FOLDERS = ("algebra", "maps", "invariants", "checks", "laboratory", "paper", "family", "systems", "documents")
-TESTS = [*(f"tests/{folder}" for folder in FOLDERS), "kahanmaps", "tests/cli", "tests/frozen"]
+LIMITS = "tests/test_limits.py"
+TESTS = [*(f"tests/{folder}" for folder in FOLDERS), "kahanmaps", "tests/cli", "tests/frozen", LIMITS]
 ENOUGH = 0.95
-MEMORY = 8 << 30  # bytes that a mutant may take
 
 SWAPPED: dict[type[ast.AST], tuple[str, str]] = {
     ast.Add: ("+", "-"),
@@ -76,7 +75,7 @@ TURNED: dict[type[ast.AST], list[tuple[str, str]]] = {
     ast.NotIn: [("not in", "in")],
 }
 PRINTS = re.compile(r"__repr__|__str__|_repr_\w+_|to_json|\w*_html")
-NO_MATHEMATICS = {"seed", "seconds", "progress", "maxsize", "strict", "repr"}  # arguments by these names
+NO_MATHEMATICS = {"seed", "seconds", "progress", "maxsize", "strict", "repr", "init", "kw_only"}  # names of arguments
 NO_MATHEMATICS_IN = re.compile(
     r"\b(seconds|deadline|monotonic|get_close_matches|progress|randint|randrange|Random|spend)\b"
 )
@@ -168,10 +167,10 @@ class Changes(ast.NodeVisitor):
             self.inside(node)
 
     def is_no_mathematics(self, node: ast.AST) -> bool:
-        """Clocks, work, random numbers, words; private numbers of a module, which are limits of effort and sizes."""
+        """Clocks, work, random numbers, words; private numbers of a module and MAX_..., limits of effort and sizes."""
         if isinstance(node, ast.Assign) and not self.names and isinstance(node.targets[0], ast.Name):
-            private = node.targets[0].id.startswith(("_", "DEFAULT_")) and isinstance(node.value, ast.Constant)
-            return private or bool(NO_MATHEMATICS_IN.search(self.code(node)))
+            limit = node.targets[0].id.startswith(("_", "DEFAULT_", "MAX_")) and _is_number(node.value)
+            return limit or bool(NO_MATHEMATICS_IN.search(self.code(node)))
         kinds = (ast.BinOp, ast.Compare, ast.Assign, ast.Expr)
         return isinstance(node, kinds) and bool(NO_MATHEMATICS_IN.search(self.code(node)))
 
@@ -237,6 +236,13 @@ def _end(node: ast.stmt) -> int:
     return node.end_lineno or node.lineno
 
 
+def _is_number(node: ast.AST) -> bool:
+    """Whether it is a positive number, also written as a power or a product."""
+    if isinstance(node, ast.BinOp):
+        return isinstance(node.op, (ast.Pow, ast.Mult, ast.LShift)) and _is_number(node.left) and _is_number(node.right)
+    return isinstance(node, ast.Constant) and not isinstance(node.value, bool)
+
+
 def _is_text(node: ast.AST) -> bool:
     return any(isinstance(n, ast.JoinedStr) or isinstance(getattr(n, "value", 0), str) for n in ast.walk(node))
 
@@ -274,23 +280,28 @@ class Coverage:
     def tests(self, mutant: Mutant) -> list[str]:
         """The tests that execute the line, in the order in which they are to run; [] where none does."""
         lines = self.data.contexts_by_lineno(str(ROOT / mutant.path))
-        wanted = self._lines(mutant, lines)
+        wanted = self.lines(mutant, lines)
         contexts = {c for line in wanted for c in lines.get(line, [])} - {""}
-        if _is_compiled(mutant.path):  # its lines are seen only where a test runs them uncompiled
+        if is_compiled(mutant.path):  # its lines are seen only where a test runs them uncompiled
             own = "floats" if "floats" in mutant.path else "residues"
             lines = self.data.contexts_by_lineno(str(ROOT / f"kahanmaps/maps/{own}/numba_kernel.py"))
             contexts |= {c for line in lines for c in lines[line]} - {""}
         tests = set()
         for context in contexts:
             tests |= {context} if context in self.seconds else set(self.by_file.get(context, ()))
-        own = f"tests/{mutant.path.split('/')[1]}/"
+        own = f"tests/{mutant.path.split('/')[1]}/", mutant.path, LIMITS  # its folder of tests, its own docstrings
         order = sorted(tests, key=lambda test: (not test.startswith(own), self.seconds[test]))
         # What one test computed and another finds in a cache is on record for the first alone.
-        files = {test.partition("::")[0] for test in order if test.startswith(own)}
+        files = {LIMITS} | {test.partition("::")[0] for test in order if test.startswith(own)}
         others = sorted((t for file in files for t in self.by_file[file] if t not in tests), key=self.seconds.get)
         return order + others
 
-    def _lines(self, mutant: Mutant, lines: dict[int, list[str]]) -> set[int]:
+    def is_run_before(self, mutant: Mutant) -> bool:
+        """Is the line executed while tests are collected?"""
+        lines = self.data.contexts_by_lineno(str(ROOT / mutant.path))
+        return any("" in lines.get(line, []) for line in self.lines(mutant, lines))
+
+    def lines(self, mutant: Mutant, lines: dict[int, list[str]]) -> set[int]:
         """The lines to look up: of the expression, or for a constant of a module those that name it."""
         own = set(range(mutant.line, mutant.last + 1))
         if any(set(lines.get(line, [])) - {""} for line in own):
@@ -342,91 +353,10 @@ def state() -> str:
     return code.hexdigest()
 
 
-class Copy:
-    """A copy of the project in which one mutant at a time is tried."""
-
-    def __init__(self, folder: Path) -> None:
-        self.root = folder / "project"
-        listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-        for name in filter(None, listed.split("\0")):
-            if (ROOT / name).is_file():
-                (self.root / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(ROOT / name, self.root / name)
-        self.environment = {
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join(str(self.root / part) for part in (".", "cli", "tests")),
-            "PYTHONDONTWRITEBYTECODE": "1",
-            "PYTHONHASHSEED": "0",
-            "NUMBA_CACHE_DIR": str(folder / "numba"),
-        }
-        subprocess.run([sys.executable, "-m", "compileall", "-q", "kahanmaps", "cli", "tests"], cwd=self.root)
-
-    def tried(self, mutant: Mutant, tests: list[str], seconds: dict[str, float], most: float) -> str:
-        """What saw the mutant, "" for nothing."""
-        file = self.root / mutant.path
-        source = file.read_text(encoding="utf-8")
-        environment = dict(self.environment)
-        if _is_compiled(mutant.path):  # what is kept is machine code of the unchanged source
-            environment["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(dir=self.root.parent)
-        times = file.stat()
-        try:
-            file.write_text(source[: mutant.begin] + mutant.new + source[mutant.end :], encoding="utf-8")
-            for some in batches(tests, seconds, most):
-                seen = self.run(some, seconds, environment)
-                if seen:
-                    return seen
-            return ""
-        finally:
-            shutil.copy2(ROOT / mutant.path, file)
-            os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
-            shutil.rmtree(self.root / ".hypothesis", ignore_errors=True)
-
-    def run(self, tests: list[str], seconds: dict[str, float], environment: dict[str, str]) -> str:
-        """The first test that fails, "" for none."""
-        compiling = environment["NUMBA_CACHE_DIR"] != self.environment["NUMBA_CACHE_DIR"]
-        patience = 30 + 10 * max(seconds[test] for test in tests) + 300 * compiling
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", "--no-header"]
-        command += ["--tb=no", "--hypothesis-seed=0", "--timeout", str(patience), *tests]
-        with subprocess.Popen(
-            command,
-            cwd=self.root,
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY)),
-        ) as process:
-            try:
-                told = process.communicate(timeout=2 * patience + 5 * sum(seconds[test] for test in tests))[0]
-            except subprocess.TimeoutExpired:
-                return "time"
-            finally:
-                with contextlib.suppress(ProcessLookupError):  # what its tests started and left
-                    os.killpg(process.pid, signal.SIGKILL)
-        if process.returncode == 0:
-            return ""
-        if "not found: " in told:
-            raise SystemExit("a test on record is not there any more: --measure")
-        failed = re.search(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", told, re.MULTILINE)
-        return failed.group(1) if failed else f"status {process.returncode}"
-
-
-def _is_compiled(path: str) -> bool:
-    return "numba" in path or path.endswith("float_steps.py")
-
-
-def batches(tests: list[str], seconds: dict[str, float], most: float) -> Iterator[list[str]]:
-    """First a few tests, then ever more of them, up to about `most` seconds in all."""
-    size, begin, total = 15, 0, 0.0
-    while begin < len(tests) and total < most:
-        some: list[str] = []
-        while begin < len(tests) and len(some) < size and total < most:
-            some.append(tests[begin])
-            total += seconds[tests[begin]]
-            begin += 1
-        yield some
-        size *= 6
+def within(tests: list[str], seconds: dict[str, float], most: float) -> list[str]:
+    """The first of the tests that take about `most` seconds in all."""
+    before = accumulate((seconds[test] for test in tests), initial=0.0)
+    return [test for test, total in zip(tests, before, strict=False) if total < most]
 
 
 def main() -> int:
@@ -434,14 +364,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--count", type=int, default=100, help="how many mutants")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
-    parser.add_argument("--only", default="", help="only mutants whose FILE:LINE contains this")
+    parser.add_argument("--only", default="", help="only mutants whose FILE:LINE: has this pattern")
     parser.add_argument("--jobs", type=int, default=2, help="how many at once")
     parser.add_argument("--most", type=float, default=300.0, help="seconds of tests for a mutant")
     parser.add_argument("--list", action="store_true", help="print the sample and try nothing")
     parser.add_argument("--measure", nargs="*", metavar="FILE", help="run all tests, or new ones, to see their lines")
     options = parser.parse_args()
     every = all_mutants()
-    chosen = sample([m for m in every if options.only in f"{m.path}:{m.line}:"], options.count, options.seed)
+    chosen = sample([m for m in every if re.search(options.only, f"{m.path}:{m.line}:")], options.count, options.seed)
     if options.list:
         print(*chosen, sep="\n")
         return 0
@@ -454,21 +384,29 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder, ThreadPoolExecutor(options.jobs) as pool:
         copies: SimpleQueue[Copy] = SimpleQueue()
         for k in range(options.jobs):
-            copies.put(Copy(Path(folder) / str(k)))
+            copies.put(Copy(Path(folder) / str(k), TESTS))
 
         seen_by: set[str] = set()
+        kills: Counter[tuple[str, str, str]] = Counter()
 
         def outcome(mutant: Mutant) -> tuple[str, str]:
             if mutant.key in equivalent:
                 return "equivalent", equivalent[mutant.key]
-            tests = record.tests(mutant)
+            tests = within(record.tests(mutant), record.seconds, options.most)
             if not tests:
                 return "SURVIVED", "no test executes it"
-            copy = copies.get()
-            start = time.monotonic()
-            seen = copy.tried(mutant, tests, record.seconds, options.most)
-            copies.put(copy)
+            place = mutant.path, mutant.function
+            tests.sort(key=lambda test: -kills[*place, test] / record.seconds[test])
+            source = (ROOT / mutant.path).read_text(encoding="utf-8")
+            source = source[: mutant.begin] + mutant.new + source[mutant.end :]
+            before = record.is_run_before(mutant)
+            copy, start = copies.get(), time.monotonic()
+            try:
+                seen = copy.tried(mutant.path, source, mutant.line, tests, record.seconds, again=before)
+            finally:
+                copies.put(copy)
             seen_by.add(seen)
+            kills[*place, seen] += 1
             took = f"{time.monotonic() - start:.0f} s"
             return ("killed", f"by {seen}, {took}") if seen else ("SURVIVED", f"{len(tests)} tests, {took}")
 
@@ -477,7 +415,7 @@ def main() -> int:
             counts[result] += 1
             print(f"{result:10}  {mutant}\n{'':12}{mutant.old!r} -> {mutant.new!r}  {why}", flush=True)
         copy, witnesses = copies.get(), sorted(seen_by & set(record.seconds))
-        if witnesses and (fails := copy.run(witnesses, record.seconds, copy.environment)):
+        if witnesses and (fails := copy.batch(witnesses, record.seconds, copy.environment, compiling=True)):
             raise SystemExit(f"{fails} fails without any change, so that it tells nothing")
     for key in sorted(set(equivalent) - {mutant.key for mutant in every}):
         print("listed as equivalent, and not in the code any more:", *key)
@@ -518,7 +456,10 @@ def pytest_fixture_setup(fixturedef: Any, request: pytest.FixtureRequest) -> Ite
 def pytest_sessionfinish() -> None:
     """Write down how long each test took, beside what is known of others."""
     known = KEPT / "seconds.json"
-    known.write_text(json.dumps((json.loads(known.read_text()) if known.exists() else {}) | _seconds))
+    files = {test.partition("::")[0] for test in _seconds}
+    before = json.loads(known.read_text()) if known.exists() else {}
+    kept = {test: seconds for test, seconds in before.items() if test.partition("::")[0] not in files}
+    known.write_text(json.dumps(kept | _seconds))
 
 
 def _switch(context: str) -> None:

@@ -7,7 +7,9 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from mutants import ROOT, Changes, batches, sample
+from mutants import ROOT, Changes, sample, within
+from trials import batches
+from trials import changed as changed_code
 
 from kahanmaps.maps import kahan
 
@@ -65,6 +67,8 @@ def test_a_change_is_one_of_the_mathematics(source: str, mutants: list[str]) -> 
         "Pattern = tuple[bool, ...]",
         "@cache(maxsize=3)\ndef f(): ...",
         "_MOST_TERMS = 2000",
+        "_CYCLE = 2 * 10**6",
+        "MAX_POINTS = 1 << 20",
         "DEFAULT_STEPS = 60",
     ],
 )
@@ -95,5 +99,13 @@ def test_equivalent_changes_are_listed_with_a_reason() -> None:
 
 def test_tests_run_in_order_and_within_their_time() -> None:
     seconds = {f"t{k}": 1.0 for k in range(200)}
-    assert [len(some) for some in batches(list(seconds), seconds, 1000)] == [15, 90, 95]
-    assert [test for some in batches(list(seconds), seconds, 20) for test in some] == [f"t{k}" for k in range(20)]
+    assert [len(some) for some in batches(list(seconds))] == [15, 90, 95]
+    assert within(list(seconds), seconds, 20) == [f"t{k}" for k in range(20)]
+
+
+def test_a_change_is_found_in_the_function_that_stands_in_no_other(tmp_path: Path) -> None:
+    source = "a = 1\nclass C:\n  @property\n  def f(self, x=1):\n    def g():\n      return 2\n    return g\n"
+    path = tmp_path / "example.py"
+    path.write_text(source)
+    codes = [changed_code(path, line) for line in range(1, 8)]
+    assert [code and code.co_qualname for code in codes] == [None, None, None, None, "C.f", "C.f", "C.f"]

@@ -72,11 +72,8 @@ class EtaleAlgebra(Field):
 
     def parse(self, text: str) -> EtaleElement:
         """The class of a polynomial in t."""
-        coefficients: dict[int, fmpq] = {}
-        for (exponent,), coefficient in parse_polynomial(text, ["t"]).terms():
-            coefficients[int(exponent)] = coefficient
-        top = max(coefficients, default=0)
-        return self.convert(fmpq_poly([coefficients.get(k, fmpq(0)) for k in range(top + 1)]))
+        terms = parse_polynomial(text, ["t"]).terms()
+        return sum((self.generator ** int(exponent) * coefficient for (exponent,), coefficient in terms), self.zero)
 
     def format(self, element: EtaleElement) -> str:
         return format_univariate(element.polynomial)

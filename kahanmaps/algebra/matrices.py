@@ -169,12 +169,9 @@ class EntryMatrix(ABC):
         entries = [self._dot(row, column) for row in rows for column in columns]
         return type(self)(self.field, self._rows, other._columns, entries)
 
+    @abstractmethod
     def _dot(self, row: Sequence[Any], column: Sequence[Any]) -> Any:
         """The entry of a product where a row and a column meet."""
-        total = self.field.zero
-        for a, b in zip(row, column, strict=True):
-            total = total + a * b
-        return total
 
     def __rmul__(self, other: Any) -> Self:
         factor = operand(self.field, other)

@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any, NamedTuple
 
-from flint import fmpq, fmpq_mpoly, fmpq_poly
+from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.algebra.text import parse_polynomial
@@ -153,11 +153,8 @@ def _read_dynamical_degree(given: Any, mistake: Callable[[str, str], None], show
     except InputError as error:
         mistake("catalog.dynamical_degree", str(error))
         return
-    coefficients: dict[int, fmpq] = {int(monomial[0]): value for monomial, value in polynomial.terms()}
-    top = max(coefficients, default=0)
-    dense = fmpq_poly([coefficients.get(k, fmpq(0)) for k in range(top + 1)])
-    factors = dense.factor()[1] if top > 0 else []
-    if coefficients.get(top) != 1 or len(factors) != 1 or factors[0][1] != 1:
+    is_irreducible = not polynomial.is_constant() and [power for _, power in polynomial.factor()[1]] == [1]
+    if not is_irreducible or polynomial.leading_coefficient() != 1:
         mistake("catalog.dynamical_degree", f"found {show(given)}, {expected}")
 
 

@@ -94,7 +94,7 @@ class HeightGrowth:
 
     heights: tuple[int, ...]
     end: OrbitEnd
-    every: int = 1
+    every: int
     method: str = ""
 
     @property

@@ -71,7 +71,7 @@ class MapOver(ABC):
         """Whether all the equations are linear in the old point, as they are in the new one."""
         return all(equation.degree == 1 for equation in self.equations)
 
-    def denominator_name(self, backward: bool = False) -> str:
+    def denominator_name(self, backward: bool) -> str:
         """What the matrix M(x) is called, for the map or, seen from it, for its inverse."""
         return "M'(x)" if backward else "M(x)"
 
@@ -145,7 +145,7 @@ class MapOver(ABC):
         if len(shown) > 200:
             shown = f"{shown[:100]}...{shown[-80:]}"
         return SingularStep(
-            f"{det_of(self.denominator_name())} = 0 at the point {shown} for eps = {self.field.format(self.eps)}: "
+            f"{det_of(self.denominator_name(False))} = 0 at the point {shown} for eps = {self.field.format(self.eps)}: "
             "the map has no value there",
             point,
             self.eps,

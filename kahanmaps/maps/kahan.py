@@ -39,7 +39,7 @@ class KahanMapOver(StepOver):
         self.eps = eps
         self.local = local
 
-    def denominator_name(self, backward: bool = False) -> str:
+    def denominator_name(self, backward: bool) -> str:
         return f"I {'+' if backward else '-'} eps f'(x)"
 
     @cached_property

@@ -13,16 +13,13 @@ KERNELS = ("numpy", "numba")
 @cache
 def has_numba() -> bool:
     """Whether numba is installed (it is not loaded)."""
-    try:
-        return find_spec("numba") is not None
-    except ValueError:  # somebody has put None into sys.modules to keep it out
-        return False
+    return find_spec("numba") is not None
 
 
-def choose_kernel(wish: str | None, long: bool = True) -> str:
+def choose_kernel(wish: str | None, long: bool) -> str:
     """The wish, or numba where it is installed and `long` says that loading it pays. Raises InputError for another.
 
-    >>> choose_kernel("numpy"), choose_kernel(None, long=False)
+    >>> choose_kernel("numpy", long=True), choose_kernel(None, long=False)
     ('numpy', 'numpy')
     """
     if wish not in (None, *KERNELS):

@@ -181,7 +181,7 @@ class Calculus(ABC):
     @remembered
     def step(self, f: SystemOver, x: Any, times: int = 1) -> Any:
         """Phi_f(x, eps), or Phi_f(x, times eps)."""
-        eps = self.step_eps if times == 1 else self.step_eps * self.number(times)
+        eps = self.step_eps * self.number(times)
         if self.method == "euler":
             return x + self.value(f, x) * (eps * self.number(2))
         return self.K.column(KahanMapOver(f, eps).step(x.entries()))

@@ -36,6 +36,7 @@ from kahanmaps.systems.quadratic import SystemOver
 
 Draw = Callable[[str], Any]
 
+_SHEARS = 5  # symmetric ones, upper and lower in turn: with so many they reach every symplectic matrix
 # Above so many sign vectors a sample is taken: all single flips, and random ones.
 MAX_SIGN_VECTORS = 32
 
@@ -179,7 +180,7 @@ def split_prime_field(chi: fmpq_poly, rng: random.Random, tries: int) -> tuple[P
 
 
 def point_over(
-    member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, eps: fmpq | None, rng: random.Random, order: int = 3
+    member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, eps: fmpq | None, rng: random.Random, order: int
 ) -> MemberObjects:
     """A member at a random point over QQ or GF(p), eps random where it is not given."""
     value = K.convert(eps) if eps is not None else K.zero
@@ -189,16 +190,16 @@ def point_over(
     return MemberObjects.at(member, K, value, random_draw(K, member.dim, rng), roots, signs, order)
 
 
-def random_objects(m: int, K: Field, rng: random.Random, order: int = 3) -> PaperObjects:
+def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObjects:
     """A, H, x, eps at random over GF(p): roots and planar cubics at random, hidden by a random symplectic matrix.
 
-    The matrix is a product of five symmetric shears, upper and lower in turn, which reach every symplectic matrix.
+    The matrix is a product of five symmetric shears, upper and lower in turn.
     """
     n = 2 * m
     roots = tuple(K.random(rng) for _ in range(m))
     cubics = [[K.random(rng) for _ in range(4)] for _ in range(m)]
     S, S_inverse = K.identity(n), K.identity(n)
-    for k in range(5):
+    for k in range(_SHEARS):
         entries = {}
         for i in range(m):
             for j in range(i, m):
@@ -285,7 +286,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
 
 
 def member_functions(
-    member: FamilyMember, vectors: Sequence[str], eps: fmpq | None, budget: int, order: int = 3
+    member: FamilyMember, vectors: Sequence[str], eps: fmpq | None, budget: int, order: int
 ) -> MemberObjects:
     """A given member with indeterminate x (and eps, where it is not given) over the rational functions."""
     n = member.dim
@@ -363,7 +364,7 @@ def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq 
 # ---- bounds ----------------------------------------------------------------------------------------------------
 
 
-def bound_objects(member: FamilyMember, eps: fmpq | None, order: int = 3) -> PaperObjects:
+def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperObjects:
     """Bounds for a given member: x and all vectors are variables, eps as well unless it is given."""
     K = BoundField()
     n = member.dim
@@ -395,8 +396,8 @@ def universal_bound_objects(m: int, order: int) -> PaperObjects:
     """Bounds for `random_objects`: roots, cubics, shears, x and eps are variables."""
     K = BoundField()
     n = 2 * m
-    # Five shears, each with entries of degree 1: entries of S and S^{-1} have degree 5, the sum of m^4 monomials.
-    S = K.polynomial(5, 4 * math.log2(m) + 5.0)
+    # Shears with entries of degree 1: entries of S and S^{-1} have degree 5, the sum of m^4 monomials.
+    S = K.polynomial(_SHEARS, (_SHEARS - 1) * math.log2(m) + _SHEARS)
     root, cubic = K.variable(), K.variable()
     A = K.matrix(n, n, [S * S * root * K.convert(n * n)] * (n * n))
     third = K.matrix(n * n, n, [S * S * S * cubic * K.convert(6 * n**3)] * n**3)

@@ -26,7 +26,11 @@ from helpers import (
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from kahanmaps.algebra.bounds import BoundField
+from kahanmaps.algebra.duals import DualField
+from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import CC, GF, QQ, RR, PrimeField, rational
+from kahanmaps.algebra.functions import FunctionField
 from kahanmaps.algebra.matrices import nullspace, rank, solve
 from kahanmaps.errors import BadPrime, ExpressionError, InexactNumber, InputError, PrecisionLost, SingularMatrix
 
@@ -489,11 +493,24 @@ def test_random_elements_are_determined_by_the_seed(field):
     assert draws(1) != draws(2)
 
 
-def test_random_rationals_stay_below_the_height():
+ALGEBRA = EtaleAlgebra(fmpq_poly([-2, 0, 1]))
+FUNCTIONS = FunctionField(["x"])
+
+
+@pytest.mark.parametrize("field", [QQ, RR(64), CC(64), ALGEBRA, FUNCTIONS, BoundField(), DualField(QQ)], ids=repr)
+def test_only_fields_of_residues_have_a_characteristic(field):
+    assert (field.characteristic, GF(7).characteristic, DualField(GF(7)).characteristic) == (0, 7, 7)
+
+
+def test_random_rationals_reach_the_height_and_no_more():
     rng = random.Random(0)
     drawn = [QQ.random(rng, 5) for _ in range(200)]
-    assert max(abs(number.p) for number in drawn) <= 5
-    assert max(number.q for number in drawn) <= 5
+    assert (min(x.p for x in drawn), max(x.p for x in drawn), max(x.q for x in drawn)) == (-5, 5, 5)
+
+
+@pytest.mark.parametrize("field", [QQ, RR(64), CC(64), FUNCTIONS, DualField(QQ)], ids=repr)
+def test_the_height_of_random_elements_is_10_where_none_is_given(field):
+    assert all(str(field.random(random.Random(k))) == str(field.random(random.Random(k), 10)) for k in range(20))
 
 
 @pytest.mark.parametrize("prime", [2, 7])

@@ -100,6 +100,27 @@ def test_zero_and_constant_entries_are_cheap() -> None:
     assert result.samples <= 15
 
 
+COSTS = [  # names, functions, values, five of them to confirm, and primes
+    ("", ["5/7"], 6, 6),
+    ("x", ["(2*x + 1)/(x - 3)"], 9, 6),
+    ("x", ["(1 + 3*x^2)/(1 - 5*x^4)"], 13, 6),
+    ("xy", ["(x^2*y - 1/3)/(x + y + 5)"], 19, 6),
+    ("xy", [f"{above}/(x*y + 1)" for above in ("x", "y^2", "(x + y)", "1", "(x - y)")] + ["3"], 19, 6),
+    ("xy", ["(123456789123456789*x + 1)/(y - 987654321987654321)"], 15, 7),
+    ("xyz", ["x*y*z", "(x + y)/(y + z)"], 19, 6),
+]
+
+
+@pytest.mark.parametrize(("names", "texts", "values", "primes"), COSTS)
+def test_no_more_values_are_taken_than_are_needed(names: str, texts: list[str], values: int, primes: int) -> None:
+    known = functions(list(names), *texts)
+    result = found(known, list(names))
+    assert (result.samples, len(result.primes)) == (values, primes)
+    enough, too_few = (reconstruct(Box(known), list(names), max_samples=most) for most in (values, values - 1))
+    assert (enough, too_few.functions) == (result, None)
+    assert f"the limit is {values - 1}" in too_few.reason
+
+
 def test_high_coefficients_take_more_primes() -> None:
     rng = random.Random(8)
     result = found([dense(["a", "b"], 3, rng, height=10**40)], ["a", "b"])
@@ -295,7 +316,11 @@ def test_residues_without_simple_numbers() -> None:
 
 def test_chinese_remainders() -> None:
     assert chinese([2, 0], 3, [3, 4], 5) == [8, 9]
-    assert random_prime(random.Random(1), 2) in (2, 3)
+
+
+@pytest.mark.parametrize(("bits", "primes"), [(2, {2, 3}), (3, {5, 7}), (5, {17, 19, 23, 29, 31})])
+def test_random_primes_are_all_those_of_so_many_bits(bits: int, primes: set[int]) -> None:
+    assert {random_prime(random.Random(k), bits) for k in range(60)} == primes
 
 
 @pytest.mark.parametrize("prime", [7, 101, 2**61 - 1])

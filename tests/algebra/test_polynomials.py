@@ -135,6 +135,11 @@ def test_a_polynomial_is_its_factor_times_its_primitive_part(p):
     assert factor * primitive == p
 
 
+def test_zero_is_its_own_primitive_part():
+    zero = ring(["x"]).constant(0)
+    assert primitive_part(zero) == (1, zero)
+
+
 @given(p=polynomials().filter(lambda p: not p.is_zero()))
 def test_a_primitive_part_has_coprime_integers_and_a_positive_leading_one(p):
     _, primitive = primitive_part(p)

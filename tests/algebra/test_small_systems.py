@@ -69,6 +69,13 @@ def test_a_curve_is_not_solved_and_not_dropped():
     assert "not isolated points" in found.reason
 
 
+def test_equations_whose_basis_would_be_too_large_are_not_dropped(monkeypatch):
+    monkeypatch.setattr("kahanmaps.algebra.small_systems.GROEBNER_LIMITS", (1, 1, 1))
+    found = solve(x**2 + y**2 - 5, x * y - 2, z)
+    assert (found.complete, found.reason) == (False, "a Groebner basis would be too large")
+    assert sorted(map(str, found.unsolved[0].equations)) == ["x*y - 2", "x^2 + y^2 - 5"]
+
+
 def test_the_time_is_a_reason():
     found = solve(x**2 + y**2 - 1, z - x, seconds=-1.0)
     assert (found.complete, found.reason) == (False, "the time is over")
@@ -100,6 +107,7 @@ def test_point_and_slopes():
 @pytest.mark.parametrize(
     ("equations", "expected"),
     [
+        ([x**2 * fmpq(1, 4) + y**2 * fmpq(1, 9) - 5, x * y - 12, z], {(2, 6, 0), (4, 3, 0), (-2, -6, 0), (-4, -3, 0)}),
         ([x**2 + y**2 - 5, x * y - 2, z - x - y], {(1, 2, 3), (2, 1, 3), (-1, -2, -3), (-2, -1, -3)}),
         ([x + y + z - 6, x * y + y * z + z * x - 11, x * y * z - 6], set(itertools.permutations((1, 2, 3)))),
         ([x**2 - y, y**2 - z, z**2 - x], {(0, 0, 0), (1, 1, 1)}),  # x^8 = x: two rational solutions and six others

@@ -657,3 +657,12 @@ def test_the_limits_are_those_that_are_documented(good: str, bad: str) -> None:
     parse_rational_function(good, NAMES)
     with pytest.raises(ExpressionError):
         parse_rational_function(bad, NAMES)
+
+
+def test_long_numbers_are_told_by_their_length():
+    numbers = [fmpq(2**99 - 1), fmpq(1, 2**99), fmpq(-(10**1000))]
+    assert [expressions._show(number) for number in numbers] == [
+        str(2**99 - 1),
+        "of about 30 digits",
+        "of about 1000 digits",
+    ]

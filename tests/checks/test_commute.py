@@ -29,6 +29,7 @@ from helpers import EULER_TOP, FORCED_PLANE, LORENZ, LOTKA_VOLTERRA, THOROUGH, f
 from hypothesis import assume, given, settings
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.checks import commute, judge, theorems
 from kahanmaps.checks import settings as settings_module
 from kahanmaps.checks.claims import Report, Verdict
@@ -39,6 +40,7 @@ from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
+from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.orbits import Orbit
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -394,6 +396,13 @@ def test_every_map_commutes_with_itself_and_with_its_inverse(f, eps):
 
 
 # What is told
+
+
+def test_maps_are_compared_for_every_eps_where_one_of_them_has_it():
+    turned = explicit_map(["x", "y"], [parse_rational_function(text, ["x", "y", "eps"]) for text in ("-y", "x")])
+    pairs = [(LOTKA_VOLTERRA, turned), (turned, LOTKA_VOLTERRA), (turned, turned)]
+    identities = [commute.commutativity(f, g, None, ("f", "g")) for f, g in pairs]
+    assert [identity.where for identity in identities] == [", for every eps", ", for every eps", ""]
 
 
 def test_variables_are_matched_by_position_and_that_is_noted():

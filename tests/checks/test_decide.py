@@ -411,6 +411,18 @@ def test_an_identity_defined_nowhere_is_undecided(sides):
     assert "a denominator seems to vanish identically" in decision.evidence.summary
 
 
+class Ended(Stated):
+    """An identity with no further points to be had."""
+
+    def trials(self, seed):
+        return iter([])
+
+
+def test_a_statement_without_points_is_undecided():
+    decision = decide(Ended(1, TRUE.sides, None, subject=()), 0)
+    assert (decision.verdict, decision.witness, decision.evidence.data["points"]) == (UNDECIDED, None, 0)
+
+
 @pytest.mark.parametrize(("factor", "verdict"), [(1, UNDECIDED), (2, REFUTED)])
 def test_an_identity_without_values_over_bounds_has_no_bound_and_is_not_supported(factor, verdict):
     def sides(field, point, eps):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
-from kahanmaps.invariants.heights import Growth
+from kahanmaps.invariants.heights import Growth, height_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
 from kahanmaps.version import __version__
 
@@ -64,6 +66,16 @@ def test_the_time_ends_it(kahanmaps):
     outcome = kahanmaps("heights weierstrass --steps 20 --seconds 0.0001")
     assert (outcome.status, len(outcome.rows)) == (3, 2)
     assert outcome.err == "stopped early: the time was over before all orbits were finished\n"
+
+
+def test_no_orbit_is_begun_after_the_time(monkeypatch):
+    def slow(*arguments, **options):
+        time.sleep(0.02)
+        return height_growth(*arguments, **{**options, "deadline": None})
+
+    monkeypatch.setattr("kahanmaps.laboratory.growth.height_survey.height_growth", slow)
+    survey = height_survey(load("weierstrass").system, starts=3, steps=4, seconds=0.01)
+    assert (len(survey.orbits), survey.is_whole) == (1, False)
 
 
 @pytest.mark.parametrize("steps", [10**26, 10**99], ids=["10^26", "10^99"])

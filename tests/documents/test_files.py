@@ -697,16 +697,16 @@ def test_a_damaged_file_is_an_input_error_or_still_a_file(text, at, length, inse
 
 
 def test_structured_facts_are_read_and_written():
-    text = """
+    text = f"""
 variables = ["x", "y"]
 [system]
 rhs = ["x*y", "y"]
 [catalog]
-degrees = [2, 4, 8]
+degrees = [1, 4, {10**100 - 1}]
 growth = "exponential"
-dynamical_degree = "x - 2"
+dynamical_degree = "x^2 - x - 1"
 verdict = "not integrable"
-codimension = 0
+codimension = 2
 [[catalog.relations]]
 monomials = "degree <= 2"
 dimension = 0
@@ -717,8 +717,18 @@ dimension = 1
     file = parse_system(text)
     again = parse_system(file.to_toml())
     assert again.catalog == file.catalog
+    assert (file.catalog["degrees"][-1], file.catalog["codimension"]) == (10**100 - 1, 2)
     found = relations(again.catalog, again.variables)
     assert [(str(r.functions[0]), len(r.functions), r.dimension) for r in found] == [("1", 6, 0), ("x^2 + y^2", 2, 1)]
+
+
+def test_bounds_of_numbers_are_told():
+    with pytest.raises(SystemFileError) as caught:
+        parse_system(OK + "[catalog]\ncodimension = 3\n" + RELATION.format('["x", "1"]', 2), "mine")
+    assert [line.partition(", expected ")[2] for line in str(caught.value).splitlines()[1:]] == [
+        "an integer from 0 to 2, the dimension",
+        "an integer from 0 to 1",
+    ]
 
 
 def test_a_wrong_word_is_answered_with_those_that_are_known():

@@ -495,3 +495,30 @@ def test_poisson_tensors_are_told_in_dimensions_three_and_four():
     planar = analyze(load("nahm_tetrahedral"))
     assert planar.poisson is None
     assert "Poisson tensors" not in dict(planar.sections)
+
+
+@pytest.mark.parametrize(("most", "first"), [(2, True), (1, False)])
+def test_singularities_come_before_degrees_and_help_them_up_to_a_dimension(most, first, monkeypatch):
+    given, told, real = [], [], module.degree_growth
+
+    def recorded(*arguments, **options):
+        given.append(options["patterns"])
+        return real(*arguments, **options)
+
+    monkeypatch.setattr(module, "degree_growth", recorded)
+    monkeypatch.setattr(module, "WRITTEN_DIMENSION", most)
+    analyze(load("zander_111"), progress=lambda text: told.append(text.partition(":")[0]))
+    parts = [part for part in dict.fromkeys(told) if part in PARTS]
+    assert parts.index("singularities") == (2 if first else len(PARTS) - 1)
+    assert [patterns is not None for patterns in given] == [first]
+
+
+@pytest.mark.parametrize(("most", "looked_for"), [(1, True), (0, False)])
+def test_constant_structures_are_looked_for_up_to_a_dimension(most, looked_for, monkeypatch):
+    monkeypatch.setattr(module, "MAX_HAMILTONIAN_DIMENSION", most)
+    assert (analyze(load("riccati")).hamiltonian is not None) == looked_for
+
+
+def test_commuting_systems_are_sought_for_every_eps_only():
+    assert analyze(load("riccati")).commuting is not None
+    assert analyze(load("riccati"), eps="1/3").commuting is None

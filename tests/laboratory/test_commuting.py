@@ -268,7 +268,24 @@ def test_the_zero_system(names):
     zero = system(names, *["0"] * len(names.split()))
     linear, quadratic = commuting_systems(zero), commuting_systems(zero, "quadratic")
     assert ([g.trivial for g in linear.solutions], linear.complete, linear.every_g_commutes) == (["0"], True, False)
+    assert linear.order == 2  # no equations at eps^4 and beyond are needed
     assert (quadratic.every_g_commutes, quadratic.dimension) == (True, [0, 3, 12][len(names.split())])
+
+
+@pytest.mark.parametrize("shape", ["linear", "quadratic"])
+def test_points_are_added_until_all_brackets_vanish(shape, monkeypatch):
+    """However few unknowns are said to be: too few points leave fields that have another bracket."""
+    f = load("lotka_volterra").system
+    wanted = [str(g) for g in commuting_space(f, shape).fields]
+    monkeypatch.setattr("kahanmaps.laboratory.symmetry.commuting_space.unknowns", lambda *_: -2)
+    assert [str(g) for g in commuting_space(f, shape).fields] == wanted
+
+
+def test_solutions_that_are_refuted_are_counted(monkeypatch):
+    refuted = Finding("", Verdict.REFUTED, Evidence("", "", {}))
+    monkeypatch.setattr(module, "judge_field", lambda *_: refuted)
+    found = commuting_systems(load("lotka_volterra").system)
+    assert (found.solutions, found.discarded) == ([], 3)  # 0, f and -f
 
 
 def test_dependent_components_give_one_b_of_several():

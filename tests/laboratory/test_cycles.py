@@ -532,6 +532,13 @@ def test_laws_are_tried_where_there_are_points_enough(lengths, looked_at, more, 
     assert (found.verdict("integrable bound"), found.verdict("random permutation")) == (bound, permutation)
 
 
+@pytest.mark.parametrize(("complete", "share"), [(True, 100 / 300), (False, 2 / 3)])
+def test_the_share_on_short_cycles_is_one_of_points_which_samples_are(complete, share):
+    """Of cycles of 50, 50 and 200 points; or of three sampled points, on cycles of such lengths."""
+    found = compare(census_of({50: 2, 200: 1}, 300, complete=complete, cycles=None))
+    assert (found.share_within, found.longer) == (share, {200: 1})
+
+
 @pytest.mark.parametrize(
     ("passes", "lengths"), [(True, (2, 102, 119, 202, 900, 909, 918)), (False, (1, 123, 206, 1000, 1010, 1020))]
 )

@@ -21,7 +21,13 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.identities import verdict_on
-from kahanmaps.laboratory.preserve.integrals import IntegralSearch, _is_affine_integral, closing_note, find_integrals
+from kahanmaps.laboratory.preserve.integrals import (
+    IntegralSearch,
+    _affine,
+    _is_affine_integral,
+    closing_note,
+    find_integrals,
+)
 
 integral_verdict = partial(verdict_on, is_density=False)
 PLANE_AND_SPACE = [name for name in names() if load(name).system.dim <= 4]
@@ -125,6 +131,10 @@ def test_the_formulas_themselves_specialise():
     # equal up to an affine function of one variable, as members of one pencil with one denominator
     (a, b), (c, d), (e, f), (g, h) = values
     assert (a - c) * (f - h) == (b - d) * (e - g)
+
+
+def test_integrals_are_those_of_the_map_unless_the_flow_is_asked_for():
+    assert not find_integrals(load("riccati")).flow
 
 
 def test_a_number_for_eps():
@@ -470,3 +480,45 @@ def test_what_another_eps_does_not_repeat_is_no_integral(monkeypatch):
         2,
         "what was found at one eps was not found at another",
     )
+
+
+def test_an_affine_integral_is_written_with_its_coefficients():
+    function, origin, _ = _affine(Laboratory(load("euler_top")), [3, 0, -5])
+    assert (str(function.numerator), str(function.denominator), origin) == ("3*x1 - 5*x3", "1", "v.x with v.f(x) = 0")
+
+
+UP_TO_2 = "relations of degree up to 2 along orbits"
+COUNTS = [  # dimension, codimensions by degree, period, with the known ones, by theorems, formulas; what is concluded
+    (3, (0, 2), None, 0, 0, 0, (2, True, False), f"in all 2 independent (measured: {UP_TO_2} show 2)"),
+    (
+        3, (0, 1), None, 0, 1, 1, (1, False, True),
+        f"in all at least 1 independent (1 by theorems: T; measured: {UP_TO_2} show no more)",
+    ),
+    (3, (0, 1), None, 0, 0, 2, (2, True, True), f"in all 2 independent (measured: {UP_TO_2} show 1; 2 have formulas)"),
+    (4, (0, 1), None, 2, 0, 1, (2, False, False), f"in all at least 2 independent (measured: {UP_TO_2} show 2)"),
+    (3, (0, 0), None, 0, 0, 0, (0, False, True), f"none shows in {UP_TO_2} (measured)"),
+    (1, (0, 0), None, 0, 0, 0, (0, True, True), f"there is no integral (measured, {UP_TO_2})"),
+    (3, (), None, 0, 0, 0, (0, False, True), "orbits were not measured"),
+    (3, (), None, 0, 2, 0, (2, False, False), "in all at least 2 independent (2 by theorems: T)"),
+    (2, (1, 1), 4, 0, 0, 0, (1, False, False), f"in all at least 1 independent (measured: {UP_TO_2} show 1)"),
+    (2, (1, 2), 4, 0, 0, 0, (2, True, False), f"in all 2 independent (measured: {UP_TO_2} show 2)"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("dim", "codimensions", "period", "known", "proved", "formulas", "properties", "text"), COUNTS)
+def test_integrals_are_counted_by_theorems_orbits_and_formulas(
+    dim, codimensions, period, known, proved, formulas, properties, text
+):
+    profile = Profile(dim, codimensions, codimensions, period, True, True, known)
+    found = IntegralSearch(load("riccati"), (), None, (None,) * formulas, profile, "", (), 0, proved, "T", (), False)
+    assert (found.codimension, found.is_exact, found.is_complete) == properties
+    assert found.count_text == text
+
+
+@pytest.mark.parametrize(
+    ("codimensions", "settled"), [((0,), False), ((0, 1, 1), False), ((0, 1, 1, 1), True), ((0, 0, 1, 2), False)]
+)
+def test_orbits_have_settled_where_the_last_of_several_degrees_showed_no_more(codimensions, settled):
+    profile = Profile(3, codimensions, codimensions, None, True, True)
+    assert (profile.is_settled, profile.degree, profile.with_known) == (settled, len(codimensions), 0)
+    assert profile.first_degree == next((d for d, k in enumerate(codimensions, 1) if k), None)

@@ -224,6 +224,21 @@ def test_degrees_with_too_many_unknowns_are_left_out_and_told(monkeypatch):
     assert "degrees above 2 were not tried" in found.reason
 
 
+@pytest.mark.parametrize(("most", "words"), [(3, "were tried for brackets c_ij x_i x_j only"), (2, "were not tried")])
+def test_log_canonical_brackets_alone_are_tried_up_to_a_dimension(most, words, monkeypatch):
+    monkeypatch.setattr(poisson_tensors, "_MAX_UNKNOWNS", 29)
+    monkeypatch.setattr(poisson_tensors, "_MOST_LOGARITHMIC", most)
+    assert f"degrees above 1 {words}" in find_poisson(load("lorenz"), 2, integrals=()).reason
+
+
+def test_a_pencil_is_one_of_at_least_two_tensors_and_of_not_too_many(monkeypatch):
+    for most, verdict in ((3, PROVED), (2, None)):
+        monkeypatch.setattr(poisson_tensors, "_LARGEST_PENCIL", most)
+        found = find_poisson(load("euler_top"), 3, integrals=())
+        assert (len(found.tensors), found.pencil) == (3, verdict)
+    assert find_poisson(load("weierstrass"), integrals=()).pencil is None
+
+
 def test_a_tensor_for_one_eps_is_told_as_such():
     found = find_poisson(load("weierstrass"), eps="1/3")
     assert brackets(found) == ["{x,y} = 4*x - 3"]

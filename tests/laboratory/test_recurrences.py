@@ -54,6 +54,11 @@ def test_the_growth_rate_is_an_algebraic_number_with_certain_digits():
     assert found.to_json()["rate"]["minimal_polynomial"] == ["-1", "-2", "1"]
 
 
+@pytest.mark.parametrize(("values", "power"), [([0] * 4, 0), ([1] * 5, 0), ([n**3 - n for n in range(12)], 3)])
+def test_the_power_of_growth_is_that_of_n(values, power):
+    assert find_recurrence(values).power == power
+
+
 def test_a_polynomial_factor_of_exponential_growth_is_a_multiplicity():
     found = find_recurrence([n * 2**n for n in range(8)])
     assert (found.rate.text, found.rate.multiplicity, found.power) == ("2", 2, 1)

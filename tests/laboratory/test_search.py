@@ -129,6 +129,18 @@ def test_cofactors_are_tried_up_to_so_many_terms(most, degree, terms, monkeypatc
     assert told == f"polynomials of degree up to {degree} with {terms} terms and known cofactors"
 
 
+def test_relations_that_show_nothing_new_are_no_step(monkeypatch):
+    laboratory, _, found = searched(load("euler_top"))
+    map_, known = laboratory.maps[0], list(found.steps)
+    monkeypatch.setattr(module, "darboux_spaces", lambda *_: found.all_spaces)
+    module._take_relations(map_, 2, found, float("inf"))
+    assert found.steps == known
+    nothing = module.Found()
+    monkeypatch.setattr(module, "darboux_spaces", lambda *_: found.spaces[0])
+    module._take_relations(map_, 2, nothing, float("inf"))
+    assert [(step.kind, step.degree, step.product) for step in nothing.steps] == [("relations", 2, None)]
+
+
 # The pencil of 1 + a^2 x/(3 eps - 1) and y^2, as if it had been found at each value of a and eps.
 def pencil_at(prime, values):
     a, eps = values

@@ -307,3 +307,11 @@ def test_symmetries_without_a_translation_come_first(rhs, shift):
     assert [bool(any(t.r)) for t in found] == [False] * 2 + [True] * 6
     (both,) = [t.r for t in found if t.S == fmpq_mat([[-1, 0], [0, -1]])]
     assert both == (shift, shift)
+
+
+def test_signed_permutations_that_were_not_judged_in_time_are_told(monkeypatch):
+    found = [fmpq_mat([[1, 0], [0, 1]])]
+    monkeypatch.setattr("kahanmaps.laboratory.symmetry.symmetries.signed_permutations", lambda *_: (found, True))
+    late = linear_symmetries(QuadraticSystem.from_text(["x", "y"], ["x^2", "y^2"]), seconds=1e-9)
+    assert (late.signed, late.order) == ([], None)
+    assert "the time is over: not all were tried" in "; ".join(late.undecided)

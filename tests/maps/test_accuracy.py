@@ -10,11 +10,13 @@ import pytest
 from flint import arb, fmpq
 
 from kahanmaps.algebra.fields import QQ, RR
+from kahanmaps.documents.catalog import load
 from kahanmaps.family.draw import draw_with_eigenvalues
 from kahanmaps.family.structure import structure_of
 from kahanmaps.maps.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.iterate import Jump
+from kahanmaps.maps.orbit import orbit
 from kahanmaps.maps.orbits import Iterates, Orbit
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -82,3 +84,11 @@ def test_every_trial_is_told():
     bits = bits_for(orbit_with, 15, told.append)
     assert told == [f"balls of {64 * 2**k} bits" for k in range(1, len(told) + 1)]
     assert told[-1] == f"balls of {bits} bits"
+
+
+@pytest.mark.parametrize(("asked", "digits"), [({}, 15), ({"accuracy": 9}, 9)])
+def test_fifteen_digits_are_asked_for_unless_it_is_said_how_many(asked, digits, monkeypatch):
+    seen = []
+    monkeypatch.setattr("kahanmaps.maps.orbit.bits_for", lambda orbit_with, digits, told: seen.append(digits) or 64)
+    orbit(load("harmonic").system, [1, 2], "1/10", steps=3, arithmetic="ball:auto", **asked)
+    assert seen == [digits]

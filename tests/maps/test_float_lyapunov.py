@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
+from flint import fmpq_mat
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
@@ -65,6 +67,32 @@ def test_the_sum_telescopes_along_an_exact_orbit():
         x = kahan.step(x)
     found = lyapunov_exponents(load("lorenz").system, "1/50", [[1 / 2, 1 / 3, 1 / 4]], 3)
     assert found.log_volume[0] * 3 / 25 == pytest.approx(math.log(abs(product)), abs=1e-10)
+
+
+@pytest.mark.parametrize("name", ["lorenz", "lotka_volterra", "henon_heiles"])
+@pytest.mark.parametrize(("steps", "transient"), [(5, 3), (6, 0), (2, 1)])
+def test_the_exponents_are_those_of_the_exact_derivatives_along_the_exact_orbit(name, steps, transient):
+    """Q_k R_k = dPhi(x_k) Q_(k-1), Q = I at the start, and the sums of log |R_k| from after the transient on."""
+    kahan = KahanMap(load(name).system, "1/50")
+    start = x = kahan.point([f"1/{k + 2}" for k in range(kahan.dim)])
+    Q, logs, volumes = np.eye(kahan.dim), [], []
+    for _ in range(transient + steps):
+        rows = fmpq_mat(kahan.jacobian(x)).tolist()
+        J = np.array([[float(Fraction(int(entry.p), int(entry.q))) for entry in row] for row in rows])
+        Q, R = np.linalg.qr(J @ Q)
+        logs.append(np.log(np.abs(np.diagonal(R))))
+        volumes.append(math.log(abs(np.linalg.det(J))))
+        x = kahan.step(x)
+    counted, half = logs[transient:], steps // 2
+    exponents, early = sum(counted) / (steps / 25), sum(counted[:half]) / (half / 25)
+    order = np.argsort(-exponents)
+    point = [int(entry.p) / int(entry.q) for entry in start]
+    found = lyapunov_exponents(load(name).system, "1/50", [point, point], steps, transient=transient)
+    assert (found.steps, found.transient, found.orbits, found.ended, found.stopped) == (steps, transient, 2, 0, False)
+    for lane in (0, 1):
+        assert found.exponents[lane] == pytest.approx(exponents[order], abs=1e-9)
+        assert found.half[lane] == pytest.approx(early[order], abs=1e-9)
+        assert found.log_volume[lane] == pytest.approx(sum(volumes[transient:]) / (steps / 25), abs=1e-9)
 
 
 def test_symplectic_exponents_come_in_pairs_and_integrable_ones_are_small():

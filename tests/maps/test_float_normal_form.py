@@ -8,10 +8,11 @@ the last bit; and each way in which an orbit can end has its status and its step
 from __future__ import annotations
 
 import random
+from itertools import combinations
 
 import numpy as np
 import pytest
-from flint import arb, fmpq, fmpq_mat, fmpq_poly
+from flint import acb, arb, fmpq, fmpq_mat, fmpq_poly
 from helpers import HENON_HEILES, quick
 
 from kahanmaps.algebra.fields import RR
@@ -21,7 +22,7 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.floats import steps as float_steps
-from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, _doubles, planar_blocks
+from kahanmaps.maps.floats.blocks import CUBES, GENERAL, LINES, _doubles, _factors, planar_blocks
 from kahanmaps.maps.floats.fast import FloatEnsemble, FloatOrbit, float_function, to_floats
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.kernels import has_numba
@@ -529,3 +530,21 @@ def test_compiled_loops_over_the_blocks_of_a_lane_do_what_they_do_uncompiled(rea
     assert compiled == pytest.approx(plain, rel=1e-15)
     assert np.array_equal(plain[:, 0], before[:, 0])
     assert (plain[:, 1] != before[:, 1]).all()
+
+
+LINEAR_FORMS = [(1, 0), (0, 1), (1, -1), (1, 1), (3, 2)]
+
+
+@pytest.mark.parametrize("lines", list(combinations(LINEAR_FORMS, 3)) + list(combinations(LINEAR_FORMS, 2)), ids=str)
+def test_a_form_has_the_factors_it_is_the_product_of(lines):
+    """Among them those that vanish at three of the four places where it is looked at first."""
+    form = [1]
+    for f, g in lines:
+        form = [f * a + g * b for a, b in zip([*form, 0], [0, *form], strict=True)]
+    found = [(complex(a), complex(b)) for a, b in _factors([acb(c) for c in form])]
+    assert len(found) == len(lines)
+    for f, g in lines:
+        (close,) = [
+            line for line in found if abs(line[0] * g - line[1] * f) < 1e-6
+        ]  # roots are asked for to half of 53 bits
+        assert abs(close[0]) + abs(close[1]) > 0.1

@@ -20,7 +20,7 @@ from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form.periods import orbit_period
 from kahanmaps.maps.orbits import Orbit
-from kahanmaps.maps.residues.ensemble import Arithmetic, ModularEnsemble
+from kahanmaps.maps.residues.ensemble import Arithmetic, ModularEnsemble, _split
 from kahanmaps.maps.residues.numba_kernel import kernels
 
 MERSENNE = 2**61 - 1
@@ -113,6 +113,12 @@ def test_a_step_back_undoes_a_step_in_the_planes(kernel):
     assert back.x.tolist() == starts
     back.advance(1)
     assert back.x.tolist() != starts
+
+
+@pytest.mark.parametrize(("prime", "is_used"), [(2, False), (3, True), (7, True)])
+def test_modulo_2_planes_are_not_used_for_their_coordinates_are_zero(prime, is_used):
+    field = GF(prime)
+    assert (_split(normal_form(draw_with_eigenvalues([0, 1], 1)), field, field.one) is not None) == is_used
 
 
 def test_the_planes_are_used_where_chi_splits_and_else_the_elimination():

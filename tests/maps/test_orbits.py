@@ -269,6 +269,11 @@ def test_an_equilibrium_has_period_one():
     assert ended(Orbit(KahanMap(OSCILLATOR, "1/3"), [0, 0], 3)).period == 1
 
 
+def test_balls_do_not_tell_whether_the_start_came_back():
+    end = ended(Orbit(KahanMap(OSCILLATOR, "1/3", RR(64)), [0, 0], 3))
+    assert (end.status, end.period) == ("completed", None)
+
+
 def test_the_end_of_a_periodic_orbit_says_when_the_start_came_back():
     assert ended(Orbit(KahanMap(OSCILLATOR, 1), [1, 0], 8)).message == "the start came back after 4 steps"
 

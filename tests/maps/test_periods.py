@@ -21,6 +21,7 @@ from kahanmaps.errors import BadPrime, SingularStep
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.planar import normal_form
 from kahanmaps.maps.kahan import KahanMap
+from kahanmaps.maps.normal_form import level_curves, periods
 from kahanmaps.maps.normal_form.level_curves import (
     Jacobian,
     LevelCubic,
@@ -295,11 +296,37 @@ def test_the_trace_of_frobenius_modulo_small_primes_gives_the_number_of_points(p
         assert abs(points - field.q - 1) <= 2 * field.q**0.5
 
 
+def test_in_characteristic_2_an_orbit_is_walked_to_its_end_or_as_far_as_allowed(monkeypatch):
+    lengths = set()
+    for block, point in blocks(Small(2), random.Random(3), 60):
+        found = plane_period(block, point, 2)
+        if found.kind is not Kind.STEPPED or found.status != "periodic":
+            continue
+        lengths.add(found.period)
+        monkeypatch.setattr(periods, "_WALK", found.period)
+        assert plane_period(block, point, 2) == found
+        monkeypatch.setattr(periods, "_WALK", found.period - 1)
+        assert plane_period(block, point, 2).status == "undecided"
+        monkeypatch.undo()
+    assert lengths == {1, 2}
+
+
+@pytest.mark.parametrize("field", [Small(10_007), Small(37, 2)], ids=repr)
+def test_with_the_number_of_points_modulo_small_primes_the_order_of_T_is_the_same(field, monkeypatch):
+    rng = random.Random(5)
+    gammas = [gamma for gamma in (field.random(rng) for _ in range(20)) if gamma not in (0, 1)]
+    orders = [translation_order(gamma, field.q, field.context) for gamma in gammas]
+    for radius in (2, 10):
+        monkeypatch.setattr(level_curves, "_RADIUS", radius)
+        assert [translation_order(gamma, field.q, field.context) for gamma in gammas] == orders
+
+
 def test_all_multiples_at_once_are_the_multiples_one_by_one():
     curve = Jacobian(GF(1009).convert(5))
     points, order = curve.multiples(curve.T, 100)
     assert (len(points), order) == (100, None)
     assert points == [curve.multiple(k, curve.T) for k in range(1, 101)]
+    assert curve.multiples(None, 100) == ([], 1)
 
 
 def test_one_division_inverts_many():

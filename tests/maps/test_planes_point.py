@@ -18,7 +18,7 @@ from planar_helpers import SPLIT, STARTS, side_by_side, structure_and_system
 from kahanmaps.maps.integer_steps import IntegerPoint
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.normal_form import planes_point
-from kahanmaps.maps.normal_form.planes_point import PlanesPoint
+from kahanmaps.maps.normal_form.planes_point import PlanesPoint, _shared
 from kahanmaps.maps.normal_form.steps import NormalSteps
 
 PAIRS = [
@@ -181,3 +181,10 @@ def test_all_starts_put_together_are_the_start():
     for first, second in pairwise(names):
         _, structure, start = side_by_side(first, second)
         assert next(NormalSteps(structure, fmpq(1, 2)).points(start)).rationals() == start
+
+
+@pytest.mark.parametrize("numbers", [(6, 10, 15, 7), (2, 4), (4, 9, 25), (3, 5, 3), (8, 12, 18, 5), (11,), (1, 1)])
+def test_what_numbers_share_are_the_primes_that_divide_two_of_them(numbers):
+    shared = _shared([fmpz(number) for number in numbers])
+    for prime in (2, 3, 5, 7, 11):
+        assert (shared % prime == 0) == (sum(number % prime == 0 for number in numbers) > 1)

@@ -82,7 +82,7 @@ def point(name: str, number: int = 0) -> PaperObjects:
             else:
                 K = random_prime_field(rng)
                 roots = tuple(K.convert(root) for root in rational)
-            return realise.point_over(found, K, roots, None, rng)
+            return realise.point_over(found, K, roots, None, rng, 3)
         except BadPrime:
             continue
 

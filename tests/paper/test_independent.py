@@ -45,7 +45,7 @@ class Case:
     def __init__(self, name):
         found = member(name)
         roots = realise.rational_roots(found)
-        self.o = realise.point_over(found, QQ, roots, fmpq(1, 7), random.Random(name))
+        self.o = realise.point_over(found, QQ, roots, fmpq(1, 7), random.Random(name), 3)
         n = found.dim
         self.x = [fraction(entry) for entry in self.o.x.entries()]
         self.y = [fraction(entry) for entry in self.o.vector("y").entries()]

@@ -15,7 +15,7 @@ from functools import cache
 import pytest
 from flint import fmpq_mat, fmpq_poly
 from helpers import LORENZ, quick
-from paper.members import LARGE_SPECTRA, SPECTRA, file, member
+from paper.members import LARGE_SPECTRA, SPECTRA, file, member, point
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.text import parse_polynomial
@@ -213,6 +213,10 @@ def test_at_one_eps_everything_holds_as_well():
         assert by_key(report)[key].witness.eps == "1/10"
 
 
+def test_series_go_to_the_third_order_unless_asked_for_more():
+    assert verify(file("m=1"), options=VerifyOptions(sections=(6,))).context["order"] == 3
+
+
 @pytest.mark.parametrize("order", [1, 3, 6])
 def test_the_series_of_the_integrals_is_proved_to_the_order_asked_for(order):
     report = verify(file("m=2, split"), options=VerifyOptions(sections=(7,), order=order))
@@ -239,6 +243,8 @@ def test_a_claim_that_no_control_refutes_is_told(monkeypatch):
     # The control "eps" without its effect: the claim that only it refutes is no check any more.
     monkeypatch.setitem(CONTROLS, "eps", replace(CONTROLS["eps"], function=lambda o: o.changed()))
     report = verify(file("m=2, split"), options=VerifyOptions(sections=(6,), controls=True))
+    assert verify_module.NOTE_ON_PROOFS not in report.notes
+    assert verify_module.NOTE_ON_PROOFS in verify(file("m=2, split"), options=SIXTH).notes
     assert report.verdict is UNDECIDED
     assert report.findings[-1].evidence.summary == "no control refutes jacobians-at-the-images"
 
@@ -493,7 +499,7 @@ def test_the_witness_of_the_misprint_in_the_two_forms_is_a_rational_point_with_b
 
 def test_a_control_that_makes_all_systems_f_replaces_given_matrices_too():
     """Objects for derivatives are given the matrices B_i; drawn ones have none and compute them from the sign."""
-    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1))
+    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1), 3)
     trivial = CONTROLS["B=I"].function
     given = objects.changed(associate_matrices=(objects.I * objects.number(5),))
     assert trivial(given).associate_matrices == (objects.I,)
@@ -501,7 +507,30 @@ def test_a_control_that_makes_all_systems_f_replaces_given_matrices_too():
 
 
 def test_a_quadratic_system_without_structure_is_drawn_with_terms_of_all_degrees():
-    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1))
+    objects = realise.random_objects(2, GF(2**61 - 1), random.Random(1), 3)
     drawn, homogeneous = objects.arbitrary_system(), objects.arbitrary_system(homogeneous=True)
     zero = objects.vector("x") * objects.number(0)
     assert drawn.value(zero.entries()) != homogeneous.value(zero.entries())
+
+
+@pytest.mark.parametrize("m", [6, 7, 9])
+def test_of_many_sign_vectors_all_single_flips_are_tried_and_up_to_four_others(m):
+    samples = [realise.sign_sample(m, random.Random(seed)) for seed in range(20)]
+    if m == 6:
+        assert samples == [None] * 20
+        return
+    flips = tuple(tuple(-1 if j == i else 1 for j in range(m)) for i in range(m))
+    assert {sample[:m] for sample in samples} == {flips}
+    assert max(len(sample) for sample in samples) == m + 4
+    for others in (sample[m:] for sample in samples):
+        assert len({*others, *flips}) == m + len(others)
+        assert all(len(signs) == m and signs[0] == 1 and set(signs) == {1, -1} for signs in others)
+
+
+def test_a_claim_that_is_not_defined_does_not_hold():
+    def nowhere(objects):
+        raise ZeroDivisionError
+
+    claim, objects = claims()[0], point("m=2, split")
+    assert verify_module._holds(claim, objects)
+    assert not verify_module._holds(replace(claim, function=nowhere), objects)

@@ -194,12 +194,11 @@ def _search(
 ) -> tuple[list[FoundDensity], int, str]:
     """Densities, the largest degree that was tried, and why there are none; the product where none is simpler."""
     dim = laboratory.map.dim
-    of_product = 0 if product is None else product.degree(dim)
     top = max_degree if max_degree is not None else _MAX_DEGREE
     top = max((d for d in range(top + 1) if comb(dim + d, d) <= _MAX_UNKNOWNS), default=0)
     # With a product in hand only lower degrees are worth a part of the time, and the others of its own degree.
     until = deadline if product is None else time.monotonic() + (deadline - time.monotonic()) / 3
-    for degree in range(top + 1 if product is None else min(top, of_product) + 1):
+    for degree in range((top if product is None else min(top, product.degree(dim))) + 1):
         if time.monotonic() > until:
             if product is not None:
                 break
@@ -214,7 +213,7 @@ def _search(
         except NoPoint as error:
             return [], degree - 1, str(error)
     if product is not None:
-        return [product], of_product, ""
+        return [product], product.degree(dim), ""
     return [], top, f"no polynomial of degree at most {top}, and no product of powers of known ones, is a density"
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import count, product
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpz
 
@@ -127,8 +127,6 @@ def closed_forms(system: QuadraticSystem, quotient: QuotientForms, rng: random.R
         products = [K * by_y for K in forms]
         conditions = fmpq_mat([[P[i, j] - P[j, i] for P in products] for i, j in pairs])
         forms = [combination_of(vector, forms) for vector in nullspace(QQ, conditions)]
-    if not forms:
-        return ()
     echelon, _ = fmpq_mat([[K[i, j] for i, j in pairs] for K in forms]).rref()
     rows = (primitive_integers(tuple(row)) for row in echelon.tolist())
     return tuple(_skew(m, dict(zip(pairs, row, strict=True))) for row in rows)
@@ -190,19 +188,14 @@ def _invertible(forms: Sequence[fmpq_mat], m: int, rng: random.Random) -> tuple[
     if len(degrees) ** len(forms) > _GRID:
         return None, False
     # A polynomial of degree at most m/2 in each variable that vanishes on this grid is zero.
-    for coefficients in product(degrees, repeat=len(forms)):
-        K = combination_of(coefficients, forms)
-        if K.det() != 0:
-            return K, True
-    return None, True
+    grid = (combination_of(coefficients, forms) for coefficients in product(degrees, repeat=len(forms)))
+    return next((K for K in grid if K.det() != 0), None), True
 
 
-def _small(count: int, rng: random.Random) -> Iterator[tuple[int, ...]]:
+def _small(length: int, rng: random.Random) -> Iterator[tuple[int, ...]]:
     """Vectors of small integers, simple ones first, without end."""
-    for i in range(count):
-        yield tuple(int(j == i) for j in range(count))
-    yield (1,) * count
-    size = 10
-    while True:
-        yield tuple(rng.randint(-(size // 10), size // 10) for _ in range(count))
-        size += 1
+    for i in range(length):
+        yield tuple(int(j == i) for j in range(length))
+    yield (1,) * length
+    for size in count(10):
+        yield tuple(rng.randint(-(size // 10), size // 10) for _ in range(length))

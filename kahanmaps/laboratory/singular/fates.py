@@ -375,7 +375,8 @@ def orders_at(
                 return Orders(rows[:last], (), reached, True)
         found = [find_recurrence(column) for column in zip(*rows, strict=True)]
         repeats = all(one is not None and len(rows) >= max(_CONSTANT, _CHECKED * one.order) for one in found)
-        if repeats and (len(run) >= min(reach, limits.along) or not is_whole):
+        is_cut = not is_whole and not limits.is_over  # by the precision
+        if rows and repeats and (len(run) >= min(reach, limits.along) or is_cut):
             laws = tuple(one.characteristic for one in found if one is not None)
             kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
             return Orders(rows[:kept], laws, len(run), True)

@@ -43,7 +43,7 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 LINES, CUBES, GENERAL = 0, 1, 2  # kinds of block
 
 _CANONICAL = {LINES: (0, 1, 1, 0), CUBES: (1, 0, 0, 1)}
-_ROTATIONS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1))  # one of them makes u^3 or u^2 appear in a form that is not 0
+_ROTATIONS = ((1, 0), (0, 1), (1, 1), (1, -1))  # one of them makes u^3 or u^2 appear in a form that is not 0
 _OBLIQUE = 0.02  # of the sine between the forms U and V: below, digits are lost, so no canonical form
 _BITS = (192, 384, 768, 1536, 3072)
 _GOOD_BITS = 60  # of an entry before it is rounded

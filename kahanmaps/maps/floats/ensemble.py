@@ -104,9 +104,9 @@ class Stepping:
         system: QuadraticSystem | BirationalMap,
         eps: fmpq,
         *,
-        backward: bool = False,
-        form: NormalForm | None = None,
-        kernel: str | None = None,
+        backward: bool,
+        form: NormalForm | None,
+        kernel: str | None,
         threads: int | None = 1,
         long: bool = True,
     ) -> None:

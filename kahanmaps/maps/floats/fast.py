@@ -185,7 +185,6 @@ class _Floats:
 
     zero = 0.0
     one = 1.0
-    exact = False
 
     @staticmethod
     def convert(value: Any) -> float:

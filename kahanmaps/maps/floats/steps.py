@@ -41,7 +41,7 @@ from kahanmaps.maps.kahan import KahanMapOver
 IntArray = NDArray[np.int64]
 
 NEAR = 2.0**-40
-NEAR_SQUARED = 2.0**-80
+NEAR_SQUARED = NEAR * NEAR
 # In real canonical blocks |A C| <= |w - 1|: w is 1 + U V, or 1 - (U^2 + U V + V^2). So a step with |w| above this is
 # not near-singular, whatever A C is.
 CLEAR = 4 * NEAR

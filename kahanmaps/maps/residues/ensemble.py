@@ -235,7 +235,7 @@ class ModularEnsemble:
 
 
 def _chosen(kernel: str | None, prime: int) -> str:
-    chosen = choose_kernel(kernel)
+    chosen = choose_kernel(kernel, long=True)
     return "numpy" if prime == 2 else chosen  # Montgomery's form needs an odd modulus
 
 
