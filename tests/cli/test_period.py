@@ -195,6 +195,7 @@ def test_verbose_says_what_was_found_and_quiet_says_nothing(kahanmaps, pair):
         ("period --start 1,2 --eps 1", "missing SYSTEM"),
         ("period lorenz --start 1,2,3 --eps 1/10", "x' is not J grad H"),
         ("period lorenz --start 1,2,3 --eps 1/10", "kahanmaps orbit ... --steps N"),
+        ("period lyness --start 1,2", "it is an explicit map. To walk instead: kahanmaps orbit ... --steps N"),
         ("period henon_heiles --start 1,2,3,4 --eps 1/10", "H is not a homogeneous cubic"),
         ("period paper_m2 --start 1,2 --eps 1/10", "with 2 coordinates, expected 4"),
         ("period paper_m2 --start 1,2,3,4 --eps 0", "found eps = 0"),

@@ -10,6 +10,7 @@ from search_helpers import random_system, system
 
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
 from kahanmaps.laboratory.preserve import search as module
@@ -69,6 +70,18 @@ def test_so_many_further_maps_are_given_as_are_asked_for(count):
     maps = list(laboratory.other_maps(count))
     assert len(maps) == count
     assert len({map_.prime for map_ in maps} | set(laboratory.primes)) == count + len(laboratory.primes)
+
+
+def test_cofactors_alone_give_the_three_integrals_of_lyness_of_order_five():
+    # x_{n+5} x_n = 3 + x_{n+1} + ... + x_{n+4}: all have numerators of degree 6 and more over x1 x2 x3 x4 x5
+    image = ["x2", "x3", "x4", "x5", "(3 + x2 + x3 + x4 + x5)/x1"]
+    inverse = ["(3 + x1 + x2 + x3 + x4)/x5", "x1", "x2", "x3", "x4"]
+    variables = ["x1", "x2", "x3", "x4", "x5"]
+    laboratory = Laboratory(parse_system(f"variables = {variables}\n[map]\nimage = {image}\ninverse = {inverse}"))
+    profile = SimpleNamespace(nullities=(), codimension=3)
+    found = search(laboratory.maps[0], profile, laboratory.cofactors(), 60.0)
+    assert [(step.kind, step.degree) for step in found.steps] == [("cofactor", 6)]
+    assert gradient_rank(laboratory.maps[0], found.all_spaces) == 3
 
 
 def test_another_system_does_not_repeat_a_search():

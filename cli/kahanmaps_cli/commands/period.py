@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from kahanmaps.maps.normal_form.periods import OrbitPeriod
 
 _STATUS = {"periodic": 0, "aperiodic": 0}
+_WALK = "To walk instead: kahanmaps orbit ... --steps N says when the start comes back"
 _LONG_PRIME, _LONGEST_PRIME = 90, 192  # bits, between which it takes from seconds to minutes
 
 
@@ -56,15 +57,15 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if kind not in ("exact", "mod"):
         raise click.UsageError(f"found --arithmetic {kind}, expected exact or mod:P: a period is exact")
     file = load_system(system, options)
-    _ = file.system  # which says that other maps are none of a vector field
+    if not file.is_quadratic:
+        raise InputError(f"no period of {file.name} can be computed: {_structure(file)}. {_WALK}")
     eps = the_eps(options["eps"], options["time_step"])
     _require_point(file, eps, options["start"], kind, prime)
     structure = _structure(file)
     if isinstance(structure, str):
         raise InputError(
             f"no period of {file.name} can be computed: {structure}. Looked for a matrix A that makes it a member of "
-            "the commuting family with distinct roots of chi, and so a translation. To walk instead: "
-            "kahanmaps orbit ... --steps N says when the start comes back"
+            f"the commuting family with distinct roots of chi, and so a translation. {_WALK}"
         )
     if not quiet:
         if verbose:

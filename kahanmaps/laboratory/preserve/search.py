@@ -30,7 +30,7 @@ from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.maps.kahan import KahanMapOver
 
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
-_COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 5, 6: 4}
+_COFACTOR_DEGREE = {1: 6, 2: 9, 3: 7, 4: 6, 5: 6, 6: 4}
 _MOST_TERMS = 1000
 NOTHING: Mapping[int, Mapping[Pattern, Branches]] = MappingProxyType({})
 _SPARE = 8
