@@ -20,6 +20,7 @@ from kahanmaps.laboratory import report
 from kahanmaps.laboratory.analysis import Analysis, analyze
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
+from kahanmaps.laboratory.singular.singularities import Patterns
 
 FURTHER = Path(__file__).parent / "further_systems"
 PARTS = (
@@ -522,3 +523,38 @@ def test_constant_structures_are_looked_for_up_to_a_dimension(most, looked_for, 
 def test_commuting_systems_are_sought_for_every_eps_only():
     assert analyze(load("riccati")).commuting is not None
     assert analyze(load("riccati"), eps="1/3").commuting is None
+
+
+@pytest.mark.parametrize(
+    ("name", "sense", "ground"),
+    [
+        ("lotka_volterra", "not integrable", "proved"),
+        ("hietarinta_viallet", "confining and not integrable", "proved"),
+        ("henon_heiles", "confining and not integrable", "explained"),
+        ("lorenz", "not integrable", "explained"),
+        ("euler_top", "superintegrable", "proved"),
+        ("weierstrass", "integrable", "proved"),
+        ("paper_m2", "Liouville integrable", "proved"),
+        ("harmonic", "linear", "proved"),
+        ("zhukovski_volterra_2", "not integrable", "explained"),
+    ],
+)
+def test_a_verdict_says_in_which_sense_and_on_what_ground(name, sense, ground):
+    found = analyze(load(name), seconds=20).conclusion
+    assert (found.sense, found.ground) == (sense, ground)
+    assert ground != "proved" or "proved" in found.sentence or sense == "linear"
+
+
+def test_what_is_proved_of_a_verdict_goes_with_its_proof():
+    found = analyze(load("lotka_volterra"))
+    unproved = replace(found, degrees=replace(found.degrees, enclosure=None))
+    assert (unproved.conclusion.sense, unproved.conclusion.ground) == ("not integrable", "explained")
+    unexplained = replace(unproved, degrees=replace(unproved.degrees, patterns=None))
+    assert (unexplained.conclusion.kind, unexplained.conclusion.ground) == ("not integrable", "measured")
+    estimated = replace(unproved, degrees=replace(unproved.degrees, patterns=Patterns((30,), None, True)))
+    assert (estimated.conclusion.kind, estimated.conclusion.ground) == ("not integrable", "estimated")
+    # A proof of entropy beside an integral is a contradiction, and no verdict.
+    integrable = analyze(load("weierstrass"))
+    both = replace(integrable, degrees=found.degrees)
+    assert both.conclusion.kind == "undecided"
+    assert "positive entropy is proved, which excludes an integral" in both.conclusion.sentence

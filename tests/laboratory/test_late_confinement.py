@@ -300,7 +300,8 @@ def test_heights_of_orbits_shorter_than_the_last_pattern_are_no_finding():
     found = analyze(load("weierstrass"))
     assert doubt_of_heights(found) == ""
     late = replace(found.degrees, patterns=Patterns((50,), None, True))
-    assert doubt_of_heights(replace(found, degrees=late)).startswith("the singularities show something new up to step 50 and")
+    doubt = doubt_of_heights(replace(found, degrees=late))
+    assert doubt.startswith("the singularities show something new up to step 50 and")
     for degrees, words in (((20,) * 30, "are bounded"), (tuple(2**n for n in range(12)), "grow exponentially")):
         other = replace(found, degrees=replace(found.degrees, degrees=degrees, patterns=None))
         assert words in doubt_of_heights(other)
