@@ -204,7 +204,9 @@ def _forms(equation: Equation, inverse: Equation, digits: int) -> _Forms:
         form = kernel_minors(rows)[-1]
         return (form,) if digits > _MOST_DIGITS else tuple(factor for factor, _ in form.factor()[1])
 
-    return _Forms(factors(equation), factors(inverse), context.gens()[-1])
+    infinity = context.gens()[-1]
+    poles = tuple(form for form in factors(equation) if form != infinity)
+    return _Forms(poles, factors(inverse), infinity)
 
 
 def _on_line(

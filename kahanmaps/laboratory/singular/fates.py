@@ -411,9 +411,9 @@ def walked(
                     return run, len(run) == steps
             return run, True
         except PrecisionTooLow:
-            precision *= 2
-            if precision > most or time.monotonic() > end:
+            if precision >= most or time.monotonic() > end:
                 return run, False
+            precision = min(most, max(2 * precision, 8 + precision * steps // max(1, len(run))))
 
 
 def _next_hit(

@@ -20,6 +20,9 @@ from kahanmaps.maps.equation import Equation
 Function = Callable[[Sequence[nmod_poly], int], int | None]
 
 
+_FEW = 4  # terms, of which mostly one is the first that is not zero
+
+
 class PrecisionTooLow(ArithmeticError):
     """The series are not known far enough in t: start again with more terms."""
 
@@ -188,6 +191,8 @@ def form_order(form: Any, field: PrimeField) -> Function:
     def order(X: Sequence[nmod_poly], precision: int) -> int | None:
         if int(reduced(*(int(entry[0]) for entry in X))):
             return 0
+        if precision > _FEW and (found := order([entry.truncate(_FEW) for entry in X], _FEW)) is not None:
+            return found
         powers = [[nmod_poly([1], p), entry] for entry in X]
         total = nmod_poly([], p)
         for exponents, term in terms:
