@@ -56,6 +56,6 @@ def doubt_of_heights(found: Findings) -> str:
     steps = max(len(orbit.growth.heights) for orbit in found.heights.orbits) - 1
     last = max(found.degrees.patterns.lengths, default=0) if found.degrees.patterns is not None else 0
     if kind is not Growth.UNDECIDED and last > steps // 2:
-        late = f"the last confinement comes after {counted(last, 'step')} and the orbits have {steps}"
+        late = f"the singularities show something new up to step {last} and the orbits have {counted(steps, 'step')}"
         return f"{reason}: {late}" if reason else late
     return reason

@@ -299,8 +299,9 @@ def test_the_parts_of_a_report_do_not_contradict_each_other(name):
 def test_heights_of_orbits_shorter_than_the_last_pattern_are_no_finding():
     found = analyze(load("weierstrass"))
     assert doubt_of_heights(found) == ""
-    late = replace(found.degrees, patterns=Patterns((50,), None, True))
-    assert doubt_of_heights(replace(found, degrees=late)).startswith("the last confinement comes after 50 steps and")
+    degrees = replace(found.degrees, patterns=Patterns((50,), None, True))
+    late = doubt_of_heights(replace(found, degrees=degrees))
+    assert late.startswith("the singularities show something new up to step 50 and")
     for degrees, words in (((20,) * 30, "are bounded"), (tuple(2**n for n in range(12)), "grow exponentially")):
         other = replace(found, degrees=replace(found.degrees, degrees=degrees, patterns=None))
         assert words in doubt_of_heights(other)
@@ -356,7 +357,7 @@ def test_heights_and_degrees_that_do_not_go_together_are_told():
 def test_half_of_the_longest_orbit_has_to_reach_beyond_the_last_pattern():
     # 21 heights are those of 20 steps.
     kind, growth = Growth.QUADRATIC, GrowthClass.QUADRATIC
-    late = "the last confinement comes after 11 steps and the orbits have 20"
+    late = "the singularities show something new up to step 11 and the orbits have 20 steps"
     assert beside(kind, growth, (4, 10)) == ""
     assert beside(kind, growth, (4, 11)) == late
     assert beside(kind, GrowthClass.BOUNDED, (4, 11)) == f"the degrees are bounded: {late}"
