@@ -38,8 +38,8 @@ def convert(
         command: the command line that makes this file, for the comment on top.
 
     Returns:
-        The text of the file. eps is always an argument (the time step is 2 eps, as the comment on top says). Nothing in
-        it depends on the day or the machine.
+        The text of the file. eps is an argument of all functions of the map (the time step is 2 eps, as the comment on
+        top says), if it has one. Nothing in it depends on the day or the machine.
 
     Raises:
         InputError: for an unknown language or part, a name that is none, integrals or a density where none is known,

@@ -42,7 +42,8 @@ class Language:
     `vector`, `row` and `matrix` are what stands before and after entries and rows, the latter columns where they are
     written `by_columns`. `call` is a call of a function. `solve`, `solve_matrix` and `det` are what to write for the
     solution of a linear equation with a vector or a matrix as its right-hand side, and for a determinant; `solver` what
-    has to be defined for them. `head` and `tail` begin and end the file; `usage` is a call of the map.
+    has to be defined for them. `head` and `tail` begin and end the file; `usage` is a call of the map, with
+    <more> arguments, `tenth` the number 1/10 for eps.
 
     <n> is the dimension everywhere, <solve>, <vector>, <matrix> and <module> are names for what the head defines.
     `comment` is what stands before and after one, `avoided` what it must not contain, with something else for it.
@@ -55,6 +56,7 @@ class Language:
     solve: str
     det: str
     usage: str
+    tenth: str
     comment: tuple[str, str]
     vector: tuple[str, str]
     matrix: tuple[str, str]

@@ -97,6 +97,7 @@ class _Writer:
         self.words |= {key: self._new_name(key) for key in ("vector", "matrix")}
         self.safe = language.safe((*formulas.names, *formulas.new), self.used)
         self.safe["eps"] = "eps"
+        self.eps = ["eps"] if formulas.map.has_eps else []
         self.symbols = [self.safe[name] for name in formulas.symbols]
         self.written: dict[str, str] = {}  # name in the language -> text
 
@@ -114,7 +115,7 @@ class _Writer:
             lines.append(f"Names that {language.title} cannot use or reads otherwise: {', '.join(renamed)}")
         if self.names["kahan_map"] in self.written:
             values = [str(k) for k in range(1, formulas.dim + 1)]
-            more = "".join(f", {name}" for name in self.symbols)
+            more = "".join(f", {value}" for value in [*[language.tenth] * len(self.eps), *self.symbols])
             told = ", ".join(values) if len(values) <= 12 else f"1, 2, ..., {len(values)}"
             lines.append(f"For example: {fill(language.usage, self.words | {'values': told, 'more': more})}")
         solver = language.solver if any(self.words["solve"] in text for text in self.written.values()) else ""
@@ -136,7 +137,7 @@ class _Writer:
         self._function("kahan_matrix", told[0], _MATRIX, body, {"point": self.formulas.variables})
         right = [row[-1] for row in self.formulas.equation]
         self._formulas("kahan_vector", told[1], right)
-        body = self._solve(self.language.solve, self._call("kahan_vector", "point", "eps"))
+        body = self._solve(self.language.solve, self._call("kahan_vector", "point", *self.eps))
         self._function("kahan_map", told[2], _VECTOR, body)
 
     def _inverse(self) -> None:
@@ -155,7 +156,8 @@ class _Writer:
         self._function("kahan_jacobian", words, _MATRIX, body)
 
     def _map_formulas(self) -> None:
-        words = f"The {'Kahan map' if self.formulas.rhs else 'map'} as rational functions of x and eps"
+        of = "x and eps" if self.eps else "x"
+        words = f"The {'Kahan map' if self.formulas.rhs else 'map'} as rational functions of {of}"
         self._formulas("kahan_map_formula", words, self.formulas.closed_form())
 
     def _integrals(self) -> None:
@@ -199,7 +201,7 @@ class _Writer:
         return fill(self.language.call, values)
 
     def _solve(self, template: str, right: str) -> str:
-        return fill(template, self.words | {"M": self._call("kahan_matrix", "point", "eps"), "right": right})
+        return fill(template, self.words | {"M": self._call("kahan_matrix", "point", *self.eps), "right": right})
 
     def _formulas(
         self, key: str, words: str, entries: Iterable[fmpq_mpoly | RationalFunction], eps: bool = True
@@ -223,6 +225,7 @@ class _Writer:
         language = self.language
         taken = {point: [self.safe[name] for name in names] for point, names in points.items()}
         local = [name for names in taken.values() for name in names]
+        eps = eps and bool(self.eps)
         numbers = [*["eps"] * eps, *self.symbols]
         arguments = [fill(language.point, {"name": point, **self.words}) for point in taken]
         arguments += [fill(language.number, {"name": "eps"})] * eps

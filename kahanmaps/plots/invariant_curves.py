@@ -115,15 +115,15 @@ def find_invariant_curves(
     True
     """
     _require_sizes(starts, steps)
-    epsilon = rational(eps)
-    if epsilon == 0:
-        raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     structure = file.structure
     if isinstance(structure, NoStructure):
         raise HypothesisError(
             f"{file.name} has no normal form whose planes could be drawn: {structure.reason}; expected a member of "
             "the family, declared or hidden, whose chi has no repeated root (see kahanmaps family show)"
         )
+    epsilon = rational(eps)
+    if epsilon == 0:
+        raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     field = RR(BITS)
     splitting = Splitting(structure.form, field, epsilon, structure.T)
     with field.working():

@@ -94,6 +94,7 @@ def test_the_picture_knows_how_it_was_made(kahanmaps, tmp_path):
         ("paper_m2 --start 1,2,3,4 --eps 1/20 --steps 2000000", "at most 1000000 points"),
         ("paper_m2 --start 1,2,3,1e300 --eps 1/20", "scale the start"),
         ("euler_top --start 1,2,3 --eps 1/20", "euler_top has no normal form"),
+        ("lyness --start 1,2", "it is an explicit map"),
         ("nonsense --start 1,2,3 --eps 1/20", "nonsense"),
     ],
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from flint import fmpq
 from language_helpers import run_python
@@ -25,10 +27,11 @@ def start_of(file: km.SystemFile) -> list[str]:
 
 def script(file: km.SystemFile) -> str:
     point = f"[{', '.join(f'Rational({text!r})' for text in start_of(file))}]"
+    eps = f", Rational('{EPS}')" if file.map.has_eps else ""
     return convert(file, "sympy", PARTS) + (
-        f"\nfrom sympy import Rational\nimage = list(map_step({point}, Rational('{EPS}')))\n"
-        f"print(image)\nprint(list(map_step_formula({point}, Rational('{EPS}'))))\n"
-        f"print(list(map_inverse(image, Rational('{EPS}'))))\n"
+        f"\nfrom sympy import Rational\nimage = list(map_step({point}{eps}))\n"
+        f"print(image)\nprint(list(map_step_formula({point}{eps})))\n"
+        f"print(list(map_inverse(image{eps})))\n"
     )
 
 
@@ -37,9 +40,7 @@ def printed() -> dict[str, list[str]]:
     """What the scripts print, all run by one process."""
     scripts = {name: script(file) for name, file in FILES.items()}
     symbolic = convert(load("lyness"), "sympy", ["map", "integrals"], symbols=["a"])
-    scripts["symbolic"] = symbolic + (
-        "\nfrom sympy import Rational\nprint(list(map_step([1, 2], 1, Rational('7/2'))))\n"
-    )
+    scripts["symbolic"] = symbolic + ("\nfrom sympy import Rational\nprint(list(map_step([1, 2], Rational('7/2'))))\n")
     return run_python(scripts)
 
 
@@ -60,6 +61,15 @@ def test_every_language_takes_every_kind(language: str, name: str) -> None:
     text = convert(load(name), language)
     assert "Kahan map" not in text
     assert ("time step" in text) == load(name).map.has_time_step
+    assert bool(re.search(r"\beps\b", text)) == load(name).map.has_eps
+
+
+@pytest.mark.parametrize(
+    ("name", "call"),
+    [("lyness", "map_step([1, 2])"), ("repaired_octahedral", "map_step([1, 2], Rational(1, 10))")],
+)
+def test_the_example_gives_eps_to_maps_that_have_one(name: str, call: str) -> None:
+    assert f"# For example: {call}\n" in convert(load(name), "sympy")
 
 
 def test_a_map_has_no_vector_field() -> None:

@@ -46,8 +46,8 @@ def command(system: str | None, language: str, output: str | None, quiet: bool, 
       kahanmaps convert weierstrass --to julia --what map-formulas,inverse
       kahanmaps convert --vars x,y --rhs x*y --rhs=-x^2 --to toml -o my.toml
 
-    The output is a file that runs as it stands; toml is a system file. eps is an argument of the map: the time step is
-    2 eps. Numbers are exact, but in numpy, c and fortran.
+    The output is a file that runs as it stands; toml is a system file. eps is an argument of the map, where it has one:
+    the time step is 2 eps. Numbers are exact, but in numpy, c and fortran.
     """
     from kahanmaps.languages.convert import convert
 

@@ -59,9 +59,9 @@ def command(**options: Any) -> int:
     from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
     from kahanmaps.plots.invariant_curves import find_invariant_curves
 
-    eps = the_eps(options["eps"], options["time_step"])
     with Progress(options["quiet"]) as progress:
         file = load_system(options["system"], options)
+        eps = the_eps(options["eps"], options["time_step"], required=file.is_quadratic)
         original = two_variables("--original", options["original"], file.variables)
         found = find_invariant_curves(file, options["starts"], eps, options["steps"], progress)
         labels = [f"start {_short(format_point(start))}" for start in options["starts"]]
