@@ -77,7 +77,7 @@ TURNED: dict[type[ast.AST], list[tuple[str, str]]] = {
 PRINTS = re.compile(r"__repr__|__str__|_repr_\w+_|to_json|\w*_html")
 NO_MATHEMATICS = {"seed", "seconds", "progress", "maxsize", "strict", "repr", "init", "kw_only"}  # names of arguments
 NO_MATHEMATICS_IN = re.compile(
-    r"\b(seconds|deadline|monotonic|get_close_matches|progress|randint|randrange|Random|spend)\b"
+    r"\b(seconds|_SECONDS|deadline|monotonic|get_close_matches|progress|randint|randrange|Random|spend)\b"
 )
 LIKE = {
     "context",
