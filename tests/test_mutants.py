@@ -68,6 +68,7 @@ def test_a_change_is_one_of_the_mathematics(source: str, mutants: list[str]) -> 
         "@cache(maxsize=3)\ndef f(): ...",
         "_MOST_TERMS = 2000",
         "_CYCLE = 2 * 10**6",
+        "_SECONDS = {2: 16.0}",
         "MAX_POINTS = 1 << 20",
         "DEFAULT_STEPS = 60",
     ],

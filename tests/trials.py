@@ -67,6 +67,12 @@ class Copy:
         os.close(answer[1])
         self.ask, self.answers = os.fdopen(asked[1], "w"), os.fdopen(answer[0])
 
+    def close(self) -> None:
+        """Let the waiting pytest end."""
+        self.ask.close()
+        self.waiting.wait()
+        self.answers.close()
+
     def tried(self, file: str, source: str, line: int, tests: list[str], seconds: Seconds, again: bool) -> str:
         """What saw the mutant, "" for nothing; `again` where a new pytest is to try what nothing has seen."""
         path = self.root / file

@@ -370,7 +370,7 @@ class PaperObjects(Calculus):
                 draw=lambda name: dual.lift_matrix(self.vector(name)),
                 hessian_of_quadratic_part=lift(self.hessian_of_quadratic_part),
                 gradient_of_linear_part=lift(self.gradient_of_linear_part),
-                lower_terms=self.lower_terms and (lift(self.lower_terms[0]), lift(self.lower_terms[1])),
+                lower_terms=self.lower_terms and tuple(map(lift, self.lower_terms)),
                 step_eps=dual.convert(self.step_eps),
                 minus=dual.convert(self.minus),
                 base=base and SystemOver(dual, lift(base.tensor), lift(base.B), lift(base.c)),
