@@ -329,15 +329,13 @@ def _orders_until_return(
         run = _whole(walked(equations, point, direction, [], steps, limits.end, functions=tracked.functions))
         rows = tracked.rows(run)
         for t, (_, *nu) in enumerate(rows, 1):
-            if t >= up and any(nu):
-                if not tracked.functions:  # a pole is met, and nothing is asked beyond it
-                    return Orders(rows[:t], (), len(run), True)
+            if t >= up and any(nu) and tracked.functions:
                 if sorted(nu)[-2:] not in ([1], [0, 1]):
                     raise NotGeneric("a point where several critical hypersurfaces meet")
                 return Orders(rows[:t], (), t, True, (t, nu.index(1)))
         hit, reached = _next_hit(equations, run[-1].limit, len(run), reach, limits, tracked.functions)
-        if hit is None:
-            return Orders(rows[: max(up, 0)], (), reached, True)
+        if hit is None or not tracked.functions:  # nothing is asked beyond the next point without a value
+            return Orders(rows[:up], (), reached, True)
         steps = hit
 
 
