@@ -12,12 +12,14 @@ from helpers import quick
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, recurrence_of
 from kahanmaps.laboratory.singular.fates import CONFINED
 from kahanmaps.laboratory.singular.orders import Orders
 from kahanmaps.laboratory.singular.singularities import default_eps, patterns, singularities
+from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 
@@ -159,3 +161,14 @@ def test_patterns_of_two_eps_that_differ_explain_nothing():
     late = degree_growth(system, "1/10", max_terms=4)
     assert late.explained.closed_form_text == "102 for n >= 101"
     assert default_eps(system, 0) != default_eps(system, 1)
+
+
+@pytest.mark.parametrize("image", [("y", "x + y^2"), ("y", "1 - 7/5*y^2 + 3/10*x")])
+def test_a_superattracting_point_lowers_no_degree(image):
+    """Henon maps: infinity goes to a fixed point on it, with orders 2, 4, 8, ...; the degrees are 2^n."""
+    functions = [parse_rational_function(text, ["x", "y", "eps"]) for text in image]
+    found = degree_growth(explicit_map(["x", "y"], functions), max_degree=500)
+    assert found.patterns.series == ((1,), (1, -2))
+    (infinity,) = found.patterns.contracted
+    assert [row[1] for row in infinity.orders.rows] == [2**t for t in range(1, len(infinity.orders.rows) + 1)]
+    assert found.dynamical_degree.text == "2"

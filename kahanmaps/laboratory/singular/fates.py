@@ -296,19 +296,23 @@ def _fate_at(
     """What becomes of the hypersurface with these tangents at a point, and the orders of what is tracked along it."""
     full = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
-    run = _whole(walked(equations, point, direction, tangents, limits.shown, limits.end))
+    run, is_whole = walked(equations, point, direction, tangents, limits.shown, limits.end)
     status, down, up = _told([step.rank for step in run], full)
+    if not is_whole and (status != NOT_CONFINED or not tracked.functions):
+        raise PrecisionTooLow
     if status == NOT_CONTRACTED:
-        return _Fate(status, down, up, run, len(run), 0)
+        return _Fate(status, down, up, tuple(run), len(run), 0)
     if up is None:
-        orders = orders_at(equations, point, direction, tracked, (len(run), limits.reach), limits)
+        orders = orders_at(equations, point, direction, tracked, (limits.shown, limits.reach), limits)
+        if not is_whole and not orders.is_settled:  # what grows by a recurrence, as at superattracting points, is known
+            raise PrecisionTooLow
     else:
         orders = _orders_until_return(equations, point, direction, tracked, up, limits)
-    if orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
-        run = _whole(walked(equations, point, direction, tangents, orders.settled_at + 2, limits.end))
+    if is_whole and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
+        run = list(_whole(walked(equations, point, direction, tangents, orders.settled_at + 2, limits.end)))
         status, down, up = _told([step.rank for step in run], full)
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
-    return _Fate(status, down, up, run, orders.followed, settled, orders)
+    return _Fate(status, down, up, tuple(run), orders.followed, settled, orders)
 
 
 def _orders_until_return(
