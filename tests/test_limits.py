@@ -167,13 +167,13 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
         "found 2 variables",
     ),
     (
-        "documents.document.MAX_DIMENSION",
+        "documents.reader.MAX_DIMENSION",
         2,
         lambda: refused(lambda: parse_system('[family]\nA = [[1, 0], [0, 1]]\nH = "x1^3"\n')),
         "found 2 rows",
     ),
     (
-        "documents.document._MOST_FACTORS",
+        "documents.composition._MOST_FACTORS",
         3,
         lambda: refused(lambda: parse_system(f"[composition]\nof = [{STEP}]\n")),
         "found more than",
@@ -384,7 +384,7 @@ def test_the_degrees_that_are_tried_in_each_dimension_are_those_of_the_documenta
         "followed for {1} steps in the plane ({2}, {3}, {0} in".format(
             singularities._LEAST_REACH, *(singularities._REACH[n] for n in (2, 3, 4))
         ),
-        "{1}, {2}, {3}, {0} where they meet".format(
+        "{1}, {2}, {3}, {0} where orders repeat".format(
             singularities._LEAST_ALONG, *(singularities._ALONG[n] for n in (2, 3, 4))
         ),
     ],
