@@ -171,6 +171,18 @@ def test_bad_points_are_passed_over() -> None:
     assert result.samples > box.calls
 
 
+def test_a_few_primes_may_fail_before_the_box_is_blamed() -> None:
+    box, seen = Box(functions(["x"], "123456789123456789123456789*x")), list[int]()
+
+    def modulo_one_prime(prime: int, point: tuple[int, ...]) -> tuple[int, ...] | None:
+        seen.append(prime)
+        return box(prime, point) if prime == seen[0] else None
+
+    result = reconstruct(modulo_one_prime, ["x"])
+    # the first one, three that do not lift it, and two more that are no better to begin with
+    assert (result.functions, len(result.primes), len(set(seen))) == (None, 6, 6)
+
+
 def test_a_box_without_values_gives_none() -> None:
     result = reconstruct(lambda p, point: None, ["x"])
     assert (result.functions, result.samples) == (None, 60)
