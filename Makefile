@@ -27,7 +27,7 @@ test-slow: dev-venv  ## all tests, the slow ones too
 	@.ci/tools
 	@$(python) -m pytest -n 2 --timeout 1800 $(ARGS)
 
-mutants: dev-venv  ## do tests see single changes to the mathematics? An hour; ARGS="--count 40 --seed 7"
+mutants: dev-venv  ## do tests see single changes to the mathematics? Half an hour; ARGS="--count 40 --seed 7"
 	@nice $(python) tests/mutants.py $(ARGS)
 
 check: lint types test  ## all that must hold before a commit: lint, types, test

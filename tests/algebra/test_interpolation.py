@@ -21,7 +21,7 @@ from kahanmaps.algebra.interpolation import (
 )
 from kahanmaps.algebra.modular_fit import Quotient, Shape
 from kahanmaps.algebra.polynomials import RationalFunction, monomials, ring
-from kahanmaps.algebra.residues import chinese, random_prime
+from kahanmaps.algebra.residues import _common_denominator, chinese, random_prime
 from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.errors import InputError
 
@@ -171,6 +171,18 @@ def test_bad_points_are_passed_over() -> None:
     assert result.samples > box.calls
 
 
+def test_a_few_primes_may_fail_before_the_box_is_blamed() -> None:
+    box, seen = Box(functions(["x"], "123456789123456789123456789*x")), list[int]()
+
+    def modulo_one_prime(prime: int, point: tuple[int, ...]) -> tuple[int, ...] | None:
+        seen.append(prime)
+        return box(prime, point) if prime == seen[0] else None
+
+    result = reconstruct(modulo_one_prime, ["x"])
+    # the first one, three that do not lift it, and two more that are no better to begin with
+    assert (result.functions, len(result.primes), len(set(seen))) == (None, 6, 6)
+
+
 def test_a_box_without_values_gives_none() -> None:
     result = reconstruct(lambda p, point: None, ["x"])
     assert (result.functions, result.samples) == (None, 60)
@@ -307,6 +319,14 @@ def test_a_number_above_the_bound_is_not_taken_over_the_denominator_of_the_other
     numbers[3] = fmpq(2**bits + 1, below)
     residues = [int(x.p) * pow(int(x.q), -1, modulus) % modulus for x in numbers]
     assert rational_vector(residues, modulus) == (tuple(numbers) if is_one else None)
+
+
+@pytest.mark.parametrize("count", [2, 3, 7])
+def test_chance_gives_no_common_denominator(count: int) -> None:
+    rng, modulus, below = random.Random(count), 2**61 - 1, 2**20 + 7
+    found = [_common_denominator([rng.randrange(modulus) for _ in range(count)], modulus) for _ in range(100)]
+    assert found == [None] * 100
+    assert _common_denominator([k * pow(below, -1, modulus) % modulus for k in range(3, 3 + count)], modulus) == below
 
 
 def test_residues_without_simple_numbers() -> None:

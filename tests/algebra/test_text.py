@@ -666,3 +666,17 @@ def test_long_numbers_are_told_by_their_length():
         "of about 30 digits",
         "of about 1000 digits",
     ]
+
+
+def test_a_product_costs_the_words_of_the_longer_times_the_root_of_those_of_the_shorter():
+    sizes = [(0, 0), (63, 64), (640, 64), (64, 640), (640, 640), (4032, 4032)]
+    assert [expressions._times(left, right) for left, right in sizes] == [3, 6, 33, 33, 99, 1536]
+
+
+@pytest.mark.parametrize(("count", "end"), [(30, "x29"), (31, "x29, ...")])
+def test_thirty_names_are_listed_where_one_is_not_known(count, end):
+    with pytest.raises(ExpressionError) as caught:
+        parse_polynomial("q", [f"x{k}" for k in range(count)])
+    assert str(caught.value).splitlines()[0].partition("known are ")[2].startswith("x0, x1, ")
+    assert f", {end}" in str(caught.value)
+    assert ("..." in str(caught.value)) == (count > 30)

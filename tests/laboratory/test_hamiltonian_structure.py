@@ -205,6 +205,12 @@ def test_a_pfaffian_in_many_variables_is_not_proved_to_vanish():
     assert _invertible([skew(8, (0, j)) for j in range(1, 8)], 8, random.Random(1)) == (None, False)
 
 
+def test_among_many_forms_an_invertible_one_is_found_without_looking_at_all_points():
+    forms = [skew(8, pair) for pair in ((0, 1), (2, 3), (4, 5), (6, 7), (0, 2), (1, 3), (4, 6))]
+    K, proved = _invertible(forms, 8, random.Random(1))
+    assert (K.det() != 0, proved) == (True, True)
+
+
 def test_simple_coefficients_come_first():
     first = list(itertools.islice(_small(3, random.Random(1)), 4 + 100))
     assert first[:4] == [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)]

@@ -117,3 +117,13 @@ def test_the_equation_that_a_broken_claim_amounts_to_is_bounded(claim, control, 
         # A denominator that occurs to some power must not be zero once.
         assert sum(true_size(factor)[0] for factor, _ in below.factor_squarefree()[1]) <= poles
         assert true_size(above)[1] <= equation.bits
+
+
+@pytest.mark.parametrize("m", [1, 3])
+def test_the_bounds_of_the_member_in_general_are_those_of_matrices_of_its_size(m):
+    objects = realise.universal_bound_objects(m, 3)
+    assert [(matrix.nrows(), matrix.ncols()) for matrix in (objects.A, objects.J, objects.x)] == [
+        (2 * m, 2 * m),
+        (2 * m, 2 * m),
+        (2 * m, 1),
+    ]

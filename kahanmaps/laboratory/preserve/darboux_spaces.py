@@ -217,8 +217,6 @@ def _blocks(solutions: list[nmod_mat], coordinates: Vectors, prime: int) -> list
                     row[j * n + m] = (row[j * n + m] - int(A[i, m])) % prime
                 rows.append(row)
     algebra = null_space(rows, n * n, prime)
-    if len(algebra) == 1:
-        return [coordinates]
     rng = random.Random(prime)
     entries = combine([[rng.randrange(prime) for _ in algebra]], algebra, prime)[0]
     E = nmod_mat(n, n, entries, prime)
