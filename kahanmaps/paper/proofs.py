@@ -8,6 +8,7 @@ from typing import Any
 from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.checks.claims import Evidence
 from kahanmaps.checks.judge import Contradiction
+from kahanmaps.errors import counted
 from kahanmaps.paper import realise
 from kahanmaps.paper.evaluate import UNDEFINED, evaluate, witness_of
 from kahanmaps.paper.registry import claims
@@ -38,7 +39,7 @@ def normal_form_proof(key: str, blocks: int, order: int) -> Evidence | None:
         raise Contradiction(text, witness_of(outcome))
     if not outcome.pairs:
         return None
-    what = "1 block" if blocks == 1 else f"{blocks} blocks"
+    what = counted(blocks, "block")
     return Evidence(
         "symbolic, normal form",
         f"multiplied out in normal form, {what}, all data indeterminate",
