@@ -135,7 +135,7 @@ def test_with_symbols_theorems_are_asked_at_random_values():
     [
         (lotka_volterra(7, 3), "at least 3 independent integrals in dimension 7."),
         (DEGENERATE, "at least 3 independent integrals in dimension 6."),
-        (load("volterra_periodic_3"), "Integrable: 2 independent integrals in dimension 3,"),
+        (load("volterra_periodic_3"), "Superintegrable (proved): 2 independent integrals in dimension 3,"),
         (random_system(2, 1), "no integral in dimension 2 up to degree "),
     ],
 )
