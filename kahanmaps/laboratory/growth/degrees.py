@@ -37,7 +37,7 @@ from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.enclosure import Enclosure, enclose
 from kahanmaps.laboratory.growth.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence
 from kahanmaps.laboratory.growth.renewal import coefficients, recurrence_of
-from kahanmaps.laboratory.singular.singularities import MAX_STEPS, Patterns
+from kahanmaps.laboratory.singular.singularities import MAX_STEPS, WRITTEN_DIMENSION, Patterns
 from kahanmaps.laboratory.singular.singularities import patterns as patterns_of_map
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
@@ -317,18 +317,21 @@ class _Search:
         return DegreeGrowth(tuple(self.degrees), self._eps, "", "", self._seed, (), (), (), self._patterns)
 
     def _look_at_fit(self, may_stop: bool) -> None:
-        """Follow the singularities once the degree of the map is known, and stop where a recurrence is certain."""
+        """Follow the singularities in good time, and stop where a recurrence is certain."""
         size = len(self.degrees)
         if size < 2 or (size > _OFTEN and size % _SELDOM):
             return
-        if self._patterns is None and self.degrees[1] > 1:  # an affine map contracts nothing
+        found = find_recurrence(self.degrees)
+        # Above dimension 4 series are slow and wait until degrees say something. Affine maps contract nothing.
+        soon = self._map.dim <= WRITTEN_DIMENSION or found is not None
+        if self._patterns is None and self.degrees[1] > 1 and soon:
             left = max(0.0, self._deadline - time.monotonic())
             self._patterns = patterns_of_map(
                 self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
             )
         if not may_stop:
             return
-        known, found = self._patterns, find_recurrence(self.degrees)
+        known = self._patterns
         enough = found is not None and found.checked >= max(6, found.order)
         explained = self._so_far().explained
         if explained is not None:
