@@ -12,7 +12,7 @@ import subprocess
 import sys
 import termios
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -21,6 +21,8 @@ from typing import Any
 from unittest.mock import patch
 
 from kahanmaps_cli.main import main
+
+_END = b"\0"  # what no command prints
 
 COMMAND = [sys.executable, "-m", "kahanmaps_cli.main"]
 
@@ -73,34 +75,44 @@ def shell(script: str, folder: Path, stdin: bytes = b"", **more: str) -> Outcome
 
 def terminal(*arguments: str, columns: int = 80, **more: str) -> Outcome:
     """Run a command, in this process, with a terminal of that width as its standard output, not standard error."""
-    ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-    pieces: list[bytes] = []
-    reader = Thread(target=lambda: pieces.extend(until_closed(ours)))
-    reader.start()
     err = io.TextIOWrapper(io.BytesIO(), "utf-8")
     kept = [os.dup(number) for number in (0, 1)]
-    try:
-        for number in (0, 1):  # the size of a terminal is asked of the descriptor
-            os.dup2(theirs, number)
-        with (
-            open(theirs, "w", encoding="utf-8") as out,
-            patch.dict(os.environ, environment(TERM="xterm-256color", **more), clear=True),
-            patch.multiple(sys, stdout=out, stderr=err),
-        ):
-            status = main(list(arguments))
-    finally:
-        for number, stream in enumerate(kept):
-            os.dup2(stream, number)
-            os.close(stream)
-        reader.join()
-        os.close(ours)
+    with screen(columns) as (descriptor, pieces):
+        try:
+            for number in (0, 1):  # the size of a terminal is asked of the descriptor
+                os.dup2(descriptor, number)
+            with (
+                open(descriptor, "w", encoding="utf-8", closefd=False) as out,
+                patch.dict(os.environ, environment(TERM="xterm-256color", **more), clear=True),
+                patch.multiple(sys, stdout=out, stderr=err),
+            ):
+                status = main(list(arguments))
+        finally:
+            for number, stream in enumerate(kept):
+                os.dup2(stream, number)
+                os.close(stream)
     err.flush()
     return Outcome(status, b"".join(pieces).decode().replace("\r\n", "\n"), err.buffer.getvalue().decode())
 
 
-def until_closed(terminal: int) -> Iterator[bytes]:
-    """What is written to the other end of a terminal, piece by piece."""
-    with suppress(OSError):  # what Linux says when the other end is closed
-        while piece := os.read(terminal, 65536):
-            yield piece
+@contextmanager
+def screen(columns: int = 80) -> Iterator[tuple[int, list[bytes]]]:
+    """The descriptor of a terminal of that width, and what was written to it: whole when the block is left."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    pieces: list[bytes] = []
+
+    def read() -> None:
+        while not (pieces and pieces[-1].endswith(_END)):
+            pieces.append(os.read(ours, 65536))
+        pieces[-1] = pieces[-1].removesuffix(_END)
+
+    reader = Thread(target=read)
+    reader.start()
+    try:
+        yield theirs, pieces
+    finally:
+        os.write(theirs, _END)  # to close it would lose what is on its way
+        reader.join()
+        os.close(theirs)
+        os.close(ours)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import pty
 import re
 import subprocess
 from pathlib import Path
 
 import pytest
-from cli_helpers import COMMAND, environment, shell, terminal, until_closed
+from cli_helpers import COMMAND, environment, screen, shell, terminal
 
 import kahanmaps_cli
 from kahanmaps_cli.terminal import COLOURS
@@ -85,15 +83,12 @@ def test_a_terminal_gets_colours():
 
 
 def test_a_process_of_its_own_says_to_a_terminal_what_the_tests_of_terminals_see():
-    ours, theirs = pty.openpty()
     env = environment(TERM="xterm-256color", COLUMNS="80")
     words = [*COMMAND, "check-integrals", "euler_top"]
-    with subprocess.Popen(words, stdin=theirs, stdout=theirs, stderr=subprocess.PIPE, env=env) as process:
-        os.close(theirs)
-        said = b"".join(until_closed(ours)).decode().replace("\r\n", "\n")
-        assert process.stderr is not None
-        assert process.stderr.read() == b""
-    os.close(ours)
+    with screen() as (descriptor, pieces):
+        process = subprocess.run(words, stdin=descriptor, stdout=descriptor, stderr=subprocess.PIPE, env=env)
+    said = b"".join(pieces).decode().replace("\r\n", "\n")
+    assert process.stderr == b""
     assert (process.returncode, said) == (0, terminal("check-integrals", "euler_top").out)
     assert GREEN in said
 
