@@ -17,7 +17,7 @@ from kahanmaps.laboratory.preserve import search as module
 from kahanmaps.laboratory.preserve.closed_forms import closed_forms
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace, gradient_rank
 from kahanmaps.laboratory.preserve.hirota_kimura import orbit_profile
-from kahanmaps.laboratory.preserve.search import affine_space, repeat, search
+from kahanmaps.laboratory.preserve.search import affine_space, may_be_conjugate, repeat, search
 
 
 def searched(file, eps=None, seconds=30.0):
@@ -55,6 +55,7 @@ def test_searches_can_be_repeated_on_another_map(name, kinds, independent):
     laboratory, known, found = searched(load(name))
     assert [step.kind for step in found.steps] == kinds
     assert gradient_rank(laboratory.maps[0], found.all_spaces) == independent
+    assert not may_be_conjugate(found)
     reference, second = laboratory.primes[0], laboratory.maps[1]
     again = repeat(found, second, known, reference)
     assert again is not None

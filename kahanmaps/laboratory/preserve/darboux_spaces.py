@@ -245,7 +245,7 @@ def _of_rank_two(solutions: list[nmod_mat], fresh: Vectors, prime: int) -> list[
     size = len(fresh)
     pairs = [(s, t) for s in range(count) for t in range(s, count)]
     rows = []
-    for _ in range(2 * len(pairs) + 4):
+    for _ in range(2 * len(pairs)):
         mix = nmod_mat(4, size, [rng.randrange(prime) for _ in range(4 * size)], prime)
         small = [mix * A * mix.transpose() for A in solutions]
 
