@@ -15,9 +15,14 @@ from hypothesis import HealthCheck, settings
 settings.register_profile("kahanmaps", max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("kahanmaps")
 
-# What a shell without job control starts behind it is deaf to Ctrl-C, and so is all that it starts itself.
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+# What a shell without job control or nohup starts is deaf to these signals, and so is all that it starts itself.
+for number, handler in [
+    (signal.SIGINT, signal.default_int_handler),
+    (signal.SIGQUIT, signal.SIG_DFL),
+    (signal.SIGHUP, signal.SIG_DFL),
+]:
+    if signal.getsignal(number) is signal.SIG_IGN:
+        signal.signal(number, handler)
 
 
 @pytest.hookimpl(wrapper=True)
