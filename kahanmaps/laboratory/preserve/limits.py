@@ -81,7 +81,8 @@ class FlowAndMap:
     Integrals of the flow are those that integrals of the map tend to, `limits`, and `others`, all independent;
     `without_limit` counts the integrals of the map of which no limit is known, of `count` that it has. `search` is that
     of the flow, None where there can be no more than the limits. `density` is a phi of the flow, where there is none
-    `reason` says so; `polynomials` are those of its Darboux polynomials above degree 1 that are known and no integrals.
+    `reason` says so; `polynomials` are those of its Darboux polynomials above degree 1 that are known and no integrals,
+    `polynomials_degree` is the degree up to which there are no others, measured; 0 where they were not sought.
     """
 
     limits: tuple[Limit, ...]
@@ -93,6 +94,7 @@ class FlowAndMap:
     density: FoundDensity | None
     reason: str
     polynomials: tuple[fmpq_mpoly, ...]
+    polynomials_degree: int
 
     @property
     def lost(self) -> int:
@@ -134,11 +136,20 @@ class FlowAndMap:
         if self.polynomials:
             told = ", ".join(map(format_polynomial, self.polynomials))
             found.append(("proved", f"Darboux polynomials of the flow, apart from affine ones: {told}"))
+        for timed in self.search.in_time if others and self.search is not None else ():
+            text = f"{timed.name} = {timed.text} is an integral of the flow that depends on time"
+            found.append((str(timed.integral.verdict), text))
+        if self.polynomials_degree > 1:
+            which = "no other Darboux polynomial of the flow"
+            which = which if self.polynomials else "no Darboux polynomial of the flow but affine ones"
+            found.append(("measured", f"{which} shows up to degree {self.polynomials_degree}"))
         return found
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        known = attributes(self, "limits", "others", "lost", "without_limit", "density", "reason", "polynomials")
+        known = attributes(
+            self, "limits", "others", "lost", "without_limit", "density", "reason", "polynomials", "polynomials_degree"
+        )
         return {**known, "degree": None if self.search is None else self.search.profile.degree}
 
 
@@ -203,8 +214,11 @@ def flow_and_map(
     density, reason = _density(laboratory, densities, seconds)
     count = max(known, search.codimension)
     without = max(0, count - len(limits))
-    polynomials = _polynomials(laboratory, [*functions, *([] if density is None else [density.function])])
-    return FlowAndMap(limits, tuple(others), without, count, search, flow, density, reason, polynomials)
+    progress("Darboux polynomials of the flow")
+    sought = laboratory.flow_polynomials()
+    known_factors = [*functions, *([] if density is None else [density.function])]
+    polynomials = _polynomials(laboratory, sought.functions, known_factors)
+    return FlowAndMap(limits, tuple(others), without, count, search, flow, density, reason, polynomials, sought.degree)
 
 
 def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
@@ -308,14 +322,18 @@ def _density(
     return (search.densities[0], "") if search.densities else (None, search.reason)
 
 
-def _polynomials(laboratory: Laboratory, functions: Sequence[RationalFunction]) -> tuple[fmpq_mpoly, ...]:
-    """The irreducible factors of functions that are Darboux polynomials of the flow, neither affine nor integrals."""
-    assert laboratory.system is not None
-    n, found = laboratory.map.dim, dict[str, fmpq_mpoly]()
+def _polynomials(
+    laboratory: Laboratory, sought: Sequence[fmpq_mpoly], functions: Sequence[RationalFunction]
+) -> tuple[fmpq_mpoly, ...]:
+    """The Darboux polynomials of the flow, neither affine nor integrals: those sought, and factors of the functions."""
+    assert laboratory.field is not None
+    n = laboratory.map.dim
+    found = {str(P): P for P in sought if degree_in(P, n) > 1}
     for function in functions:
         for part in (function.numerator, function.denominator):
-            for P, _ in part.factor()[1]:
-                K = darboux_cofactor(laboratory.system, P) if degree_in(P, n) > 1 else None
+            for factor, _ in part.factor()[1]:
+                P = primitive_part(factor)[1]
+                K = darboux_cofactor(laboratory.field, P) if degree_in(P, n) > 1 else None
                 if K is not None and not K.is_zero():
-                    found[str(P)] = primitive_part(P)[1]
+                    found[str(P)] = P
     return tuple(found.values())
