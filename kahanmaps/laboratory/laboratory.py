@@ -22,9 +22,10 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.affine_functions import affine_darboux, darboux_cofactor
 from kahanmaps.laboratory.preserve.closed_forms import ClosedForms, Spaces, closed_forms
 from kahanmaps.laboratory.preserve.cofactors import Cofactor, cofactor_of_affine, determinant_factors, jacobian_factors
-from kahanmaps.laboratory.preserve.flow import ModularFlow, is_kept_by_flow
+from kahanmaps.laboratory.preserve.flow import ModularFlow, euler_map, is_kept_by_flow
 from kahanmaps.laboratory.preserve.flow_polynomials import FlowPolynomials, flow_polynomials
 from kahanmaps.laboratory.preserve.identities import verdict_on
+from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -38,8 +39,9 @@ class Laboratory:
     """The maps on which a file's map is examined: two primes, each with its own eps and its own values of the symbols.
 
     With `eps` (exact; the time step is 2 eps) all maps are at that eps. With `flow` they are flows, of an adjusted
-    Kahan map that of the field at eps = 0. `system` is there if the map is the Kahan map of a system without eps in its
-    coefficients: what theorems say of these is known then.
+    Kahan map that of the field at eps = 0, and of a polarised map `map` is then x + eps f. `system` is there if the map
+    is the Kahan map of a system without eps in its coefficients: what theorems say of these is known then. `field` is
+    the system or, with `flow`, the field of any degree.
     Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
@@ -67,10 +69,13 @@ class Laboratory:
         if isinstance(self.map, Kahan) and "eps" not in self.map.system.symbols:
             self.system = self.map.system
         self.field: PolynomialField | None = self.system
+        if flow and isinstance(self.map, ImplicitMap) and self.map.of_field is not None:
+            self.field = self.map.of_field
+            self.map = euler_map(self.field)
         self.flow = flow
         if flow and (self.field is None or self.eps is not None):
-            what = "eps = " + str(self.eps) if self.system is not None else self.map.kind
-            raise InputError(f"found {what}, expected a quadratic vector field without eps: its flow is asked for")
+            what = "eps = " + str(self.eps) if self.field is not None else self.map.kind
+            raise InputError(f"found {what}, expected a polynomial vector field without eps: its flow is asked for")
         self.seed = seed_for(seed, self.symbols, self.map.subject, self.eps)  # of all that is drawn for this map
         self.maps = list(self._drawn("laboratory", 2))
 
@@ -117,7 +122,7 @@ class Laboratory:
     @property
     def defect(self) -> str:
         """Why the maps at the given eps are no birational maps, measured at random points; empty where they are."""
-        if self.eps is None and self.system is not None:
+        if self.flow or (self.eps is None and self.system is not None):
             return ""  # det(I - eps f'(x)) is 1 at eps = 0
         at = "" if self.eps is None else f"at eps = {self.eps} "
         name, above = self.map.denominator_name, "det dPhi(x)"
@@ -159,6 +164,8 @@ class Laboratory:
     def flow_polynomials(self) -> FlowPolynomials:
         """Darboux polynomials of the flow in (variables, symbols, eps); with symbols affine ones only (degree 0)."""
         assert self.field is not None
+        if self.symbols and self.system is None:
+            return FlowPolynomials((), 0)
         if self.symbols:
             known = [one.polynomial for one in self.affine_cofactors() if one.polynomial is not None]
             return FlowPolynomials(tuple(known), 0)

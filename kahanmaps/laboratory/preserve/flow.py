@@ -17,7 +17,7 @@ from random import Random
 from flint import fmpq_mpoly, nmod_poly
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
     Point,
@@ -25,6 +25,8 @@ from kahanmaps.laboratory.modular_points import (
     monomial_tables,
     monomial_values,
 )
+from kahanmaps.maps.explicit import explicit_map
+from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.systems.polynomial import PolynomialField
 
 Terms = list[tuple[int, int]]
@@ -34,6 +36,14 @@ Terms = list[tuple[int, int]]
 def _places(dim: int, degree: int) -> dict[tuple[int, ...], int]:
     """The number of each monomial among those up to a degree."""
     return {exponent: k for k, exponent in enumerate(exponents_up_to(dim, degree))}
+
+
+def euler_map(field: PolynomialField) -> ImplicitMap:
+    """x -> x + eps f(x), the map that stands for a field where its variables and symbols are asked for."""
+    context = ring((*field.variables, *field.symbols, "eps"))
+    *old, eps = context.gens()
+    moved = (x + eps * f.compose(*old, ctx=context) for x, f in zip(old, field.rhs, strict=False))
+    return explicit_map(field.variables, [RationalFunction(P, context.constant(1)) for P in moved])
 
 
 class ModularFlow(ModularMap):

@@ -290,7 +290,7 @@ def find_integrals(
         found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems, tuple(in_time), flow)
         return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found)
 
-    empty = Profile(file.dim, (), (), None, True, False)
+    empty = Profile(laboratory.map.dim, (), (), None, True, False)
     if laboratory.defect:
         return result([], empty, laboratory.defect)
     if inherited:
@@ -307,7 +307,7 @@ def find_integrals(
     integrals = _independent(laboratory, formulas, progress)
     if inherited and not laboratory.symbols:
         integrals = _by_theorems(laboratory, inherited[0], integrals, deadline)
-    if len(integrals) < file.dim - 1:
+    if len(integrals) < laboratory.map.dim - 1:
         progress("products of powers of known polynomials")
         integrals, in_time = _products(laboratory, cofactors, integrals, progress)
     done = result(integrals, profile, "")
