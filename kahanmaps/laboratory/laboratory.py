@@ -162,16 +162,15 @@ class Laboratory:
         ]
 
     def flow_polynomials(self) -> FlowPolynomials:
-        """Darboux polynomials of the flow in (variables, symbols, eps); with symbols affine ones only (degree 0)."""
+        """Darboux polynomials of the flow in (variables, symbols, eps)."""
         assert self.field is not None
-        if self.symbols and self.system is None:
-            return FlowPolynomials((), 0)
-        if self.symbols:
-            known = [one.polynomial for one in self.affine_cofactors() if one.polynomial is not None]
-            return FlowPolynomials(tuple(known), 0)
         found, context = flow_polynomials(self.field, seed=self.seed), ring(self.map.names)
-        gens = context.gens()[: self.field.dim]
-        return replace(found, functions=tuple(P.compose(*gens, ctx=context) for P in found.functions))
+        gens = context.gens()[:-1]
+        functions = [P.compose(*gens, ctx=context) for P in found.functions]
+        # With symbols that search ends at a low degree in all names.
+        affine = self.affine_cofactors() if self.symbols and self.system is not None else []
+        more = [one.polynomial for one in affine if one.polynomial is not None and one.polynomial not in functions]
+        return replace(found, functions=(*functions, *more))
 
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None

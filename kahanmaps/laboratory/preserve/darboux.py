@@ -22,7 +22,6 @@ from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, product_of
 from kahanmaps.laboratory.preserve.affine_functions import darboux_cofactor
@@ -109,7 +108,7 @@ def darboux_polynomials(
         products of elements of others span is left out.
 
     Raises:
-        InputError: for unknown symbols and eps = 0, and for symbols with `flow`.
+        InputError: for unknown symbols and eps = 0.
 
     Source: celledoni-2019.
 
@@ -165,8 +164,6 @@ def darboux_polynomials(
 def _of_flow(laboratory: Laboratory, found: DarbouxSearch, seconds: float) -> DarbouxSearch:
     """The search with the Darboux polynomials of the flow, each with its own cofactor."""
     assert laboratory.field is not None
-    if laboratory.symbols:
-        raise InputError("found symbols, expected numbers: Darboux polynomials of a flow are sought at given values")
     known = flow_polynomials(laboratory.field, found.degree, seconds, laboratory.seed)
     for P in known.functions:
         K = darboux_cofactor(laboratory.field, P)

@@ -5,18 +5,17 @@ degree, are orthogonal to the coefficients of P: the matrix of these, an order a
 random points, and P divides its minors, the extactic determinants (pereira-2001). These are interpolated on a random
 line modulo a prime. Where P vanishes on the line they all do; and at each such point the polynomials that vanish along
 its solution are one null space, which contains P. Where integrals I have that degree, multiples of some I - c are in it
-at every point: two points of P = 0 have P in common, but no such multiples. So have points of conjugate hypersurfaces
-the product of these. P is lifted to Q; whether it divides f . grad P is then decided exactly.
+at every point: enough points of P = 0 have P in common, but no such multiples. So have points of two conjugate
+hypersurfaces the product of these. P is lifted to Q; whether it divides f . grad P is then decided exactly.
 """
 
 from __future__ import annotations
 
 import random
 import time
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import combinations
 from math import comb, inf
 
 from flint import fmpq_mpoly, nmod_mat, nmod_poly
@@ -31,12 +30,13 @@ from kahanmaps.laboratory.preserve.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.flow import ModularFlow
 from kahanmaps.systems.polynomial import PolynomialField
 
-_MOST_MONOMIALS, _MOST_EVER = (
-    21,
-    56,
-)  # of the degree that is gone to unasked, within a second; where a line takes a minute
+_MOST_MONOMIALS = 21  # of the degree that is gone to unasked, within a second
+_MOST_EVER = 56  # with which a line takes a minute
 _SPARE = 8  # orders of a series beyond the number of monomials
+_MOST_SPACES = 24  # of which all choices of some are looked at
 _PRIMES = 12  # of which the first mostly suffices
+
+Vectors = list[list[int]]
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class FlowPolynomials:
 
     Members P - c Q for an integral P/Q of the same degree are left out unless they are factors of right-hand sides.
     There are no others of at most `degree` that are irreducible over the complex numbers, or have two conjugate factors
-    there: measured on lines modulo primes.
+    there: measured on lines modulo primes. Symbols count for the degree.
     """
 
     functions: tuple[fmpq_mpoly, ...]
@@ -56,11 +56,12 @@ class FlowPolynomials:
 def flow_polynomials(
     field: PolynomialField, max_degree: int | None = None, seconds: float = inf, seed: int = 0
 ) -> FlowPolynomials:
-    """The Darboux polynomials of a field without symbols, up to a degree.
+    """The Darboux polynomials of a field, up to a degree.
 
     Args:
-        field: x' = f(x), exact.
-        max_degree: of the polynomials; by default up to 4, as long as there are at most 21 monomials.
+        field: x' = f(x), exact. A symbol s counts as a variable with s' = 0.
+        max_degree: of the polynomials in variables and symbols; by default up to 4, as long as there are at most 21
+            monomials.
         seconds: the time that the search may take, about.
         seed: of the random lines and primes.
 
@@ -71,6 +72,11 @@ def flow_polynomials(
     >>> flow_polynomials(load("lorenz", {"b": 20}).system).functions
     (x^2 - 20*z,)
     """
+    if field.symbols:
+        context = field.rhs[0].context()
+        wider = PolynomialField((*field.rhs, *[context.constant(0)] * len(field.symbols)))
+        known = flow_polynomials(wider, max_degree, seconds, seed)
+        return replace(known, functions=tuple(P for P in known.functions if degree_in(P, field.dim)))
     n = field.dim
     if max_degree is not None:
         max_degree = max((d for d in range(max_degree + 1) if comb(n + d, d) <= _MOST_EVER), default=0)
@@ -81,9 +87,10 @@ def flow_polynomials(
     found: dict[str, fmpq_mpoly] = {}
     # Where all right-hand sides have a factor nothing moves; and of infinitely many, as with x' = x, y' = y, these are
     # the ones that formulas need.
-    for P in [P for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
-        _add(found, primitive_part(P)[1], field)
-    done = 0
+    for P in [primitive_part(P)[1] for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
+        if darboux_cofactor(field, P) is not None:
+            found.setdefault(str(P), P)
+    done, lowest = 0, 0  # the lowest degree of integrals
     for degree in range(1, max_degree + 1):
         for _ in range(_PRIMES):
             if time.monotonic() > deadline:
@@ -92,40 +99,52 @@ def flow_polynomials(
                 flow = ModularFlow(field, random_prime(rng), (), rng.getrandbits(64))
             except BadPrime:
                 continue
-            if _has_all(flow, field, degree, found):
+            if not lowest and _rank(flow, degree) < comb(n + degree, degree):
+                lowest = degree
+            # Products of integrals less a number at all points are no more common to one point more.
+            if _has_all(flow, field, degree, degree // lowest + 1 if lowest else 1, found):
                 done = degree
                 break
         if done < degree:
             break
-    by_size = sorted(
-        found.values(), key=lambda P: (degree_in(P, n), len(P), [[-int(e) for e in m] for m in P.monoms()])
-    )
+    listed = [P for P in found.values() if not field.derivative(P).is_zero()]
+    by_size = sorted(listed, key=lambda P: (degree_in(P, n), len(P), [[-int(e) for e in m] for m in P.monoms()]))
     return FlowPolynomials(tuple(by_size), done)
 
 
-def _add(found: dict[str, fmpq_mpoly], P: fmpq_mpoly, field: PolynomialField) -> None:
-    """Adds P if it is a Darboux polynomial and no integral."""
-    K = darboux_cofactor(field, P)
-    if K is not None and not K.is_zero():
-        found.setdefault(str(P), P)
+def _has_all(flow: ModularFlow, field: PolynomialField, degree: int, points: int, found: dict[str, fmpq_mpoly]) -> bool:
+    """Adds the polynomials that so many lines show, and tells whether these show that there are no others.
 
-
-def _has_all(flow: ModularFlow, field: PolynomialField, degree: int, found: dict[str, fmpq_mpoly]) -> bool:
-    """Adds the Darboux polynomials that a line or two show, and tells whether one shows that there are no others.
-
-    It does if what is left on it, without what was found, has no irreducible factor of a degree from 2 on that another
-    polynomial could have there. Then all points of others would have been seen.
+    They do if what is left on them, without what was found, has no irreducible factor of a degree from 2 on that
+    another polynomial could have there: then at least `points` points of it were seen.
     """
-    lines = [_Line(flow, degree, found.values())]
-    if lines[0].rank < lines[0].count:  # of a polynomial of degree 1 a line has one point
-        lines.append(_Line(flow, degree, found.values()))
+    lines = [_Line(flow, degree, found.values()) for _ in range(points)]
     spaces = [space for line in lines for space in line.spaces()]
-    pairs = (_intersection(A, B, flow.prime) for A, B in combinations(spaces, 2))
-    for vector in [common[0] for common in (*spaces, *pairs) if len(common) == 1]:
+    for vector in _in_common(spaces, points + 1, flow.prime):
         P = _lifted(vector, degree, flow.prime, field)
-        if P is not None:
-            _add(found, P, field)
-    return any(line.is_explained_by(found.values()) for line in lines)
+        if P is not None and darboux_cofactor(field, P) is not None:
+            found.setdefault(str(P), P)
+    return len(spaces) <= _MOST_SPACES and all(line.is_explained_by(found.values()) for line in lines)
+
+
+def _in_common(spaces: Sequence[Vectors], most: int, prime: int) -> Iterator[list[int]]:
+    """What up to so many of the spaces have in common, where that is one vector."""
+
+    def further(common: Vectors, start: int, left: int) -> Iterator[list[int]]:
+        if len(common) == 1:
+            yield common[0]
+        elif common and left:
+            for k in range(start, len(spaces)):
+                yield from further(_intersection(common, spaces[k], prime), k + 1, left - 1)
+
+    for k, space in enumerate(spaces[:_MOST_SPACES]):
+        yield from further(space, k + 1, max(1, most - 1))
+
+
+def _rank(flow: ModularFlow, degree: int) -> int:
+    """How many monomials up to a degree are independent along the solution from a random point."""
+    orders = comb(flow.dim + degree, degree) + _SPARE
+    return rank(flow.series(flow.random_point(), degree, orders), flow.prime)
 
 
 class _Line:
@@ -137,7 +156,7 @@ class _Line:
     def __init__(self, flow: ModularFlow, degree: int, known: Iterable[fmpq_mpoly]) -> None:
         self.flow, self.degree = flow, degree
         self.count = comb(flow.dim + degree, degree)
-        self.rank = rank(self._rows(flow.random_point()), flow.prime)
+        self.rank = _rank(flow, degree)
         self.start, self.slope = flow.random_point(), flow.random_point()
         self.left = self._without(self._extactic(), known)
 
@@ -145,7 +164,7 @@ class _Line:
         """The point of a parameter."""
         return tuple((a + t * b) % self.flow.prime for a, b in zip(self.start, self.slope, strict=True))
 
-    def spaces(self) -> list[list[list[int]]]:
+    def spaces(self) -> list[Vectors]:
         """What vanishes along the solution from each point of the line where that is more than at others."""
         p, found = self.flow.prime, []
         for root, _ in self.left.roots():
@@ -172,7 +191,7 @@ class _Line:
             power = power % rest if rest.degree() > 0 else power
         return True
 
-    def _rows(self, x: Point) -> list[list[int]]:
+    def _rows(self, x: Point) -> Vectors:
         return self.flow.series(x, self.degree, self.count + _SPARE)
 
     def _extactic(self) -> nmod_poly:
@@ -210,7 +229,7 @@ class _Line:
         return whole
 
 
-def _intersection(A: list[list[int]], B: list[list[int]], prime: int) -> list[list[int]]:
+def _intersection(A: Vectors, B: Vectors, prime: int) -> Vectors:
     """A basis of what the spans of two bases have in common."""
     kernel = null_space(list(zip(*A, *B, strict=True)), len(A) + len(B), prime)
     return combine([weights[: len(A)] for weights in kernel], A, prime)
