@@ -130,6 +130,14 @@ def test_nothing_moves_on_a_common_factor():
     assert found_in(field("x y", *rhs), 3) == ["x^2 + y - 1", "2*y^2 + 2*x + 1"]
 
 
+def test_of_a_pencil_no_member_is_taken_for_a_rational_one():
+    """x^2 + y^2 - 1 + c y for every c: that of c = 2 i is a product of lines, and 2 i is a residue modulo primes."""
+    known = ["x^2 + y^2 + 2*x + 1", "x^2 + y^2 - 2*x + 1", "y"]  # z = x + i y has z' = z^2 - 1
+    for seed in range(5):
+        found = flow_polynomials(field("x y", "x^2 - y^2 - 1", "2*x*y"), 3, seed=seed).functions
+        assert sorted(map(format_polynomial, found)) == known
+
+
 def test_of_infinitely_many_those_are_listed_that_divide_right_hand_sides():
     assert found_in(field("x y", "x", "y"), 3) == ["x", "y"]  # x + c y for every c
 

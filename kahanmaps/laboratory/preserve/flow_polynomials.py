@@ -33,6 +33,7 @@ from kahanmaps.systems.polynomial import PolynomialField
 _MOST_MONOMIALS = 21  # of the degree that is gone to unasked, within a second
 _MOST_EVER = 56  # with which a line takes a minute
 _SPARE = 8  # orders of a series beyond the number of monomials
+_LARGEST = 10**6  # coefficient: in a random fraction modulo primes of 61 bits it is as small once in 2^20 times
 _MOST_SPACES = 24  # of which all choices of some are looked at
 _PRIMES = 12  # of which the first mostly suffices
 
@@ -45,7 +46,8 @@ class FlowPolynomials:
 
     Members P - c Q for an integral P/Q of the same degree are left out unless they are factors of right-hand sides.
     There are no others of at most `degree` that are irreducible over the complex numbers, or have two conjugate factors
-    there: measured on lines modulo primes. Symbols count for the degree.
+    there: measured on lines modulo primes. Symbols count for the degree. Coefficients are
+    at most 10^6.
     """
 
     functions: tuple[fmpq_mpoly, ...]
@@ -236,11 +238,16 @@ def _intersection(A: Vectors, B: Vectors, prime: int) -> Vectors:
 
 
 def _lifted(vector: Sequence[int], degree: int, prime: int, field: PolynomialField) -> fmpq_mpoly | None:
-    """The polynomial over Q with these coefficients modulo the prime, up to a factor; None where they are too long."""
+    """The polynomial over Q with these coefficients modulo the prime, up to a factor; None where they are too long.
+
+    A residue that is no small number is a fraction of two of half its length, and where a pencil has a member for every
+    number that fraction would pass: so is x^2 + y^2 - 1 + 2 i y, a product of conjugate lines of two special members.
+    """
     lead = pow(next(c for c in vector if c), -1, prime)
     values = rational_vector([c * lead % prime for c in vector], prime)
     if values is None:
         return None
     support = exponents_up_to(field.dim, degree)
     terms = {exponent: c for exponent, c in zip(support, values, strict=True) if c}
-    return primitive_part(field.rhs[0].context().from_dict(terms))[1]
+    P = primitive_part(field.rhs[0].context().from_dict(terms))[1]
+    return P if max(abs(c) for c in P.coeffs()) <= _LARGEST else None
