@@ -5,13 +5,14 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
-from kahanmaps.algebra.polynomials import RationalFunction, substitute
+from kahanmaps.algebra.polynomials import RationalFunction, ring, substitute
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.documents.files import SystemFile
@@ -21,12 +22,16 @@ from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.affine_functions import affine_darboux, darboux_cofactor
 from kahanmaps.laboratory.preserve.closed_forms import ClosedForms, Spaces, closed_forms
 from kahanmaps.laboratory.preserve.cofactors import Cofactor, cofactor_of_affine, determinant_factors, jacobian_factors
-from kahanmaps.laboratory.preserve.flow import ModularFlow, is_kept_by_flow
+from kahanmaps.laboratory.preserve.flow import ModularFlow, euler_map, is_kept_by_flow
+from kahanmaps.laboratory.preserve.flow_polynomials import FlowPolynomials, flow_polynomials
 from kahanmaps.laboratory.preserve.identities import verdict_on
+from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan
+from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 _INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
+_TIMED = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
 _DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
 
 
@@ -34,8 +39,9 @@ class Laboratory:
     """The maps on which a file's map is examined: two primes, each with its own eps and its own values of the symbols.
 
     With `eps` (exact; the time step is 2 eps) all maps are at that eps. With `flow` they are flows, of an adjusted
-    Kahan map that of the field at eps = 0. `system` is there if the map is the Kahan map of a system without eps in its
-    coefficients: what theorems say of these is known then.
+    Kahan map that of the field at eps = 0, and of a polarised map `map` is then x + eps f. `system` is there if the map
+    is the Kahan map of a system without eps in its coefficients: what theorems say of these is known then. `field` is
+    the system or, with `flow`, the field of any degree.
     Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
@@ -62,10 +68,14 @@ class Laboratory:
         self.system = None
         if isinstance(self.map, Kahan) and "eps" not in self.map.system.symbols:
             self.system = self.map.system
+        self.field: PolynomialField | None = self.system
+        if flow and isinstance(self.map, ImplicitMap) and self.map.of_field is not None:
+            self.field = self.map.of_field
+            self.map = euler_map(self.field)
         self.flow = flow
-        if flow and (self.system is None or self.eps is not None):
-            what = "eps = " + str(self.eps) if self.system is not None else self.map.kind
-            raise InputError(f"found {what}, expected a quadratic vector field without eps: its flow is asked for")
+        if flow and (self.field is None or self.eps is not None):
+            what = "eps = " + str(self.eps) if self.field is not None else self.map.kind
+            raise InputError(f"found {what}, expected a polynomial vector field without eps: its flow is asked for")
         self.seed = seed_for(seed, self.symbols, self.map.subject, self.eps)  # of all that is drawn for this map
         self.maps = list(self._drawn("laboratory", 2))
 
@@ -75,8 +85,8 @@ class Laboratory:
             eps = int(GF(prime).convert(self.eps))
             if eps == 0:
                 raise BadPrime(f"the prime {prime} divides the numerator of eps", prime)
-        if self.flow and self.system is not None:
-            return ModularFlow(self.system, prime, values, self.seed)
+        if self.flow and self.field is not None:
+            return ModularFlow(self.field, prime, values, self.seed)
         return ModularMap(self.map, prime, eps, values, self.seed)
 
     def map_for(self, prime: int, values: Sequence[int]) -> ModularMap:
@@ -112,7 +122,7 @@ class Laboratory:
     @property
     def defect(self) -> str:
         """Why the maps at the given eps are no birational maps, measured at random points; empty where they are."""
-        if self.eps is None and self.system is not None:
+        if self.flow or (self.eps is None and self.system is not None):
             return ""  # det(I - eps f'(x)) is 1 at eps = 0
         at = "" if self.eps is None else f"at eps = {self.eps} "
         name, above = self.map.denominator_name, "det dPhi(x)"
@@ -133,9 +143,11 @@ class Laboratory:
 
     def cofactors(self) -> list[Cofactor]:
         """The cofactors that polynomials are tried with."""
+        if self.flow:
+            return []
         if self.system is None:
             return list(jacobian_factors(self.map))
-        return [] if self.flow else [*self.affine_cofactors(), *determinant_factors(self.map)]
+        return [*self.affine_cofactors(), *determinant_factors(self.map)]
 
     def affine_cofactors(self) -> list[Cofactor]:
         """Those of affine Darboux functions of the system, which is there."""
@@ -149,13 +161,25 @@ class Laboratory:
             if darboux_cofactor(self.system, one.function.compose(*gens, ctx=context)) is not None
         ]
 
+    def flow_polynomials(self) -> FlowPolynomials:
+        """Darboux polynomials of the flow in (variables, symbols, eps)."""
+        assert self.field is not None
+        found, context = flow_polynomials(self.field, seed=self.seed), ring(self.map.names)
+        gens = context.gens()[:-1]
+        functions = [P.compose(*gens, ctx=context) for P in found.functions]
+        # With symbols that search ends at a low degree in all names.
+        affine = self.affine_cofactors() if self.symbols and self.system is not None else []
+        more = [one.polynomial for one in affine if one.polynomial is not None and one.polynomial not in functions]
+        return replace(found, functions=(*functions, *more))
+
     def verdict_on(
         self, function: RationalFunction, *, is_density: bool = False, factor: RationalFunction | None = None
     ) -> tuple[Verdict, Evidence]:
         """Whether the map, or the flow, keeps I or dx/phi, as identities.verdict_on has it; of a flow by expansion."""
-        if self.system is not None and self.flow:
-            kept = is_kept_by_flow(self.system, function, is_density=is_density)
-            return (Verdict.PROVED if kept else Verdict.REFUTED), _DENSITY if is_density else _INTEGRAL
+        if self.field is not None and self.flow:
+            kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
+            evidence = _DENSITY if is_density else _INTEGRAL if factor is None else _TIMED
+            return (Verdict.PROVED if kept else Verdict.REFUTED), evidence
         return verdict_on(self.map, function, self.eps, self.seed, is_density=is_density, factor=factor)
 
     def formulas(self, model: Spaces, spaces_on: Callable[[ModularMap], Spaces | None], deadline: float) -> ClosedForms:

@@ -6,7 +6,7 @@ import random
 from collections.abc import Iterator, Sequence
 from functools import cache
 
-from flint import nmod_mat
+from flint import nmod_mat, nmod_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import monomials
@@ -191,6 +191,19 @@ def echelon(vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
 def combine(weights: Sequence[Sequence[int]], vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:
     """The combinations sum_k w_k v_k of vectors modulo a prime, one for each row w of weights."""
     return integers(nmod_mat(weights, prime) * nmod_mat(vectors, prime)) if weights and vectors else []
+
+
+def interpolated(nodes: Sequence[int], values: Sequence[int], prime: int) -> nmod_poly:
+    """The polynomial modulo a prime that has these values at different nodes, of a degree below their number."""
+    table = list(values)
+    inverse = cache(lambda difference: pow(difference, -1, prime))
+    for k in range(1, len(nodes)):  # Newton's divided differences
+        for i in range(len(nodes) - 1, k - 1, -1):
+            table[i] = (table[i] - table[i - 1]) * inverse(nodes[i] - nodes[i - k]) % prime
+    P = nmod_poly([0], prime)
+    for node, c in zip(reversed(nodes), reversed(table), strict=True):
+        P = P * nmod_poly([-node % prime, 1], prime) + nmod_poly([c], prime)
+    return P
 
 
 def rank(vectors: Sequence[Sequence[int]], prime: int) -> int:

@@ -37,6 +37,7 @@ from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
 from kahanmaps.maps.equation import Equation, equation_of
 from kahanmaps.maps.integer_steps import IntegerPoint, IntegerSteps
 from kahanmaps.maps.inverse import Rows, inverse_rows, why_not_birational
+from kahanmaps.systems.polynomial import PolynomialField
 
 
 class MapOver(ABC):
@@ -355,7 +356,7 @@ class ImplicitMap(BirationalMap):
     Entries are polynomials over Q in the variables, then symbols, if there are any, then eps. `backward` are the rows
     of the inverse map where they are known; else, where M and r are of degree 1 in the variables, exchanging the points
     gives it, and elimination elsewhere. `title` says in a word or two what kind of map it is, `has_time_step` that it
-    approximates a flow for the time 2 eps.
+    approximates a flow for the time 2 eps, `of_field` which one, in the first of the variables, where that is known.
 
     >>> x, y, eps = ring(["x", "y", "eps"]).gens()
     >>> shear = ImplicitMap(("x", "y"), ((x.context().constant(1), 0 * x, -x - eps*y**2), (0 * x, y**0, -y)), "shear")
@@ -368,6 +369,7 @@ class ImplicitMap(BirationalMap):
     title: str
     has_time_step: bool = False
     backward: Rows | None = None
+    of_field: PolynomialField | None = None
     _last: list[tuple[Field, Any, EquationMap]] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -15,11 +15,12 @@ from itertools import permutations
 from math import factorial
 from typing import Any
 
-from flint import fmpq_mpoly
+from flint import fmpq, fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import names_of, ring
+from kahanmaps.algebra.polynomials import names_of, ring, substitute
 from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import ImplicitMap
+from kahanmaps.systems.polynomial import PolynomialField
 
 TITLE = "polarised map"
 MAX_DEGREE = 6
@@ -71,7 +72,8 @@ def polarised_map(rhs: Sequence[fmpq_mpoly], degree: int = 3) -> ImplicitMap:
         behind = [one + entry for one, entry in zip(unknown, matrix, strict=True)]
         forward.append((*zero, *ahead, -known[0][i] - right))
         backward.append((*behind, *zero, -known[-1][i] + right))
-    return ImplicitMap(variables, tuple(forward), TITLE, has_time_step=True, backward=tuple(backward))
+    field = PolynomialField(tuple(substitute(f, {rest[-1]: fmpq(0)}) for f in rhs), rest[:-1])
+    return ImplicitMap(variables, tuple(forward), TITLE, has_time_step=True, backward=tuple(backward), of_field=field)
 
 
 def _linear_in_one_point(

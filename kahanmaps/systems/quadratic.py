@@ -20,6 +20,7 @@ from kahanmaps.algebra.polynomials import digits_of, evaluate, linear_combinatio
 from kahanmaps.algebra.text import format_polynomial, parse_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import InputError
+from kahanmaps.systems.polynomial import PolynomialField
 
 # f'' has dim^3 entries: 10^6 of them at the largest dimension.
 MAX_DIMENSION = 100
@@ -27,7 +28,7 @@ LONG_COEFFICIENTS = 2_000  # digits, with which equations in them are no longer 
 
 
 @dataclass(frozen=True, eq=False)
-class QuadraticSystem(DisplayedAsFormula):
+class QuadraticSystem(PolynomialField, DisplayedAsFormula):
     """x' = f(x), its right-hand sides of degree at most 2 in the variables.
 
     `rhs` are polynomials over Q in the variables, then in `symbols`: constants without a value, eps possibly among
@@ -41,8 +42,6 @@ class QuadraticSystem(DisplayedAsFormula):
     False
     """
 
-    rhs: tuple[fmpq_mpoly, ...]
-    symbols: tuple[str, ...] = ()
     _over: dict[Field, SystemOver] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -78,22 +77,6 @@ class QuadraticSystem(DisplayedAsFormula):
         check_names(variables)
         constants = {name: rational(value) for name, value in (parameters or {}).items()}
         return cls(tuple(parse_polynomial(text, variables, constants) for text in rhs))
-
-    @cached_property
-    def variables(self) -> tuple[str, ...]:
-        """The names of the variables."""
-        names = names_of(self.rhs[0])
-        return names[: len(names) - len(self.symbols)]
-
-    @property
-    def dim(self) -> int:
-        """The number of variables."""
-        return len(self.variables)
-
-    @cached_property
-    def degree(self) -> int:
-        """The degree of f in the variables; 0 for f = 0."""
-        return max((sum(m[: self.dim]) for polynomial in self.rhs for m in polynomial.monoms()), default=0)
 
     @cached_property
     def is_homogeneous(self) -> bool:
@@ -138,23 +121,6 @@ class QuadraticSystem(DisplayedAsFormula):
             for monomial, coefficient in polynomial.terms()
             if sum(monomial) == of_degree
         ]
-
-    @cached_property
-    def divergence(self) -> fmpq_mpoly:
-        """The trace of f'(x), a polynomial of degree at most 1."""
-        return sum((p.derivative(i) for i, p in enumerate(self.rhs)), self.rhs[0].context().constant(0))
-
-    def derivative(self, function: fmpq_mpoly) -> fmpq_mpoly:
-        """f . grad P, how P changes along solutions; P is in the variables and symbols and, if need be, in eps.
-
-        >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "x"])
-        >>> [system.derivative(x) for x in system.rhs[0].context().gens()]
-        [x*y, x]
-        """
-        context = function.context()
-        images = context.gens()[: self.dim + len(self.symbols)]
-        slopes = (p.compose(*images, ctx=context) * function.derivative(i) for i, p in enumerate(self.rhs))
-        return sum(slopes, context.constant(0))
 
     @property
     def is_divergence_free(self) -> bool:
@@ -228,15 +194,6 @@ class QuadraticSystem(DisplayedAsFormula):
     def digits(self) -> int:
         """About how many decimal digits the longest coefficient has, over one denominator."""
         return digits_of(self.rhs)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, QuadraticSystem):
-            return NotImplemented
-        return (self.variables, self.symbols) == (other.variables, other.symbols) and self.rhs == other.rhs
-
-    def __hash__(self) -> int:
-        # All terms would make it slow; equal systems have equal hashes all the same.
-        return hash((self.variables, self.symbols, *(len(polynomial) for polynomial in self.rhs)))
 
     def __str__(self) -> str:
         pairs = zip(self.variables, self.rhs, strict=True)

@@ -276,6 +276,6 @@ def test_integrals_of_the_flow(kahanmaps):
     assert [one["combination"] for one in record["beside_map"]["limits"]] == ["(I1 + 1)/eps^2", "(-I2/2 + 1/2)/eps^2"]
     assert mistakes("find-integrals", record) == []
     assert "flow" not in json.loads(kahanmaps("find-integrals euler_top --json -q").out)
-    for option in ("--toml", "--darboux 2", "--monomials x1,1"):
+    for option in ("--toml", "--darboux 2 --latex", "--monomials x1,1"):
         assert kahanmaps(f"find-integrals euler_top --flow {option}").status == 2
     assert kahanmaps("find-integrals lyness --flow").status == 2

@@ -12,6 +12,7 @@ from kahanmaps.algebra.text import format_rational_function, parse_rational_func
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.integrals import find_integrals
@@ -200,7 +201,7 @@ def test_what_density_a_flow_keeps_is_decided_by_multiplying_out():
 
 def test_products_of_darboux_polynomials_of_a_flow_are_found_by_their_exponents():
     [one] = find_integrals(THREE_LINES, flow=True, max_degree=4).integrals
-    assert (one.text, str(one.verdict)) == ("(x + 2*y)^3*x*y^3", "proved")
+    assert (one.text, str(one.verdict)) == ("x*y^3*(x + 2*y)^3", "proved")
     # div f is a multiple of the cofactor of no product of the lines with whole exponents, but of degree 3
     assert find_densities(THREE_LINES, flow=True, max_degree=2).densities == ()
 
@@ -212,7 +213,60 @@ def test_an_adjusted_map_has_the_flow_of_the_field_at_eps_0():
     assert flow_and_map(find_integrals(file)).lost == 1
 
 
-@pytest.mark.parametrize(("name", "eps"), [("lyness", None), ("duffing_polarised", None), ("harmonic", "1/10")])
+def polarised(*rhs):
+    """A file of the polarised map of a cubic field in the plane."""
+    return parse_system(f'variables = ["x", "y"]\n[system]\nrhs = {list(rhs)}\ndiscretization = "polarised"')
+
+
+DUFFING = ("y", "-x^3")
+FOUR_LINES = ("2*x^3 + 4*x^2*y - 4*x*y^2 + 2*x^2 + 5*x*y", "-3*x^2*y + 4*x*y^2 + y^3 - 4*x*y - y^2")
+
+
+def test_a_polarised_map_deforms_the_energy_of_a_cubic_field():
+    """Its integral depends on two points, and tends to the energy where they are those of a solution (cmoq-2015)."""
+    found = flow_and_map(find_integrals(polarised(*DUFFING)))
+    [one] = found.limits
+    assert (format_rational_function(one.leading), one.kept.holds) == ("x^4 + 2*y^2", False)
+    assert one.text.endswith("the map deforms: -I1/3 tends to L1 where the points are those of a solution")
+    assert (found.others, found.lost, found.density.text) == ((), 0, "1")
+
+
+def test_a_polarised_map_may_lose_an_integral():
+    """x y^2 (x + y)^3/(x - y + 1), a product of lines that the field keeps zero."""
+    found = flow_and_map(find_integrals(polarised(*FOUR_LINES)))
+    assert [one.text for one in found.others] == ["(x^4*y^2 + 3*x^3*y^3 + 3*x^2*y^4 + x*y^5)/(x - y + 1)"]
+    assert (found.limits, found.lost) == ((), 1)
+    assert is_kept_by_flow(Laboratory(polarised(*FOUR_LINES), flow=True).field, found.others[0].function)
+    assert not is_kept_by_flow(Laboratory(polarised(*DUFFING), flow=True).field, found.others[0].function)
+
+
+@pytest.mark.parametrize(
+    ("formula", "leading"),
+    [
+        ("(x^4 + 2*y^2)/(1 + eps*x_1)", "x^4 + 2*y^2"),
+        ("1/(3 + 6*eps*(x^2*x_1^2 + y^2 + y_1^2))", "x^4 + 2*y^2"),  # a number first
+        ("(x_1 - x)/eps - 2*y + 2*eps*x^3", None),  # 0 as far as is known
+        ("x*y_1 - y*x_1 + x", None),  # x is no integral
+        ("(x_1 - x)*eps*(x^4 + 2*y^2)/(x_1 - x)/eps", "x^4 + 2*y^2"),
+    ],
+)
+def test_leading_terms_are_those_along_solutions(formula, leading):
+    search = find_integrals(polarised(*DUFFING))
+    names = [*search.file.variables, "eps"]
+    made = replace(search.integrals[0], function=parse_rational_function(formula, names))
+    found = flow_and_map(replace(search, integrals=(made,)))
+    assert [format_rational_function(one.leading) for one in found.limits] == ([] if leading is None else [leading])
+    assert (found.without_limit, len(found.others)) == ((0, 0) if leading else (1, 1))
+
+
+def test_a_field_of_degree_four_has_a_flow():
+    text = 'variables = ["x"]\n[system]\nrhs = ["x^4 - 1"]\ndiscretization = "polarised"\ndegree = 4'
+    laboratory = Laboratory(parse_system(text), flow=True)
+    assert [str(P) for P in laboratory.flow_polynomials().functions] == ["x - 1", "x + 1", "x^2 + 1"]
+    assert laboratory.maps[0].step((2,)) == (17,)
+
+
+@pytest.mark.parametrize(("name", "eps"), [("lyness", None), ("duffing_polarised", "1/10"), ("harmonic", "1/10")])
 def test_without_a_flow_there_is_no_line(name, eps):
     assert flow_and_map(find_integrals(load(name), eps=eps)) is None
 
@@ -220,6 +274,6 @@ def test_without_a_flow_there_is_no_line(name, eps):
 def test_the_report_has_the_flow_and_its_map():
     found = analyze(load("zander_120"), seconds=8)
     [lines] = [lines for title, lines in found.sections if title == "the flow"]
-    assert [line.status for line in lines] == ["proved", "measured", "proved"]
+    assert [line.status for line in lines] == ["proved", "measured", "proved", "measured"]
     assert found.to_json()["flow"]["lost"] == 1
     assert analyze(load("harmonic"), eps="1/3", seconds=8).to_json()["flow"] is None

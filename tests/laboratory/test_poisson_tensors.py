@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from flint import fmpq, fmpq_mat
 from helpers import random_point
@@ -88,7 +90,7 @@ def test_integrals_and_casimirs_of_the_euler_top():
     # rank 2 in dimension 3: each tensor has one Casimir, a function of the two integrals
     found = find_poisson(load("euler_top"), 3)
     assert [(one.rank, one.verdict, one.jacobi, one.involution) for one in found.tensors] == [(2, *[PROVED] * 3)] * 3
-    assert [one.casimirs for one in found.tensors] == [("I1",), ("I2",), ()]
+    assert [one.casimirs for one in found.tensors] == [("I1",), ("I2",), ("I1/I2",)]
     assert all(one.is_liouville_integrable for one in found.tensors)
     assert found.pencil is PROVED  # tri-Hamiltonian
     assert all(holds_exactly(load("euler_top"), one, "-2/3") for one in found.tensors)
@@ -134,6 +136,42 @@ def test_a_rotation_has_a_constant_and_a_lie_poisson_bracket():
     found = find_poisson(system("x y z", "2*z - 3*y", "3*x - z", "y - 2*x"), 1)
     assert brackets(found)[:2] == ["{x,y} = 3, {x,z} = -2, {y,z} = 1", "{x,y} = z, {x,z} = -y, {y,z} = x"]
     assert [one.casimirs for one in found.tensors[:2]] == [("I1",), ("I2",)]  # w.x and |x|^2
+
+
+ROTATION = system("x y z", "2*z - 3*y", "3*x - z", "y - 2*x")  # about w = (1, 2, 3)
+ALONG, SQUARE = "(x + 2*y + 3*z)", "(x^2 + y^2 + z^2)"
+
+
+def casimirs_of_lie_poisson(*texts):
+    """Those of {x,y} = z, ... among functions of these integrals I1, I2 of the rotation."""
+    [model, *_] = find_poisson(ROTATION, 1).integrals
+    names = ["x", "y", "z", "eps"]
+    known = [replace(model, name=f"I{k}", function=parse_rational_function(t, names)) for k, t in enumerate(texts, 1)]
+    return next(one for one in find_poisson(ROTATION, 1, integrals=known).tensors if "{x,y} = z" in one.text).casimirs
+
+
+@pytest.mark.parametrize(
+    ("integrals", "casimirs"),
+    [
+        ((ALONG, f"{SQUARE} + 3*{ALONG}^2"), ("3*I1^2 - I2",)),
+        ((ALONG, f"{SQUARE} + eps^2*{ALONG}^2 + {ALONG}"), ("I1^2*eps^2 + I1 - I2",)),
+        ((f"{SQUARE}^2*{ALONG}^3", f"{SQUARE}*{ALONG}"), ("I1/I2^3",)),
+        ((f"{ALONG}^2/{SQUARE}", f"1/{ALONG}"), ("I1*I2^2",)),
+        ((ALONG,), ()),  # w.x is none
+        ((f"{SQUARE} + {ALONG}",), ()),
+        ((ALONG, f"{SQUARE} + {ALONG}^3"), ()),  # of a higher degree than is tried
+        ((SQUARE, ALONG), ("I1",)),  # enough, and no functions of it
+    ],
+)
+def test_functions_of_integrals_are_tried_as_casimirs(integrals, casimirs):
+    assert casimirs_of_lie_poisson(*integrals) == casimirs
+
+
+def test_a_function_that_is_said_to_be_a_casimir_is_put_to_the_proof(monkeypatch):
+    names = ["x", "y", "z", "eps"]
+    wrong = [("I1*I2", parse_rational_function(f"{ALONG}*{SQUARE}", names))]
+    monkeypatch.setattr(poisson_tensors, "casimir_candidates", lambda *given: iter(wrong))
+    assert casimirs_of_lie_poisson(ALONG, f"{SQUARE} + {ALONG}") == ()
 
 
 def test_products_of_integrals_and_tensors_are_left_out():

@@ -35,7 +35,7 @@ from kahanmaps_cli.terminal import tell
     "--darboux",
     type=click.IntRange(1, 12),
     metavar="DEGREE",
-    help="Instead: all discrete Darboux polynomials up to it.",
+    help="Instead: all discrete Darboux polynomials up to it; with --flow those of the differential equation.",
 )
 @click.option("--flow", is_flag=True, help="Integrals of the differential equation, and what the map makes of them.")
 @click.option("--max-degree", type=click.IntRange(1, 20), metavar="D", help="Largest degree of relations along orbits.")
@@ -49,6 +49,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals lagrange_top --monomials 'm1^2+m2^2,p3^2,p3,1'
       kahanmaps find-integrals volterra_periodic_4 --darboux 2
       kahanmaps find-integrals henon_heiles --flow
+      kahanmaps find-integrals lorenz --parameter b=20 --flow --darboux 3
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
     Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals there are is known
@@ -65,8 +66,8 @@ def command(system: str | None, **options: Any) -> int:
     with Progress(options["quiet"]) as progress:
         file = load_system(system, options)
         symbols, eps = symbols_and_eps(options)
-        if options["flow"] and (options["sets"] or options["darboux"] is not None or options["as_toml"]):
-            raise click.UsageError("--flow goes without --monomials, --darboux and --toml, which are about the map")
+        if options["flow"] and (options["sets"] or options["as_toml"]):
+            raise click.UsageError("--flow goes without --monomials and --toml, which are about the map")
         if options["sets"]:
             if options["darboux"] is not None:
                 raise click.UsageError("give --monomials or --darboux, not both")
@@ -97,7 +98,8 @@ def command(system: str | None, **options: Any) -> int:
     print_search("find-integrals", found, options, named, _count(found))
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for one in found.in_time:
-            tell(f"{one.name}\t{one.integral.verdict}\t{formula(one.text)}\n\tof the n-th point: depends on time")
+            where = "" if found.flow else "of the n-th point: "
+            tell(f"{one.name}\t{one.integral.verdict}\t{formula(one.text)}\n\t{where}depends on time")
         for status, text in () if beside is None else beside.lines(others=False):
             tell(f"{status}\t{formula(text)}")
     return 3 if found.reason else 0
@@ -118,6 +120,7 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
         options["darboux"],
         symbols=symbols,
         eps=eps,
+        flow=options["flow"],
         seconds=options["seconds"],
         seed=options["seed"],
         progress=progress,
@@ -127,9 +130,10 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
     else:
         tell(f"Darboux polynomials: {file.name}{scope(found)}")
         meaning = ", C a product of C[g] = g(x~, -eps)/g(x, eps)" if "C[" in "".join(found.cofactors) else ""
-        tell(f"P(x~) = C P(x){meaning}; spaces spanned by products left out")
+        law = f"P(x~) = C P(x){meaning}; spaces spanned by products left out"
+        tell("P' = K P, irreducible; integrals left out" if found.flow else law)
         for space in found.spaces:
-            tell(f"C = {space.cofactor}")
+            tell(f"{'K' if found.flow else 'C'} = {space.cofactor}")
             for P in space.polynomials:
                 text = format_polynomial(P)
                 tell(f"\t{space.verdict}\t{formula(text)}")

@@ -26,6 +26,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace, primitive_integers, rank
 from kahanmaps.algebra.polynomials import degree, linear_combinations, primitive_part
+from kahanmaps.systems.polynomial import PolynomialField
 from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem, SystemOver
 
 # The determinant has degree m (m + 3)/2 along a line for m variables: 90 for this bound, a few seconds.
@@ -239,7 +240,7 @@ def _factors_that_are(system: QuadraticSystem, normals: Sequence[Sequence[fmpq]]
     return tuple(sorted(found.values(), key=lambda d: _coefficients(d.function), reverse=True))
 
 
-def darboux_cofactor(system: QuadraticSystem, function: fmpq_mpoly) -> fmpq_mpoly | None:
+def darboux_cofactor(system: PolynomialField, function: fmpq_mpoly) -> fmpq_mpoly | None:
     """The polynomial L with l' = l L along the flow for a polynomial l = `function`, not 0, or None. Exact.
 
     >>> system = QuadraticSystem.from_text(["x", "y"], ["x*y", "x"])

@@ -17,12 +17,14 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, echelon, product_of
+from kahanmaps.laboratory.preserve.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.cofactors import (
     Cofactor,
     CofactorProduct,
@@ -32,6 +34,7 @@ from kahanmaps.laboratory.preserve.cofactors import (
     products,
 )
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.flow_polynomials import flow_polynomials
 from kahanmaps.laboratory.preserve.identities import judged
 
 _MOST_TERMS = 2000  # of a polynomial: as many unknowns
@@ -42,7 +45,8 @@ _MOST_PRODUCTS = 2000
 class DarbouxPolynomials:
     """A basis of all P with P(x~) = C(x) P(x); `cofactor` is C as text, where C[g] = g(x~, -eps)/g(x, eps).
 
-    The verdict is on the identity, for all of them: proved by expansion or supported at random points.
+    Of a flow it is K in P' = K P. The verdict is on the identity, for all of them: proved by expansion or supported at
+    random points.
     """
 
     cofactor: str
@@ -68,10 +72,12 @@ class DarbouxSearch(Displayed):
     cofactors: tuple[str, ...] = ()
     spaces: list[DarbouxPolynomials] = field(default_factory=list)
     reason: str = ""
+    flow: bool = False  # whether they are those of the differential equation
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return attributes(self, "degree", "cofactors", "spaces", "reason", "primes")
+        known = attributes(self, "degree", "cofactors", "spaces", "reason", "primes")
+        return {**({"flow": True} if self.flow else {}), **known}
 
 
 def darboux_polynomials(
@@ -80,6 +86,7 @@ def darboux_polynomials(
     *,
     symbols: Sequence[str] = (),
     eps: Any = None,
+    flow: bool = False,
     seconds: float = 60.0,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
@@ -91,6 +98,7 @@ def darboux_polynomials(
         degree: the largest degree of the polynomials, and of the products of cofactors.
         symbols: names of parameters that formulas are to contain; the others have the values of the file.
         eps: an exact number, or None for formulas that contain eps (the time step is 2 eps).
+        flow: ask for those of the differential equation instead, P' = K P with any K but 0 (flow_polynomials.py).
         seconds: the time that the search may take, about.
         seed: of everything random.
         progress: is told what is being tried.
@@ -110,11 +118,13 @@ def darboux_polynomials(
     C[x] x proved
     C[y] y proved
     """
-    laboratory = Laboratory(file, symbols, eps, seed)
-    found = DarbouxSearch(file, laboratory.symbols, laboratory.eps, degree, seed, laboratory.primes)
+    laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
+    found = DarbouxSearch(file, laboratory.symbols, laboratory.eps, degree, seed, laboratory.primes, flow=flow)
     if laboratory.defect:  # all multiples of what vanishes on the image have the cofactor 0
         found.reason = laboratory.defect
         return found
+    if flow:
+        return _of_flow(laboratory, found, seconds)
     deadline = time.monotonic() + seconds
     cofactors = laboratory.cofactors()
     found.cofactors = tuple(one.name for one in cofactors)
@@ -148,6 +158,19 @@ def darboux_polynomials(
         if space not in listed:
             listed.append(space)
             _list(found, laboratory, cofactors, product, space, deadline)
+    return found
+
+
+def _of_flow(laboratory: Laboratory, found: DarbouxSearch, seconds: float) -> DarbouxSearch:
+    """The search with the Darboux polynomials of the flow, each with its own cofactor."""
+    assert laboratory.field is not None
+    known = flow_polynomials(laboratory.field, found.degree, seconds, laboratory.seed)
+    for P in known.functions:
+        K = darboux_cofactor(laboratory.field, P)
+        assert K is not None  # or it would not have been listed
+        found.spaces.append(DarbouxPolynomials(format_polynomial(K), (P,), Verdict.PROVED))
+    if known.degree < found.degree:
+        found.reason = f"degrees above {known.degree} are not settled: too little time, or too many monomials"
     return found
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import Field
+from kahanmaps.algebra.functions import DEFAULT_BUDGET
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides, decide
@@ -21,7 +22,7 @@ from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_BUDGET = 60_000_000
+_BUDGET = DEFAULT_BUDGET  # as `check-integrals` has it: what is proved there is proved here
 
 
 def verdict_on(

@@ -21,7 +21,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate, ring
-from kahanmaps.algebra.text import format_rational_function
+from kahanmaps.algebra.text import format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
@@ -81,17 +81,26 @@ class FoundIntegral:
 
 @dataclass(frozen=True)
 class TimedIntegral:
-    """An integral c^-n I(x) that depends on time, x being the n-th point of an orbit: I(x~) = c I(x), c a number."""
+    """An integral c^-n I(x) that depends on time, x being the n-th point of an orbit: I(x~) = c I(x), c a number.
+
+    Of a flow it is exp(-c t) I(x), with I' = c I.
+    """
 
     name: str
     integral: FoundIntegral
     factor: RationalFunction
+    flow: bool = False
 
     @property
     def text(self) -> str:
         """The formula."""
         I = self.integral.text
-        return f"({format_rational_function(self.factor)})^-n*{I if I.isidentifier() else f'({I})'}"
+        bracketed = I if I.isidentifier() else f"({I})"
+        if self.flow:
+            rate = format_polynomial(-self.factor.numerator)
+            power = {"1": "t", "-1": "-t"}.get(rate, f"({rate})*t" if " " in rate else f"{rate}*t")
+            return f"exp({power})*{bracketed}"
+        return f"({format_rational_function(self.factor)})^-n*{bracketed}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -281,7 +290,7 @@ def find_integrals(
         found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems, tuple(in_time), flow)
         return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found)
 
-    empty = Profile(file.dim, (), (), None, True, False)
+    empty = Profile(laboratory.map.dim, (), (), None, True, False)
     if laboratory.defect:
         return result([], empty, laboratory.defect)
     if inherited:
@@ -298,7 +307,7 @@ def find_integrals(
     integrals = _independent(laboratory, formulas, progress)
     if inherited and not laboratory.symbols:
         integrals = _by_theorems(laboratory, inherited[0], integrals, deadline)
-    if len(integrals) < file.dim - 1:
+    if len(integrals) < laboratory.map.dim - 1:
         progress("products of powers of known polynomials")
         integrals, in_time = _products(laboratory, cofactors, integrals, progress)
     done = result(integrals, profile, "")
@@ -443,7 +452,7 @@ def _products(
             rows.append(row)
             name = f"T{len(in_time) + 1}"
             one = FoundIntegral(name, function, origin, verdict, evidence, product.text)
-            in_time.append(TimedIntegral(name, one, product.constant))
+            in_time.append(TimedIntegral(name, one, product.constant, laboratory.flow))
     return found, in_time
 
 

@@ -30,6 +30,7 @@ from kahanmaps.laboratory.modular_points import exponents_up_to, rank
 from kahanmaps.laboratory.preserve.affine_functions import darboux_cofactor
 from kahanmaps.laboratory.preserve.densities import DensitySearch, FoundDensity, find_densities
 from kahanmaps.laboratory.preserve.integrals import FoundIntegral, IntegralSearch, find_integrals, gradient_at
+from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan
 
 _BUDGET = 2_000_000  # products of terms, for all that is done to integrals
@@ -45,7 +46,8 @@ class Limit:
     """An integral of the flow that the map keeps or deforms: `combination` = `leading` + eps^order `second` + ....
 
     `combination` is a function of integrals of the map by their names and of eps; `second` is None where it does not
-    contain eps. f . grad leading = 0 is proved; `kept` is the verdict on the map conserving `leading` itself.
+    contain eps. f . grad leading = 0 is proved; `kept` is the verdict on the map conserving `leading` itself. Where the
+    phase space consists of several points, `on_solutions`, leading terms are all that is told: those for such points.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Limit:
     order: int
     second: RationalFunction | None
     kept: Verdict
+    on_solutions: bool = False
 
     @property
     def text(self) -> str:
@@ -61,7 +64,8 @@ class Limit:
         done = "one of the map tends to"
         if self.kept.holds or self.kept is Verdict.REFUTED:
             done = f"the map keeps ({self.kept})" if self.kept.holds else "the map deforms"
-        series = f"{self.combination} = {self.name}"
+        series = f"{self.combination} {'tends to' if self.on_solutions else '='} {self.name}"
+        series += " where the points are those of a solution" * self.on_solutions
         if self.second is not None:
             power = "eps" if self.order == 1 else f"eps^{self.order}"
             series += f" + {power}*({_short(self.second, _SHOWN_TERMS)}) + ..."
@@ -81,7 +85,8 @@ class FlowAndMap:
     Integrals of the flow are those that integrals of the map tend to, `limits`, and `others`, all independent;
     `without_limit` counts the integrals of the map of which no limit is known, of `count` that it has. `search` is that
     of the flow, None where there can be no more than the limits. `density` is a phi of the flow, where there is none
-    `reason` says so; `polynomials` are those of its Darboux polynomials above degree 1 that are known and no integrals.
+    `reason` says so; `polynomials` are those of its Darboux polynomials above degree 1 that are known and no integrals,
+    `polynomials_degree` is the degree up to which there are no others, measured; 0 where they were not sought.
     """
 
     limits: tuple[Limit, ...]
@@ -93,6 +98,7 @@ class FlowAndMap:
     density: FoundDensity | None
     reason: str
     polynomials: tuple[fmpq_mpoly, ...]
+    polynomials_degree: int
 
     @property
     def lost(self) -> int:
@@ -134,11 +140,20 @@ class FlowAndMap:
         if self.polynomials:
             told = ", ".join(map(format_polynomial, self.polynomials))
             found.append(("proved", f"Darboux polynomials of the flow, apart from affine ones: {told}"))
+        for timed in self.search.in_time if others and self.search is not None else ():
+            text = f"{timed.name} = {timed.text} is an integral of the flow that depends on time"
+            found.append((str(timed.integral.verdict), text))
+        if self.polynomials_degree > 1:
+            which = "no other Darboux polynomial of the flow"
+            which = which if self.polynomials else "no Darboux polynomial of the flow but affine ones"
+            found.append(("measured", f"{which} shows up to degree {self.polynomials_degree}"))
         return found
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        known = attributes(self, "limits", "others", "lost", "without_limit", "density", "reason", "polynomials")
+        known = attributes(
+            self, "limits", "others", "lost", "without_limit", "density", "reason", "polynomials", "polynomials_degree"
+        )
         return {**known, "degree": None if self.search is None else self.search.profile.degree}
 
 
@@ -157,7 +172,7 @@ def flow_and_map(
     seconds: float = 10.0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> FlowAndMap | None:
-    """What a Kahan map makes of the integrals of its differential equation.
+    """What a Kahan map, or a polarised one, makes of the integrals of its differential equation.
 
     Args:
         search: the integrals of the map, for every eps.
@@ -175,14 +190,16 @@ def flow_and_map(
     >>> print(*flow_and_map(find_integrals(load("weierstrass"))).lines()[0])
     proved L1 = 4*x^3 - y^2 - 4*x is an integral of the flow that the map deforms: (I1/3 + 1/3)/eps^2 = L1 + ...
     """
-    if not isinstance(search.file.map, Kahan) or search.eps is not None:
+    given = search.file.map
+    is_kahan = isinstance(given, Kahan)
+    if search.eps is not None or not (is_kahan or (isinstance(given, ImplicitMap) and given.of_field is not None)):
         return None
     laboratory = Laboratory(search.file, search.symbols, None, search.seed, flow=True)
-    limits = _limits(search, laboratory)
+    limits = _limits(search, laboratory) if is_kahan else _limits_on_solutions(search, laboratory)
     modular = laboratory.maps[0]
     point = modular.random_point()
     rows = [gradient_at(modular, one.leading, point) for one in limits]
-    dim = search.file.dim
+    dim = laboratory.map.dim
     if flow is None and len(limits) < dim - 1:
         flow = find_integrals(
             search.file,
@@ -200,11 +217,14 @@ def flow_and_map(
             rows.append(row)
             others.append(one)
     functions = [*(one.leading for one in limits), *(one.function for one in others)]
-    density, reason = _density(laboratory, densities, seconds)
+    density, reason = _density(laboratory, densities if is_kahan else None, seconds)
     count = max(known, search.codimension)
     without = max(0, count - len(limits))
-    polynomials = _polynomials(laboratory, [*functions, *([] if density is None else [density.function])])
-    return FlowAndMap(limits, tuple(others), without, count, search, flow, density, reason, polynomials)
+    progress("Darboux polynomials of the flow")
+    sought = laboratory.flow_polynomials()
+    known_factors = [*functions, *([] if density is None else [density.function])]
+    polynomials = _polynomials(laboratory, sought.functions, known_factors)
+    return FlowAndMap(limits, tuple(others), without, count, search, flow, density, reason, polynomials, sought.degree)
 
 
 def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
@@ -247,6 +267,57 @@ def _limits(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]
         used.append((I, name))
         found.append(Limit(f"L{len(found) + 1}", formal.format(name), leading, order, second, kept))
     return tuple(found)
+
+
+def _limits_on_solutions(search: IntegralSearch, laboratory: Laboratory) -> tuple[Limit, ...]:
+    """The same for a map of several successive points x, x_1, ..., of a symmetric method, of second order therefore.
+
+    On smooth solutions x_k is x + h_k f + h_k^2/2 f'f + O(eps^3), h_k = 2 k eps. So terms of a numerator or denominator
+    below eps^3 are known there, and an integral has a limit if its leading terms are among these.
+    """
+    field, n = laboratory.field, laboratory.map.dim
+    assert field is not None
+    context = ring(laboratory.map.names)
+    gens = context.gens()
+    f = [g.compose(*gens[:-1], ctx=context) for g in field.rhs]
+    images, lifted = list[fmpq_mpoly](), ring((*search.file.variables, *search.symbols, "eps"))
+    for k in range(search.file.dim // n):
+        h = 2 * k * gens[-1]
+        images += [x + h * g + h**2 * field.derivative(g) / 2 for x, g in zip(gens, f, strict=False)]
+    images += gens[n:]
+    old = [*lifted.gens()[:n], *lifted.gens()[search.file.dim :]]
+    formal = FunctionField([one.name for one in search.integrals] + ["eps"], reduces=True)
+    functions = FunctionField(laboratory.map.names, _BUDGET)
+    map_ = laboratory.maps[0]
+    point = map_.random_point()
+    found: list[Limit] = []
+    for one, name in zip(search.integrals, formal.variables, strict=False):
+        P, Q = (
+            _below_third_order(part.compose(*images, ctx=context))
+            for part in (one.function.numerator, one.function.denominator)
+        )
+        try:
+            for _ in range(2):
+                order, content, leading = _leading(Function(functions, P, Q))
+                if not (leading.is_polynomial and leading.numerator.is_constant()):
+                    break
+                P = _below_third_order(P - content * Q)
+                name = name - formal.convert(content)
+            rows = [*(gradient_at(map_, limit.leading, point) for limit in found), gradient_at(map_, leading, point)]
+        except (BudgetExceeded, _NoLimit, ZeroDivisionError):
+            continue
+        if rank(rows, map_.prime) < len(rows) or not laboratory.verdict_on(leading)[0].holds:
+            continue
+        combination = formal.format(name * formal.variables[-1] ** -order / formal.convert(content))
+        parts = (part.compose(*old, ctx=lifted) for part in (leading.numerator, leading.denominator))
+        kept, _ = Laboratory(search.file, search.symbols, None, search.seed).verdict_on(RationalFunction(*parts))
+        found.append(Limit(f"L{len(found) + 1}", combination, leading, 0, None, kept, on_solutions=True))
+    return tuple(found)
+
+
+def _below_third_order(P: fmpq_mpoly) -> fmpq_mpoly:
+    """P without its terms in eps^3 and above."""
+    return P.context().from_dict({monomial: c for monomial, c in P.terms() if monomial[-1] < 3})
 
 
 class _NoLimit(KahanmapsError):
@@ -308,14 +379,18 @@ def _density(
     return (search.densities[0], "") if search.densities else (None, search.reason)
 
 
-def _polynomials(laboratory: Laboratory, functions: Sequence[RationalFunction]) -> tuple[fmpq_mpoly, ...]:
-    """The irreducible factors of functions that are Darboux polynomials of the flow, neither affine nor integrals."""
-    assert laboratory.system is not None
-    n, found = laboratory.map.dim, dict[str, fmpq_mpoly]()
+def _polynomials(
+    laboratory: Laboratory, sought: Sequence[fmpq_mpoly], functions: Sequence[RationalFunction]
+) -> tuple[fmpq_mpoly, ...]:
+    """The Darboux polynomials of the flow, neither affine nor integrals: those sought, and factors of the functions."""
+    assert laboratory.field is not None
+    n = laboratory.map.dim
+    found = {str(P): P for P in sought if degree_in(P, n) > 1}
     for function in functions:
         for part in (function.numerator, function.denominator):
-            for P, _ in part.factor()[1]:
-                K = darboux_cofactor(laboratory.system, P) if degree_in(P, n) > 1 else None
+            for factor, _ in part.factor()[1]:
+                P = primitive_part(factor)[1]
+                K = darboux_cofactor(laboratory.field, P) if degree_in(P, n) > 1 else None
                 if K is not None and not K.is_zero():
-                    found[str(P)] = primitive_part(P)[1]
+                    found[str(P)] = P
     return tuple(found.values())

@@ -23,7 +23,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, gradient, ring
+from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
@@ -43,6 +43,7 @@ from kahanmaps.laboratory.modular_points import (
     product_of,
     rank,
 )
+from kahanmaps.laboratory.preserve.casimirs import casimir_candidates, slopes
 from kahanmaps.laboratory.preserve.closed_forms import closed_forms
 from kahanmaps.laboratory.preserve.cofactors import CofactorProduct, Sample, cofactor_space, points_needed
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
@@ -65,8 +66,9 @@ class FoundTensor:
     """A tensor that the map preserves, with the verdict on that, and on the Jacobi identity (`jacobi`).
 
     `rank` is that at random points. Of the integrals that are known, `casimirs` names those whose gradient the tensor
-    kills, and `in_involution` as many as there are in involution with each other, `involution` being the verdict on
-    that, None without any.
+    kills and, where there are more Casimirs among functions of the integrals, products and polynomials of them, as
+    I1/I2; `in_involution` names as many integrals as there are in involution with each other, `involution` being the
+    verdict on that, None without any.
     """
 
     name: str
@@ -474,17 +476,33 @@ def _judged(
     field = GF(map_.prime)
     x, at = tuple(field.convert(c) for c in (*map_.random_point(), *map_.values)), field.convert(map_.eps)
     P = tensor.value(field, at, x)
-    rows = [_slopes(one.function, field, (*x, at), tensor.dim) for one in integrals]
-    casimirs = []
-    for one, row in zip(integrals, rows, strict=True):
+    rows = [slopes(one.function, field, (*x, at), tensor.dim) for one in integrals]
+    casimirs: list[str] = []
+    independent: list[list[int]] = []  # gradients of Casimirs
+
+    def add_casimir(name: str, function: RationalFunction, row: Sequence[Any]) -> None:
+        more = [*independent, [int(entry) for entry in row]]
         is_killed = all(entry == 0 for entry in (P * field.column(row)).entries())
-        if is_killed and _verdict(laboratory, _brackets(laboratory, tensor, [one], True), deadline)[0].holds:
-            casimirs.append(one.name)
+        if is_killed and _verdict(laboratory, _brackets(laboratory, tensor, [function], True), deadline)[0].holds:
+            casimirs.append(name)
+            independent[:] = more if rank(more, map_.prime) == len(more) else independent
+
+    rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], map_.prime)
+    for one, row in zip(integrals, rows, strict=True):
+        add_casimir(one.name, one.function, row)
+    most = min(tensor.dim - rank_of_P, rank([[int(entry) for entry in row] for row in rows], map_.prime))
+    if len(independent) < most and len(integrals) <= _MOST_INTEGRALS and time.monotonic() < deadline:
+        seconds = deadline - time.monotonic()
+        for name, function in casimir_candidates(laboratory, tensor, integrals, seconds):
+            row = slopes(function, field, (*x, at), tensor.dim)
+            if len(independent) < most and rank([*independent, [int(e) for e in row]], map_.prime) > len(independent):
+                add_casimir(name, function, row)
     chosen = [integrals[k] for k in _in_involution(field, P, rows)]
     involution = None
     if chosen:
-        involution = _verdict(laboratory, _brackets(laboratory, tensor, chosen, False), deadline)[0]
-    rank_of_P = rank([[int(entry) for entry in row] for row in P.tolist()], map_.prime)
+        involution = _verdict(
+            laboratory, _brackets(laboratory, tensor, [one.function for one in chosen], False), deadline
+        )[0]
     names = tuple(one.name for one in chosen)
     found = (verdict, evidence, jacobi, jacobi_evidence, rank_of_P, tuple(casimirs), names, involution)
     return FoundTensor("P", tensor, *found)
@@ -507,17 +525,10 @@ def _verdict(laboratory: Laboratory, identity: Identity, deadline: float) -> tup
     return judged(identity, laboratory.seed, expands=time.monotonic() < deadline)
 
 
-def _slopes(function: RationalFunction, field: Field, place: Sequence[Any], n: int) -> list[Any]:
-    """The gradient of N/D in the first n variables, times D^2."""
-    N, D = (evaluate(part, field, place) for part in (function.numerator, function.denominator))
-    upper, lower = (gradient(part)[:n] for part in (function.numerator, function.denominator))
-    return [evaluate(a, field, place) * D - evaluate(b, field, place) * N for a, b in zip(upper, lower, strict=True)]
-
-
 def _brackets(
-    laboratory: Laboratory, tensor: GivenTensor, integrals: Sequence[FoundIntegral], of_variables: bool
+    laboratory: Laboratory, tensor: GivenTensor, functions: Sequence[RationalFunction], of_variables: bool
 ) -> Identity:
-    """That all brackets of two integrals vanish or, `of_variables`, those of an integral and a variable."""
+    """That all brackets of two functions vanish or, `of_variables`, those of a function and a variable."""
     n = tensor.dim
 
     def sides(field: Field, place: tuple[Any, ...], eps: Any) -> Sides | None:
@@ -525,7 +536,7 @@ def _brackets(
         if P is None:
             return None
         with field.working():
-            columns = [field.column(_slopes(one.function, field, (*place, eps), n)) for one in integrals]
+            columns = [field.column(slopes(one, field, (*place, eps), n)) for one in functions]
             found: list[Any] = []
             for k, column in enumerate(columns):
                 moved = P * column
@@ -535,7 +546,7 @@ def _brackets(
                     found += [(columns[j].transpose() * moved)[0, 0] for j in range(k)]
         return found, [field.zero] * len(found)
 
-    subject = ("brackets", tensor.subject, [one.function for one in integrals], of_variables)
+    subject = ("brackets", tensor.subject, list(functions), of_variables)
     has_eps = laboratory.map.has_eps or tensor.has_eps
     return Identity(n + len(laboratory.symbols), sides, laboratory.eps, has_eps=has_eps, subject=subject)
 

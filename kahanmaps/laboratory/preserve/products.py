@@ -40,10 +40,11 @@ from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory
-from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
 from kahanmaps.laboratory.preserve.cofactors import Cofactor
-from kahanmaps.laboratory.preserve.flow import flow_exponents
+from kahanmaps.laboratory.preserve.flow import coefficient_rows
 from kahanmaps.maps.implicit import StepOver
+from kahanmaps.systems.polynomial import PolynomialField
 
 _BUDGET = 5_000_000  # products of terms, for the Jacobi determinants
 _MAX_CANDIDATES = 60
@@ -56,7 +57,7 @@ class Product:
     """The product I of powers g^k of the `factors`, a function of (variables, symbols, eps); there may be none.
 
     `constant` is the number c with I(x~) = c I(x), a function of the symbols and eps: 1 for an integral. For a density
-    it is that in phi(x~) = c det dPhi(x) phi(x), 1 or -1.
+    it is that in phi(x~) = c det dPhi(x) phi(x), 1 or -1. Of a flow what depends on time has c with I' = c I.
     """
 
     factors: tuple[tuple[fmpq_mpoly, int], ...]
@@ -107,10 +108,10 @@ def candidates(laboratory: Laboratory, cofactors: Sequence[Cofactor]) -> list[fm
 
     They are the variables, the polynomials of the cofactors (affine Darboux functions of a system, and factors of
     Jacobi determinants), and the factors of det dPhi and det dPhi^-1, as far as these are not too long; for a flow
-    the affine Darboux functions.
+    its Darboux polynomials.
     """
     if laboratory.flow:
-        return [one.polynomial for one in laboratory.affine_cofactors() if one.polynomial is not None]
+        return list(laboratory.flow_polynomials().functions)
     n, context = laboratory.map.dim, ring(laboratory.map.names)
     known = [one.polynomial for one in cofactors if one.polynomial is not None]
     found: dict[str, fmpq_mpoly] = {}
@@ -228,18 +229,7 @@ def _interpolated(values: Callable[[int], list[int]], top: int, p: int) -> list[
             missed += 1
             if missed > top + 20:
                 raise NoPoint("the map has no value at random points modulo a prime") from None
-    found = []
-    for column in zip(*rows, strict=True):
-        # Newton's divided differences
-        table = list(column)
-        for k in range(1, len(nodes)):
-            for i in range(len(nodes) - 1, k - 1, -1):
-                table[i] = (table[i] - table[i - 1]) * pow(nodes[i] - nodes[i - k], -1, p) % p
-        P = nmod_poly([0], p)
-        for node, c in zip(reversed(nodes), reversed(table), strict=True):
-            P = P * nmod_poly([-node % p, 1], p) + nmod_poly([c], p)
-        found.append(P)
-    return found
+    return [interpolated(nodes, column, p) for column in zip(*rows, strict=True)]
 
 
 def coprime_base(polynomials: Sequence[nmod_poly]) -> list[nmod_poly]:
@@ -310,12 +300,33 @@ def products_of(laboratory: Laboratory, polynomials: Sequence[fmpq_mpoly]) -> Pr
     >>> products_of(laboratory, candidates(laboratory, laboratory.cofactors())).density.function.numerator
     x*y
     """
-    if laboratory.system is not None and laboratory.flow:
-        rows = flow_exponents(laboratory.system, polynomials)
-    else:
-        rows = _exponents_on_line(laboratory.maps[0], polynomials)
     weights = [_FIRST, *map(len, polynomials)]  # short formulas before long ones
+    if laboratory.field is not None and laboratory.flow:
+        return _products_of_flow(laboratory.field, laboratory.map.names, polynomials, weights)
+    rows = _exponents_on_line(laboratory.maps[0], polynomials)
     return _sorted_by_constant(laboratory, polynomials, _reduced(relations(rows), weights), weights)
+
+
+def _products_of_flow(
+    field: PolynomialField, names: Sequence[str], polynomials: Sequence[fmpq_mpoly], weights: Sequence[int]
+) -> Products:
+    """The same for a flow: sum k K is 0 for integrals, div f for densities, free of x for what depends on time."""
+    context = ring(names)
+    gens, n = context.gens(), field.dim
+    cofactors = [
+        field.divergence.compose(*gens[: n + len(field.symbols)], ctx=context),
+        *(field.derivative(P) / P for P in polynomials),
+    ]
+    constants = [K.compose(*[context.constant(0)] * n, *gens[n:], ctx=context) for K in cofactors]
+    moving = [K - c for K, c in zip(cofactors, constants, strict=True)]
+    in_time = []
+    for vector in _reduced(relations(coefficient_rows(moving)), weights):
+        total = sum((k * c for k, c in zip(vector, constants, strict=True)), context.constant(0))
+        if vector[0] == 0 and not total.is_zero():
+            in_time.append((vector, RationalFunction(total, context.constant(1))))
+    exact = _reduced(relations(coefficient_rows(cofactors)), weights)
+    one = RationalFunction(context.constant(1), context.constant(1))
+    return _assembled(polynomials, n, exact, [(one, exact)], in_time)
 
 
 def _exponents_on_line(map_: ModularMap, polynomials: Sequence[fmpq_mpoly]) -> list[list[int]]:
@@ -339,7 +350,6 @@ def _sorted_by_constant(
     weights: Sequence[int],
 ) -> Products:
     """Which products of the vectors have the constant 1; the exponent of det dPhi comes first in them."""
-    degrees = [0, *(degree_in(g, laboratory.map.dim) for g in polynomials)]
     context = ring(laboratory.map.names)
     one = RationalFunction(context.constant(1), context.constant(1))
     values = _constants(laboratory, polynomials, vectors)
@@ -353,21 +363,33 @@ def _sorted_by_constant(
         return _reduced(vectors, weights)
 
     exact = with_constant_1([])
+    in_time = [(v, c) for v, c in known if v[0] == 0 and c != one]
+    return _assembled(
+        polynomials, laboratory.map.dim, exact, [(one, exact), (minus, with_constant_1([minus]))], in_time
+    )
+
+
+def _assembled(
+    polynomials: Sequence[fmpq_mpoly],
+    n: int,
+    exact: Sequence[list[int]],
+    of_densities: Sequence[tuple[RationalFunction, Sequence[list[int]]]],
+    in_time: Sequence[tuple[list[int], RationalFunction]],
+) -> Products:
+    """The products: integrals and a density by their vectors, for each constant of one; what depends on time."""
+    degrees = [0, *(degree_in(g, n) for g in polynomials)]
     integrals = [_upright(v, degrees) for v in exact if v[0] == 0]
 
     def product(vector: Sequence[int], constant: RationalFunction) -> Product:
         return Product(tuple((g, k) for g, k in zip(polynomials, vector[1:], strict=True) if k), constant)
 
     density = None
-    for constant, choice in ((one, exact), (minus, with_constant_1([minus]))):
+    for constant, choice in of_densities:
         vector = next((v if v[0] == -1 else [-e for e in v] for v in choice if abs(v[0]) == 1), None)
         if vector is not None and density is None:
             density = product(_most_polynomial(vector, integrals, degrees), constant)
-    return Products(
-        tuple(product(v, one) for v in integrals),
-        density,
-        tuple(product(v, c) for v, c in known if v[0] == 0 and c != one),
-    )
+    one = of_densities[0][0]
+    return Products(tuple(product(v, one) for v in integrals), density, tuple(product(v, c) for v, c in in_time))
 
 
 def _constants(
@@ -376,8 +398,6 @@ def _constants(
     """The numbers that the products of the vectors are, functions of the symbols and eps; None where not found."""
     context = ring(laboratory.map.names)
     one = RationalFunction(context.constant(1), context.constant(1))
-    if laboratory.flow:
-        return [one] * len(vectors)
 
     def constants(map_: ModularMap) -> list[int]:
         return [_constant(map_, polynomials, vector) for vector in vectors]

@@ -26,6 +26,7 @@ from kahanmaps.laboratory.preserve.cofactors import (
     search_cofactors,
 )
 from kahanmaps.laboratory.preserve.darboux_spaces import LARGEST_SPAN, DarbouxSpace, darboux_spaces, gradient_rank
+from kahanmaps.laboratory.preserve.flow import ModularFlow
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.maps.kahan import KahanMapOver
 
@@ -92,7 +93,7 @@ def search(
 
     affine = affine_space(map_)
     if affine is not None:
-        text = AFFINE if isinstance(map_.map, KahanMapOver) else "affine integral"
+        text = AFFINE if isinstance(map_, ModularFlow) or isinstance(map_.map, KahanMapOver) else "affine integral"
         found.add(Step("affine", 1, None, text), [affine])
 
     def take_relations(least: int, most: int) -> None:

@@ -1,0 +1,67 @@
+"""Polynomial vector fields x' = f(x) of any degree, exact, with symbols in the coefficients where they are wanted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import names_of
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialField:
+    """x' = f(x): `rhs` are polynomials over Q in the variables, as many as these, then in `symbols`.
+
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> field = PolynomialField(tuple(parse_polynomial(text, ["x", "y"]) for text in ("x^3*y", "x")))
+    >>> field.degree, field.divergence
+    (4, 3*x^2*y)
+    """
+
+    rhs: tuple[fmpq_mpoly, ...]
+    symbols: tuple[str, ...] = ()
+
+    @cached_property
+    def variables(self) -> tuple[str, ...]:
+        """The names of the variables."""
+        names = names_of(self.rhs[0])
+        return names[: len(names) - len(self.symbols)]
+
+    @property
+    def dim(self) -> int:
+        """The number of variables."""
+        return len(self.variables)
+
+    @cached_property
+    def degree(self) -> int:
+        """The degree of f in the variables; 0 for f = 0."""
+        return max((sum(m[: self.dim]) for polynomial in self.rhs for m in polynomial.monoms()), default=0)
+
+    @cached_property
+    def divergence(self) -> fmpq_mpoly:
+        """The trace of f'(x), a polynomial of a degree below that of f."""
+        return sum((p.derivative(i) for i, p in enumerate(self.rhs)), self.rhs[0].context().constant(0))
+
+    def derivative(self, function: fmpq_mpoly) -> fmpq_mpoly:
+        """f . grad P, how P changes along solutions; P is in the variables and symbols and, if need be, in eps.
+
+        >>> from kahanmaps.algebra.text import parse_polynomial
+        >>> field = PolynomialField(tuple(parse_polynomial(text, ["x", "y"]) for text in ("x*y", "x")))
+        >>> [field.derivative(x) for x in field.rhs[0].context().gens()]
+        [x*y, x]
+        """
+        context = function.context()
+        images = context.gens()[: self.dim + len(self.symbols)]
+        slopes = (p.compose(*images, ctx=context) * function.derivative(i) for i, p in enumerate(self.rhs))
+        return sum(slopes, context.constant(0))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, PolynomialField):
+            return NotImplemented
+        return (self.variables, self.symbols) == (other.variables, other.symbols) and self.rhs == other.rhs
+
+    def __hash__(self) -> int:
+        # All terms would make it slow; equal fields have equal hashes all the same.
+        return hash((self.variables, self.symbols, *(len(polynomial) for polynomial in self.rhs)))

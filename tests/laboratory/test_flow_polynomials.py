@@ -1,0 +1,205 @@
+"""Darboux polynomials of a flow, found with no cofactor given: known ones, and none where there are none."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.text import format_polynomial, parse_polynomial, parse_rational_function
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
+from kahanmaps.laboratory.preserve import flow_polynomials as searched
+from kahanmaps.laboratory.preserve.affine_functions import darboux_cofactor
+from kahanmaps.laboratory.preserve.darboux import darboux_polynomials
+from kahanmaps.laboratory.preserve.densities import find_densities
+from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
+from kahanmaps.laboratory.preserve.flow_polynomials import flow_polynomials
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.limits import flow_and_map
+from kahanmaps.systems.polynomial import PolynomialField
+
+
+def field(variables, *rhs):
+    return PolynomialField(tuple(parse_polynomial(text, variables.split()) for text in rhs))
+
+
+def lorenz(s, r, b):
+    return load("lorenz", {"s": s, "r": r, "b": b})
+
+
+def found_in(given, degree=None):
+    return [format_polynomial(P) for P in flow_polynomials(given, degree).functions]
+
+
+@pytest.mark.parametrize(
+    ("s", "r", "b", "known"),
+    [
+        ("10", "28", "20", ["x^2 - 20*z"]),  # b = 2 s
+        ("10", "0", "1", ["y^2 + z^2"]),  # irreducible over Q, two conjugate planes
+        ("1", "3", "1", ["3*x^2 - y^2 - z^2"]),  # b = s = 1: r x^2 - y^2 - z^2
+        ("10", "28", "8/3", []),
+        ("10", "28", "19", []),  # next to b = 2 s
+    ],
+)
+def test_the_quadrics_of_the_lorenz_system_are_found(s, r, b, known):
+    """The classical cases with an integral that depends on time, and parameters beside them."""
+    assert found_in(lorenz(s, r, b).system, 2) == known
+
+
+def test_a_quartic_is_found():
+    """Of a field made for it, of degree 4: (P_y + P, -P_x + 2 P) is tangent to P = 0."""
+    P = parse_polynomial("x^4 + y^2 + 1", ["x", "y"])
+    made = PolynomialField((P.derivative(1) + P, -P.derivative(0) + 2 * P))
+    assert found_in(made, 4) == [format_polynomial(P)]
+    assert found_in(made, 3) == []
+
+
+def test_what_is_found_divides_its_derivative_at_rational_points():
+    system = lorenz("10", "28", "20").system
+    [P] = flow_polynomials(system).functions
+    K = darboux_cofactor(system, P)
+    rng = random.Random(4)
+    x = [fmpq(rng.randint(-9, 9), 7) for _ in range(3)]
+    slope = sum(evaluate(P.derivative(k), QQ, x) * evaluate(f, QQ, x) for k, f in enumerate(system.rhs))
+    assert slope == evaluate(K, QQ, x) * evaluate(P, QQ, x) != 0
+    assert format_polynomial(K) == "-20"
+
+
+def test_integrals_of_the_same_degree_do_not_hide_others():
+    """H = x^2 + y^2 + z^2 is an integral, and z = 0 and y^2 - z^2 + 1 = 0 are kept: (A x B) with grad H."""
+    H, P = (parse_polynomial(text, ["x", "y", "z"]) for text in ("x^2 + y^2 + z^2", "y^2 - z^2 + x"))
+    a, b = ([one.derivative(k) for k in range(3)] for one in (H, P))
+    cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    z = P.context().gens()[2]
+    spin = [a[1] * z, -a[0] * z, z * 0]  # keeps H, and does not keep P
+    made = PolynomialField(tuple(c + P * s for c, s in zip(cross, spin, strict=True)))
+    assert made.derivative(H).is_zero()
+    assert not made.derivative(P).is_zero()
+    assert format_polynomial(P) in found_in(made, 2)
+    assert format_polynomial(H) not in found_in(made, 2)
+
+
+def test_affine_integrals_do_not_hide_quadrics():
+    """Products of two of x + y - c are at two points of a quadric what it is; at three they are not."""
+    P = parse_polynomial("x^2 - y*z + 1", ["x", "y", "z"])
+    px, py, pz = (P.derivative(k) for k in range(3))
+    rhs = (pz + P, -pz - P, py - px + 2 * P)  # f . grad P is a multiple of P, and x + y is an integral
+    made = PolynomialField(rhs)
+    assert darboux_cofactor(made, P) is not None
+    assert (rhs[0] + rhs[1]).is_zero()
+    assert found_in(made, 2) == [format_polynomial(P)]
+
+
+def test_integrals_are_left_out():
+    """x^2 + y^2 and y^2 + 2 z^2, whose factors are not real; x^2 - y^2, which has factors that are none."""
+    assert found_in(field("x y z", "y*z", "-x*z", "1/2*x*y")) == []
+    assert found_in(field("x y z", "y*z", "x*z", "-2*x*y")) == ["x + y", "x - y"]
+
+
+def test_affine_ones_are_those_of_lotka_and_volterra():
+    assert found_in(load("lotka_volterra").system) == ["x", "y"]
+
+
+def test_a_polynomial_that_does_not_divide_its_derivative_is_none(monkeypatch):
+    """Whatever the points modulo a prime say, it is put to the proof."""
+    monkeypatch.setattr(searched._Line, "spaces", lambda line: [[[0, 1, *[0] * (line.count - 2)]]])
+    assert flow_polynomials(field("x y", "y + x^2", "x*y + 1"), 2, seed=5).functions == ()
+    assert found_in(field("x y", "x*y + x^2", "x*y + 1"), 2) == ["x"]
+
+
+def test_where_a_line_leaves_others_possible_the_degree_is_not_done(monkeypatch):
+    monkeypatch.setattr(searched._Line, "is_explained_by", lambda line, known: line.degree < 2)
+    found = flow_polynomials(lorenz("10", "28", "20").system, 3, seed=6)
+    assert ([format_polynomial(P) for P in found.functions], found.degree) == (["x^2 - 20*z"], 1)
+
+
+def test_a_quadric_without_points_on_a_line_keeps_the_search_going():
+    """Half of all lines modulo a prime have none, and do not show that there is nothing."""
+    system = lorenz("1", "3", "1").system
+    for seed in range(8):
+        assert [format_polynomial(P) for P in flow_polynomials(system, 2, seed=seed).functions] == ["3*x^2 - y^2 - z^2"]
+
+
+def test_nothing_moves_on_a_common_factor():
+    """Where it is 0 every polynomial that vanishes at the point does so along its solution."""
+    rhs = ["y*(x^2 + y - 1)", "(x + y^2)*(x^2 + y - 1)"]
+    assert found_in(field("x y", *rhs), 3) == ["x^2 + y - 1", "2*y^2 + 2*x + 1"]
+
+
+def test_of_a_pencil_no_member_is_taken_for_a_rational_one():
+    """x^2 + y^2 - 1 + c y for every c: that of c = 2 i is a product of lines, and 2 i is a residue modulo primes."""
+    known = ["x^2 + y^2 + 2*x + 1", "x^2 + y^2 - 2*x + 1", "y"]  # z = x + i y has z' = z^2 - 1
+    for seed in range(5):
+        found = flow_polynomials(field("x y", "x^2 - y^2 - 1", "2*x*y"), 3, seed=seed).functions
+        assert sorted(map(format_polynomial, found)) == known
+
+
+def test_of_infinitely_many_those_are_listed_that_divide_right_hand_sides():
+    assert found_in(field("x y", "x", "y"), 3) == ["x", "y"]  # x + c y for every c
+
+
+def test_without_time_nothing_is_said_to_be_tried():
+    found = flow_polynomials(load("euler_top").system, 2, 0.0)
+    assert (found.functions, found.degree) == ((), 0)
+
+
+def test_a_constant_cofactor_gives_an_integral_that_depends_on_time():
+    file = lorenz("10", "28", "20")
+    found = find_integrals(file, flow=True, max_degree=2)
+    assert [(one.text, str(one.integral.verdict)) for one in found.in_time] == [("exp(20*t)*(x^2 - 20*z)", "proved")]
+    assert find_integrals(lorenz("10", "28", "19"), flow=True, max_degree=2).in_time == ()
+    beside = flow_and_map(find_integrals(file, max_degree=2))
+    assert ("proved", "Darboux polynomials of the flow, apart from affine ones: x^2 - 20*z") in beside.lines()
+    assert ("proved", "T1 = exp(20*t)*(x^2 - 20*z) is an integral of the flow that depends on time") in beside.lines()
+    [told] = [text for _, text in beside.lines() if text.startswith("no other Darboux")]
+    assert told == "no other Darboux polynomial of the flow shows up to degree 3"
+
+
+def test_symbols_stay_in_them():
+    text = 'variables = ["x", "y", "z"]\nparameters.s = 10\n[system]\nrhs = ["s*(y-x)", "28*x-y-x*z", "x*y-2*s*z"]'
+    [one] = darboux_polynomials(parse_system(text), 2, flow=True, symbols=["s"]).spaces
+    assert (one.cofactor, list(map(format_polynomial, one.polynomials))) == ("-2*s", ["x^2 - 2*z*s"])
+    [one] = find_integrals(parse_system(text), flow=True, max_degree=2, symbols=["s"]).in_time
+    assert one.text == "exp(2*s*t)*(x^2 - 2*z*s)"
+    assert darboux_polynomials(parse_system(text.replace("2*s*z", "3*s*z")), 2, flow=True, symbols=["s"]).spaces == []
+
+
+@pytest.mark.parametrize(("factor", "kept"), [("-20", True), ("20", False), ("-19", False), ("0", False)])
+def test_the_rate_of_what_depends_on_time_is_decided_by_multiplying_out(factor, kept):
+    names = ["x", "y", "z", "eps"]
+    I, c = (parse_rational_function(text, names) for text in ("x^2 - 20*z", factor))
+    assert is_kept_by_flow(lorenz("10", "28", "20").system, I, factor=c) is kept
+
+
+def test_powers_of_two_of_them_make_an_integral_without_time():
+    """P = x^2 - 20 z with the rate -20, and w' = -3 w: P^3/w^20."""
+    text = 'variables = ["x", "y", "z", "w"]\n[system]\nrhs = ["10*(y-x)", "28*x-y-x*z", "x*y-4*z", "w*(y - 2*z)"]'
+    assert find_integrals(parse_system(text), flow=True, max_degree=1).integrals == ()
+    text = 'variables = ["x", "y", "z"]\n[system]\nrhs = ["2*(y-x)", "3*x-y-x*z", "x*y-4*z"]'
+    extended = text.replace('"z"]', '"z", "w"]').replace('-4*z"', '-4*z", "8*w"')
+    [one] = find_integrals(parse_system(extended), flow=True, max_degree=1).integrals
+    assert (one.text, str(one.verdict)) == ("w*(x^2 - 4*z)^2", "proved")
+
+
+def test_a_density_may_be_a_power_of_what_was_found():
+    """A conic that is kept zero, f = (P_y, -P_x) + P (1, 1) y: div f = K + ..., as chosen."""
+    P = parse_polynomial("x^2 + y^2 - 1", ["x", "y"])
+    rhs = [format_polynomial(f) for f in (P.derivative(1), -P.derivative(0))]
+    assert (
+        find_densities(parse_system(f'variables = ["x", "y"]\n[system]\nrhs = {rhs}'), flow=True).densities[0].text
+        == "1"
+    )
+
+
+def test_the_list_up_to_a_degree_names_the_cofactors():
+    found = darboux_polynomials(load("lotka_volterra"), 2, flow=True)
+    assert [(one.cofactor, list(map(str, one.polynomials)), str(one.verdict)) for one in found.spaces] == [
+        ("-y + 1", ["x"], "proved"),
+        ("x - 1", ["y"], "proved"),
+    ]
+    assert found.reason == ""
+    assert darboux_polynomials(load("lotka_volterra"), 2, flow=True, seconds=1e-9).reason.startswith("degrees above 0")
