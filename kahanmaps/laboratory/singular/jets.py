@@ -82,7 +82,8 @@ class Step:
     other; `pole` the valuation of Z at the image when the least of
     all coordinates is 0 (the order of the pole), `denominator` that of det(I - eps f') at the point before the step,
     `rank` the rank of the differential of the map from the hypersurface to the limits of its points, `limit` such a
-    point after the step, `orders` the valuations at the image of the functions that were asked for.
+    point after the step, `orders` the valuations at the image of the functions that were asked for, `curve` the image
+    itself as far as it is known, where these are followed.
     """
 
     common: int
@@ -91,6 +92,7 @@ class Step:
     rank: int
     limit: tuple[int, ...] = field(repr=False)
     orders: tuple[int, ...] = field(default=(), repr=False)
+    curve: tuple[nmod_poly, ...] = field(default=(), repr=False, compare=False)
 
 
 def walk(
@@ -163,7 +165,8 @@ def walk_along(
         if None in orders:
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in X)
-        yield Step(divided, pole, _product(denominators), 0, limit, tuple(order or 0 for order in orders))
+        kept = tuple(order or 0 for order in orders)
+        yield Step(divided, pole, _product(denominators), 0, limit, kept, tuple(X) if functions else ())
 
 
 def _product(valuations: Sequence[int | None]) -> int | None:
