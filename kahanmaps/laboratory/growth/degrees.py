@@ -323,7 +323,7 @@ class _Search:
             return
         found = find_recurrence(self.degrees)
         # Above dimension 4 series are slow and wait until degrees say something. Affine maps contract nothing.
-        soon = self._map.dim <= WRITTEN_DIMENSION or found is not None
+        soon = self._map.dim <= WRITTEN_DIMENSION or found is not None or self.degrees[-1] > _LARGE
         if self._patterns is None and self.degrees[1] > 1 and soon:
             left = max(0.0, self._deadline - time.monotonic())
             self._patterns = patterns_of_map(

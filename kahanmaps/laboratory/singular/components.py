@@ -13,8 +13,9 @@ from typing import Any
 
 from flint import Ordering, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
 
+from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.laboratory.singular.jets import modulo
 from kahanmaps.maps.equation import Equation
 
 Kind = tuple[tuple[int, ...], int]  # exponents in forms, and degree
@@ -22,16 +23,26 @@ Kind = tuple[tuple[int, ...], int]  # exponents in forms, and degree
 
 @dataclass(frozen=True)
 class Component:
-    """A hypersurface: its exponents in the forms, its degree, and its order along a curve (None: it contains it)."""
+    """A hypersurface: its exponents in the forms, its degree, its order along the curve t (None: it contains it), and
+    its equation on the surface (t, u)."""
 
     exponents: tuple[int, ...]
     degree: int
     order: int | None
+    equation: nmod_mpoly
 
     @property
     def kind(self) -> Kind:
         """What two components have to differ in if they are to be told apart."""
         return self.exponents, self.degree
+
+    def roots(self, t: int) -> list[int]:
+        """The points u in GF(p) that it has at this t."""
+        p = int(self.equation.context().modulus())
+        on_line = [0] * (self.degree + 1)
+        for (i, j), c in self.equation.terms():
+            on_line[j] += int(c) * pow(t, i, p)
+        return [int(u) for u, _ in nmod_poly(on_line, p).roots()]
 
 
 def components(
@@ -42,8 +53,8 @@ def components(
     With each of the forms over Q stands whether it is one at the image of the point under the map of the equation.
     `direction` is a random vector: then degrees are those of hypersurfaces. Exact for the surface. Raises BadPrime.
     """
-    p = equation.over.characteristic
-    ring = nmod_mpoly_ctx.get(("t", "u"), modulus=p, ordering=Ordering.degrevlex)
+    field = GF(equation.over.characteristic)
+    ring = nmod_mpoly_ctx.get(("t", "u"), modulus=field.prime, ordering=Ordering.degrevlex)
     X = [
         ring.from_dict({(k, 0): int(c) for k, c in enumerate(entry.coeffs())}) + ring.gen(1) * w
         for entry, w in zip(curve, direction, strict=True)
@@ -53,7 +64,8 @@ def components(
     image = [entry / common for entry in image]
     found: dict[str, tuple[nmod_mpoly, list[int]]] = {}
     for k, (form, is_there) in enumerate(forms):
-        for factor, exponent in evaluate(form, equation.over, image if is_there else X).factor()[1]:
+        value = modulo(form, field).compose(*(image if is_there else X), ctx=ring)
+        for factor, exponent in value.factor()[1]:
             _, exponents = found.setdefault(str(factor), (factor, [0] * len(forms)))
             exponents[k] = int(exponent)
     return [
@@ -61,6 +73,7 @@ def components(
             tuple(exponents),
             int(factor.degrees()[1]),
             min((int(power[0]) for power in factor.monoms() if power[1] == 0), default=None),
+            factor,
         )
         for factor, exponents in found.values()
         if factor.degrees()[1]

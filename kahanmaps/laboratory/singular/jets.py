@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from flint import Ordering, nmod, nmod_mat, nmod_mpoly_ctx, nmod_poly
+from flint import Ordering, nmod, nmod_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
 
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.minors import kernel_minors
@@ -184,11 +184,15 @@ def _divided(image: Sequence[nmod_poly], known: int) -> tuple[int, int | None]:
     return min(seen), sizes[-1]
 
 
+def modulo(form: Any, field: PrimeField) -> nmod_mpoly:
+    """A form over Q modulo a prime. Raises BadPrime."""
+    context = nmod_mpoly_ctx.get(form.context().names(), modulus=field.prime, ordering=Ordering.degrevlex)
+    return context.from_dict({exponents: int(field.convert(c)) for exponents, c in form.terms()})
+
+
 def form_order(form: Any, field: PrimeField) -> Function:
     """The order of a form over Q in (X : Z), along curves modulo the prime of `field`. Raises BadPrime."""
-    p = field.prime
-    context = nmod_mpoly_ctx.get(form.context().names(), modulus=p, ordering=Ordering.degrevlex)
-    reduced = context.from_dict({exponents: int(field.convert(c)) for exponents, c in form.terms()})
+    p, reduced = field.prime, modulo(form, field)
     terms = [(exponents, nmod_poly([int(c)], p)) for exponents, c in reduced.terms()]
 
     def order(X: Sequence[nmod_poly], precision: int) -> int | None:
