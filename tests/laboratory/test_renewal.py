@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, recurrence_of
+from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, needed, recurrence_of
 from kahanmaps.laboratory.singular import contracted
 from kahanmaps.laboratory.singular.fates import CONFINED
 from kahanmaps.laboratory.singular.orders import Orders
@@ -201,3 +201,42 @@ def test_a_superattracting_point_lowers_no_degree(image):
     (infinity,) = found.patterns.contracted
     assert [row[1] for row in infinity.orders.rows] == [2**t for t in range(1, len(infinity.orders.rows) + 1)]
     assert found.dynamical_degree.text == "2"
+
+
+def explicit(*image):
+    names = ["x", "y", "z"][: len(image)]
+    return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image])
+
+
+@pytest.mark.parametrize(
+    ("image", "series", "beyond"),
+    [
+        (("y", "-x + y^30 + 1"), ((1,), (1, -30)), [(0,)]),  # (0 : 1 : 0) is fixed, with orders 30, 900, ...
+        (("y", "(y^3 + 1)/x"), ((1, 0, 1), (1, -3, 1)), [(), (), (), (0, 3)]),
+        (("y", "z", "x + 2*y^3 - z"), ((1, 3), (1, 0, -3)), [()]),  # no value at the point: the orders are needed
+    ],
+)
+def test_orders_at_points_that_close_are_not_needed(image, series, beyond):
+    map_ = explicit(*image)
+    found = patterns(map_, None)
+    assert (found.series, [h.orders.beyond for h in found.contracted]) == (series, beyond)
+    assert degree_growth(map_, max_degree=3000, max_terms=8, patterns=found).explained is not None
+
+
+def test_unknown_orders_that_are_needed_explain_nothing():
+    costly, attracted = settled((1, 0, 0)), settled((0, 1, 2))
+    assert needed([costly, attracted]) == [0, 1]
+    assert needed([costly, replace(attracted, beyond=(1,))]) is None
+    assert needed([costly, replace(attracted, beyond=(0,))]) is None
+    assert needed([costly, replace(attracted, rows=((0, 0, 2),), beyond=(1,))]) == [0]
+    # Through a return as well: the first becomes the third, which costs and is met by the second.
+    returning = replace(settled((0, 0, 0, 0), (0, 0, 0, 1)), returns=(2, 2))
+    chain = [returning, settled((0, 0, 0, 1)), settled((1, 0, 0, 0))]
+    assert needed(chain) == [0, 1, 2]
+    assert needed([*chain[:2], replace(chain[2], beyond=(0,))]) is None
+    with pytest.raises(ValueError, match="orders that are not known"):
+        degree_series(2, [(1, costly), (1, replace(attracted, beyond=(0,)))])
+    # What is not needed does not count.
+    assert degree_series(2, [(1, costly), (1, replace(attracted, rows=((0, 0, 2),)))]) == degree_series(
+        2, [(1, settled((1, 0)))]
+    )

@@ -37,7 +37,7 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap
 
 _MAX_PRECISION = 4096
-_MOST_ALONG = 1024  # where series are followed far
+_MOST_ALONG = 4096  # where series are followed far
 _TRIES = 40
 _LINES = 6  # on which critical points are looked for, and more while some have no point
 _POINTS = 2  # each modulo a prime of its own
@@ -383,9 +383,62 @@ def orders_at(
             kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
             return Orders(rows[:kept], laws, len(run), True)
         longest = min(reach, max(limits.along, 2 * (hit or 0)))
+        if (
+            rows
+            and is_cut
+            and (beyond := _met_for_ever(equations, run[-1].limit, direction, reach, tracked, limits.end)) is not None
+        ):
+            last = max(
+                (
+                    t
+                    for t, (mu, *nu) in enumerate(rows, 1)
+                    if mu or any(order for k, order in enumerate(nu) if k not in beyond)
+                ),
+                default=1,
+            )
+            return Orders(rows[:last], (), reach, True, None, beyond)
         if not is_whole or steps >= longest:
             return Orders(rows, (), len(rows), False)
         steps = longest
+
+
+def _met_for_ever(
+    equations: Sequence[Equation],
+    point: Sequence[int],
+    direction: Sequence[int],
+    reach: int,
+    tracked: AlongCurves,
+    end: float,
+) -> tuple[int, ...] | None:
+    """The critical hypersurfaces on the later orbit of a point, where that closes and the map has a value on all of it.
+
+    Then no power of t is ever divided out again. None elsewhere. Lines in a random direction show the value of the map.
+    """
+    if not isinstance(tracked, Tracked):
+        return None
+    p = equations[0].over.characteristic
+    point, seen, met = _normal(point, p), set[tuple[int, ...]](), set[int]()
+    for _ in range(reach):
+        seen.add(point)
+        line = [nmod_poly([x, v], p) for x, v in zip(point, direction, strict=True)]
+        first = [function(line, _MAX_PRECISION) for function in tracked.functions]
+        run = walked(equations, point, direction, [], 1, end, functions=tracked.functions)[0]
+        if not run or None in first:
+            return None
+        ((mu, *orders),) = replace(tracked, first=tuple(k or 0 for k in first)).rows(run)
+        if mu:
+            return None
+        point = _normal(run[0].limit, p)
+        met |= {k for k, order in enumerate(orders) if order}
+        if point in seen:
+            return tuple(sorted(met))
+    return None
+
+
+def _normal(point: Sequence[int], p: int) -> tuple[int, ...]:
+    """The coordinates of a point with the first one that is not zero as 1."""
+    inverse = pow(next(x for x in point if x), -1, p)
+    return tuple(x * inverse % p for x in point)
 
 
 def walked(
