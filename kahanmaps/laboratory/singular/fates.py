@@ -37,7 +37,8 @@ from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap
 
 _MAX_PRECISION = 4096
-_MOST_ALONG = 4096  # where series are followed far
+_MOST_ALONG = 2048  # where series are followed far
+_MOST_WITH_TANGENTS = 1024
 _TRIES = 40
 _LINES = 6  # on which critical points are looked for, and more while some have no point
 _POINTS = 2  # each modulo a prime of its own
@@ -296,7 +297,7 @@ def _fate_at(
     """What becomes of the hypersurface with these tangents at a point, and the orders of what is tracked along it."""
     full = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
-    run, is_whole = walked(equations, point, direction, tangents, limits.shown, limits.end)
+    run, is_whole = walked(equations, point, direction, tangents, limits.shown, limits.end, most=_MOST_WITH_TANGENTS)
     status, down, up = _told([step.rank for step in run], full)
     if not is_whole and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow

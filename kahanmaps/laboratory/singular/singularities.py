@@ -424,9 +424,11 @@ def _patterns(map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = 
     lengths = {h.settled_at for h in critical if h.settled_at}
     open_ones = [h.followed for h in critical if h.status != CONFINED]
     series: tuple[tuple[int, ...], ...] = ()
-    if needed([h.orders for h in critical]) is None:
-        return _unknown("some images meet a hypersurface that lowers degrees for ever, to orders that are not known")
     if all(h.orders.is_settled and h.degree for h in critical) and map_degree > 0:
+        if needed([h.orders for h in critical]) is None:
+            return _unknown(
+                "some images meet a hypersurface that lowers degrees for ever, to orders that are not known"
+            )
         fraction = degree_series(map_degree, [(h.degree, h.orders) for h in critical])
         series = tuple(tuple(int(c) for c in polynomial.coeffs()) for polynomial in fraction)
     return Patterns(
