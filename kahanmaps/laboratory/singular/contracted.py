@@ -237,6 +237,7 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
         for curve in curves:
             kinds.setdefault(curve.key, []).append(curve)
         if all(len({curve.prime for curve in kind}) > 1 for kind in kinds.values()):
+            kinds = dict(sorted(kinds.items()))  # the same hypersurfaces in the same order, whatever is random
             try:
                 return degree, _resolved(kinds, forms, degree, zeros, limits)
             except Untold:
