@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from flint import fmpq
-
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Kind, Pairs, claim
 
@@ -72,9 +70,7 @@ def degrees_of_the_iterates(o: PaperObjects) -> Pairs:
         points = [o.step(o.f, x) for x in points]
         values = [o.dot(form, x) for x in points]
         # Of a rational function of degree d of t the matrix (y(s) - y(t))/(s - t) has the rank d.
-        quotients = [
-            (values[s] - values[t]) * o.number(fmpq(1, s - t)) for s in range(size) for t in range(size, 2 * size)
-        ]
+        quotients = [(values[s] - values[t]) * o.number(1, s - t) for s in range(size) for t in range(size, 2 * size)]
         yield o.rank(o.K.matrix(size, size, quotients)), degree
 
 
