@@ -32,7 +32,8 @@ from kahanmaps.laboratory.singular.orders import AlongCurves, Orders
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver
 
-_MOST_LINES = 24  # modulo primes of their own; they end when two have points of every hypersurface
+_LEAST_LINES, _MOST_LINES = 8, 24  # modulo primes of their own, until two have points of every hypersurface
+_REPEATED = 4  # so many times orders of forms are told apart, and then the same way again
 _FIRST = 12  # steps that tell hypersurfaces apart
 _MOST_DIGITS = 1000  # in forms that are factored
 _TRIES = 16  # lines on a surface, for a point of a component
@@ -192,10 +193,11 @@ class _Resolved:
         nu, largest = fmpq_mat(len(self.keys), 1), max(level.entries())
         if largest == 0:
             return nu
-        # As few terms as show the orders: with the same orders of forms as many as before.
-        terms = 1 + max(
-            (int(max(one.entries())) for one in self.told.values() if self.exponents * one == level), default=1
-        )
+        # With the same orders of forms they are often the same; else as few terms are taken as show them.
+        same = [one for one in self.told.values() if self.exponents * one == level]
+        if len(same) >= _REPEATED and all(one == same[0] for one in same):
+            return same[0]
+        terms = 1 + max((int(max(one.entries())) for one in same), default=1)
         while True:
             cut = [entry.truncate(terms) for entry in curve]
             found = self.curve.components(cut)
@@ -224,7 +226,7 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
     here = map_.at(eps)
     forms = _forms(here.equations[0], here.inverse.equations[0], map_.digits)
     kinds: dict[Key, list[_Curve]] = {}
-    for _ in range(_MOST_LINES):
+    for line in range(_MOST_LINES):
         if limits.is_over:
             break
         field = GF(random_prime(rng, _BITS))
@@ -236,7 +238,8 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
         degree, zeros, curves = _on_line(over.factors[0], forms, functions, limits.end, rng)
         for curve in curves:
             kinds.setdefault(curve.key, []).append(curve)
-        if all(len({curve.prime for curve in kind}) > 1 for kind in kinds.values()):
+        # A hypersurface that splits over an extension has points modulo some primes only.
+        if line >= _LEAST_LINES and all(len({curve.prime for curve in kind}) > 1 for kind in kinds.values()):
             kinds = dict(sorted(kinds.items()))  # the same hypersurfaces in the same order, whatever is random
             try:
                 return degree, _resolved(kinds, forms, degree, zeros, limits)
