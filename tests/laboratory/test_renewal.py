@@ -84,6 +84,16 @@ def test_hypersurfaces_of_one_form_are_told_apart_and_explain_degrees(name):
         assert (tuple(coefficients(degree_series(measured.degrees[1], wrong), 7)) != measured.degrees) == costs
 
 
+def test_a_hypersurface_with_points_modulo_some_primes_only_is_met():
+    """One form of degree 15: three conjugate hypersurfaces of degree 3, which cost nothing, and two others."""
+    rhs = ["-x3*x4", "-x3*x1", "3*x2*x1", "2*x2*x3", "-x1*x2"]
+    system = QuadraticSystem.from_text(["x1", "x2", "x3", "x4", "x5"], rhs)
+    found = patterns(system, default_eps(system, 0)[0])
+    assert sorted(h.degree for h in found.contracted) == [1, 4, 6, 9]
+    measured = degree_growth(system, max_terms=5).degrees
+    assert tuple(coefficients(found.fraction, 6)) == measured == (1, 5, 17, 59, 209, 743)
+
+
 def test_the_singularities_are_asked_where_degrees_are_too_large_for_a_recurrence():
     found = degree_growth(load(str(FURTHER / "coupled_euler_tops.toml")).map, seconds=60, max_degree=2000)
     assert (found.fitted, found.ended, found.dynamical_degree.text.split()[-5:]) == (
