@@ -39,12 +39,12 @@ from kahanmaps.laboratory.singular.fates import (
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
-    Range,
     fate_of,
     fates_at_random,
     untold,
     unwritten,
 )
+from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.orders import Fraction
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.inverse import TooLarge
