@@ -21,7 +21,6 @@ from kahanmaps import degree_growth, load
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.maps.projective import linear_forms
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 GROUP = "Degrees of the iterates"
@@ -45,9 +44,15 @@ def _line(system: QuadraticSystem) -> list[list[int]]:
     return [*([rng.randrange(PRIME), rng.randrange(PRIME)] for _ in range(system.dim)), [1]]
 
 
+def _linear_forms(system: QuadraticSystem) -> list[list[list[Any]]]:
+    """The coefficients of the linear forms in (X : Z) that are the entries of the matrix of the map."""
+    equation = KahanMap(system, EPS, GF(PRIME)).equation
+    return [[[dict(entry).get(k, 0) for k in range(system.dim + 1)] for entry in row] for row in equation.terms]
+
+
 def polynomials(system: QuadraticSystem, n: int) -> tuple[float, list[int]]:
     """The same by homogeneous coordinates that are polynomials in t: Cramer's rule, then the content."""
-    forms = linear_forms(KahanMap(system, EPS, GF(PRIME)))
+    forms = _linear_forms(system)
 
     def run() -> list[int]:
         x = [nmod_poly(pair, PRIME) for pair in _line(system)]
@@ -74,7 +79,7 @@ def _combination(coefficients: list[Any], x: list[nmod_poly]) -> nmod_poly:
 
 def pari(system: QuadraticSystem, n: int) -> tuple[float, list[int]]:
     """The same by rational functions of t, which PARI reduces itself. Raises Absent."""
-    forms = linear_forms(KahanMap(system, EPS, GF(PRIME)))
+    forms = _linear_forms(system)
     size = system.dim
     entries = ", ".join(
         "[" + ", ".join("[" + ", ".join(f"Mod({int(c)}, p)" for c in entry) + "]" for entry in line) + "]"

@@ -14,36 +14,11 @@ from flint import Ordering, fmpq, fmpq_mpoly_ctx, nmod_mpoly_ctx
 
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.minors import kernel_minors
-from kahanmaps.errors import InputError
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import MapOver, StepOver
+from kahanmaps.maps.implicit import MapOver
 from kahanmaps.maps.inverse import TooLarge
 
-Forms = list[list[list[Any]]]
-
 _MOST_TERMS = 3_000  # of a form of several factors, before a common one is divided out
-
-
-def linear_forms(map_over: StepOver) -> Forms:
-    """The coefficients L[i][j][k] of L where it is linear: its entry (i, j) is the sum of L[i][j][k] X_k, X_n being Z.
-
-    Exact over exact fields. Raises InputError where the forms are of a higher degree.
-
-    >>> from kahanmaps.maps.kahan import KahanMap
-    >>> from kahanmaps.systems.quadratic import QuadraticSystem
-    >>> linear_forms(KahanMap(QuadraticSystem.from_text(["x"], ["x^2"]), "1/2"))
-    [[[-1, 1], [-1, 0]]]
-    """
-    equation = map_over.equation
-    if equation.degree != 1:
-        raise InputError(f"found an equation of degree {equation.degree} in the point, expected degree 1")
-    zero = [equation.over.zero] * (equation.dim + 1)
-    forms = [[list(zero) for _ in row] for row in equation.terms]
-    for i, row in enumerate(equation.terms):
-        for j, entry in enumerate(row):
-            for k, coefficient in entry:
-                forms[i][j][k] = coefficient
-    return forms
 
 
 class HomogeneousMap(NamedTuple):

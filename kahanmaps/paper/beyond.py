@@ -5,6 +5,8 @@ from __future__ import annotations
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import Kind, Pairs, claim
 
+_ITERATES = 4  # the first one that tells a planar Hamiltonian map from others
+
 
 @claim(
     "Structure",
@@ -46,6 +48,30 @@ def opposite_field(o: PaperObjects) -> Pairs:
     """The map of -f is the inverse of the map of f"""
     opposite = o.g(-o.I)
     yield o.step(opposite, o.x_tilde), o.x
+
+
+@claim(
+    "Structure",
+    "",
+    "deg Phi^n = 3 m n^2/4 + 1 (n even), m (3 n^2 + 5)/4 (n odd), n = 1, ..., 4",
+    kind=Kind.ATTAINED,
+    in_general=True,
+    at_most="docs/mathematics.md proves it for all n by the content rule",
+    breaks=("f",),
+    distinct_roots=True,
+)
+def degrees_of_the_iterates(o: PaperObjects) -> Pairs:
+    """The degrees of the first four iterates are those of the theorem for all n"""
+    direction, form = o.vector("direction"), o.vector("form")
+    degrees = [o.m * (3 * n * n + 5) // 4 if n % 2 else 3 * o.m * n * n // 4 + 1 for n in range(1, _ITERATES + 1)]
+    size = degrees[-1] + 1  # one more, to see a larger degree
+    points = [o.x + direction * o.number(t) for t in range(2 * size)]
+    for degree in degrees:
+        points = [o.step(o.f, x) for x in points]
+        values = [o.dot(form, x) for x in points]
+        # Of a rational function of degree d of t the matrix (y(s) - y(t))/(s - t) has the rank d.
+        quotients = [(values[s] - values[t]) * o.number(1, s - t) for s in range(size) for t in range(size, 2 * size)]
+        yield o.rank(o.K.matrix(size, size, quotients)), degree
 
 
 @claim(

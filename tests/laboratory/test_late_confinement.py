@@ -36,12 +36,11 @@ from kahanmaps.laboratory.singular.fates import (
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
-    Range,
     _joined,
     _tangents,
     fate_of,
-    walked,
 )
+from kahanmaps.laboratory.singular.following import Range, walked
 from kahanmaps.laboratory.singular.jets import PrecisionTooLow
 from kahanmaps.laboratory.singular.singularities import (
     MAX_DIGITS,
@@ -504,6 +503,6 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
         yield SimpleNamespace(name="t", common=1)
         yield SimpleNamespace(name="last", common=0)
 
-    monkeypatch.setattr("kahanmaps.laboratory.singular.fates.walk_along", walk)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.following.walk_along", walk)
     run, whole = walked((), (), (), (), steps, **{"end": math.inf, **options})
     assert ([step.name for step in run], whole, tried) == found

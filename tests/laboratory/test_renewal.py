@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import pytest
 from degree_helpers import polynomial_degrees
@@ -15,7 +16,8 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.documents.catalog import load, map_names, names
 from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, recurrence_of
+from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, needed, recurrence_of
+from kahanmaps.laboratory.singular import contracted
 from kahanmaps.laboratory.singular.fates import CONFINED
 from kahanmaps.laboratory.singular.orders import Orders
 from kahanmaps.laboratory.singular.singularities import default_eps, patterns, singularities
@@ -34,8 +36,16 @@ def explained(name):
 
 
 WRITTEN = [name for name in (*names(), *map_names()) if load(name).dim <= 4]
-# In these two contracted hypersurfaces are zeros of one form, which random points do not tell apart.
-OPEN = ["clebsch_first_flow", "kirchhoff_case", "lagrange_top", "so4_euler_manakov", "three_wave"]
+FURTHER = Path(__file__).parent / "further_systems"
+# In these several contracted hypersurfaces are zeros of one form over Q: the degrees of all of them.
+OF_ONE_FORM = {
+    "clebsch_first_flow": [1, 5, 8, 18],
+    "kirchhoff_case": [5, 10, 20],
+    "lagrange_top": [1, 4, 4, 8],
+    "so4_euler_manakov": [5, 10, 20],
+    "three_wave": [10, 15],
+    str(FURTHER / "coupled_euler_tops.toml"): [8, 16],  # 8 + 8, each of which splits over a field of degree 2
+}
 
 
 @pytest.mark.parametrize(
@@ -59,13 +69,46 @@ def test_random_points_explain_degrees_in_dimension_5_and_6(name):
     assert len(found.degrees) >= 6
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", OPEN)
-def test_where_forms_do_not_tell_hypersurfaces_apart_degrees_are_measured_only(name):
+@pytest.mark.parametrize("name", quick(list(OF_ONE_FORM), ["kirchhoff_case", "three_wave"]))
+def test_hypersurfaces_of_one_form_are_told_apart_and_explain_degrees(name):
     found = explained(name)
+    sizes = [h.degree for h in found.contracted]
+    assert sorted(sizes) == OF_ONE_FORM[name]
+    measured = degree_growth(load(name).map, seconds=60, max_terms=6, patterns=found)
+    assert measured.explained is not None
+    # Each degree counts: with another one in its place the degrees of the map are other ones.
+    every = [h.orders for h in found.contracted]
+    for k in range(len(sizes)):
+        wrong = [(size + (j == k), orders) for j, (size, orders) in enumerate(zip(sizes, every, strict=True))]
+        costs = any(row[0] for row in every[k].rows)
+        assert (tuple(coefficients(degree_series(measured.degrees[1], wrong), 7)) != measured.degrees) == costs
+
+
+def test_a_hypersurface_with_points_modulo_some_primes_only_is_met():
+    """One form of degree 15: three conjugate hypersurfaces of degree 3, which cost nothing, and two others."""
+    rhs = ["-x3*x4", "-x3*x1", "3*x2*x1", "2*x2*x3", "-x1*x2"]
+    system = QuadraticSystem.from_text(["x1", "x2", "x3", "x4", "x5"], rhs)
+    found = patterns(system, default_eps(system, 0)[0])
+    assert sorted(h.degree for h in found.contracted) == [1, 4, 6, 9]
+    measured = degree_growth(system, max_terms=5).degrees
+    assert tuple(coefficients(found.fraction, 6)) == measured == (1, 5, 17, 59, 209, 743)
+
+
+def test_the_singularities_are_asked_where_degrees_are_too_large_for_a_recurrence():
+    found = degree_growth(load(str(FURTHER / "coupled_euler_tops.toml")).map, seconds=60, max_degree=2000)
+    assert (found.fitted, found.ended, found.dynamical_degree.text.split()[-5:]) == (
+        None,
+        "degree",
+        ["t^2", "-", "4*t", "-", "1"],
+    )
+
+
+def test_where_hypersurfaces_are_not_told_apart_degrees_are_measured_only(monkeypatch):
+    monkeypatch.setattr(contracted, "components", lambda *_: [])
+    found = patterns(load("three_wave").map, None)
     assert (found.series, found.told, found.running) == ((), [], "")
     assert found.lengths
-    assert degree_growth(load(name).map, seconds=60, patterns=found).basis.startswith("measured")
+    assert degree_growth(load("three_wave").map, seconds=60, patterns=found).basis.startswith("measured")
 
 
 def test_the_generating_function_is_a_law_for_all_times():
@@ -172,3 +215,42 @@ def test_a_superattracting_point_lowers_no_degree(image):
     (infinity,) = found.patterns.contracted
     assert [row[1] for row in infinity.orders.rows] == [2**t for t in range(1, len(infinity.orders.rows) + 1)]
     assert found.dynamical_degree.text == "2"
+
+
+def explicit(*image):
+    names = ["x", "y", "z"][: len(image)]
+    return explicit_map(names, [parse_rational_function(text, [*names, "eps"]) for text in image])
+
+
+@pytest.mark.parametrize(
+    ("image", "series", "beyond"),
+    [
+        (("y", "-x + y^30 + 1"), ((1,), (1, -30)), [(0,)]),  # (0 : 1 : 0) is fixed, with orders 30, 900, ...
+        (("y", "(y^3 + 1)/x"), ((1, 0, 1), (1, -3, 1)), [(0, 3), (), (), (0, 3)]),
+        (("y", "z", "x + 2*y^3 - z"), ((1, 3), (1, 0, -3)), [()]),  # no value at the point: the orders are needed
+    ],
+)
+def test_orders_at_points_that_close_are_not_needed(image, series, beyond):
+    map_ = explicit(*image)
+    found = patterns(map_, None)
+    assert (found.series, [h.orders.beyond for h in found.contracted]) == (series, beyond)
+    assert degree_growth(map_, max_degree=3000, max_terms=8, patterns=found).explained is not None
+
+
+def test_unknown_orders_that_are_needed_explain_nothing():
+    costly, attracted = settled((1, 0, 0)), settled((0, 1, 2))
+    assert needed([costly, attracted]) == [0, 1]
+    assert needed([costly, replace(attracted, beyond=(1,))]) is None
+    assert needed([costly, replace(attracted, beyond=(0,))]) is None
+    assert needed([costly, replace(attracted, rows=((0, 0, 2),), beyond=(1,))]) == [0]
+    # Through a return as well: the first becomes the third, which costs and is met by the second.
+    returning = replace(settled((0, 0, 0, 0), (0, 0, 0, 1)), returns=(2, 2))
+    chain = [returning, settled((0, 0, 0, 1)), settled((1, 0, 0, 0))]
+    assert needed(chain) == [0, 1, 2]
+    assert needed([*chain[:2], replace(chain[2], beyond=(0,))]) is None
+    with pytest.raises(ValueError, match="orders that are not known"):
+        degree_series(2, [(1, costly), (1, replace(attracted, beyond=(0,)))])
+    # What is not needed does not count.
+    assert degree_series(2, [(1, costly), (1, replace(attracted, rows=((0, 0, 2),)))]) == degree_series(
+        2, [(1, settled((1, 0)))]
+    )

@@ -304,6 +304,8 @@ class _Search:
                     raise Stopped("constant", f"iterate {len(self.degrees) - 1} is a constant map")
         except Stopped as end:
             ended, message = end.ended, end.message
+        if ended == "degree":  # too soon for a recurrence to be seen
+            self._follow()
         primes, residues = tuple(line.prime for line in lines), tuple(line.eps for line in lines)
         found = replace(
             self._so_far(), ended=ended, message=message, primes=primes, residues=residues, notes=tuple(self.notes)
@@ -324,11 +326,8 @@ class _Search:
         found = find_recurrence(self.degrees)
         # Above dimension 4 series are slow and wait until degrees say something. Affine maps contract nothing.
         soon = self._map.dim <= WRITTEN_DIMENSION or found is not None
-        if self._patterns is None and self.degrees[1] > 1 and soon:
-            left = max(0.0, self._deadline - time.monotonic())
-            self._patterns = patterns_of_map(
-                self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
-            )
+        if soon:
+            self._follow()
         if not may_stop:
             return
         known = self._patterns
@@ -346,6 +345,14 @@ class _Search:
             raise Stopped("unconfirmed", f"a recurrence of order {found.order} fits, but {known.running}")
         if known is None or size >= known.terms_needed(found.order):
             raise Stopped("recurrence", f"a recurrence of order {found.order} holds for {found.checked} terms to spare")
+
+    def _follow(self) -> None:
+        """What the singularities say, if that was not asked before and the map is not affine."""
+        if self._patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
+            left = max(0.0, self._deadline - time.monotonic())
+            self._patterns = patterns_of_map(
+                self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
+            )
 
     def _line(self) -> Line:
         while True:

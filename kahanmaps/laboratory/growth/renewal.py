@@ -26,7 +26,8 @@ def degree_series(degree: int, hypersurfaces: Sequence[tuple[int, Orders]]) -> F
     """The generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms.
 
     `degree` is d_1; of each contracted hypersurface its degree and its orders are given. These are settled ones, and
-    the columns nu follow the hypersurfaces. Exact. Source: docs/mathematics.md.
+    the columns nu follow the hypersurfaces; orders beyond what is known must not be `needed`. Exact. Source:
+    docs/mathematics.md.
 
     >>> free = Orders((), (), 0, True)
     >>> degree_series(2, [(1, free)])
@@ -36,14 +37,15 @@ def degree_series(degree: int, hypersurfaces: Sequence[tuple[int, Orders]]) -> F
     (3*x^2 + 1, (-1)*x^3 + 3*x^2 + (-3)*x + 1)
     """
     z, one, zero = fmpz_poly([0, 1]), fmpz_poly([1]), fmpz_poly([])
-    count = len(hypersurfaces)
-    # The unknowns are S_1, ..., S_n, D and 1.
     every = [orders for _, orders in hypersurfaces]
-    table = [[_through_returns(every, i, k) for k in range(count + 1)] for i in range(count)]
-    rows = [[*(row[0] for row in table), (one - z * degree, one), (-one, one)]]
-    for i, (size, _) in enumerate(hypersurfaces):
-        nu = [row[i + 1] for row in table]
-        rows.append([*nu, (fmpz_poly([-size]), one), (zero, one)])
+    which = needed(every)
+    if which is None:
+        raise ValueError("found orders that are not known, expected those needed")
+    # The unknowns are S_i, i in `which`, D and 1.
+    rows = [[*(_through_returns(every, j, 0) for j in which), (one - z * degree, one), (-one, one)]]
+    for i, k in enumerate(which):
+        nu = [_through_returns(every, j, k + 1) for j in which]
+        rows.append([*nu, (fmpz_poly([-hypersurfaces[k][0]]), one), (zero, one)])
         above, below = rows[-1][i]
         rows[-1][i] = above + below, below
     below, above = _eliminated([_cleared(row) for row in [*rows[1:], rows[0]]])
@@ -51,6 +53,26 @@ def degree_series(degree: int, hypersurfaces: Sequence[tuple[int, Orders]]) -> F
     above, below = above // common, below // common
     sign = 1 if below[0] > 0 else -1
     return above * sign, below * sign
+
+
+def needed(every: Sequence[Orders]) -> list[int] | None:
+    """The hypersurfaces of which the degrees of preimages are needed for those of the iterates; None if unknown ones.
+
+    Those that lower degrees, and those that meet such ones or others that do. Orders `beyond` what is known are unknown
+    ones where they are those of hypersurfaces needed.
+
+    >>> attracted = Orders(((0, 2),), (), 9, True, beyond=(0,))
+    >>> needed([attracted]), needed([Orders(((1, 0),), (), 9, True), Orders(((0, 1),), (), 9, True, beyond=(0,))])
+    ([], None)
+    """
+    chains = [_chain(every, k) for k in range(len(every))]
+    found = [k for k, chain in enumerate(chains) if any(row[0] for j in chain for row in every[j].rows)]
+    for i in found:
+        if any(i in every[j].beyond for chain in chains for j in chain):
+            return None
+        met_by = (k for k, chain in enumerate(chains) if any(row[i + 1] for j in chain for row in every[j].rows))
+        found += [k for k in met_by if k not in found]
+    return sorted(found)
 
 
 def recurrence_of(series: Fraction, measured: Sequence[int]) -> Recurrence:
@@ -75,6 +97,14 @@ def coefficients(series: Fraction, count: int) -> list[int]:
     for n in range(count):
         earlier = sum(c * found[n - k] for k, c in enumerate(lower[1 : n + 1], 1))
         found.append((int(above[n]) - earlier) // lower[0])
+    return found
+
+
+def _chain(every: Sequence[Orders], start: int) -> list[int]:
+    """A hypersurface and those that it becomes, in this order."""
+    found = [start]
+    while (returns := every[found[-1]].returns) is not None and returns[1] not in found:
+        found.append(returns[1])
     return found
 
 

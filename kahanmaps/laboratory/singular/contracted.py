@@ -6,33 +6,43 @@ det M'(F(X)). Of these forms only det M, det M' and their factors over Q are wri
 modulo a prime their zeros are points. Those that share all orders from the first step on stand for one hypersurface.
 
 What is known along a curve are the orders of forms, each a product of powers of hypersurfaces. The exponents are the
-orders at the points themselves, and so linear equations give the orders of the hypersurfaces and their degrees.
+orders at the points themselves, and so linear equations give the orders of the hypersurfaces and their degrees. Where
+these do not suffice, as hypersurfaces are zeros of one form, forms are factored on surfaces through the curves.
 """
 
 from __future__ import annotations
 
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import reduce
+from dataclasses import dataclass, field, replace
+from functools import cached_property, reduce
 from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly_ctx, nmod_poly
 
-from kahanmaps.algebra.chance import random_prime_field
+from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.residues import random_prime
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.singular.fates import CONFINED, NOT_CONFINED, Hypersurface, Range, orders_at, walked
+from kahanmaps.laboratory.singular.components import Component, Kind, components
+from kahanmaps.laboratory.singular.fates import CONFINED, NOT_CONFINED, Hypersurface
+from kahanmaps.laboratory.singular.following import Range, orders_at, walked
 from kahanmaps.laboratory.singular.jets import Function, Step, form_order, image_of
-from kahanmaps.laboratory.singular.orders import Orders
+from kahanmaps.laboratory.singular.orders import AlongCurves, Orders
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import BirationalMap, StepOver
 
-_MOST_LINES = 24  # modulo primes of their own; they end when two have points of every hypersurface
+_LEAST_LINES, _MOST_LINES = 8, 24  # modulo primes of their own, until two have points of every hypersurface
+_REPEATED = 4  # so many times orders of forms are told apart, and then the same way again
 _FIRST = 12  # steps that tell hypersurfaces apart
 _MOST_DIGITS = 1000  # in forms that are factored
+_TRIES = 16  # lines on a surface, for a point of a component
 _PRECISION = 8  # of the orders at points themselves
+_BITS = 31  # of primes: with larger ones python-flint does not order the factors of polynomials in several variables
+
+
+Key = tuple[Any, ...]
 
 
 class Untold(ArithmeticError):
@@ -52,25 +62,60 @@ class _Forms:
         """The forms in the order of columns; one may stand there twice."""
         return (*self.poles, *self.images, self.infinity)
 
+    @property
+    def placed(self) -> list[tuple[Any, bool]]:
+        """The same, each with whether it counts at the image."""
+        return [(form, k in self.at_images) for k, form in enumerate(self.all)]
+
+    @property
+    def at_images(self) -> range:
+        """The columns of those that count at the image."""
+        return range(len(self.poles), len(self.poles) + len(self.images))
+
 
 @dataclass(frozen=True)
 class _Curve:
     """A curve through a point of a line where a form vanishes, and what is tracked along it.
 
-    `excess` are the exponents of the forms in the common factor of the minors of the equation, which is no part of the
-    map, `own` their orders at the point. `solved` turns orders of forms into those of hypersurfaces, exactly or not:
-    `exponents` turns them back.
+    `across` is another random vector, for surfaces. `excess` are the exponents of the forms in the common factor of the
+    minors of the equation, which is no part of the map. Curves end at a time of the monotonic clock.
     """
 
     equation: Equation
+    inverse: Equation
     point: tuple[int, ...]
     direction: tuple[int, ...]
+    across: tuple[int, ...]
     functions: tuple[Function, ...]
     excess: tuple[int, ...]
-    own: tuple[int, ...]
     forms: _Forms
-    solved: fmpq_mat | None = None
-    exponents: fmpq_mat | None = None
+    end: float
+
+    @property
+    def prime(self) -> int:
+        """The prime modulo which all is computed."""
+        return self.equation.over.characteristic
+
+    @cached_property
+    def line(self) -> list[nmod_poly]:
+        """The curve as polynomials in t."""
+        return [nmod_poly([x, v], self.prime) for x, v in zip(self.point, self.direction, strict=True)]
+
+    @cached_property
+    def own(self) -> tuple[int, ...]:
+        """The orders of the forms at the point itself."""
+        return tuple(function(self.line, _PRECISION) or 0 for function in self.functions)
+
+    @cached_property
+    def key(self) -> Key:
+        """What tells hypersurfaces apart: whether it is contracted, which forms vanish there, and the first orders."""
+        run = walked([self.equation], self.point, self.direction, [], _FIRST, self.end, functions=self.functions)[0]
+        is_contracted = image_of([self.inverse], run[0].limit) is None
+        return is_contracted, self.own[: len(self.forms.poles)], self.own[-1], *self.levels(run)[:1], self.rows(run)
+
+    def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
+        """The rows of `Orders` for steps along the curve but the last, with forms in place of hypersurfaces."""
+        return tuple((mu, *level) for mu, level in zip(self.divided(run), self.levels(run)[1:], strict=False))
 
     def divided(self, run: Sequence[Step]) -> list[int]:
         """The powers of t divided out that belong to the map."""
@@ -89,19 +134,87 @@ class _Curve:
             found.append((*here[:poles], *(k + mu * int(form.total_degree()) for form, k in images), here[-1]))
         return found
 
+    def components(self, curve: Sequence[nmod_poly]) -> list[Component]:
+        """Those of the forms on a surface through any curve."""
+        return components(self.equation, self.forms.placed, curve, self.across)
+
+    def through(self, one: Component, curve: Sequence[nmod_poly]) -> _Curve:
+        """The same with a point of a component on the surface through a curve. Raises Untold where there is none."""
+        for t in range(1, _TRIES):
+            for u in one.roots(t):
+                point = tuple((int(entry(t)) + u * w) % self.prime for entry, w in zip(curve, self.across, strict=True))
+                return replace(self, point=point)
+        raise Untold("a hypersurface without points modulo a prime")
+
+    @cached_property
+    def census(self) -> list[tuple[Component, _Curve]]:
+        """All components on a plane, each with a curve through a point of it; empty where one has no point."""
+        try:
+            return [(one, self.through(one, self.line)) for one in self.components(self.line)]
+        except Untold:
+            return []
+
+
+@dataclass(frozen=True)
+class _Resolved:
+    """The orders of hypersurfaces along a curve, from those of forms: the rows of `Orders`.
+
+    `exponents` are those of the hypersurfaces in the forms; `solved` turns orders back, exactly or not. Without it
+    forms are factored on surfaces: `places` has the keys of the hypersurfaces with components of a kind, `keys` those
+    of all, in their order, and `told` what was found after so many steps.
+    """
+
+    curve: _Curve
+    exponents: fmpq_mat
+    solved: fmpq_mat | None
+    keys: Sequence[Key]
+    places: dict[Kind, set[Key]]
+    told: dict[int, fmpq_mat] = field(default_factory=dict)
+
+    @property
+    def functions(self) -> tuple[Function, ...]:
+        """What is tracked."""
+        return self.curve.functions
+
     def rows(self, run: Sequence[Step]) -> tuple[tuple[int, ...], ...]:
-        """The rows of `Orders` for steps along the curve but the last. Raises Untold."""
+        """Those of the steps but the last. Raises Untold."""
         found = []
-        for mu, level in zip(self.divided(run), self.levels(run)[1:], strict=False):
-            nu: Sequence[Any] = level
-            if self.solved is not None and self.exponents is not None:
-                column = fmpq_mat(len(level), 1, list(level))
-                solution = self.solved * column
-                nu = solution.entries()
-                if self.exponents * solution != column or any(entry.q != 1 or entry < 0 for entry in nu):
-                    raise Untold("the orders of hypersurfaces do not follow from those of forms")
-            found.append((mu, *(int(entry) for entry in nu)))
+        for t, (mu, level) in enumerate(zip(self.curve.divided(run), self.curve.levels(run)[1:], strict=False)):
+            column = fmpq_mat(len(level), 1, list(level))
+            if t not in self.told:
+                self.told[t] = self._on_surface(column, run[t].curve) if self.solved is None else self.solved * column
+            nu = self.told[t]
+            if self.exponents * nu != column or any(entry.q != 1 or entry < 0 for entry in nu.entries()):
+                raise Untold("the orders of hypersurfaces do not follow from those of forms")
+            found.append((mu, *(int(entry) for entry in nu.entries())))
         return tuple(found)
+
+    def _on_surface(self, level: fmpq_mat, curve: Sequence[nmod_poly]) -> fmpq_mat:
+        """The orders along a curve by the factors of forms on a surface through it. Raises Untold."""
+        nu, largest = fmpq_mat(len(self.keys), 1), max(level.entries())
+        if largest == 0:
+            return nu
+        # With the same orders of forms they are often the same; else as few terms are taken as show them.
+        same = [one for one in self.told.values() if self.exponents * one == level]
+        if len(same) >= _REPEATED and all(one == same[0] for one in same):
+            return same[0]
+        terms = 1 + max((int(max(one.entries())) for one in same), default=1)
+        while True:
+            cut = [entry.truncate(terms) for entry in curve]
+            found = self.curve.components(cut)
+            if all(one.order is not None and one.order < terms for one in found):
+                break
+            if terms > largest:
+                raise Untold("the image of a curve lies on a critical hypersurface")
+            terms *= 2
+        for one in found:
+            if one.order:
+                places = self.places.get(one.kind, set())
+                key = next(iter(places)) if len(places) == 1 else self.curve.through(one, cut).key
+                if key not in self.keys:
+                    raise Untold("a hypersurface that was not met before")
+                nu[self.keys.index(key), 0] += one.order
+        return nu
 
 
 def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range) -> tuple[int, list[Hypersurface]]:
@@ -113,65 +226,81 @@ def contracted(map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range
     """
     here = map_.at(eps)
     forms = _forms(here.equations[0], here.inverse.equations[0], map_.digits)
-    kinds: dict[tuple[Any, ...], list[_Curve]] = {}
-    for _ in range(_MOST_LINES):
+    kinds: dict[Key, list[_Curve]] = {}
+    for line in range(_MOST_LINES):
         if limits.is_over:
             break
-        field = random_prime_field(rng)
+        field = GF(random_prime(rng, _BITS))
         try:
             over = map_.at(eps, field)
             functions = tuple(form_order(form, field) for form in forms.all)
         except BadPrime:
             continue
-        degree, zeros, curves = _on_line(over.equations[0], forms, functions, field, rng)
+        degree, zeros, curves = _on_line(over.factors[0], forms, functions, limits.end, rng)
         for curve in curves:
-            run = walked([curve.equation], curve.point, curve.direction, [], _FIRST, limits.end, functions=functions)[0]
-            is_contracted = image_of(over.inverse.equations, run[0].limit) is None
-            key = (is_contracted, curve.own[: len(forms.poles)], curve.own[-1], *curve.levels(run)[:1], curve.rows(run))
-            kinds.setdefault(key, []).append(curve)
-        if all(len({curve.equation.over.characteristic for curve in kind}) > 1 for kind in kinds.values()):
+            kinds.setdefault(curve.key, []).append(curve)
+        # A hypersurface that splits over an extension has points modulo some primes only.
+        if line >= _LEAST_LINES and all(len({curve.prime for curve in kind}) > 1 for kind in kinds.values()):
+            kinds = dict(sorted(kinds.items()))  # the same hypersurfaces in the same order, whatever is random
             try:
                 return degree, _resolved(kinds, forms, degree, zeros, limits)
             except Untold:
                 continue  # a hypersurface without points modulo the primes so far
-    raise Untold("the contracted hypersurfaces could not be told apart at random points")
+    if limits.is_over or any(len({curve.prime for curve in kind}) < 2 for kind in kinds.values()):
+        raise Untold("the contracted hypersurfaces could not be told apart at random points")
+    followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {
+        key: [(curve, curve) for curve in curves] for key, curves in kinds.items()
+    }
+    return degree, _followed(followed, [0] * len(kinds), range(len(forms.all)), limits)
 
 
 def _resolved(
-    kinds: dict[tuple[Any, ...], list[_Curve]], forms: _Forms, degree: int, zeros: int, limits: Range
+    kinds: dict[Key, list[_Curve]], forms: _Forms, degree: int, zeros: int, limits: Range
 ) -> list[Hypersurface]:
-    exponents = fmpq_mat([list(key[3]) for key in kinds]).transpose()
-    solved: fmpq_mat | None = None
-    columns, sizes = range(len(forms.all)), [0] * len(kinds)
-    if exponents.rank() == len(kinds):
+    """The contracted hypersurfaces with their degrees and orders. Raises Untold."""
+    keys = list(kinds)
+    exponents = fmpq_mat([list(key[3]) for key in keys]).transpose()
+    total = [int(form.total_degree()) * (degree if k in forms.at_images else 1) for k, form in enumerate(forms.all)]
+    column, sizes = fmpq_mat(len(total), 1, total), fmpq_mat(len(keys), 1)
+    followed: dict[Key, list[tuple[_Curve, AlongCurves]]] = {key: [] for key in keys}
+    if exponents.rank() == len(keys):
         solved = (exponents.transpose() * exponents).inv() * exponents.transpose()
-        images = range(len(forms.poles), len(forms.all) - 1)
-        total = [int(form.total_degree()) * (degree if k in images else 1) for k, form in enumerate(forms.all)]
-        column = fmpq_mat(len(total), 1, total)
-        if exponents * (solved * column) != column or sum((solved * column).entries(), fmpq(0)) != zeros:
-            raise Untold("not all hypersurfaces were met")
-        sizes = [int(entry) for entry in (solved * column).entries()]
-        columns = range(len(kinds))
+        sizes = solved * column
+        for key, curves in kinds.items():
+            followed[key] = [(curve, _Resolved(curve, exponents, solved, keys, {})) for curve in curves]
+    else:
+        lines = {curve.prime: curve for curves in kinds.values() for curve in curves}
+        for census in [line.census for line in lines.values() if line.census][:2]:
+            places: dict[Kind, set[Key]] = {}
+            sizes = fmpq_mat(len(keys), 1)
+            for one, curve in census:
+                if curve.key not in kinds:
+                    raise Untold("a hypersurface that was not met before")
+                places.setdefault(one.kind, set()).add(curve.key)
+                sizes[keys.index(curve.key), 0] += one.degree
+                followed[curve.key].append((curve, _Resolved(curve, exponents, None, keys, places)))
+    if exponents * sizes != column or sum(sizes.entries(), fmpq(0)) != zeros:
+        raise Untold("not all hypersurfaces were met")
     # Orders on hypersurfaces that are not contracted have no part in what follows.
-    chosen = [k for k in columns if solved is None or list(kinds)[k][0]]
+    chosen = [k for k, key in enumerate(keys) if key[0]]
+    return _followed(followed, [int(size) for size in sizes.entries()], chosen, limits)
+
+
+def _followed(
+    curves: dict[Key, list[tuple[_Curve, AlongCurves]]], sizes: Sequence[int], columns: Sequence[int], limits: Range
+) -> list[Hypersurface]:
+    """The contracted hypersurfaces with the orders in these columns, at points modulo two primes. Raises Untold."""
     found = []
-    for size, (key, curves) in zip(sizes, kinds.items(), strict=True):
+    for size, (key, pairs) in zip(sizes, curves.items(), strict=True):
         if key[0]:
-            by_prime = {curve.equation.over.characteristic: curve for curve in curves}
-            one, other = (
-                orders_at(
-                    [curve.equation],
-                    curve.point,
-                    curve.direction,
-                    replace(curve, solved=solved, exponents=exponents),
-                    (_FIRST, limits.reach),
-                    limits,
-                )
-                for curve in list(by_prime.values())[:2]
-            )
-            if one.known != other.known:
+            by_prime = {curve.prime: (curve, along) for curve, along in pairs}
+            orders = [
+                orders_at([curve.equation], curve.point, curve.direction, along, (_FIRST, limits.reach), limits)
+                for curve, along in list(by_prime.values())[:2]
+            ]
+            if len(orders) < 2 or orders[0].known != orders[1].known:
                 raise Untold("two points tell different things")
-            found.append(_hypersurface(key, size, tuple(by_prime)[:2], one.of(chosen)))
+            found.append(_hypersurface(key, size, tuple(by_prime)[:2], orders[0].of(columns)))
     return found
 
 
@@ -210,19 +339,19 @@ def _forms(equation: Equation, inverse: Equation, digits: int) -> _Forms:
 
 
 def _on_line(
-    equation: Equation, forms: _Forms, functions: tuple[Function, ...], field: Any, rng: random.Random
+    map_: StepOver, forms: _Forms, functions: tuple[Function, ...], end: float, rng: random.Random
 ) -> tuple[int, int, list[_Curve]]:
     """The degree of the map on a random line, the number of points over the closure where forms vanish, and those in
     GF(p), each with the line as a curve through it."""
-    p = field.prime
-    a, b = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(2))
+    equation, p = map_.equation, map_.field.characteristic
+    a, b, across = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(3))
     line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
     image = kernel_minors(equation.rows(equation.monomials(line), nmod_poly([], p)))
     common = reduce(nmod_poly.gcd, image)
     image = [entry // common for entry in image]
     degree = max(int(entry.degree()) for entry in image)
-    at_points = [evaluate(form, field, line) for form in (*forms.poles, forms.infinity)]
-    at_images = [evaluate(form, field, image) for form in forms.images]
+    at_points = [evaluate(form, map_.field, line) for form in (*forms.poles, forms.infinity)]
+    at_images = [evaluate(form, map_.field, image) for form in forms.images]
     excess = [_exponent(value, common) for value in at_points]
     if sum(k * int(value.degree()) for k, value in zip(excess, at_points, strict=True)) != common.degree():
         raise Untold("the minors of the equation have a common factor of another kind")
@@ -230,16 +359,10 @@ def _on_line(
     if product.is_zero():
         raise Untold("the map or its inverse has no value anywhere")
     radical = product // product.gcd(product.derivative())
-    *poles, infinity = excess
-    curves = []
-    for factor, _ in radical.factor()[1]:
-        if factor.degree() == 1:
-            s = -int(factor[0])
-            point = tuple((x + s * v) % p for x, v in zip(a, b, strict=True))
-            start = [nmod_poly([x, v], p) for x, v in zip(point, b, strict=True)]
-            own = tuple(function(start, _PRECISION) or 0 for function in functions)
-            every = (*poles, *([0] * len(forms.images)), infinity)
-            curves.append(_Curve(equation, point, b, functions, every, own, forms))
+    every = (*excess[:-1], *([0] * len(forms.images)), excess[-1])
+    points = [tuple((x + int(s) * v) % p for x, v in zip(a, b, strict=True)) for s, _ in radical.roots()]
+    (inverse,) = map_.inverse.equations
+    curves = [_Curve(equation, inverse, point, b, across, functions, every, forms, end) for point in points]
     return degree, int(radical.degree()), curves
 
 

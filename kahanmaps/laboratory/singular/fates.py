@@ -6,10 +6,8 @@ Source: grammaticos-ramani-papageorgiou-1991.
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from typing import Any
 
 from flint import fmpq, nmod_poly
@@ -20,31 +18,23 @@ from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import evaluate, gradient
 from kahanmaps.errors import BadPrime, counted
-from kahanmaps.laboratory.growth.recurrences import find_recurrence
 from kahanmaps.laboratory.singular.critical import critical_points, pole_points
+from kahanmaps.laboratory.singular.following import Range, orders_at, orders_until_return, walked, whole
 from kahanmaps.laboratory.singular.jets import (
-    Function,
     NotGeneric,
     PrecisionTooLow,
     Step,
     form_order,
-    image_of,
-    walk,
-    walk_along,
 )
 from kahanmaps.laboratory.singular.orders import NO_ORDERS, NOTHING, AlongCurves, Orders, Tracked
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap
 
-_MAX_PRECISION = 4096
-_MOST_ALONG = 1024  # where series are followed far
+_MOST_WITH_TANGENTS = 1024
 _TRIES = 40
 _LINES = 6  # on which critical points are looked for, and more while some have no point
 _POINTS = 2  # each modulo a prime of its own
-_CONSTANT = 8  # so often at least is the same order repeated that goes on
-_CHECKED = 3  # so many times as many orders as their recurrence is long have to follow it
 _LONGEST = 60  # characters of a polynomial in a sentence
-_FREE_STEPS = 100  # for which a hypersurface is followed that is one again
 
 FIRST_STEPS = 12  # that are shown
 CONFINED = "confined"
@@ -105,26 +95,6 @@ class Hypersurface:
         """Plain data: what is known of it beside its first steps."""
         names = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
         return {**attributes(self, *names, "followed", "settled_at", "note"), "orders": self.orders.to_json()}
-
-
-@dataclass(frozen=True)
-class Range:
-    """How far hypersurfaces are followed: along series for `shown` steps, and for `reach` steps in all.
-
-    Memory can only come back where the image of a hypersurface meets points without a value. Beyond the first steps
-    its image is therefore followed as a point, which is cheap. Where it meets such points along series again, which is
-    not: for at most `along` steps. `end` is the time of the monotonic clock at which all of it stops.
-    """
-
-    shown: int
-    reach: int
-    along: int
-    end: float
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the time is over."""
-        return time.monotonic() > self.end
 
 
 @dataclass(frozen=True)
@@ -296,7 +266,7 @@ def _fate_at(
     """What becomes of the hypersurface with these tangents at a point, and the orders of what is tracked along it."""
     full = len(tangents)
     direction = [rng.randrange(equations[0].over.characteristic) for _ in point]
-    run, is_whole = walked(equations, point, direction, tangents, limits.shown, limits.end)
+    run, is_whole = walked(equations, point, direction, tangents, limits.shown, limits.end, most=_MOST_WITH_TANGENTS)
     status, down, up = _told([step.rank for step in run], full)
     if not is_whole and (status != NOT_CONFINED or not tracked.functions):
         raise PrecisionTooLow
@@ -307,139 +277,12 @@ def _fate_at(
         if not is_whole and not orders.is_settled:  # what grows by a recurrence, as at superattracting points, is known
             raise PrecisionTooLow
     else:
-        orders = _orders_until_return(equations, point, direction, tracked, up, limits)
+        orders = orders_until_return(equations, point, direction, tracked, up, limits)
     if is_whole and orders.is_settled and not orders.returns and len(run) < orders.settled_at + 2 <= limits.reach:
-        run = list(_whole(walked(equations, point, direction, tangents, orders.settled_at + 2, limits.end)))
+        run = list(whole(walked(equations, point, direction, tangents, orders.settled_at + 2, limits.end)))
         status, down, up = _told([step.rank for step in run], full)
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
     return _Fate(status, down, up, tuple(run), orders.followed, settled, orders)
-
-
-def _orders_until_return(
-    equations: Sequence[Equation],
-    point: Sequence[int],
-    direction: Sequence[int],
-    tracked: AlongCurves,
-    up: int,
-    limits: Range,
-) -> Orders:
-    """The orders along a curve whose hypersurface is one again after the step `up`, until it is a critical one.
-
-    From then on they are those of the other.
-    """
-    steps = limits.shown
-    reach = min(limits.reach, steps + _FREE_STEPS)
-    while True:
-        run = _whole(walked(equations, point, direction, [], steps, limits.end, functions=tracked.functions))
-        rows = tracked.rows(run)
-        for t, (_, *nu) in enumerate(rows, 1):
-            if t >= up and any(nu) and tracked.functions:
-                if sorted(nu)[-2:] not in ([1], [0, 1]):
-                    raise NotGeneric("a point where several critical hypersurfaces meet")
-                return Orders(rows[:t], (), t, True, (t, nu.index(1)))
-        hit, reached = _next_hit(equations, run[-1].limit, len(run), reach, limits, tracked.functions)
-        if hit is None or not tracked.functions:  # nothing is asked beyond the next point without a value
-            return Orders(rows[:up], (), reached, True)
-        steps = hit
-
-
-def _whole(walked: tuple[list[Step], bool]) -> tuple[Step, ...]:
-    run, is_whole = walked
-    if not is_whole:
-        raise PrecisionTooLow
-    return tuple(run)
-
-
-def orders_at(
-    equations: Sequence[Equation],
-    point: Sequence[int],
-    direction: Sequence[int],
-    tracked: AlongCurves,
-    span: tuple[int, int],
-    limits: Range,
-) -> Orders:
-    """The orders along a curve, for as many steps as it takes until they are known for all, or the limits end it.
-
-    `span` has the number of steps to begin with, and the largest one. The image may move on a critical hypersurface
-    until something happens, so that orders have to repeat for as long as curves are followed.
-    """
-    steps, reach = span
-    while True:
-        run, is_whole = walked(
-            equations, point, direction, [], steps, limits.end, most=_MOST_ALONG, functions=tracked.functions
-        )
-        rows = tracked.rows(run)
-        last = max((k for k, row in enumerate(rows, 1) if any(row)), default=0)
-        hit = None
-        if is_whole and len(rows) - last >= _CONSTANT:
-            hit, reached = _next_hit(equations, run[-1].limit, len(run), reach, limits, tracked.functions)
-            if hit is None:
-                return Orders(rows[:last], (), reached, True)
-        found = [find_recurrence(column) for column in zip(*rows, strict=True)]
-        repeats = all(one is not None and len(rows) >= max(_CONSTANT, _CHECKED * one.order) for one in found)
-        is_cut = not is_whole and not limits.is_over  # by the precision
-        if rows and repeats and (len(run) >= min(reach, limits.along) or is_cut):
-            laws = tuple(one.characteristic for one in found if one is not None)
-            kept = max(_CONSTANT, *(2 * int(law.degree()) for law in laws))
-            return Orders(rows[:kept], laws, len(run), True)
-        longest = min(reach, max(limits.along, 2 * (hit or 0)))
-        if not is_whole or steps >= longest:
-            return Orders(rows, (), len(rows), False)
-        steps = longest
-
-
-def walked(
-    equations: Sequence[Equation],
-    point: Sequence[int],
-    direction: Sequence[int],
-    tangents: Sequence[Sequence[int]],
-    steps: int,
-    end: float,
-    most: int = _MAX_PRECISION,
-    functions: Sequence[Function] = (),
-) -> tuple[list[Step], bool]:
-    """So many steps along series as long as needed, and whether these are all: time or precision may end it."""
-    precision = 8
-    while True:
-        run: list[Step] = []
-        try:
-            if tangents:
-                taken = walk(equations, point, direction, tangents, precision)
-            else:
-                taken = walk_along(equations, point, direction, precision, functions)
-            for step in islice(taken, steps):
-                run.append(step)
-                if time.monotonic() > end:
-                    return run, len(run) == steps
-            return run, True
-        except PrecisionTooLow:
-            if precision >= most or time.monotonic() > end:
-                return run, False
-            precision = min(most, max(2 * precision, 8 + precision * steps // max(1, len(run))))
-
-
-def _next_hit(
-    equations: Sequence[Equation],
-    limit: Sequence[int],
-    steps: int,
-    reach: int,
-    limits: Range,
-    functions: Sequence[Function] = (),
-) -> tuple[int | None, int]:
-    """The next step that a point does not have, or with a zero of a function, and for how long it was followed."""
-    p = equations[0].over.characteristic
-    at: Sequence[int] = limit
-    for step in range(steps + 1, reach + 1):
-        image = image_of(equations, at)
-        if image is None:
-            return step, step
-        at = image
-        constants = [nmod_poly([x], p) for x in at]
-        if any(function(constants, 1) is None for function in functions):
-            return step, step
-        if limits.is_over:
-            return None, step
-    return None, reach
 
 
 def _point_on(factor: Any, field: PrimeField, rng: random.Random) -> tuple[list[int], list[list[int]]] | None:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from flint import Ordering, nmod, nmod_mat, nmod_mpoly_ctx, nmod_poly
+from flint import Ordering, nmod, nmod_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
 
 from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.minors import kernel_minors
@@ -82,7 +82,8 @@ class Step:
     other; `pole` the valuation of Z at the image when the least of
     all coordinates is 0 (the order of the pole), `denominator` that of det(I - eps f') at the point before the step,
     `rank` the rank of the differential of the map from the hypersurface to the limits of its points, `limit` such a
-    point after the step, `orders` the valuations at the image of the functions that were asked for.
+    point after the step, `orders` the valuations at the image of the functions that were asked for, `curve` the image
+    itself as far as it is known, where these are followed.
     """
 
     common: int
@@ -91,6 +92,7 @@ class Step:
     rank: int
     limit: tuple[int, ...] = field(repr=False)
     orders: tuple[int, ...] = field(default=(), repr=False)
+    curve: tuple[nmod_poly, ...] = field(default=(), repr=False, compare=False)
 
 
 def walk(
@@ -163,7 +165,8 @@ def walk_along(
         if None in orders:
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in X)
-        yield Step(divided, pole, _product(denominators), 0, limit, tuple(order or 0 for order in orders))
+        kept = tuple(order or 0 for order in orders)
+        yield Step(divided, pole, _product(denominators), 0, limit, kept, tuple(X) if functions else ())
 
 
 def _product(valuations: Sequence[int | None]) -> int | None:
@@ -181,11 +184,15 @@ def _divided(image: Sequence[nmod_poly], known: int) -> tuple[int, int | None]:
     return min(seen), sizes[-1]
 
 
+def modulo(form: Any, field: PrimeField) -> nmod_mpoly:
+    """A form over Q modulo a prime. Raises BadPrime."""
+    context = nmod_mpoly_ctx.get(form.context().names(), modulus=field.prime, ordering=Ordering.degrevlex)
+    return context.from_dict({exponents: int(field.convert(c)) for exponents, c in form.terms()})
+
+
 def form_order(form: Any, field: PrimeField) -> Function:
     """The order of a form over Q in (X : Z), along curves modulo the prime of `field`. Raises BadPrime."""
-    p = field.prime
-    context = nmod_mpoly_ctx.get(form.context().names(), modulus=p, ordering=Ordering.degrevlex)
-    reduced = context.from_dict({exponents: int(field.convert(c)) for exponents, c in form.terms()})
+    p, reduced = field.prime, modulo(form, field)
     terms = [(exponents, nmod_poly([int(c)], p)) for exponents, c in reduced.terms()]
 
     def order(X: Sequence[nmod_poly], precision: int) -> int | None:

@@ -26,7 +26,8 @@ class Orders:
 
     `is_settled`: they are known for all steps. By the recurrences whose characteristic polynomials are given for the
     columns; or after (T, j) as in `returns` the hypersurface is the j-th one, and goes on like that; else all later
-    rows are zero, as far as was looked, which is `followed` steps.
+    rows are zero, as far as was looked, which is `followed` steps, but for the orders of the hypersurfaces in `beyond`,
+    on which its points come to lie again and again: these are not known.
     """
 
     rows: tuple[tuple[int, ...], ...]
@@ -34,11 +35,12 @@ class Orders:
     followed: int = 0
     is_settled: bool = False
     returns: tuple[int, int] | None = None
+    beyond: tuple[int, ...] = ()
 
     @property
     def known(self) -> tuple[object, ...]:
         """What two points on one hypersurface have to agree on."""
-        return self.rows[: 2 * self.settled_at], self.is_settled, self.returns
+        return self.rows[: 2 * self.settled_at], self.is_settled, self.returns, self.beyond
 
     @cached_property
     def settled_at(self) -> int:
@@ -58,6 +60,8 @@ class Orders:
             for j, nu in enumerate(row[1:], 1)
             if nu
         ]
+        if self.beyond:
+            meets.append(f"then {', '.join(f'C{k + 1}' for k in self.beyond)} for ever, which lowers no degree")
         return [f"{verb} {_first(events) or 'nothing'}" for verb, events in (("costs", costs), ("meets", meets))]
 
     def to_json(self) -> dict[str, Any]:
@@ -67,6 +71,7 @@ class Orders:
             "met": [list(row[1:]) for row in self.rows],
             "recurrences": [[str(c) for c in characteristic.coeffs()] for characteristic in self.recurrences],
             "settled": self.is_settled,
+            "beyond": [f"C{k + 1}" for k in self.beyond],
             "returns": None if self.returns is None else {"after": self.returns[0], "as": f"C{self.returns[1] + 1}"},
         }
 

@@ -30,7 +30,7 @@ from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
-from kahanmaps.laboratory.growth.renewal import degree_series
+from kahanmaps.laboratory.growth.renewal import degree_series, needed
 from kahanmaps.laboratory.singular.contracted import Untold, contracted
 from kahanmaps.laboratory.singular.fates import (
     CONFINED,
@@ -39,12 +39,12 @@ from kahanmaps.laboratory.singular.fates import (
     NOT_CONTRACTED,
     UNDECIDED,
     Hypersurface,
-    Range,
     fate_of,
     fates_at_random,
     untold,
     unwritten,
 )
+from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.orders import Fraction
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.inverse import TooLarge
@@ -425,6 +425,10 @@ def _patterns(map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = 
     open_ones = [h.followed for h in critical if h.status != CONFINED]
     series: tuple[tuple[int, ...], ...] = ()
     if all(h.orders.is_settled and h.degree for h in critical) and map_degree > 0:
+        if needed([h.orders for h in critical]) is None:
+            return _unknown(
+                "some images meet a hypersurface that lowers degrees for ever, to orders that are not known"
+            )
         fraction = degree_series(map_degree, [(h.degree, h.orders) for h in critical])
         series = tuple(tuple(int(c) for c in polynomial.coeffs()) for polynomial in fraction)
     return Patterns(
