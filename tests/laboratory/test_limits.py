@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -91,13 +92,13 @@ def test_a_flow_integral_that_no_integral_tends_to_is_lost_and_that_is_measured(
         found = flow_and_map(find_integrals(file))
         assert [one.text for one in found.others] == [formula]
         assert found.lost == 1
-        assert ("measured", "F1 is lost: the map shows no integral up to degree 14") in found.lines()
+        assert ("measured", "F1 is lost up to degree 14: the map shows no integral") in found.lines()
 
 
 def test_of_two_integrals_one_is_lost():
     found = beside("zhukovski_volterra_2")
     assert len(found.limits) == len(found.others) == found.lost == 1
-    assert any(text.startswith("F2 is lost: the map shows 1 integral up to degree") for text in told(found))
+    assert any(re.match(r"F2 is lost up to degree \d+: the map shows 1 integral", text) for text in told(found))
 
 
 def test_of_the_integrable_henon_heiles_systems_one_keeps_both_integrals():
@@ -121,7 +122,7 @@ def test_where_integrals_have_no_limit_nothing_is_said_to_be_lost():
 def test_integrals_that_depend_on_time_are_told_from_others():
     found = flow_and_map(find_integrals(parse_system('variables = ["x", "y"]\n[system]\nrhs = ["x", "2*y"]')))
     assert [one.text for one in found.others] == ["x^2/y"]
-    assert ("measured", "F1 is lost: the map shows no integral free of n up to degree 14") in found.lines()
+    assert ("measured", "F1 is lost up to degree 14: the map shows no integral free of n") in found.lines()
 
 
 def test_integrals_of_the_flow_without_a_formula_are_counted():

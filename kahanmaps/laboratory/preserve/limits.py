@@ -102,7 +102,7 @@ class FlowAndMap:
 
     @property
     def lost(self) -> int:
-        """How many of the others, at least, no integral of the map tends to: measured."""
+        """How many of the others, at least, no integral of the map of the degrees that were tried tends to: measured."""
         profile = self.map_search.profile
         return max(0, len(self.others) - self.without_limit) if profile.nullities and profile.agree else 0
 
@@ -116,11 +116,11 @@ class FlowAndMap:
         names = ", ".join(one.name for one in self.others)
         shown = counted(self.count, "integral") if self.count else "no integral"
         shown += " free of n" if self.map_search.in_time else ""  # others depend on the number of the point
-        shown = f"the map shows {shown} up to degree {self.map_search.profile.degree}"
         if self.lost:
             which = names if self.lost == len(self.others) else f"at least {self.lost} of {names}"
             limits = f", with limits independent of {names}" if self.count else ""
-            found.append(("measured", f"{which} {'is' if self.lost == 1 else 'are'} lost: {shown}{limits}"))
+            lost = f"{which} {'is' if self.lost == 1 else 'are'} lost up to degree {self.map_search.profile.degree}"
+            found.append(("measured", f"{lost}: the map shows {shown}{limits}"))
         if self.lost < len(self.others):
             missing = f"the limits of {counted(self.without_limit, 'integral')} are not known"
             why = missing if self.without_limit else "its integrals were not counted"
