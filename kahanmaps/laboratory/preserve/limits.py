@@ -102,7 +102,7 @@ class FlowAndMap:
 
     @property
     def lost(self) -> int:
-        """How many of the others, at least, no integral of the map of the degrees that were tried tends to: measured."""
+        """How many of the others, at least, no integral of the map of the degrees tried tends to: measured."""
         profile = self.map_search.profile
         return max(0, len(self.others) - self.without_limit) if profile.nullities and profile.agree else 0
 
