@@ -90,9 +90,6 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     if spec is not None:
         _require_names(options["only"], spec)
     with Store.open(db, create=spec is not None) as store:
-        damaged = store.forget_damaged()
-        if damaged and not options["quiet"]:
-            say(f"{counted(len(damaged), 'damaged result')} removed, to be done again: {', '.join(damaged[:_SHOWN])}")
         planned = {} if spec is None else plan(spec, store)
         names = list(options["only"]) or ([e.name for e in spec.experiments] if spec is not None else None)
         which: dict[str, Any] = {"experiments": names, "shard": options["shard"] or (1, 1)}

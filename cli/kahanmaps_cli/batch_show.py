@@ -11,17 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import echo, on_terminal, print_table, shorten, tell, tell_entry
 
 if TYPE_CHECKING:
-    from kahanmaps.experiments.checking import Checked
     from kahanmaps.experiments.store import Found, Store
 
 _VALUE_WIDTH = 300
-_PROBLEM_WIDTH = 100
-_SHOWN = 3  # names of what is damaged
 
 
 def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
@@ -148,34 +144,6 @@ def print_summary(
     else:
         for line in found.lines():
             echo(line)
-
-
-def print_checked(db: str, found: Checked, as_json: bool, quiet: bool) -> None:
-    """One line on what is damaged and what is whole, and what to do."""
-    from kahanmaps.errors import counted
-    from kahanmaps.version import __version__
-
-    if as_json:
-        kinds = {kind: {"whole": count, "damaged": found.damaged[kind]} for kind, count in found.whole.items()}
-        head = {"command": "batch check", "version": __version__, "db": db, "is_whole": found.is_whole}
-        print_json({**head, "has_checksums": found.has_checksums, "pages": found.pages, **kinds})
-    else:
-        whole = "whole: " + ", ".join(counted(count, kind[:-1]) for kind, count in found.whole.items())
-        damaged = [f"pages of the file ({shorten(found.pages[0], _PROBLEM_WIDTH)})"] if found.pages else []
-        for kind, names in found.damaged.items():
-            if names:
-                listed = ", ".join(shorten(name, _PROBLEM_WIDTH) for name in names[:_SHOWN])
-                damaged.append(f"{counted(len(names), kind[:-1])} ({listed}{', ...' if len(names) > _SHOWN else ''})")
-        if damaged:
-            whole = f"damaged: {', '.join(damaged)}; {whole}"
-        echo(f"{db}: {whole}{'' if found.has_checksums else ', without checksums'}")
-    if quiet:
-        return
-    if not found.has_checksums:
-        say("an older version wrote it, without checksums of results: 'batch run' and 'batch merge' add them")
-    if not found.is_whole:
-        is_done_again = not found.pages and {kind for kind, names in found.damaged.items() if names} == {"results"}
-        say("'batch run' does the damaged results again" if is_done_again else "take a copy from before the damage")
 
 
 def export_rows(store: Store, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:

@@ -24,10 +24,10 @@ GRACE = 10.0  # seconds that tasks in flight have after an interrupt
 
 
 class Batch:
-    """Iterate over it for lists of records, as they come in; the next tasks are handed out after each list.
+    """Iterate over it for lists of records, as they come in; the next tasks are handed out before each list.
 
-    A list is empty now and then, where nothing has come for a while. Whoever writes a list down before asking for the
-    next one loses at most the tasks in flight.
+    So they are being done while the list is written down, and whoever does that before asking for the next one loses
+    at most the tasks in flight. A list is empty now and then, where nothing has come for a while.
     """
 
     def __init__(self, jobs: Iterable[Job], executor: Executor, grace: float = GRACE) -> None:
@@ -49,20 +49,23 @@ class Batch:
     def __iter__(self) -> Iterator[list[Record]]:
         executor = self._executor
         try:
-            while True:
-                while self._until is None and executor.is_free:
-                    job = next(self._jobs, None)
-                    if job is None:
-                        break
-                    executor.submit(job)
-                if not executor.in_flight:
-                    return
+            self._hand_out()
+            while executor.in_flight:
                 if self._until is not None and time.monotonic() > self._until:
                     self.abandoned = executor.in_flight
                     return
-                yield executor.wait(_POLL)
+                records = executor.wait(_POLL)
+                self._hand_out()
+                yield records
         finally:
             executor.close()
+
+    def _hand_out(self) -> None:
+        while self._until is None and self._executor.is_free:
+            job = next(self._jobs, None)
+            if job is None:
+                break
+            self._executor.submit(job)
 
 
 def plan(spec: Spec, store: Store) -> dict[str, Planned]:
@@ -111,8 +114,7 @@ def run(
     a record there are not done again, and every record is in the database before it is yielded; without, nothing is
     kept. `jobs` children work at a time, or those of a dask `scheduler`. `only` names experiments, `shard` = (i, n) is
     the i-th of n parts, `retry_failed` does failed tasks again. A task that is killed from outside at every try is
-    yielded as lost, and stays without a record in `db`. A record there that is damaged is removed, and its task done
-    again. Closing the generator kills what is in flight.
+    yielded as lost, and stays without a record in `db`. Closing the generator kills what is in flight.
 
     Raises SpecError, StoreError.
 
@@ -129,7 +131,6 @@ def run(
                 yield from records
         return
     with Store.open(db, create=True) as store, closing(executor_for(store.document, jobs, scheduler)) as executor:
-        store.forget_damaged()
         plan(spec, store)
         for records in Batch(store.pending(names, retry_failed=retry_failed, shard=shard), executor):
             if records:

@@ -12,11 +12,10 @@ import os
 import re
 import shutil
 import signal
-import sqlite3
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -341,48 +340,6 @@ def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept
     assert batch("merge one.db one.db").status == 2
 
 
-def test_check_says_in_one_line_what_is_whole_and_what_is_damaged_and_run_does_it_again(batch, space):
-    before = batch("export --db study.db --csv --stable").out
-    done = batch("check --db study.db")
-    assert done == Outcome(0, "study.db: whole: 1 experiment, 6 tasks, 0 documents, 6 results\n", "")
-    with closing(sqlite3.connect("study.db")) as connection, connection:
-        connection.execute("UPDATE result SET message = 'other' WHERE task < 3")
-    first, second = (line.split(",")[2] for line in before.splitlines()[1:3])
-    done = batch("check --db study.db")
-    assert (done.status, done.err) == (3, "'batch run' does the damaged results again\n")
-    damaged = f"damaged: 2 results ({first}, {second})"
-    assert done.out == f"study.db: {damaged}; whole: 1 experiment, 6 tasks, 0 documents, 4 results\n"
-    assert batch("check --db study.db --json -q").json["results"] == {"whole": 4, "damaged": [first, second]}
-    for reader in (
-        "export --csv -o out.csv",
-        "summary",
-        f"show {first[:8]}",
-        "export --jsonl",
-        "merge new.db study.db",
-    ):
-        done = batch(f"{reader}{'' if 'merge' in reader else ' --db study.db'}")
-        assert (done.status, done.err.count("\n")) == (2, 1), reader
-        assert f"study.db is damaged (the record of task {first}: it has not its checksum)" in done.err
-    assert not Path("out.csv").exists()
-    done = batch("run --db study.db -j 1")
-    assert done.status == 0
-    assert f"2 damaged results removed, to be done again: {first}, {second}" in done.err
-    assert batch("export --db study.db --csv --stable").out == before
-
-
-def test_check_of_pages_that_are_damaged_and_of_what_is_no_database(batch, space):
-    content = bytearray(Path("study.db").read_bytes())
-    content[4096 * 5 : 4096 * 5 + 8] = b"\xa5" * 8
-    Path("study.db").write_bytes(content)
-    done = batch("check --db study.db")
-    assert (done.status, done.err) == (3, "take a copy from before the damage\n")
-    assert re.match(r"study\.db: damaged: pages of the file \(.+\), .*; whole: .*\n$", done.out)
-    assert batch("status --db study.db").status == 2
-    Path("text.db").write_text("text" * 1000)
-    assert batch("check --db text.db").err == "Error: text.db is not an SQLite database: check the name\n"
-    assert batch("check --db text.db").status == 2
-
-
 def test_tasks_lists_what_can_be_done(batch):
     assert "family-space" in batch("tasks").out
     assert "(required)" in batch("tasks orbit").out
@@ -391,7 +348,7 @@ def test_tasks_lists_what_can_be_done(batch):
     assert described["orbit"]["options"]["steps"]["default"] == 100
 
 
-@pytest.mark.parametrize("name", ["run", "status", "show", "export", "summary", "merge", "check", "tasks"])
+@pytest.mark.parametrize("name", ["run", "status", "show", "export", "summary", "merge", "tasks"])
 def test_every_help_has_an_example(batch, name: str):
     assert f"kahanmaps batch {name}" in batch(f"{name} --help").out
 

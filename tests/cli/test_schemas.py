@@ -162,7 +162,6 @@ def test_what_batch_commands_print_satisfies_their_schemas(kahanmaps: Run, tmp_p
         ],
         "batch-status": [kahanmaps("batch status --json --db", db), kahanmaps("batch status --json --db", other)],
         "batch-summary": [kahanmaps("batch summary --json --by task,eps --db", db)],
-        "batch-check": [kahanmaps("batch check --json --db", db)],
         "batch-merge": [kahanmaps("batch merge --json", tmp_path / "all.db", db, other)],
     }
     [key] = {row["key"] for row in outputs["batch-export"][0].records if row.get("experiment") == "orbit"}

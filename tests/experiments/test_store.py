@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, seed, seeds, small_chunks, task, tasks
 
 from kahanmaps.experiments import tables as tables_module
-from kahanmaps.experiments.database import StoreError, Unavailable
+from kahanmaps.experiments.database import StoreError
 from kahanmaps.experiments.records import Limits, Outcome, Record, Row, Task, digest
 from kahanmaps.experiments.store import ExperimentStatus, Store
 from kahanmaps.experiments.tables import PLAN_CHUNK, Planned
@@ -373,17 +373,6 @@ def test_at_most_twenty_are_found_and_all_of_them_begin_as_asked(store, monkeypa
 def test_what_is_no_beginning_of_a_key_is_refused(store, prefix):
     with pytest.raises(StoreError, match="at least 4 of its 32 hexadecimal digits"):
         store.find(prefix)
-
-
-@pytest.mark.parametrize("is_replaced", [False, True])
-def test_a_database_that_is_taken_away_while_it_is_written_to_is_told(store, path, is_replaced):
-    store.plan("a", "1", LIMITS, tasks(1, 2), {})
-    store.add([ok(1)])
-    path.rename(path.with_name("elsewhere.db"))
-    if is_replaced:
-        path.write_bytes(b"")
-    with pytest.raises(Unavailable, match="has been removed or replaced while it was being written to"):
-        store.add([ok(2)])
 
 
 def test_an_experiment_that_is_planned_while_somebody_asks_for_the_status_does_no_harm(store, path):

@@ -1,4 +1,4 @@
-"""kahanmaps batch run | status | show | export | summary | merge | check | tasks."""
+"""kahanmaps batch run | status | show | export | summary | merge | tasks."""
 
 from __future__ import annotations
 
@@ -276,28 +276,6 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
             f"{', '.join(keys[:3])}{', ...' if len(keys) > 3 else ''} (batch show KEY --db FILE)"
         )
     return 3 if conflicts else 0
-
-
-@command.command("check", short_help="Is all of a database what was written to it?")
-@_database()
-@output_options
-def check(db: str, as_json: bool, quiet: bool) -> int:
-    """Read all of a database, and say what is damaged and what is whole.
-
-    \b
-      kahanmaps batch check --db study.db
-      kahanmaps batch check --db study.db --json | jq .results.damaged
-
-    Damaged results are done again by 'batch run'; for anything else take a copy from before. Exit status: 0 all is
-    whole, 2 not a database of results, 3 something is damaged.
-    """
-    from kahanmaps.experiments.store import Store
-    from kahanmaps_cli.batch_show import print_checked
-
-    with Store.open(db, readonly=True, is_checked=False) as store:
-        found = store.check()
-    print_checked(db, found, as_json, quiet)
-    return 0 if found.is_whole else 3
 
 
 @command.command("tasks", short_help="What an experiment can do, with all options.")
