@@ -148,6 +148,12 @@ def test_wrong_specs_and_missing_files_are_told(tmp_path: Path):
         list(run(tmp_path / "no.toml"))
 
 
+@pytest.fixture
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Records are handed on as they come."""
+    monkeypatch.setattr("kahanmaps.experiments.run._GATHER", 0.0)
+
+
 class Scripted:
     """An executor that hands back what was submitted, one at a time, and writes down what it was asked."""
 
@@ -186,6 +192,7 @@ def test_no_more_is_handed_out_than_the_executor_takes():
     assert executor.closed == 1
 
 
+@pytest.mark.usefixtures("_at_once")
 def test_nothing_is_handed_out_after_an_interrupt():
     executor = Scripted()
     batch = Batch(jobs(50), executor)
@@ -216,6 +223,7 @@ def test_what_is_not_done_within_the_grace_is_given_up():
     assert batch.abandoned == 2
 
 
+@pytest.mark.usefixtures("_at_once")
 def test_jobs_are_taken_one_by_one_as_they_are_needed():
     taken = 0
 
