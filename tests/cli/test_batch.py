@@ -473,7 +473,7 @@ def test_an_export_to_a_full_disk_ends_with_status_3_and_leaves_the_old_file(bat
 
 def test_two_batches_do_not_write_to_one_database(batch, start):
     Path("study.toml").write_text(PAUSE)
-    process = start("study.toml", "-j", "1")
+    start("study.toml", "-j", "1")
     done = batch("run study.toml")
     assert done.status == 2
     assert "another batch is writing to study.db" in done.err

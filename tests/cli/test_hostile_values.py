@@ -150,8 +150,6 @@ def test_numbers_and_paths_that_nobody_means_are_refused_in_a_sentence(words, ca
         "batch export --csv --db DB",
         "batch export --jsonl --db DB -o x.jsonl",
         "batch summary --db DB",
-        "batch merge new.db DB",
-        "batch status --db DB",
         "batch show KEY --db DB",
         "batch run SPEC --dry-run --db DB",
         "report --db DB -o x.html",
