@@ -98,10 +98,6 @@ def test_the_second_run_has_nothing_to_do(batch):
     assert done.err == "nothing to do: every task has a result in study.db\n"
 
 
-def test_quiet_is_quiet(batch):
-    assert batch("run", SPACE, "-q").err == ""
-
-
 def test_json_is_one_object_with_everything_counted(batch):
     done = batch("run", SPACE, "--json -q")
     (one,) = done.json["experiments"]
@@ -144,14 +140,6 @@ def test_a_dry_run_shows_the_tasks_and_does_nothing(batch):
     assert done.rows[1][2].endswith("m=2 seed=0")
     assert done.out.endswith("6 tasks\n")
     assert not Path("study.db").exists()
-
-
-def test_a_dry_run_shows_a_second_system_by_its_name_and_one_task_as_one(batch):
-    done = batch(
-        "run", '[experiments.a]\ntask = "check-commute"\nsystem = "lorenz"\noptions.other = "lorenz"\n', "--dry-run"
-    )
-    assert done.rows[0][2] == "1 task"
-    assert done.rows[1][3].startswith("other=lorenz s=10 r=28 b=8/3 steps=10 ")
 
 
 def test_a_dry_run_with_a_database_says_what_is_missing(batch, space):
@@ -288,12 +276,6 @@ def test_an_export_follows_links_and_goes_through_pipes(batch, space):
     assert sorted(os.listdir()) == ["link.csv", "pipe", "real.csv", "study.db", "study.toml"]
 
 
-def test_an_export_that_fails_leaves_the_old_file(batch, space):
-    Path("out.csv").mkdir()
-    assert batch("export --db study.db --csv -o out.csv").status == 2
-    assert sorted(path.name for path in Path().iterdir() if "part" in path.name) == []
-
-
 def test_a_summary_groups_and_counts(batch, space):
     rows = batch("summary --db study.db --by m --value dimension --stable").rows
     assert rows[:3] == [["m", "tasks", "ok"], ["2", "3", "3"], ["3", "3", "3"]]
@@ -346,11 +328,6 @@ def test_tasks_lists_what_can_be_done(batch):
     described = {task["name"]: task for task in batch("tasks --json").json["tasks"]}
     assert described["orbit"]["options"]["eps"]["required"]
     assert described["orbit"]["options"]["steps"]["default"] == 100
-
-
-@pytest.mark.parametrize("name", ["run", "status", "show", "export", "summary", "merge", "tasks"])
-def test_every_help_has_an_example(batch, name: str):
-    assert f"kahanmaps batch {name}" in batch(f"{name} --help").out
 
 
 def test_on_a_terminal_there_are_tables(batch, space):
@@ -464,13 +441,6 @@ def test_a_full_disk_ends_a_batch_with_status_3_and_what_was_stored_before(batch
         assert batch("run", SPACE, "-q", "-j", "1").status == 0
 
 
-def test_an_export_to_a_full_disk_ends_with_status_3_and_leaves_the_old_file(batch, tmp_path: Path, space):
-    Path("old.csv").write_text("old")
-    done = shell("ulimit -f 0; kahanmaps batch export --db study.db -o old.csv", tmp_path)
-    assert (done.status, Path("old.csv").read_text()) == (3, "old")
-    assert done.err.startswith("Error: File too large")
-
-
 def test_two_batches_do_not_write_to_one_database(batch, start):
     Path("study.toml").write_text(PAUSE)
     start("study.toml", "-j", "1")
@@ -497,12 +467,6 @@ def test_progress_is_a_line_now_and_then_where_there_is_no_terminal(monkeypatch:
     assert "left" in said[0]
 
 
-def test_an_empty_batch_database_has_an_empty_status(batch, kahanmaps: Callable[..., Outcome], space):
-    done = batch("merge empty.db study.db")
-    assert done.status == 0
-    assert batch("status --db empty.db").rows[1][:4] == ["space", "6", "0", "6"]
-
-
 @pytest.mark.slow
 def test_the_documented_shell_examples_run(tmp_path: Path):
     (tmp_path / "study.toml").write_text(SPACE)
@@ -516,20 +480,6 @@ def test_the_documented_shell_examples_run(tmp_path: Path):
     done = shell(script, tmp_path)
     assert done.status == 0, done.err
     assert done.out.splitlines()[-1] == "6"
-
-
-def test_what_a_reader_does_not_want_is_no_error(batch, tmp_path: Path, space):
-    done = shell("kahanmaps batch export --db study.db --jsonl | head -n 1; echo ${PIPESTATUS[0]}", tmp_path)
-    assert done.out.splitlines()[-1] == "0"
-    assert done.err == ""
-
-
-def test_nothing_of_a_record_reaches_a_terminal_as_an_escape_sequence(batch):
-    key = failed_with("evil \x1b[41m")
-    for words in ([f"show {key}"], ["summary", "--by", "outcome,message"]):
-        shown = terminal("batch", *" ".join(words).split(), "--db", "study.db", NO_COLOR="1").out
-        assert r"evil \x1b[41m" in shown
-        assert "\x1b[41m" not in shown
 
 
 def test_on_a_terminal_a_message_is_broken_but_complete_and_numbers_are_not_broken(batch):

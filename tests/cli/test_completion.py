@@ -6,7 +6,6 @@ import os
 import shlex
 import shutil
 import subprocess
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -68,17 +67,8 @@ def test_commands_are_offered(offered):
     assert offered("kahanmaps check-i") == ["check-integrals"]
 
 
-def test_subcommands_are_offered(offered):
-    assert offered("kahanmaps family s") == ["show", "space"]
-
-
 def test_options_are_offered(offered):
     assert offered("kahanmaps orbit euler_top --arith") == ["--arithmetic"]
-
-
-def test_choices_are_offered(offered):
-    assert offered("kahanmaps orbit euler_top --format c") == ["csv"]
-    assert offered("kahanmaps --color ") == ["auto", "always", "never"]
 
 
 def test_systems_of_the_catalogue_are_offered(offered, tmp_path):
@@ -89,10 +79,6 @@ def test_systems_of_the_catalogue_are_offered(offered, tmp_path):
 def test_system_files_and_folders_are_offered_and_no_other_file(offered, folder):
     assert offered("kahanmaps orbit m", folder) == ["mine/", "my-top.toml"]
     assert offered("kahanmaps orbit n", folder) == [name for name in names() if name.startswith("n")]
-
-
-def test_files_in_a_folder_are_offered(offered, folder):
-    assert offered("kahanmaps orbit mine/", folder) == ["mine/other.toml"]
 
 
 def test_parameters_of_the_system_are_offered(offered, folder):
@@ -125,12 +111,6 @@ def test_nothing_is_said_where_the_line_is_wrong(asked, folder, line):
     assert asked(line, folder).err == ""
 
 
-def test_nothing_is_said_where_a_command_cannot_be_loaded(asked, monkeypatch):
-    monkeypatch.setitem(COMMANDS, "orbit", ("no_such_module", ""))
-    outcome = asked("kahanmaps orbit --")
-    assert (outcome.out, outcome.err) == ("", "")
-
-
 def test_nothing_that_computes_is_loaded():
     code = (
         "import sys\nfrom kahanmaps_cli.main import main\nmain([])\n"
@@ -140,21 +120,6 @@ def test_nothing_that_computes_is_loaded():
     done = subprocess.run([COMMAND[0], "-c", code], env=env, capture_output=True, text=True, timeout=60)
     assert done.stdout.split() == ["plain,a1=", "plain,a2=", "plain,a3="]
     assert done.stderr == "[]\n"
-
-
-def test_an_answer_ends_with_0():
-    done = subprocess.run(COMMAND, env=environment(**question("kahanmaps orbit eul")), capture_output=True, text=True)
-    assert (done.returncode, done.stdout.split()) == (0, ["plain,euler_top"])
-
-
-@pytest.mark.slow  # a clock on a busy machine
-def test_the_answer_is_there_at_once():
-    best = 9.0
-    for _ in range(5):
-        start = time.perf_counter()
-        subprocess.run(COMMAND, env=environment(**question("kahanmaps orbit eul")), capture_output=True, check=True)
-        best = min(best, time.perf_counter() - start)
-    assert best < 0.3
 
 
 # The scripts
@@ -170,20 +135,6 @@ def test_a_script_is_printed_for_each_shell(kahanmaps, name):
 def test_the_shell_is_that_of_the_environment(kahanmaps, monkeypatch):
     monkeypatch.setenv("SHELL", "/usr/bin/fish")
     assert kahanmaps("completion") == kahanmaps("completion fish")
-
-
-@pytest.mark.parametrize("value", ["/bin/dash", ""])
-def test_another_shell_is_told_which_ones_there_are(kahanmaps, monkeypatch, value):
-    monkeypatch.setenv("SHELL", value)
-    outcome = kahanmaps("completion")
-    assert outcome.status == 2
-    assert "expected one of bash, zsh, fish: name it as SHELL" in outcome.err
-
-
-def test_the_help_says_which_line_goes_to_which_file(kahanmaps):
-    shown = kahanmaps("completion --help").out
-    for piece in ("~/.bashrc", "~/.zshrc", "config.fish", 'eval "$(kahanmaps completion bash)"'):
-        assert piece in shown
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
