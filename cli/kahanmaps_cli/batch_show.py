@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import echo, on_terminal, print_table, shorten, tell, tell_entry
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ _VALUE_WIDTH = 300
 def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
     """How far the experiments are, as plain data."""
     from kahanmaps.errors import InputError, quoted
-    from kahanmaps.version import __version__
 
     found = store.status()
     for name in only:
@@ -31,8 +30,7 @@ def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
             known = ", ".join(one.name for one in found) or "none"
             raise InputError(f"there is no experiment {quoted(name)} in it, expected one of: {known}")
     return {
-        "command": "batch status",
-        "version": __version__,
+        **envelope("batch status"),
         "experiments": [
             {
                 "name": one.name,
@@ -69,12 +67,10 @@ def print_status(data: Mapping[str, Any]) -> None:
 def found_data(store: Store, found: Found) -> dict[str, Any]:
     """A task and its record as plain data."""
     from kahanmaps.checks.settings import CONVENTION
-    from kahanmaps.version import __version__
 
     task, record, places, attempts = found
     return {
-        "command": "batch show",
-        "version": __version__,
+        **envelope("batch show"),
         "convention": CONVENTION,
         "key": task.key,
         "task": task.kind,
@@ -129,11 +125,10 @@ def print_summary(
     """The tables of a summary."""
     from kahanmaps.checks.settings import CONVENTION
     from kahanmaps.experiments.summary import summarise
-    from kahanmaps.version import __version__
 
     found = summarise(store.rows(list(only) or None, missing=True), by, list(values) or None, stable=stable)
     if as_json:
-        print_json({"command": "batch summary", "version": __version__, "convention": CONVENTION, **found.to_json()})
+        print_json({**envelope("batch summary"), "convention": CONVENTION, **found.to_json()})
     elif as_markdown:
         from kahanmaps.display.experiments import summary_markdown
 
@@ -168,7 +163,6 @@ def print_tasks(name: str | None, as_json: bool) -> None:
     """The kinds of tasks, or one with its options."""
     from kahanmaps.experiments.options import FAMILY
     from kahanmaps.experiments.registry import task_kind, task_kinds
-    from kahanmaps.version import __version__
 
     kinds = list(task_kinds().values()) if name is None else [task_kind(name)]
     if as_json:
@@ -184,7 +178,7 @@ def print_tasks(name: str | None, as_json: bool) -> None:
             }
             for kind in kinds
         ]
-        print_json({"command": "batch tasks", "version": __version__, "tasks": data})
+        print_json({**envelope("batch tasks"), "tasks": data})
         return
     width = max(len(kind.name) for kind in kinds)
     for kind in kinds:

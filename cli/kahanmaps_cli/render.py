@@ -18,6 +18,13 @@ if TYPE_CHECKING:
 CLAIMS_SHOWN = 40
 
 
+def envelope(command: str) -> dict[str, str]:
+    """What every object begins with that a command prints as JSON."""
+    from kahanmaps.version import __version__
+
+    return {"command": command, "version": __version__}
+
+
 def print_json(data: Mapping[str, Any]) -> None:
     """One JSON object on a line of its own."""
     click.echo(json.dumps(data))

@@ -15,7 +15,7 @@ from kahanmaps_cli.options import json_option, output_options
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import OptionType
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import echo
 
 if TYPE_CHECKING:
@@ -257,14 +257,13 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
     """
     from kahanmaps.errors import counted
     from kahanmaps.experiments.store import Store
-    from kahanmaps.version import __version__
 
     with Store.open(target, create=True) as store:
         merged = [(source, store.merge(source)) for source in sources]
     conflicts = sum(found.conflicts for _, found in merged)
     if as_json:
         data = [{"source": source, **asdict(found)} for source, found in merged]
-        print_json({"command": "batch merge", "version": __version__, "target": target, "merged": data})
+        print_json({**envelope("batch merge"), "target": target, "merged": data})
     else:
         for source, found in merged:
             counts = f"new results: {found.results}\tfailures replaced: {found.replaced}\tconflicts: {found.conflicts}"
