@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.terminal import COLOURS, NARROW, NUMBER_WIDTH, columns, console, on_terminal, shorten, styled, tell
+from kahanmaps_cli.terminal import COLOURS, NUMBER_WIDTH, console, on_terminal, shorten, styled, tell
 
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Evidence, Finding, Report, Witness
@@ -99,10 +99,7 @@ def _print_plain(report: Report) -> None:
 def _print_terminal(report: Report, verbose: bool) -> None:
     tell(headline(report), style="bold")
     shown = _selection(report.findings)
-    if columns() < NARROW:
-        _print_list(report, shown, verbose)
-    else:
-        _print_table(report, shown, verbose)
+    _print_table(report, shown, verbose)
     if len(shown) < len(report.findings):
         tell(f"{len(report.findings) - len(shown)} more claims, proved like those above (--json has all)")
     if not verbose:
@@ -111,18 +108,6 @@ def _print_terminal(report: Report, verbose: bool) -> None:
     for note in report.notes:
         tell(f"note: {note}")
     tell(f"verdict\t{report.verdict}", 9)
-
-
-def _print_list(report: Report, shown: list[Finding], verbose: bool) -> None:
-    """One claim below the other, where there is no room for a table."""
-    told: set[str] = set()
-    for finding in shown:
-        tell(f"{_verdict_text(finding)}\t{finding.claim}")
-        if verbose:
-            for line in _details(finding, told, NUMBER_WIDTH):
-                tell(f"\t{line}")
-        else:
-            tell(f"\t{_short(finding.evidence)}")
 
 
 def _print_table(report: Report, shown: list[Finding], verbose: bool) -> None:

@@ -13,7 +13,6 @@ import pytest
 from cli_helpers import COMMAND, Outcome, environment, shell
 
 from kahanmaps.documents.catalog import names
-from kahanmaps.experiments.registry import task_kinds
 from kahanmaps_cli.main import COMMANDS
 
 HEAVY = ("numpy", "flint", "rich", "matplotlib")
@@ -81,20 +80,6 @@ def test_system_files_and_folders_are_offered_and_no_other_file(offered, folder)
     assert offered("kahanmaps orbit n", folder) == [name for name in names() if name.startswith("n")]
 
 
-def test_parameters_of_the_system_are_offered(offered, folder):
-    assert offered("kahanmaps orbit euler_top -p ") == ["a1=", "a2=", "a3="]
-    assert offered("kahanmaps systems lotka_volterra -p ") == ["a=", "b=", "c=", "d="]
-    assert offered("kahanmaps orbit my-top.toml --parameter al", folder) == ["alpha="]
-
-
-def test_one_more_symbol_of_the_system_is_offered(offered):
-    assert offered("kahanmaps find-integrals euler_top --symbolic a1,a") == ["a1,a2", "a1,a3"]
-
-
-def test_kinds_of_tasks_are_offered(offered):
-    assert offered("kahanmaps batch tasks ") == list(task_kinds())
-
-
 @pytest.mark.parametrize(
     "line",
     [
@@ -116,9 +101,9 @@ def test_nothing_that_computes_is_loaded():
         "import sys\nfrom kahanmaps_cli.main import main\nmain([])\n"
         f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
     )
-    env = environment(**question("kahanmaps ensemble euler_top -p "))
+    env = environment(**question("kahanmaps ensemble euler_"))
     done = subprocess.run([COMMAND[0], "-c", code], env=env, capture_output=True, text=True, timeout=60)
-    assert done.stdout.split() == ["plain,a1=", "plain,a2=", "plain,a3="]
+    assert done.stdout.split() == ["plain,euler_top"]
     assert done.stderr == "[]\n"
 
 
@@ -152,14 +137,12 @@ def test_bash_completes_with_the_script(tmp_path):
     }
     complete -p kahanmaps
     try kahanmaps orbit eul
-    try kahanmaps orbit euler_top -p ""
     try kahanmaps orbit euler_top -p a1 = 2 --ste
     """
     outcome = shell(script, tmp_path, PATH=f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     assert outcome.out.splitlines() == [
         "complete -o nosort -F _kahanmaps_completion kahanmaps",
         "euler_top",
-        "a1= a2= a3=",
         "--steps",
     ]
     assert outcome.err == ""

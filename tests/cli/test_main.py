@@ -21,8 +21,6 @@ from kahanmaps.errors import InputError, SingularStep
 from kahanmaps.version import __version__
 from kahanmaps_cli.main import cli, main
 
-needs_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
-
 
 def all_commands() -> list[list[str]]:
     """Every command and subcommand, as the words that call it."""

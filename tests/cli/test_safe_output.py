@@ -66,7 +66,6 @@ PAGES = ("report", "svg", "--markdown")
 TAGS = re.compile(r"<script|<img")
 # What a terminal obeys, but for the colours of a terminal.
 OBEYED = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]")
-COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import shlex
-import shutil
 import signal
 import socket
 import subprocess
@@ -25,7 +24,7 @@ from helpers import quick
 from kahanmaps.errors import InputError
 from kahanmaps.experiments import cluster
 from kahanmaps.experiments.children import TRIES
-from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers, WorkersUnfit, record_on
+from kahanmaps.experiments.cluster import ClusterLost, ClusterWorkers, WorkersUnfit
 from kahanmaps.experiments.records import Job, Limits, Outcome, Task
 
 pytest.importorskip("distributed")
@@ -221,13 +220,6 @@ def test_a_group_carries_the_documents_it_needs_and_no_others(shared):
     ]
 
 
-def test_a_job_cannot_be_in_flight_twice(workers):
-    (job,) = jobs_of(1)
-    workers.submit(job)
-    with pytest.raises(InputError, match="in flight already"):
-        workers.submit(job)
-
-
 # Groups
 
 
@@ -278,11 +270,6 @@ def test_a_job_is_done_at_the_second_try_with_its_limits_in_the_environment_of_t
     assert record.result["limits"] == {"time": 7.5, "memory": 10**9}
     assert [record.result[name] for name in ("seed", "home")] == ["0", "kept"]
     assert len(record.result["padding"]) == 1 << 20
-
-
-def test_a_job_that_kills_its_group_is_lost_even_when_it_is_the_only_one(workers):
-    (record,) = done(workers, jobs_of(1, die=11))
-    assert (record.outcome, record.message) == (Outcome.LOST, "the worker's command was killed by signal 11 (SIGSEGV)")
 
 
 def test_a_job_whose_group_always_ends_early_is_lost_after_a_few_tries_and_has_no_result(workers, tmp_path):
@@ -396,18 +383,6 @@ def test_closing_twice_is_allowed_and_leaves_the_scheduler_and_its_workers(share
         again.close()
 
 
-def test_what_was_in_flight_is_forgotten_when_the_executor_is_closed(shared, tmp_path):
-    workers = shared.workers()
-    until(lambda: workers.wait(0.1) == [] and workers.threads == 2)
-    marks = [tmp_path / str(n) for n in range(4)]
-    for n, mark in enumerate(marks):  # two of them run, two wait
-        workers.submit(Job(Task("test", None, {"number": n, "once": str(mark), "sleep": 1.0})))
-    until(lambda: sum(mark.exists() for mark in marks) == 2)
-    workers.close()
-    time.sleep(1.5)
-    assert sum(mark.exists() for mark in marks) == 2
-
-
 # The group command itself
 
 
@@ -459,14 +434,6 @@ def test_an_address_that_cannot_be_one_is_told_in_a_sentence(address, sentence):
         ClusterWorkers(address, str, connect_seconds=0.3)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"address": '])
-def test_a_file_that_no_scheduler_has_written_is_told_in_a_sentence(tmp_path, text):
-    path = tmp_path / "scheduler.json"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match="is not the file that `dask scheduler --scheduler-file` writes"):
-        ClusterWorkers(str(path), str)
-
-
 def test_a_missing_installation_is_told_with_the_command_that_repairs_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"pip install 'kahanmaps\[cluster\]'"):
@@ -499,42 +466,4 @@ finally:
     assert len(ended.stdout.splitlines()) == 1
 
 
-def test_json_that_is_no_record_is_no_record():
-    assert [record_on(line) for line in (b"", b"{", b"{}", b"[1]", b'{"key": 1, "outcome": "fine"}')] == [None] * 5
-    line = json.dumps({"key": "k", "outcome": "ok"}).encode()
-    assert record_on(line).is_ok
-
-
 # Who may come: whoever reaches a port of dask runs code there
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl, which makes the certificates")
-def test_tls_is_set_up_as_dask_has_it_and_nobody_comes_in_without_a_certificate(tmp_path, monkeypatch):
-    for name in ("ca", "stranger"):
-        words = "openssl req -x509 -newkey rsa:2048 -nodes -days 1 -subj /CN=kahanmaps -keyout KEY -out CERT"
-        words = words.replace("KEY", f"{name}.key").replace("CERT", f"{name}.pem")
-        subprocess.run(words.split(), cwd=tmp_path, check=True, capture_output=True)
-    files = {"ca-file": "ca.pem", "cert": "ca.pem", "key": "ca.key"}
-    options = [word for name, file in files.items() for word in (f"--tls-{name}", str(tmp_path / file))]
-    (tmp_path / "study.toml").write_text(
-        '[experiments.e]\ntask = "family-space"\nsystem = "family"\naxes = { m = "2", seed = "0..3" }\n'
-    )
-    with machines_in(tmp_path, "--protocol", "tls", *options) as machines:
-        machines.worker()
-        address = json.loads(machines.file.read_text())["address"]
-        assert address.startswith("tls://127.0.0.1:")
-
-        def run(**chosen):
-            """The batch, by a client that dask's own variables give these files."""
-            found = {f"DASK_DISTRIBUTED__COMM__TLS__{name}": str(tmp_path / file) for name, file in chosen.items()}
-            command = [sys.executable, "-m", "kahanmaps_cli.main", "batch", "run", "study.toml", "--json"]
-            command += ["--scheduler", address]
-            return subprocess.run(command, cwd=tmp_path, env={**os.environ, **found}, capture_output=True)
-
-        for wrong in ({}, {"CA_FILE": "ca.pem", "CLIENT__CERT": "stranger.pem", "CLIENT__KEY": "stranger.key"}):
-            refused = run(**wrong)
-            assert refused.returncode == 2
-            assert b"Error: no dask scheduler answers at tls://" in refused.stderr, refused.stderr
-        ended = run(CA_FILE="ca.pem", CLIENT__CERT="ca.pem", CLIENT__KEY="ca.key")
-        assert json.loads(ended.stdout)["done"] == {"ok": 4}, ended.stderr

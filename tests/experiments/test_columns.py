@@ -44,10 +44,6 @@ def test_what_has_no_number_is_counted():
     assert (len(found.y.values), found.missing, found.left_out) == (1, 1, 3)
 
 
-def test_the_time_of_the_run_is_a_number():
-    assert value_pairs([row(2, {"h": 1})], "m", "seconds").y.values.tolist() == [2.5]
-
-
 def test_a_result_of_that_name_comes_before_the_run():
     assert value_pairs([row(0, {"seconds": 7})], "m", "result.seconds").y.values.tolist() == [7.0]
 
@@ -56,12 +52,3 @@ def test_a_result_of_that_name_comes_before_the_run():
 def test_names_without_numbers_are_refused(x, y):
     with pytest.raises(InputError, match="found the unknown name"):
         value_pairs([row(0, {"h": 1, "word": "many"})], x, y)
-
-
-def test_too_many_words_are_refused():
-    with pytest.raises(InputError, match="found 61 different values of w"):
-        value_pairs([row(k, {"h": k, "w": f"w{k}"}) for k in range(61)], "w", "h")
-
-
-def test_nothing_is_no_pair():
-    assert len(value_pairs([], "eps", "h").y.values) == 0

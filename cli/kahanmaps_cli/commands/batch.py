@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from kahanmaps_cli.complete import complete_task, complete_toml
+from kahanmaps_cli.complete import complete_toml
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options
 from kahanmaps_cli.outputs import OutputFile
@@ -278,7 +278,7 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
 
 
 @command.command("tasks", short_help="What an experiment can do, with all options.")
-@click.argument("name", required=False, shell_complete=complete_task)
+@click.argument("name", required=False)
 @json_option
 def tasks(name: str | None, as_json: bool) -> None:
     """What an experiment can do: the kinds of tasks, and their options with defaults.
