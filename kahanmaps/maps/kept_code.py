@@ -1,8 +1,9 @@
-"""Machine code of numba, kept on disk where there is a folder for it, so that it is compiled once."""
+"""Machine code of numba, kept on disk where there is a folder and room for it, so that it is compiled once."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numba
@@ -11,6 +12,14 @@ import numba
 def compiled(function: Callable[..., Any], **options: Any) -> Any:
     """The function compiled by numba with these options, from the disk or for it if there is a folder that takes it."""
     try:
-        return numba.njit(cache=True, **options)(function)
+        found = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # "no locator available": no folder that can be written to
         return numba.njit(**options)(function)
+    save = found._cache.save_overload
+
+    def save_if_possible(signature: Any, data: Any) -> None:
+        with suppress(OSError):  # the disk is full, the folder gone: the code is in memory all the same
+            save(signature, data)
+
+    found._cache.save_overload = save_if_possible
+    return found

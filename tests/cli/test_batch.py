@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import re
 import shutil
 import signal
@@ -119,11 +118,6 @@ def test_failed_tasks_give_status_3_and_say_how_to_try_again(batch):
     assert batch("run", FAULT, "-q").status == 3  # they have not been mended
     again = batch("run --db study.db --retry-failed --json -q")
     assert again.json["done"] == {"failed": 2}
-
-
-def test_the_command_that_continues_is_about_the_same_experiments(batch):
-    done = batch("run", FAULT, "-e fault --shard 1/1")
-    assert "kahanmaps batch run study.toml --db study.db -e fault --shard 1/1 --retry-failed" in done.err
 
 
 def test_refuted_claims_are_results_like_others(batch):
@@ -259,21 +253,6 @@ def test_export_to_parquet(batch):
     batch("run", SPACE, "-q")
     assert batch("export --db study.db --parquet -o study.parquet").status == 0
     assert parquet.read_table("study.parquet")["dimension"].to_pylist() == [8] * 3 + [12] * 3
-
-
-def test_an_export_follows_links_and_goes_through_pipes(batch, space):
-    expected = batch("export --db study.db --csv --stable").out
-    os.symlink("real.csv", "link.csv")
-    assert batch("export --db study.db --csv --stable -o link.csv").status == 0
-    assert Path("link.csv").is_symlink()
-    assert Path("real.csv").read_text() == expected
-    os.mkfifo("pipe")
-    with subprocess.Popen(["cat", "pipe"], stdout=subprocess.PIPE, text=True) as reader:
-        assert batch("export --db study.db --csv --stable -o pipe").status == 0
-        assert reader.communicate(timeout=10)[0] == expected
-    assert Path("pipe").is_fifo()
-    assert batch("export --db study.db --csv --stable -o -").out == expected
-    assert sorted(os.listdir()) == ["link.csv", "pipe", "real.csv", "study.db", "study.toml"]
 
 
 def test_a_summary_groups_and_counts(batch, space):
@@ -450,23 +429,6 @@ def test_two_batches_do_not_write_to_one_database(batch, start):
     assert batch("status --db study.db").status == 0  # looking is allowed
 
 
-def test_progress_is_a_line_now_and_then_where_there_is_no_terminal(monkeypatch: pytest.MonkeyPatch):
-    from kahanmaps_cli import batch_run
-
-    monkeypatch.setattr(batch_run, "_LINE_EVERY", 0.0)
-    said: list[str] = []
-    monkeypatch.setattr(batch_run, "say", said.append)
-    from kahanmaps.experiments.records import Outcome as Word
-    from kahanmaps.experiments.records import Record
-
-    progress = batch_run.BatchProgress(4, quiet=False)
-    progress.tell([Record("a", Word.OK), Record("b", Word.FAILED)], 2)
-    assert len(said) == 1
-    assert said[0].startswith("2 of 4 tasks, ")
-    assert said[0].endswith(", 2 running, 1 failed")
-    assert "left" in said[0]
-
-
 @pytest.mark.slow
 def test_the_documented_shell_examples_run(tmp_path: Path):
     (tmp_path / "study.toml").write_text(SPACE)
@@ -480,29 +442,3 @@ def test_the_documented_shell_examples_run(tmp_path: Path):
     done = shell(script, tmp_path)
     assert done.status == 0, done.err
     assert done.out.splitlines()[-1] == "6"
-
-
-def test_on_a_terminal_a_message_is_broken_but_complete_and_numbers_are_not_broken(batch):
-    words = ["no", "period", "of", "this", "orbit"] * 5
-    failed_with(" ".join(words))
-    batch("run --db study.db --shard 2/6 -q")
-    shown = terminal("batch", "summary", "--db", "study.db", "--by", "outcome,message", NO_COLOR="1").out
-    cells = [line.split("│")[2].split() for line in shown.partition("└")[0].splitlines() if "│" in line]
-    assert [word for cell in cells for word in cell] == words
-    shown = terminal("batch", "summary", "--db", "study.db", "--by", "experiment,m", NO_COLOR="1").out
-    assert re.search(r"│ *[0-9]{8,9}│", shown)  # the memory, in bytes
-
-
-def failed_with(message: str) -> str:
-    """Make study.db, in which the first task of SPACE failed with this message; its key."""
-    from kahanmaps.experiments.records import Outcome as Word
-    from kahanmaps.experiments.records import Record
-    from kahanmaps.experiments.run import plan
-    from kahanmaps.experiments.spec import parse_spec
-    from kahanmaps.experiments.store import Store
-
-    spec = parse_spec(SPACE)
-    with Store.open("study.db", create=True) as store:
-        plan(spec, store)
-        store.add([Record(spec.experiments[0][0].key, Word.FAILED, message=message)])
-    return spec.experiments[0][0].key

@@ -180,14 +180,6 @@ def test_want_of_memory_is_told_and_never_ends_with_the_status_of_a_refuted_clai
     assert (outcome.status, outcome.err.startswith("Error: out of memory (numpy would have no room)")) == (3, True)
 
 
-def test_debugging_shows_where_an_error_happened(kahanmaps, monkeypatch):
-    failing_with(monkeypatch, RuntimeError("all wrong"))
-    monkeypatch.setenv("KAHANMAPS_DEBUG", "1")
-    outcome = kahanmaps("version")
-    assert outcome.status == 70
-    assert "Traceback" in outcome.err
-
-
 def test_nothing_in_a_message_can_steer_a_terminal(kahanmaps):
     outcome = kahanmaps("systems", Path("\x1b[31mred\x07.toml"))
     assert outcome.status == 2
@@ -223,17 +215,6 @@ def test_a_reader_that_has_seen_enough_changes_no_verdict(tmp_path, form):
     outcome = shell(script, tmp_path)
     assert outcome.out[10:] == "1\n"
     assert outcome.err == ""
-
-
-def test_a_closed_standard_output_loses_the_output_and_nothing_else(tmp_path):
-    outcome = shell("kahanmaps check-integrals euler_top --integral x1 --json >&-", tmp_path)
-    assert (outcome.status, outcome.err) == (1, "")
-
-
-def test_a_character_that_the_output_cannot_encode_is_spelt_out(tmp_path):
-    (tmp_path / "a.toml").write_text('name = "ξ"\nvariables = ["x"]\n[system]\nrhs = ["x"]', encoding="utf-8")
-    outcome = shell("kahanmaps systems a.toml", tmp_path, PYTHONIOENCODING="latin-1")
-    assert (outcome.status, outcome.out) == (0, "\\u03be\nx' = x\n")
 
 
 IN_FLINT = """

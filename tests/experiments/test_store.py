@@ -5,7 +5,6 @@ Plans with tasks that come twice, shards and retries are compared with a model i
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import replace
 from tempfile import TemporaryDirectory
 
@@ -15,9 +14,9 @@ from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, seed, seeds, small_chunks, task, tasks
 
 from kahanmaps.experiments.database import StoreError
-from kahanmaps.experiments.records import Limits, Outcome, Record, Row, Task, digest
+from kahanmaps.experiments.records import Limits, Outcome, Record, Row, digest
 from kahanmaps.experiments.store import ExperimentStatus, Store
-from kahanmaps.experiments.tables import PLAN_CHUNK, Planned
+from kahanmaps.experiments.tables import Planned
 
 # Records
 
@@ -172,26 +171,6 @@ def test_a_document_under_a_wrong_digest_is_refused(store):
     with pytest.raises(StoreError, match="not the one with this digest"):
         store.plan("a", "1", LIMITS, [], {"0123": "text"})
     assert store.experiments() == []
-
-
-def test_a_plan_is_written_while_it_is_made_and_not_held_in_memory(store):
-    alive: weakref.WeakSet[Task] = weakref.WeakSet()
-    most = 0
-
-    class Counted(Task):
-        __hash__ = object.__hash__
-
-    def made():
-        nonlocal most
-        for number in range(10 * PLAN_CHUNK):
-            one = Counted("orbit", None, {"n": number})
-            alive.add(one)
-            if number % 100 == 0:
-                most = max(most, len(alive))
-            yield one
-
-    assert store.plan("a", "1", LIMITS, made(), {}).total == 10 * PLAN_CHUNK
-    assert most <= 2 * PLAN_CHUNK + 100
 
 
 # What is pending
