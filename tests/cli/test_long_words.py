@@ -45,7 +45,7 @@ LINES = {
     "check-measure": "check",
     "check-integrals": "check",
     "degrees --terms 1": "degrees",
-    "find-density --seconds 2": "find-density",
+    "find-density --seconds 5": "find-density",
     "find-integrals --seconds 2": "find-integrals",
     "cycles --prime 11 --samples 5 --steps 5": "cycles",
     "lyapunov --eps 1/50 --steps 20": "lyapunov",
