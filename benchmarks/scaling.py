@@ -309,7 +309,7 @@ def memory_of(number: int) -> dict[str, float]:
         planning = time.perf_counter() - start
         size = (Path(folder) / "plan.db").stat().st_size
         executor = Simulated(0.025, 500, 0.3, 0.0)
-        executor._means["check-commute"].learn(0.025, 500)  # groups of 200
+        executor._means["check-commute"].learn(0.025)  # groups of 200
         pending = store.pending()
         after = resident()
         held = _filled(executor, pending)

@@ -43,7 +43,6 @@ LEAST = {
     "batch export": "--csv --db DB",
     "batch summary": "--db DB",
     "batch merge": "OTHER DB",
-    "batch check": "--db DB",
     "batch tasks": "",
     "plot commute": "harmonic harmonic --start 1,2 --eps 1/10 --steps 1 --format text",
     "plot degrees": "harmonic --terms 3 --seconds 1 --format text",

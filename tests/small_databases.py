@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -85,24 +84,3 @@ path, arguments = sys.argv[1], sys.argv[2:]
 def start(script: str, path: Path, *arguments: object) -> subprocess.Popen[str]:
     command = [sys.executable, "-c", PRELUDE + script, str(path), *map(str, arguments)]
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-
-
-def output(script: str, path: Path, *arguments: object) -> str:
-    with start(script, path, *arguments) as process:
-        text, _ = process.communicate(timeout=60)
-    assert process.returncode == 0
-    return text
-
-
-def killed(path: Path) -> None:
-    """A database whose writer was killed: the results are in its journal."""
-    script = """
-database.journal_for = lambda path: "wal"
-store = Store.open(path)
-store.add([ok(1)])
-os.kill(os.getpid(), 9)
-"""
-    planned(path, 1, 2)
-    with start(script, path) as process:
-        assert process.wait(60) == -signal.SIGKILL
-    assert path.with_name("results.db-wal").stat().st_size > 0

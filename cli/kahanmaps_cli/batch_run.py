@@ -17,7 +17,7 @@ import click
 from kahanmaps.errors import counted, quoted, suggestion
 from kahanmaps_cli.batch_show import duration, print_status, status_data
 from kahanmaps_cli.progress import as_typed, say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.terminal import is_coloured, tell
 
@@ -36,7 +36,6 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
     """Read the spec, and say what it would do."""
     from kahanmaps.checks.settings import CONVENTION
     from kahanmaps.experiments.spec import MAX_TASKS, read_spec
-    from kahanmaps.version import __version__
 
     spec = read_spec(path, max_tasks=options["max_tasks"] or MAX_TASKS)
     missing = _missing(db, spec, options)
@@ -56,8 +55,7 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
         ]
         print_json(
             {
-                "command": "batch run --dry-run",
-                "version": __version__,
+                **envelope("batch run --dry-run"),
                 "convention": CONVENTION,
                 "spec": path,
                 "tasks": sum(experiment.size for experiment in chosen),
@@ -90,9 +88,6 @@ def run_batch(path: str | None, db: str, options: Mapping[str, Any]) -> int:
     if spec is not None:
         _require_names(options["only"], spec)
     with Store.open(db, create=spec is not None) as store:
-        damaged = store.forget_damaged()
-        if damaged and not options["quiet"]:
-            say(f"{counted(len(damaged), 'damaged result')} removed, to be done again: {', '.join(damaged[:_SHOWN])}")
         planned = {} if spec is None else plan(spec, store)
         names = list(options["only"]) or ([e.name for e in spec.experiments] if spec is not None else None)
         which: dict[str, Any] = {"experiments": names, "shard": options["shard"] or (1, 1)}

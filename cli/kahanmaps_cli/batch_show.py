@@ -11,23 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import echo, on_terminal, print_table, shorten, tell, tell_entry
 
 if TYPE_CHECKING:
-    from kahanmaps.experiments.checking import Checked
     from kahanmaps.experiments.store import Found, Store
 
 _VALUE_WIDTH = 300
-_PROBLEM_WIDTH = 100
-_SHOWN = 3  # names of what is damaged
 
 
 def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
     """How far the experiments are, as plain data."""
     from kahanmaps.errors import InputError, quoted
-    from kahanmaps.version import __version__
 
     found = store.status()
     for name in only:
@@ -35,8 +30,7 @@ def status_data(store: Store, only: Sequence[str]) -> dict[str, Any]:
             known = ", ".join(one.name for one in found) or "none"
             raise InputError(f"there is no experiment {quoted(name)} in it, expected one of: {known}")
     return {
-        "command": "batch status",
-        "version": __version__,
+        **envelope("batch status"),
         "experiments": [
             {
                 "name": one.name,
@@ -73,12 +67,10 @@ def print_status(data: Mapping[str, Any]) -> None:
 def found_data(store: Store, found: Found) -> dict[str, Any]:
     """A task and its record as plain data."""
     from kahanmaps.checks.settings import CONVENTION
-    from kahanmaps.version import __version__
 
     task, record, places, attempts = found
     return {
-        "command": "batch show",
-        "version": __version__,
+        **envelope("batch show"),
         "convention": CONVENTION,
         "key": task.key,
         "task": task.kind,
@@ -133,11 +125,10 @@ def print_summary(
     """The tables of a summary."""
     from kahanmaps.checks.settings import CONVENTION
     from kahanmaps.experiments.summary import summarise
-    from kahanmaps.version import __version__
 
     found = summarise(store.rows(list(only) or None, missing=True), by, list(values) or None, stable=stable)
     if as_json:
-        print_json({"command": "batch summary", "version": __version__, "convention": CONVENTION, **found.to_json()})
+        print_json({**envelope("batch summary"), "convention": CONVENTION, **found.to_json()})
     elif as_markdown:
         from kahanmaps.display.experiments import summary_markdown
 
@@ -148,34 +139,6 @@ def print_summary(
     else:
         for line in found.lines():
             echo(line)
-
-
-def print_checked(db: str, found: Checked, as_json: bool, quiet: bool) -> None:
-    """One line on what is damaged and what is whole, and what to do."""
-    from kahanmaps.errors import counted
-    from kahanmaps.version import __version__
-
-    if as_json:
-        kinds = {kind: {"whole": count, "damaged": found.damaged[kind]} for kind, count in found.whole.items()}
-        head = {"command": "batch check", "version": __version__, "db": db, "is_whole": found.is_whole}
-        print_json({**head, "has_checksums": found.has_checksums, "pages": found.pages, **kinds})
-    else:
-        whole = "whole: " + ", ".join(counted(count, kind[:-1]) for kind, count in found.whole.items())
-        damaged = [f"pages of the file ({shorten(found.pages[0], _PROBLEM_WIDTH)})"] if found.pages else []
-        for kind, names in found.damaged.items():
-            if names:
-                listed = ", ".join(shorten(name, _PROBLEM_WIDTH) for name in names[:_SHOWN])
-                damaged.append(f"{counted(len(names), kind[:-1])} ({listed}{', ...' if len(names) > _SHOWN else ''})")
-        if damaged:
-            whole = f"damaged: {', '.join(damaged)}; {whole}"
-        echo(f"{db}: {whole}{'' if found.has_checksums else ', without checksums'}")
-    if quiet:
-        return
-    if not found.has_checksums:
-        say("an older version wrote it, without checksums of results: 'batch run' and 'batch merge' add them")
-    if not found.is_whole:
-        is_done_again = not found.pages and {kind for kind, names in found.damaged.items() if names} == {"results"}
-        say("'batch run' does the damaged results again" if is_done_again else "take a copy from before the damage")
 
 
 def export_rows(store: Store, form: str, output: str | None, stable: bool, only: list[str] | None) -> None:
@@ -200,7 +163,6 @@ def print_tasks(name: str | None, as_json: bool) -> None:
     """The kinds of tasks, or one with its options."""
     from kahanmaps.experiments.options import FAMILY
     from kahanmaps.experiments.registry import task_kind, task_kinds
-    from kahanmaps.version import __version__
 
     kinds = list(task_kinds().values()) if name is None else [task_kind(name)]
     if as_json:
@@ -216,7 +178,7 @@ def print_tasks(name: str | None, as_json: bool) -> None:
             }
             for kind in kinds
         ]
-        print_json({"command": "batch tasks", "version": __version__, "tasks": data})
+        print_json({**envelope("batch tasks"), "tasks": data})
         return
     width = max(len(kind.name) for kind in kinds)
     for kind in kinds:

@@ -1,7 +1,7 @@
 """The starts of many orbits: from a .npy file, from text with a point in each line, or drawn at random.
 
 Text is exact: integers, p/q and decimals, separated by commas or blanks; # starts a comment. A first line with the
-names of the variables says which columns are meant. All mistakes of a file are told at once.
+names of the variables says which columns are meant.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 MAX_TEXT_BYTES = 100_000_000
 MAX_NPY_BYTES = 2_000_000_000
 MAX_NUMBERS = 50_000_000  # of all starts together
-_MISTAKES_SHOWN = 20
 _MAGIC = b"\x93NUMPY"
 
 Convert = Callable[[str], "float | int"]
@@ -53,7 +52,7 @@ def drawn(count: int, dim: int, box: Any, seed: int, prime: int | None) -> NDArr
 def read_starts(path: str, variables: Sequence[str], prime: int | None) -> NDArray[Any]:
     """The starts in a file, or on standard input for "-": an array (n, dim) of doubles, or of residues below the prime.
 
-    Raises InputError with file and line of every mistake.
+    Raises InputError with file and line of the first mistake.
     """
     where = "standard input" if path == "-" else path
     if path == "-":
@@ -106,8 +105,8 @@ def _from_npy(data: bytes, where: str, variables: Sequence[str], prime: int | No
         starts: NDArray[Any] = np.ascontiguousarray(rows, dtype=np.float64)
     bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
     if len(bad):
-        lines = [f"row {row}: found {starts[row][~np.isfinite(starts[row])][0]}" for row in bad[:_MISTAKES_SHOWN]]
-        raise _mistakes(where, [f"{line}, expected finite numbers" for line in lines], len(bad))
+        found = starts[bad[0]][~np.isfinite(starts[bad[0]])][0]
+        raise InputError(f"{where}: row {bad[0]}: found {found}, expected finite numbers")
     return starts
 
 
@@ -121,8 +120,6 @@ class _Text:
         self.convert = _to_residue(prime) if prime is not None else _to_double
         self.columns: list[int] | None = None
         self.width = len(self.variables)
-        self.mistakes: list[str] = []
-        self.wrong = 0
 
     def read(self, text: str) -> NDArray[Any]:
         import numpy as np
@@ -138,13 +135,9 @@ class _Text:
                 fresh = False
                 continue
             fresh = False
-            row = self._row(number, cells)
-            if row is not None and not self.mistakes:
-                rows.append(row)
+            rows.append(self._row(number, cells))
             if len(rows) * len(self.variables) > MAX_NUMBERS:
                 raise InputError(f"{self.where}:{number}: found more than {MAX_NUMBERS} numbers, expected fewer")
-        if self.mistakes:
-            raise _mistakes(self.where, self.mistakes, self.wrong)
         if not rows:
             raise InputError(
                 f"{self.where}: found no point, expected one a line: {', '.join(self.variables)}, e.g. 1/2,-1/3,..."
@@ -158,34 +151,20 @@ class _Text:
         self.columns, self.width = [cells.index(name) for name in self.variables], len(cells)
         return True
 
-    def _row(self, number: int, cells: list[str]) -> list[float | int] | None:
+    def _row(self, number: int, cells: list[str]) -> list[float | int]:
+        where = f"{self.where}:{number}"
         if len(cells) != self.width:
             what = "1 number" if len(cells) == 1 else f"{len(cells)} numbers"
             named = "" if self.columns is not None else f": {', '.join(self.variables)}"
-            self._wrong(number, f"found {what}, expected {self.width}{named}")
-            return None
+            raise InputError(f"{where}: found {what}, expected {self.width}{named}")
         row: list[float | int] = []
         for k in range(len(cells)) if self.columns is None else self.columns:
             try:
                 row.append(self.convert(cells[k]))
-            except ExpressionError as error:
-                self._wrong(number, f"entry {k + 1}: {error.message}")
-                return None
             except InputError as error:
-                self._wrong(number, f"entry {k + 1}: {error}")
-                return None
+                message = error.message if isinstance(error, ExpressionError) else error
+                raise InputError(f"{where}: entry {k + 1}: {message}") from error
         return row
-
-    def _wrong(self, number: int, what: str) -> None:
-        self.wrong += 1
-        if len(self.mistakes) < _MISTAKES_SHOWN:
-            self.mistakes.append(f"{self.where}:{number}: {what}")
-
-
-def _mistakes(where: str, lines: Sequence[str], count: int) -> InputError:
-    head = f"{where}: {'1 mistake' if count == 1 else f'{count} mistakes'}"
-    more = [f"  and {count - len(lines)} more"] if count > len(lines) else []
-    return InputError("\n".join([head, *(f"  {line}" for line in lines), *more]))
 
 
 def _to_double(text: str) -> float:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from kahanmaps_cli.complete import complete_parameter, complete_symbols, complete_system
+from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.groups import close_to
 from kahanmaps_cli.params import ExactNumber, NameValue, PointText, Seconds, Whole
 
@@ -58,7 +58,6 @@ def _parameter_option(kind: NameValue, help_text: str) -> Callable[[F], F]:
         multiple=True,
         metavar="NAME=VALUE",
         help=help_text,
-        shell_complete=complete_parameter,
     )
 
 
@@ -131,7 +130,6 @@ symbolic_option: Callable[[F], F] = click.option(
     "--symbolic",
     metavar="NAMES",
     help="Parameters that formulas are to contain, e.g. a1,a2 (eps is one).",
-    shell_complete=complete_symbols,
 )
 
 backward_option: Callable[[F], F] = click.option(

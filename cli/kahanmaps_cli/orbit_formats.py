@@ -10,16 +10,13 @@ import re
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from itertools import islice
 from typing import IO, Any
-from zipfile import ZIP_DEFLATED, ZipFile
 
 from kahanmaps_cli.render import ending
 from kahanmaps_cli.terminal import tell
 
 # An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
 MAX_PADDED_BYTES = 512_000_000
-_ROWS = 10_000  # of an npz file that are held in memory
 _LONG_LINE = 10_000  # characters, after which the next step may take minutes
 _NARROWEST = 9  # a column of numbers with the middle left out
 
@@ -159,78 +156,57 @@ class Text(Writer):
 
 
 class Npz(Writer):
-    """Arrays `step`, `x` and one `integral_k` a column, and the header and end as JSON text.
+    """Arrays `step`, `x` and, if there are any, `integrals`, and the header and end as JSON text, all at the end.
 
-    Floats and residues below 2^63 are machine numbers; exact numbers and balls are text, for a float
-    would no longer be exact. An array begins with its length: until that is known, rows wait in `rows` as text.
+    Floats and residues below 2^63 are machine numbers; exact numbers and balls are text, for a float would no longer be
+    exact.
     """
 
-    def __init__(
-        self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str], kind: str, rows: IO[str]
-    ) -> None:
+    def __init__(self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str], kind: str) -> None:
         super().__init__(stream, columns, integrals)
-        self.kind = kind  # "float", "int" or "text"
-        n = len(self.columns)
-        self._parts = {"step": slice(0, 1), "x": slice(1, 1 + n)}
-        if self.integrals:
-            self._parts["integrals"] = slice(1 + n, None)
-        self._longest = dict.fromkeys(self._parts, 1)
-        self._has_pole = False
-        self._rows = rows
-        self._count = 0
-        self._last = 0
+        self._kind = kind  # "float", "int" or "text"
+        self._steps: list[int] = []
+        self._x: list[list[Any]] = []
+        self._values: list[list[Any]] = []
+        self._longest = 1
 
     def header(self, header: dict[str, Any]) -> None:
         self._header = header
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
-        row = [str(step), *x, *("nan" if value is None and self.kind == "float" else value or "" for value in values)]
-        longest = {name: max(self._longest[name], *map(len, row[part])) for name, part in self._parts.items()}
-        if self.kind == "text":
-            width = max(longest[name] for name in self._parts if name != "step")
-            if width * (len(row) - 1) * (self._count + 1) > MAX_PADDED_BYTES:
-                raise OutputFull(
-                    f"with step {step} an npz file of exact numbers would exceed {MAX_PADDED_BYTES} bytes: "
-                    "take --format jsonl, fewer steps or --every",
-                    self._last,
-                )
+        longest = max(self._longest, *map(len, x), *(len(value or "") for value in values))
+        if self._kind == "text" and longest * (len(x) + len(values)) * (len(self._x) + 1) > MAX_PADDED_BYTES:
+            raise OutputFull(
+                f"with step {step} an npz file of exact numbers would exceed {MAX_PADDED_BYTES} bytes: "
+                "take --format jsonl, fewer steps or --every",
+                self._steps[-1] if self._steps else 0,
+            )
         self._longest = longest
-        self._has_pole = self._has_pole or "" in row
-        self._rows.write("\t".join(row) + "\n")
-        self._count, self._last = self._count + 1, step
+        convert: Any = {"float": float, "int": int, "text": str.encode}[self._kind]
+        pole = float("nan") if self._kind == "float" else None
+        self._steps.append(step)
+        self._x.append(list(map(convert, x)))
+        self._values.append([pole if value is None else convert(value) for value in values])
 
     def end(self, end: dict[str, Any]) -> None:
         import numpy as np
 
         meta = {"header": self._header, "columns": self.columns, "integrals": self.integrals, "end": end}
-        kinds = {
-            # Steps that were jumped to may be longer than machine integers.
-            "step": "int" if self._last < 2**63 else "text",
-            "x": self.kind,
-            "integrals": "text" if self._has_pole else self.kind,
-        }
-        with ZipFile(self.stream, "w", ZIP_DEFLATED) as archive:
-            with archive.open("meta.npy", "w") as member:
-                np.lib.format.write_array(member, np.array(json.dumps(meta)), allow_pickle=False)
-            for name in self._parts:
-                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                    self._write(name, kinds[name], member)
+        # Steps that were jumped to may be longer than machine integers.
+        are_short = max(self._steps, default=0) < 2**63
+        steps: list[Any] = self._steps if are_short else [str(step).encode() for step in self._steps]
+        n = len(self._x)
+        arrays = {"step": np.array(steps), "x": np.array(self._x).reshape(n, len(self.columns))}
+        if self.integrals:
+            if any(None in row for row in self._values):  # at a pole, which residues and text have no number for
+                self._values = [[_bytes(value) for value in row] for row in self._values]
+            arrays["integrals"] = np.array(self._values).reshape(n, len(self.integrals))
+        save: Any = np.savez_compressed
+        save(self.stream, meta=np.array(json.dumps(meta)), **arrays)
 
-    def _write(self, name: str, kind: str, member: IO[bytes]) -> None:
-        """One array, some rows at a time."""
-        import numpy as np
 
-        part = self._parts[name]
-        width = 1 + len(self.columns) + len(self.integrals)
-        shape = (self._count,) if name == "step" else (self._count, len(range(width)[part]))
-        dtype = {"float": "<f8", "int": "<i8", "text": f"|S{self._longest[name]}"}[kind]
-        convert: Any = {"float": float, "int": int, "text": str.encode}[kind]
-        what = {"descr": dtype, "fortran_order": False, "shape": shape}
-        np.lib.format.write_array_header_1_0(member, what)
-        self._rows.seek(0)
-        while lines := list(islice(self._rows, _ROWS)):
-            cells = [[convert(cell) for cell in line[:-1].split("\t")[part]] for line in lines]
-            member.write(np.array(cells, dtype=dtype).tobytes())
+def _bytes(value: Any) -> bytes:
+    return b"" if value is None else value if isinstance(value, bytes) else str(value).encode()
 
 
 def _comment(data: dict[str, Any]) -> str:

@@ -9,13 +9,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.terminal import COLOURS, NARROW, NUMBER_WIDTH, columns, console, on_terminal, shorten, styled, tell
+from kahanmaps_cli.terminal import COLOURS, NUMBER_WIDTH, console, on_terminal, shorten, styled, tell
 
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Evidence, Finding, Report, Witness
 
 # On a terminal long lists of claims are cut to this many.
 CLAIMS_SHOWN = 40
+
+
+def envelope(command: str) -> dict[str, str]:
+    """What every object begins with that a command prints as JSON."""
+    from kahanmaps.version import __version__
+
+    return {"command": command, "version": __version__}
 
 
 def print_json(data: Mapping[str, Any]) -> None:
@@ -92,10 +99,7 @@ def _print_plain(report: Report) -> None:
 def _print_terminal(report: Report, verbose: bool) -> None:
     tell(headline(report), style="bold")
     shown = _selection(report.findings)
-    if columns() < NARROW:
-        _print_list(report, shown, verbose)
-    else:
-        _print_table(report, shown, verbose)
+    _print_table(report, shown, verbose)
     if len(shown) < len(report.findings):
         tell(f"{len(report.findings) - len(shown)} more claims, proved like those above (--json has all)")
     if not verbose:
@@ -104,18 +108,6 @@ def _print_terminal(report: Report, verbose: bool) -> None:
     for note in report.notes:
         tell(f"note: {note}")
     tell(f"verdict\t{report.verdict}", 9)
-
-
-def _print_list(report: Report, shown: list[Finding], verbose: bool) -> None:
-    """One claim below the other, where there is no room for a table."""
-    told: set[str] = set()
-    for finding in shown:
-        tell(f"{_verdict_text(finding)}\t{finding.claim}")
-        if verbose:
-            for line in _details(finding, told, NUMBER_WIDTH):
-                tell(f"\t{line}")
-        else:
-            tell(f"\t{_short(finding.evidence)}")
 
 
 def _print_table(report: Report, shown: list[Finding], verbose: bool) -> None:

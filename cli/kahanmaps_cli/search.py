@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 
 from kahanmaps_cli.options import eps_options, output_options, seconds_option, seed_option, symbolic_option, the_eps
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import on_terminal, shorten, tell
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -64,11 +64,9 @@ def scope(found: Any) -> str:
 def heading(name: str, found: Any) -> dict[str, Any]:
     """What is needed to redo a search, as plain data."""
     from kahanmaps.checks.settings import eps_record
-    from kahanmaps.version import __version__
 
     return {
-        "command": name,
-        "version": __version__,
+        **envelope(name),
         "system": found.file.name,
         "parameters": {key: str(value) for key, value in found.file.parameters.items()},
         "symbols": list(found.symbols),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kahanmaps.display import markup
 from kahanmaps_cli.render import exit_status, headline, print_report, verdict_style, witness_lines
-from kahanmaps_cli.terminal import NARROW, NUMBER_WIDTH, columns, console, echo, on_terminal, shorten, styled, tell
+from kahanmaps_cli.terminal import NUMBER_WIDTH, console, echo, on_terminal, shorten, styled, tell
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -84,10 +84,7 @@ def _print_terminal(report: Report, verbose: bool) -> None:
     controls = bool(report.context.get("controls"))
     for (number, title), findings in by_section.items():
         name = title if number == 10 else f"Section {number}. {title}"
-        if columns() < NARROW:
-            _print_list(name, findings, verbose, controls)
-        else:
-            console().print(_table(name, findings, verbose, controls))
+        console().print(_table(name, findings, verbose, controls))
     for finding in others:
         tell(f"{finding.claim}: {finding.evidence.summary}")
     for method in dict.fromkeys(finding.evidence.method for finding in report.findings):
@@ -113,16 +110,6 @@ def _rows(finding: Finding, verbose: bool) -> list[str]:
     if shows and finding.witness is not None:
         lines += witness_lines(finding.witness, NUMBER_WIDTH)
     return lines
-
-
-def _print_list(name: str, findings: list[Finding], verbose: bool, controls: bool) -> None:
-    """One statement below the other, where there is no room for a table."""
-    tell(f"\n{name}", style="bold")
-    for finding in findings:
-        printed = ", as printed" if finding.place.get("misprint") else ""
-        tell(f"{finding.verdict}\t{finding.place['place']}{printed} ({_decided(finding, controls)})")
-        for line in _rows(finding, verbose):
-            tell(f"\t{line}")
 
 
 def _table(name: str, findings: list[Finding], verbose: bool, controls: bool) -> Table:

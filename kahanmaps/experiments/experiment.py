@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,6 @@ from kahanmaps.experiments.recipes import family_recipe, find_file, recipe_of
 from kahanmaps.experiments.records import Limits, Task, canonical
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, task_kind
 from kahanmaps.experiments.shape import SpecDocument, read_memory, read_time
-from kahanmaps.family.draw import parse_chi
 
 PARAMETERS = "parameters."  # what the name of a value begins with that is a parameter of the system
 DEFAULT_LIMITS = Limits(time=3600.0, memory=4 * 10**9)
@@ -27,13 +26,6 @@ TIME_STEP = "time_step"
 _EPS2 = "eps2"
 _FAMILY_WORD = "family"
 _FILES_AT_MOST = 10_000
-_POINTS_COMPARED = 1_000
-# m from what a random member is drawn with.
-_SIZES: Mapping[str, Callable[[Any], int]] = {
-    "m": int,
-    "eigenvalues": lambda text: int(text.count(",")) + 1,
-    "chi": lambda text: parse_chi(text).degree(),
-}
 _CONTRADICTIONS = (("m", "eigenvalues"), ("m", "chi"), ("eigenvalues", "chi"), ("draw", "chi"), ("draw", "eigenvalues"))
 
 
@@ -106,7 +98,7 @@ def _axis_data(values: Sequence[Any]) -> Any:
 class ExperimentReader:
     """Reads the table of this name, once.
 
-    `files` are the systems of the key system, `others` those of the option other with their places; `is_family` says
+    `files` are the systems of the key system; `is_family` says
     that members are drawn at random instead. `kind` is None where the task is not known.
     """
 
@@ -116,7 +108,6 @@ class ExperimentReader:
         self.raw: dict[str, Any] = spec.document["experiments"][name]  # as it was written, whatever its shape
         self.kind: TaskKind | None = None
         self.files: list[SystemFile] = []
-        self.others: list[tuple[str, SystemFile]] = []
         self.is_family = False
 
     def read(self) -> Experiment | None:
@@ -136,7 +127,6 @@ class ExperimentReader:
         zips = self._read_zips(axes)
         limits = self._read_limits(kind, fixed)
         self._require(kind)
-        self._compare_dimensions({**fixed, **axes}, zips)
         if len(self.spec.mistakes) > told_before:
             return None
         constant = {key: values[0] for key, values in fixed.items()}
@@ -361,34 +351,9 @@ class ExperimentReader:
                     if key == "system":
                         self.files.append(file)
                         self._require_kind(place, file)
-                    else:
-                        self.others.append((place, file))
             except InputError as error:
                 self.mistake(place, str(error))
         return list(recipes.values())
-
-    def _compare_dimensions(self, values: Mapping[str, Values], zips: Sequence[Sequence[str]]) -> None:
-        """Every start and every second system must fit every system; zipped ones are compared in pairs."""
-        drawn = next((name for name in _SIZES if name in values), None) if self.is_family else None
-        if drawn is not None and len(values[drawn]) <= _POINTS_COMPARED:
-            dims = [2 * _SIZES[drawn](value) for value in values[drawn]]
-        else:
-            dims = [file.dim for file in self.files]
-        starts = values.get("start", ())
-        if len(starts) <= _POINTS_COMPARED:
-            place = self.given().get("start", "")
-            places = [f"{place}[{k}]" if len(starts) > 1 else place for k in range(1, len(starts) + 1)]
-            found = [(place, start.count(",") + 1) for place, start in zip(places, starts, strict=True)]
-            self._compare(found, dims, "coordinates", any({drawn, "start"} <= set(names) for names in zips))
-        if OTHER in values:
-            found = [(place, file.dim) for place, file in self.others]
-            self._compare(found, dims, "variables", any({drawn, OTHER} <= set(names) for names in zips))
-
-    def _compare(self, found: Sequence[tuple[str, int]], dims: Sequence[int], what: str, zipped: bool) -> None:
-        for (place, count), partners in zip(found, [[d] for d in dims] if zipped else [dims] * len(found), strict=True):
-            wrong = sorted({dim for dim in partners if dim != count})
-            if wrong:
-                self.mistake(place, f"found {count} {what}, expected {wrong[0]}, the dimension of the system")
 
     def _find(self, reference: str) -> list[SystemFile]:
         """The system of a reference, or all those that match a pattern such as members/*.toml."""

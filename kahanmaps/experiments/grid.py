@@ -6,20 +6,19 @@ A grid of ten thousand million points costs nothing until somebody walks it; its
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import accumulate
-from math import gcd, lcm, prod
+from math import lcm, prod
 from typing import Any
 
 from flint import fmpq
 
 from kahanmaps.algebra.text import parse_number
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.options import Option, number_of, show
+from kahanmaps.experiments.options import Option, show
 
 _RANGE_FORM = 'expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'
 _MOST = 2**62  # values of an axis: Python's `len` ends there
-_PAIRS_COMPARED = 100_000
 _TOO_MANY = "more values than anybody can want"
 
 Place = tuple[int, ...]
@@ -67,29 +66,6 @@ class RationalRange(Sequence[fmpq]):
             return [fmpq(numerator, self._scale) for numerator in self.numerators[index]]
         return fmpq(self.numerators[index], self._scale)
 
-    def common(self, other: RationalRange) -> fmpq | None:
-        """The least value that both have, if there is one: a congruence, nothing is enumerated.
-
-        >>> RationalRange.from_text("0..9999 step 3").common(RationalRange.from_text("9998..0 step -7"))
-        9
-        """
-        scale = lcm(self._scale, other._scale)
-        mine, its = self._increasing(scale), other._increasing(scale)
-        shared = gcd(mine.step, its.step)
-        if (its.start - mine.start) % shared:
-            return None
-        modulus = its.step // shared
-        steps = (its.start - mine.start) // shared * pow(mine.step // shared, -1, modulus) % modulus
-        value, period = mine.start + steps * mine.step, mine.step * modulus
-        value += -((value - max(mine.start, its.start)) // period) * period
-        return fmpq(value, scale) if value <= min(mine[-1], its[-1]) else None
-
-    def _increasing(self, scale: int) -> range:
-        """The values times `scale`, from the least to the largest."""
-        found = self.numerators if self.numerators.step > 0 else self.numerators[::-1]
-        factor = scale // self._scale
-        return range(found.start * factor, found.stop * factor, found.step * factor)
-
 
 class Values(Sequence[Any]):
     """The canonical values of an option, in pieces: single values and ranges."""
@@ -124,7 +100,6 @@ def read_values(option: Option, raw: Any) -> tuple[Values | None, list[Mistake]]
     pieces: list[Sequence[Any]] = []
     mistakes: list[Mistake] = []
     seen: dict[Any, int] = {}
-    ranges: dict[int, RationalRange] = {}
     items = raw if isinstance(raw, list) else [raw]
     if not items:
         mistakes.append(((), "found an empty list, expected at least one value"))
@@ -138,7 +113,6 @@ def read_values(option: Option, raw: Any) -> tuple[Values | None, list[Mistake]]
                 zero = found.numerators.index(0) if 0 in found.numerators else 0
                 for k in {0, min(1, len(found) - 1), len(found) - 1, zero}:
                     values[k]
-                ranges[number] = found
                 pieces.append(found)
                 continue
             value = option.read(item)
@@ -150,26 +124,7 @@ def read_values(option: Option, raw: Any) -> tuple[Values | None, list[Mistake]]
             mistakes.append((place, str(error)))
     if not mistakes and sum(map(len, pieces)) > _MOST:
         mistakes.append(((), f"found {_TOO_MANY}"))
-    if not mistakes and 0 < len(ranges) * len(items) <= _PAIRS_COMPARED:
-        mistakes += _twice(items, ranges)
     return (None if mistakes else Values(option, pieces)), mistakes
-
-
-def _twice(items: Sequence[Any], ranges: Mapping[int, RationalRange]) -> Iterator[Mistake]:
-    """What is in a range and somewhere else as well; `ranges` has the ranges by their numbers in the list."""
-    for number, item in enumerate(items, start=1):
-        mine = ranges.get(number)
-        if mine is None:
-            value = number_of(item)
-            mine = RationalRange(value, value, fmpq(1))
-        for other, values in ranges.items():
-            if other >= number and number in ranges:
-                break
-            common = values.common(mine)
-            if common is not None:
-                told = f"found {show(common)}, which is in place {min(other, number)} as well: expected it once"
-                yield (max(other, number),), told
-                break
 
 
 class Grid:

@@ -8,13 +8,12 @@ batch, on every machine.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from hashlib import sha256
 from typing import Any, Protocol
-from zlib import crc32
 
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), allow_nan=False)
 # digest of a system document -> its canonical text
@@ -40,23 +39,6 @@ def digest(text: str) -> str:
 def encodable(text: str) -> str:
     """The text, with lone surrogates spelled out: a file name or what a child printed may be no UTF-8."""
     return text if text.isascii() else text.encode(errors="backslashreplace").decode()
-
-
-def checksum(cells: Sequence[Any]) -> int:
-    """By what it is seen that the cells of a row are still those that were written.
-
-    >>> checksum(["ok", None, 0.25]) == checksum(["ok", None, 0.5])
-    False
-    """
-    return crc32(canonical(list(cells)).encode())
-
-
-def has_checksum(cells: Sequence[Any], found: Any) -> bool:
-    """Whether this is their checksum; whatever the cells hold."""
-    try:
-        return bool(found == checksum(cells))
-    except (TypeError, ValueError):  # bytes, or a number that is not finite
-        return False
 
 
 @dataclass(frozen=True)

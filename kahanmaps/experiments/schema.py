@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-FORMAT = 2  # of the tables below; a change that older versions cannot read counts it up. Format 1 is read, too.
+# A change that older versions cannot read counts it up. Format 2 is this one with two more columns, which nobody reads.
+FORMATS = (1, 2)
 APPLICATION_ID = 0x4B61684D  # "KahM": by this a file is known to be ours
 
 SCHEMA = f"""
@@ -27,13 +28,4 @@ CREATE TABLE result (
 CREATE INDEX result_summary ON result (task, outcome, verdict, seconds);
 PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = 1;
-"""
-
-# Format 2. A new file is made in format 1 and upgraded, so that there is one way to it, and one text of the tables.
-UPGRADE = """
--- Of the other columns of the row, and of the key of the task: what is read is what was written. The texts of tasks,
--- documents and definitions have digests already, and plans and indexes say the same twice, which SQLite compares.
-ALTER TABLE experiment ADD COLUMN checksum INTEGER;
-ALTER TABLE result ADD COLUMN checksum INTEGER;
-PRAGMA user_version = 2;
 """

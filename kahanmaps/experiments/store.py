@@ -12,7 +12,7 @@ Three rules keep it whole:
 * no reader holds the writer up: long reads go in chunks, each fetched completely before the first row is handed out.
 
 The file itself is the matter of database.py, its tables are in schema.py. What plans and results are in them is in
-tables.py, checking.py sees whether they are what was written, and merging.py makes one database of two.
+tables.py, and merging.py makes one database of two.
 """
 
 from __future__ import annotations
@@ -23,16 +23,14 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, NamedTuple, NoReturn, Self
+from typing import Any, NamedTuple, Self
 
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import note_source, quoted
 from kahanmaps.experiments import tables
-from kahanmaps.experiments.checking import Checked, add_checksums, check, forget_damaged
 from kahanmaps.experiments.database import Database, StoreError
 from kahanmaps.experiments.merging import Merged, merge
 from kahanmaps.experiments.records import KEY_LENGTH, Job, Limits, Outcome, Record, Row, Task
-from kahanmaps.experiments.schema import FORMAT
 from kahanmaps.experiments.tables import Chosen, Planned
 
 COUNT_CHUNK = 50_000  # rows that are only counted: some 50 ms
@@ -92,31 +90,9 @@ class Store(Displayed):
     # Opening and closing
 
     @classmethod
-    def open(
-        cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False, is_checked: bool = True
-    ) -> Self:
-        """The store in this file; `create` makes it if it is not there. Open for writing, it has the lock.
-
-        What SQLite finds damaged is `Damaged` at once, unless it is not `is_checked`, which is for `check`. A file of
-        an older format gets the latest one when it is opened for writing.
-        """
-        database = Database.open(path, create, readonly, is_checked)
-        try:
-            if not readonly and database.format < FORMAT:
-                add_checksums(database)
-        except BaseException:
-            database.close()
-            raise
-        return cls(database)
-
-    def check(self) -> Checked:
-        """All of it, read and compared with its checksums; nothing that is damaged is an error here."""
-        return check(self._database)
-
-    def forget_damaged(self) -> list[str]:
-        """Remove the records that are not what was written, so that their tasks are done again; the tasks' keys."""
-        self._database.must_write()
-        return forget_damaged(self._database)
+    def open(cls, path: str | os.PathLike[str], create: bool = False, readonly: bool = False) -> Self:
+        """The store in this file; `create` makes it if it is not there. Open for writing, it has the lock."""
+        return cls(Database.open(path, create, readonly))
 
     def close(self) -> None:
         """Leave one complete file behind. May be called twice."""
@@ -148,8 +124,7 @@ class Store(Displayed):
         only the limits are set. If it is another one, this plan replaces the old; results stay, planned or not.
         `documents` (digest to text) is read after `tasks`, so whoever makes the tasks may fill it meanwhile.
         """
-        self._database.must_write()
-        with self._database.large_cache(), self._database.transaction():
+        with self._database.transaction():
             return tables.replace_plan(self._database, experiment, definition, limits, tasks, documents)
 
     def merge(self, other: str | os.PathLike[str]) -> Merged:
@@ -228,7 +203,6 @@ class Store(Displayed):
 
         What is lost is no result, and leaves the task as it was.
         """
-        self._database.must_write()
         records = [record for record in records if record.outcome is not Outcome.LOST]
         rows = [tables.row_of(record) for record in records]  # what JSON cannot hold is refused here
         with self._database.transaction():
@@ -241,7 +215,7 @@ class Store(Displayed):
                 task, before = found
                 is_kept = before[0] == Outcome.OK and not record.is_ok
                 attempts = (before[tables.ATTEMPTS] or 0) + 1
-                tables.put_result(self._database, task, record.key, attempts, before if is_kept else row)
+                tables.put_result(self._database, task, attempts, before if is_kept else row)
 
     def rows(self, experiments: Sequence[str] | None = None, *, missing: bool = False) -> Iterator[Row]:
         """The tasks with their records in plan order; with `missing` also those that have none."""
@@ -250,11 +224,11 @@ class Store(Displayed):
     def _rows(self, chosen: list[Chosen], missing: bool) -> Iterator[Row]:
         # All rows of the plan, so that what is missing is seen.
         sql = f"""
-            SELECT p.number, t.key, t.text, {tables.record_columns(self._database)}
+            SELECT p.number, t.key, t.text, {tables.RECORD_COLUMNS}
             FROM plan AS p JOIN task AS t ON t.id = p.task LEFT JOIN result AS r ON r.task = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? ORDER BY p.number"""
         for experiment in chosen:
-            for rows in tables.whole_stretches(self._database, sql, experiment, tables.RESULT_CHUNK):
+            for rows in tables.stretches(self._database, sql, experiment, tables.RESULT_CHUNK):
                 for number, key, text, *cells in rows:
                     record = tables.record_of(self._database, key, cells)
                     if record is not None or missing:
@@ -264,14 +238,13 @@ class Store(Displayed):
         """How many results no plan asks for."""
         found, last = 0, 0
         while last is not None:
-            # By what comes next and not by number: a damaged file may have results of tasks with any number.
-            count, after = self._database.fetch(
+            # In stretches, so that no reader holds the writer up.
+            count, last = self._database.fetch(
                 "SELECT sum(NOT EXISTS (SELECT 1 FROM plan AS p WHERE p.task = r.task)), max(r.task) FROM "
                 "(SELECT task FROM result INDEXED BY result_summary WHERE task > ? ORDER BY task LIMIT ?) AS r",
                 (last, COUNT_CHUNK),
             )[0]
-            self._database.require(after is None or after > last, "the table of results, task", after, "larger ones")
-            found, last = found + (count or 0), after
+            found += count or 0
         return found
 
     # Looking
@@ -286,7 +259,7 @@ class Store(Displayed):
             SELECT 1 FROM plan AS q WHERE q.task = p.task AND q.experiment = p.experiment AND q.number < p.number
         )"""
         sql = f"""
-            SELECT r.outcome, r.verdict, count(*), sum(r.seconds), sum(typeof(r.seconds) NOT IN ('integer', 'real'))
+            SELECT r.outcome, r.verdict, count(*), sum(r.seconds)
             FROM plan AS p
             JOIN result AS r INDEXED BY result_summary ON r.task = p.task
             WHERE p.experiment = ? AND p.number BETWEEN ? AND ? {once if experiment.tasks < experiment.total else ""}
@@ -295,24 +268,16 @@ class Store(Displayed):
         verdicts: Counter[str] = Counter()
         seconds = 0.0
         for rows in tables.stretches(self._database, sql, experiment, COUNT_CHUNK):
-            for outcome, verdict, count, time, without in rows:
-                is_sound = tables.is_a_verdict(verdict) and tables.is_a_time(time) and not without
-                if outcome not in set(Outcome) or not is_sound:
-                    self._name_the_damage(experiment)
-                outcomes[Outcome(outcome)] += count
+            for outcome, verdict, count, time in rows:
+                with self._database.making(f"the outcomes of {quoted(experiment.name)}"):
+                    outcomes[Outcome(outcome)] += count
+                    seconds += time
                 if verdict is not None:
                     verdicts[verdict] += count
-                seconds += time
         missing = experiment.tasks - outcomes.total()
         return ExperimentStatus(
             experiment.name, experiment.total, experiment.tasks, missing, dict(outcomes), dict(verdicts), seconds
         )
-
-    def _name_the_damage(self, experiment: Chosen) -> NoReturn:
-        """What is counted says that something is damaged, but not which record."""
-        for _ in self._rows([experiment], missing=False):
-            pass
-        raise self._database.damaged(f"the outcomes of {quoted(experiment.name)} in its index")
 
     def find(self, prefix: str) -> list[Found]:
         """The tasks whose key begins like this, at most 20; the first 4 digits at least."""
@@ -323,12 +288,11 @@ class Store(Displayed):
                 "digits"
             )
         rows = self._database.fetch(
-            f"SELECT t.id, t.key, t.text, {tables.record_columns(self._database)} "
+            f"SELECT t.id, t.key, t.text, {tables.RECORD_COLUMNS} "
             "FROM task AS t LEFT JOIN result AS r ON r.task = t.id "
             "WHERE t.key >= ? AND t.key < ? ORDER BY t.key LIMIT ?",
             (prefix, f"{prefix}g", FOUND_AT_MOST),  # g comes after every hexadecimal digit
         )
-        tables.choose(self._database, None)  # what is damaged in the plans is told
         return [
             Found(
                 tables.task_of(self._database, key, text),

@@ -9,7 +9,7 @@ import subprocess
 import time
 
 import pytest
-from cli_helpers import COMMAND, shell, terminal
+from cli_helpers import COMMAND
 
 from kahanmaps.version import __version__
 
@@ -125,12 +125,6 @@ def test_symbolic_parameters_stay_in_the_formulas(kahanmaps):
     assert "*g2" in out.partition("I1 = ")[2].partition("\n")[0]
 
 
-def test_parameters_are_set(kahanmaps):
-    out = kahanmaps("analyze weierstrass -p g2=12").out
-    assert "g2 = 12" in out.splitlines()[0]
-    assert "along orbits x^3 - eps^2*x*y^2 + 12*eps^2*x^2 - 1/4*y^2 + c1*x + c2 = 0\n" in out
-
-
 @pytest.mark.parametrize("step", ["--eps 1", "--time-step 2"])
 def test_one_eps_is_told_to_be_one(kahanmaps, step):
     title, _, verdict = report(kahanmaps(f"{FOUR} {step}").out)
@@ -140,20 +134,6 @@ def test_one_eps_is_told_to_be_one(kahanmaps, step):
     assert report(kahanmaps(FOUR).out)[2][0] == "integrable"
     found = kahanmaps(f"{FOUR} {step} --json").json
     assert (found["eps"], found["time_step"], found["commuting"]) == ("1", "2", None)
-
-
-def test_a_system_on_standard_input(tmp_path):
-    file = 'variables = ["x"]\n[system]\nrhs = ["x^2"]\n[density]\nphi = "x + 5"\n'
-    outcome = shell("kahanmaps analyze -", tmp_path, file.encode())
-    assert outcome.status == 0
-    assert "phi = x^2\n" in outcome.out
-
-
-def test_on_a_terminal_statuses_have_colours():
-    outcome = terminal("analyze", "--vars", "x,y", "--rhs", "y", "--rhs=-x")
-    assert outcome.status == 0
-    assert "\x1b[32mproved\x1b[0m      " in outcome.out
-    assert "\n\x1b[1mverdict\x1b[0m\n\x1b[1mThe system is linear" in outcome.out
 
 
 # Exit statuses
@@ -212,11 +192,6 @@ def test_an_interrupt_in_any_part_ends_it(kahanmaps, monkeypatch):
             outcome = kahanmaps(FOUR)
         assert (outcome.status, outcome.out) == (130, "")
         assert "interrupted" in outcome.err
-
-
-def test_progress_is_told_and_quiet_is_quiet(kahanmaps, slow_clock):
-    assert "degrees" in kahanmaps(f"{FOUR}").err
-    assert kahanmaps(f"{FOUR} -q").err == ""
 
 
 @pytest.mark.slow

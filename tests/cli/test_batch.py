@@ -8,15 +8,13 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import re
 import shutil
 import signal
-import sqlite3
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -99,10 +97,6 @@ def test_the_second_run_has_nothing_to_do(batch):
     assert done.err == "nothing to do: every task has a result in study.db\n"
 
 
-def test_quiet_is_quiet(batch):
-    assert batch("run", SPACE, "-q").err == ""
-
-
 def test_json_is_one_object_with_everything_counted(batch):
     done = batch("run", SPACE, "--json -q")
     (one,) = done.json["experiments"]
@@ -126,11 +120,6 @@ def test_failed_tasks_give_status_3_and_say_how_to_try_again(batch):
     assert again.json["done"] == {"failed": 2}
 
 
-def test_the_command_that_continues_is_about_the_same_experiments(batch):
-    done = batch("run", FAULT, "-e fault --shard 1/1")
-    assert "kahanmaps batch run study.toml --db study.db -e fault --shard 1/1 --retry-failed" in done.err
-
-
 def test_refuted_claims_are_results_like_others(batch):
     done = batch("run", PAUSE.replace("0..99", "0..5").replace("30", "1"), "-q")
     assert done.status == 0
@@ -145,14 +134,6 @@ def test_a_dry_run_shows_the_tasks_and_does_nothing(batch):
     assert done.rows[1][2].endswith("m=2 seed=0")
     assert done.out.endswith("6 tasks\n")
     assert not Path("study.db").exists()
-
-
-def test_a_dry_run_shows_a_second_system_by_its_name_and_one_task_as_one(batch):
-    done = batch(
-        "run", '[experiments.a]\ntask = "check-commute"\nsystem = "lorenz"\noptions.other = "lorenz"\n', "--dry-run"
-    )
-    assert done.rows[0][2] == "1 task"
-    assert done.rows[1][3].startswith("other=lorenz s=10 r=28 b=8/3 steps=10 ")
 
 
 def test_a_dry_run_with_a_database_says_what_is_missing(batch, space):
@@ -274,27 +255,6 @@ def test_export_to_parquet(batch):
     assert parquet.read_table("study.parquet")["dimension"].to_pylist() == [8] * 3 + [12] * 3
 
 
-def test_an_export_follows_links_and_goes_through_pipes(batch, space):
-    expected = batch("export --db study.db --csv --stable").out
-    os.symlink("real.csv", "link.csv")
-    assert batch("export --db study.db --csv --stable -o link.csv").status == 0
-    assert Path("link.csv").is_symlink()
-    assert Path("real.csv").read_text() == expected
-    os.mkfifo("pipe")
-    with subprocess.Popen(["cat", "pipe"], stdout=subprocess.PIPE, text=True) as reader:
-        assert batch("export --db study.db --csv --stable -o pipe").status == 0
-        assert reader.communicate(timeout=10)[0] == expected
-    assert Path("pipe").is_fifo()
-    assert batch("export --db study.db --csv --stable -o -").out == expected
-    assert sorted(os.listdir()) == ["link.csv", "pipe", "real.csv", "study.db", "study.toml"]
-
-
-def test_an_export_that_fails_leaves_the_old_file(batch, space):
-    Path("out.csv").mkdir()
-    assert batch("export --db study.db --csv -o out.csv").status == 2
-    assert sorted(path.name for path in Path().iterdir() if "part" in path.name) == []
-
-
 def test_a_summary_groups_and_counts(batch, space):
     rows = batch("summary --db study.db --by m --value dimension --stable").rows
     assert rows[:3] == [["m", "tasks", "ok"], ["2", "3", "3"], ["3", "3", "3"]]
@@ -341,59 +301,12 @@ def test_different_results_of_one_task_are_told_and_those_of_the_target_are_kept
     assert batch("merge one.db one.db").status == 2
 
 
-def test_check_says_in_one_line_what_is_whole_and_what_is_damaged_and_run_does_it_again(batch, space):
-    before = batch("export --db study.db --csv --stable").out
-    done = batch("check --db study.db")
-    assert done == Outcome(0, "study.db: whole: 1 experiment, 6 tasks, 0 documents, 6 results\n", "")
-    with closing(sqlite3.connect("study.db")) as connection, connection:
-        connection.execute("UPDATE result SET message = 'other' WHERE task < 3")
-    first, second = (line.split(",")[2] for line in before.splitlines()[1:3])
-    done = batch("check --db study.db")
-    assert (done.status, done.err) == (3, "'batch run' does the damaged results again\n")
-    damaged = f"damaged: 2 results ({first}, {second})"
-    assert done.out == f"study.db: {damaged}; whole: 1 experiment, 6 tasks, 0 documents, 4 results\n"
-    assert batch("check --db study.db --json -q").json["results"] == {"whole": 4, "damaged": [first, second]}
-    for reader in (
-        "export --csv -o out.csv",
-        "summary",
-        f"show {first[:8]}",
-        "export --jsonl",
-        "merge new.db study.db",
-    ):
-        done = batch(f"{reader}{'' if 'merge' in reader else ' --db study.db'}")
-        assert (done.status, done.err.count("\n")) == (2, 1), reader
-        assert f"study.db is damaged (the record of task {first}: it has not its checksum)" in done.err
-    assert not Path("out.csv").exists()
-    done = batch("run --db study.db -j 1")
-    assert done.status == 0
-    assert f"2 damaged results removed, to be done again: {first}, {second}" in done.err
-    assert batch("export --db study.db --csv --stable").out == before
-
-
-def test_check_of_pages_that_are_damaged_and_of_what_is_no_database(batch, space):
-    content = bytearray(Path("study.db").read_bytes())
-    content[4096 * 5 : 4096 * 5 + 8] = b"\xa5" * 8
-    Path("study.db").write_bytes(content)
-    done = batch("check --db study.db")
-    assert (done.status, done.err) == (3, "take a copy from before the damage\n")
-    assert re.match(r"study\.db: damaged: pages of the file \(.+\), .*; whole: .*\n$", done.out)
-    assert batch("status --db study.db").status == 2
-    Path("text.db").write_text("text" * 1000)
-    assert batch("check --db text.db").err == "Error: text.db is not an SQLite database: check the name\n"
-    assert batch("check --db text.db").status == 2
-
-
 def test_tasks_lists_what_can_be_done(batch):
     assert "family-space" in batch("tasks").out
     assert "(required)" in batch("tasks orbit").out
     described = {task["name"]: task for task in batch("tasks --json").json["tasks"]}
     assert described["orbit"]["options"]["eps"]["required"]
     assert described["orbit"]["options"]["steps"]["default"] == 100
-
-
-@pytest.mark.parametrize("name", ["run", "status", "show", "export", "summary", "merge", "check", "tasks"])
-def test_every_help_has_an_example(batch, name: str):
-    assert f"kahanmaps batch {name}" in batch(f"{name} --help").out
 
 
 def test_on_a_terminal_there_are_tables(batch, space):
@@ -496,18 +409,6 @@ def test_a_second_ctrl_c_is_immediate(batch):
     assert "finishing 2 tasks in flight" in err
 
 
-def test_a_database_that_is_taken_away_ends_the_batch_with_status_3_and_a_sentence(batch, start):
-    Path("study.toml").write_text(PAUSE)
-    process = start("study.toml", "-j", "2")
-    Path("study.db").rename("elsewhere.db")
-    _, err = process.communicate(timeout=20)
-    assert process.returncode == 3
-    assert "removed or replaced" in err
-    assert "Traceback" not in err
-    Path("elsewhere.db").rename("study.db")
-    assert batch("run", PAUSE, "-q").status == 0  # what had been done is still there
-
-
 @pytest.mark.parametrize("blocks", quick([0, 1, 2, 40], [0, 40]))
 def test_a_full_disk_ends_a_batch_with_status_3_and_what_was_stored_before(batch, tmp_path: Path, blocks: int):
     """What is planned does not fit, or the file itself, or its lock; ulimit counts in units of 1024 bytes."""
@@ -519,43 +420,13 @@ def test_a_full_disk_ends_a_batch_with_status_3_and_what_was_stored_before(batch
         assert batch("run", SPACE, "-q", "-j", "1").status == 0
 
 
-def test_an_export_to_a_full_disk_ends_with_status_3_and_leaves_the_old_file(batch, tmp_path: Path, space):
-    Path("old.csv").write_text("old")
-    done = shell("ulimit -f 0; kahanmaps batch export --db study.db -o old.csv", tmp_path)
-    assert (done.status, Path("old.csv").read_text()) == (3, "old")
-    assert done.err.startswith("Error: File too large")
-
-
 def test_two_batches_do_not_write_to_one_database(batch, start):
     Path("study.toml").write_text(PAUSE)
-    process = start("study.toml", "-j", "1")
+    start("study.toml", "-j", "1")
     done = batch("run study.toml")
     assert done.status == 2
-    assert str(process.pid) in done.err
+    assert "another batch is writing to study.db" in done.err
     assert batch("status --db study.db").status == 0  # looking is allowed
-
-
-def test_progress_is_a_line_now_and_then_where_there_is_no_terminal(monkeypatch: pytest.MonkeyPatch):
-    from kahanmaps_cli import batch_run
-
-    monkeypatch.setattr(batch_run, "_LINE_EVERY", 0.0)
-    said: list[str] = []
-    monkeypatch.setattr(batch_run, "say", said.append)
-    from kahanmaps.experiments.records import Outcome as Word
-    from kahanmaps.experiments.records import Record
-
-    progress = batch_run.BatchProgress(4, quiet=False)
-    progress.tell([Record("a", Word.OK), Record("b", Word.FAILED)], 2)
-    assert len(said) == 1
-    assert said[0].startswith("2 of 4 tasks, ")
-    assert said[0].endswith(", 2 running, 1 failed")
-    assert "left" in said[0]
-
-
-def test_an_empty_batch_database_has_an_empty_status(batch, kahanmaps: Callable[..., Outcome], space):
-    done = batch("merge empty.db study.db")
-    assert done.status == 0
-    assert batch("status --db empty.db").rows[1][:4] == ["space", "6", "0", "6"]
 
 
 @pytest.mark.slow
@@ -571,43 +442,3 @@ def test_the_documented_shell_examples_run(tmp_path: Path):
     done = shell(script, tmp_path)
     assert done.status == 0, done.err
     assert done.out.splitlines()[-1] == "6"
-
-
-def test_what_a_reader_does_not_want_is_no_error(batch, tmp_path: Path, space):
-    done = shell("kahanmaps batch export --db study.db --jsonl | head -n 1; echo ${PIPESTATUS[0]}", tmp_path)
-    assert done.out.splitlines()[-1] == "0"
-    assert done.err == ""
-
-
-def test_nothing_of_a_record_reaches_a_terminal_as_an_escape_sequence(batch):
-    key = failed_with("evil \x1b[41m")
-    for words in ([f"show {key}"], ["summary", "--by", "outcome,message"]):
-        shown = terminal("batch", *" ".join(words).split(), "--db", "study.db", NO_COLOR="1").out
-        assert r"evil \x1b[41m" in shown
-        assert "\x1b[41m" not in shown
-
-
-def test_on_a_terminal_a_message_is_broken_but_complete_and_numbers_are_not_broken(batch):
-    words = ["no", "period", "of", "this", "orbit"] * 5
-    failed_with(" ".join(words))
-    batch("run --db study.db --shard 2/6 -q")
-    shown = terminal("batch", "summary", "--db", "study.db", "--by", "outcome,message", NO_COLOR="1").out
-    cells = [line.split("│")[2].split() for line in shown.partition("└")[0].splitlines() if "│" in line]
-    assert [word for cell in cells for word in cell] == words
-    shown = terminal("batch", "summary", "--db", "study.db", "--by", "experiment,m", NO_COLOR="1").out
-    assert re.search(r"│ *[0-9]{8,9}│", shown)  # the memory, in bytes
-
-
-def failed_with(message: str) -> str:
-    """Make study.db, in which the first task of SPACE failed with this message; its key."""
-    from kahanmaps.experiments.records import Outcome as Word
-    from kahanmaps.experiments.records import Record
-    from kahanmaps.experiments.run import plan
-    from kahanmaps.experiments.spec import parse_spec
-    from kahanmaps.experiments.store import Store
-
-    spec = parse_spec(SPACE)
-    with Store.open("study.db", create=True) as store:
-        plan(spec, store)
-        store.add([Record(spec.experiments[0][0].key, Word.FAILED, message=message)])
-    return spec.experiments[0][0].key

@@ -11,7 +11,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from cli_helpers import shell, terminal
 
 DRAWN = [
     ("--m 1", 1),
@@ -43,16 +42,6 @@ def test_what_is_drawn_is_a_system_file(kahanmaps, tmp_path, options, m):
     assert kahanmaps(f"family new {options} -o", path).status == 0
     shown = kahanmaps("family show", path, "--json").json
     assert (shown["system"], shown["m"], shown["dim"]) == ("drawn", m, 2 * m)
-
-
-@pytest.mark.parametrize(("options", "_"), DRAWN)
-def test_a_seed_draws_the_same_again(kahanmaps, options, _):
-    assert kahanmaps(f"family new {options}") == kahanmaps(f"family new {options}")
-
-
-@pytest.mark.parametrize("options", ["--m 2", "--eigenvalues 1,2", "--generic --m 2", "--chi t^2-2"])
-def test_another_seed_draws_another_member(kahanmaps, options):
-    assert kahanmaps(f"family new {options} --seed 1").out != kahanmaps(f"family new {options} --seed 2").out
 
 
 def test_the_eigenvalues_are_those_asked_for(kahanmaps, tmp_path):
@@ -92,17 +81,6 @@ def test_a_file_gets_what_standard_output_would(kahanmaps, tmp_path):
     assert kahanmaps("family new --m 2 --seed 5 --name a -o -").out == printed
 
 
-def test_what_was_drawn_is_told_on_standard_error(kahanmaps, tmp_path):
-    outcome = kahanmaps("family new --eigenvalues 1,-2 -o", tmp_path / "a.toml")
-    assert outcome.out == ""
-    expected = "dimension 4; A is generic: chi = (t + 2) (t - 1), without repeated roots, all roots rational"
-    assert outcome.err == f"{tmp_path / 'a.toml'}: {expected}\n"
-
-
-def test_quiet_is_silent(kahanmaps):
-    assert kahanmaps("family new --m 2 -q").err == ""
-
-
 # show
 
 
@@ -127,29 +105,10 @@ def test_a_member_is_shown_for_scripts(kahanmaps, pair):
     assert (shown["chi"], shown["generic"], shown["signs"]) == ("t^2 + t - 2", True, [1, 1])
 
 
-def test_the_file_holds_what_is_shown(kahanmaps, pair):
-    shown = kahanmaps("family show", pair, "--json").json
-    family = tomllib.loads(pair.read_text())["family"]
-    assert shown["A"] == family["A"]
-    assert shown["hamiltonians"][0] == family["H"]
-    assert len(shown["hamiltonians"]) == shown["m"]
-
-
 def test_a_member_is_shown_to_people(kahanmaps, pair):
     lines = kahanmaps("family show", pair).out.splitlines()
     assert lines[0] == "pair: m = 2, dimension 4, variables x1, x2, x3, x4"
     assert [line.partition(" = ")[0] for line in lines[-2:]] == ["H_0", "H_1"]
-
-
-def test_a_member_may_come_from_the_catalogue_or_standard_input(kahanmaps, tmp_path):
-    from_catalogue = kahanmaps("family show paper_m2 --json").json
-    script = "kahanmaps systems paper_m2 --toml | kahanmaps family show - --json"
-    assert shell(script, tmp_path).json == from_catalogue
-
-
-def test_long_formulas_are_shortened_on_a_terminal_only(kahanmaps):
-    assert " chars)" in terminal("family", "show", "paper_m3").out
-    assert " chars)" not in kahanmaps("family show paper_m3").out
 
 
 def test_the_normal_form_is_shown_for_scripts_that_ask_for_it(kahanmaps, pair):
@@ -218,13 +177,6 @@ def test_a_member_that_does_not_say_so_is_found(kahanmaps, pair, forgetful, whic
     assert (shown["found"]["generic"], shown["found"]["dimension"], shown["found"]["standard"]) == (True, 2, True)
     assert shown["hamiltonians"][0] == member["hamiltonians"][0]
     assert [factor["factor"] for factor in shown["factors"]] == ["t - 1", "t - 2"]
-
-
-def test_people_are_told_that_it_was_found_and_not_declared(kahanmaps, pair, forgetful):
-    lines = kahanmaps("family show", forgetful[0]).out.splitlines()
-    expected = "found, not declared: H splits: A with A Hess(H) = Hess(H) A^T has chi = (t - 1) (t - 2)"
-    assert lines[1] == expected
-    assert "found" not in kahanmaps("family show", pair).out
 
 
 def test_what_was_found_has_a_normal_form(kahanmaps, forgetful):
@@ -305,13 +257,6 @@ def test_the_matrix_may_stand_on_the_command_line(kahanmaps, matrix):
     assert kahanmaps(f"family space --matrix '{matrix}' --json").json["basis"] == ["x1^3", "x1^2*x2", "x1*x2^2", "x2^3"]
 
 
-def test_people_see_a_line_for_each_element_of_the_basis(kahanmaps, pair):
-    lines = kahanmaps("family space", pair).out.splitlines()
-    basis = kahanmaps("family space", pair, "--json").json["basis"]
-    assert lines[0] == "dimension 8 (generic A: 4m = 8); the linear system has 20 unknowns and rank 12"
-    assert lines[2:] == [f"{k}\t{text}" for k, text in enumerate(basis, start=1)]
-
-
 # associated
 
 
@@ -328,12 +273,6 @@ def test_b_has_the_square_one(kahanmaps, pair):
         b = [[Fraction(entry) for entry in line] for line in row["B"]]
         square = [[sum(b[i][k] * b[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
         assert square == [[int(i == j) for j in range(4)] for i in range(4)]
-
-
-def test_an_irreducible_chi_has_the_system_itself_alone(kahanmaps):
-    assert [row["label"] for row in kahanmaps("family associated paper_m3_irreducible --json").json["associated"]] == [
-        "+"
-    ]
 
 
 def test_the_associated_systems_are_written_as_files(kahanmaps, pair, tmp_path):
@@ -353,10 +292,3 @@ def test_files_stay_in_their_folder_whatever_the_name_of_the_system(kahanmaps, t
     assert kahanmaps("family associated", tmp_path / "a.toml", "--write-to", folder).status == 0
     assert len(list(folder.iterdir())) == 2
     assert sorted(path.name for path in tmp_path.rglob("*.toml") if path.parent != folder) == ["a.toml"]
-
-
-def test_people_see_a_line_for_each_associated_system(kahanmaps, pair):
-    lines = kahanmaps("family associated", pair).out.splitlines()
-    assert lines[0] == "pair: signs belong to the factors (t + 2), (t - 1); 2 associated up to sign, f_0 first"
-    assert [line.split("\t")[0] for line in lines[1:]] == ["++", "+-"]
-    assert lines[1].split("\t")[1] == "B = [1, 0] in 1, A, A^2, ..."

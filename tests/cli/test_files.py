@@ -10,16 +10,12 @@ import io
 import json
 import os
 import random
-import resource
 import shlex
 import signal
-import sqlite3
 import subprocess
-import sys
 import time
-import tracemalloc
 from collections.abc import Callable, Iterator
-from contextlib import closing, redirect_stdout
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +23,13 @@ import click
 import numpy as np
 import pytest
 from cli_helpers import COMMAND, shell
-from command_tree import LEAST, all_commands
+from command_tree import all_commands
 from small_databases import ok, planned
 
 from kahanmaps.errors import InputError
 from kahanmaps.plots.degree_records import degrees_of_record
 from kahanmaps.plots.height_curves import curves_of_record
 from kahanmaps.plots.recipe import read_recipe
-from kahanmaps_cli import orbit_formats
 from kahanmaps_cli.ensemble_starts import read_starts
 from kahanmaps_cli.main import main
 from kahanmaps_cli.outputs import OutputFile, OutputFolder
@@ -142,8 +137,10 @@ def test_every_output_goes_through_the_one_door_and_every_input_is_tried():
                 assert parameter.name in READS[words][1], (words, parameter.name)
 
 
-@pytest.mark.parametrize("way", ["the same", "hard link", "symbolic link"])
-@pytest.mark.parametrize(("words", "name"), CASES)
+@pytest.mark.parametrize(
+    ("words", "name", "way"),
+    [*((*case, "the same") for case in CASES), *((*CASES[0], way) for way in ("hard link", "symbolic link"))],
+)
 def test_no_file_is_written_over_that_is_read(kahanmaps, given, words, name, way):
     ending, lines = READS[words]
     source = Path("in" + ending)
@@ -156,8 +153,7 @@ def test_no_file_is_written_over_that_is_read(kahanmaps, given, words, name, way
         target.symlink_to(source)
     outcome = kahanmaps(lines[name].replace("IN", str(source)), "-o", target)
     assert (outcome.status, outcome.out, source.read_bytes()) == (2, "", before)
-    two_names = way == "hard link" and CONTENT.get(name) == "study.db"  # a database with two is not even opened
-    assert ("has 2 names" if two_names else "it would be written over") in outcome.err
+    assert "it would be written over" in outcome.err
 
 
 @pytest.mark.parametrize("words", ["orbit", "convert", "ensemble", "batch export"])
@@ -186,16 +182,6 @@ def test_nothing_is_computed_before_the_output_is_refused(kahanmaps, given, monk
     assert kahanmaps("plot degrees harmonic ./system.svg -o system.svg").status == 2
 
 
-def test_the_journal_of_a_database_belongs_to_it(kahanmaps, given):
-    with closing(sqlite3.connect("study.db")) as writer:
-        writer.execute("PRAGMA journal_mode = WAL")
-        writer.executescript("CREATE TABLE t (x); DROP TABLE t")
-        before = Path("study.db-wal").read_bytes()
-        outcome = kahanmaps("batch export --db study.db --csv -o study.db-wal")
-        assert (outcome.status, Path("study.db-wal").read_bytes()) == (2, before)
-        assert "it would be written over" in outcome.err
-
-
 def test_associated_systems_are_not_written_over_the_one_they_belong_to(kahanmaps, tmp_path):
     kahanmaps("family new --m 2 --seed 1 --name a -q -o", tmp_path / "a.toml")
     assert kahanmaps("family associated --write-to", tmp_path, tmp_path / "a.toml").status == 0
@@ -209,21 +195,6 @@ def test_associated_systems_are_not_written_over_the_one_they_belong_to(kahanmap
 
 
 # Whole files
-
-
-def test_the_rows_of_an_npz_file_are_not_held_in_memory(monkeypatch, tmp_path):
-    monkeypatch.setattr(orbit_formats, "_ROWS", 100)
-    with open(tmp_path / "x.npz", "wb") as stream, open(tmp_path / "rows", "w+") as rows:
-        writer = orbit_formats.Npz(stream, ["x", "y"], [], "float", rows)
-        writer.header({})
-        tracemalloc.start()
-        for step in range(5_000):
-            writer.point(step, ["0.1", "1e-300"], [])
-        writer.end({})
-        peak = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-    assert np.load(tmp_path / "x.npz")["x"].tolist() == [[0.1, 1e-300]] * 5_000
-    assert peak < 500_000  # of what the rows would take as texts a tenth
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
@@ -247,10 +218,6 @@ def test_an_npz_file_is_the_old_one_or_the_new_one_whatever_ends_the_orbit(tmp_p
         assert json.loads(str(np.load(target)["meta"]))["end"]["status"] == "interrupted"
 
 
-def test_a_device_takes_an_npz_file(kahanmaps):
-    assert kahanmaps(f"orbit harmonic {ORBIT} --format npz -o /dev/null").status == 0
-
-
 def test_a_pipe_takes_an_npz_file(tmp_path):
     script = f"mkfifo p; cat p > x.npz & kahanmaps orbit harmonic {ORBIT} -q --format npz -o p; echo $?; wait"
     assert shell(script, tmp_path).out == "0\n"
@@ -263,15 +230,6 @@ def test_a_pipe_is_no_place_for_a_file_that_grows(kahanmaps, tmp_path, command):
     outcome = kahanmaps(command.replace("IN", "harmonic"), "-o", tmp_path / "p.npy")
     assert (outcome.status, outcome.out) == (2, "")
     assert "found a pipe, expected a file" in outcome.err
-
-
-@pytest.mark.parametrize("ending", ["csv", "jsonl", "npz", "npy", "txt"])
-def test_links_in_a_circle_are_no_place(kahanmaps, tmp_path, ending):
-    loop = tmp_path / f"loop.{ending}"
-    loop.symlink_to(loop.name)
-    outcome = kahanmaps(f"orbit harmonic {ORBIT} --arithmetic float -o", loop)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert outcome.err == f"Error: Too many levels of symbolic links: {loop}\n"
 
 
 # Damaged files
@@ -287,7 +245,7 @@ READERS = {
     "degrees.json": lambda path: degrees_of_record(read_record(path), path),
     "picture.png": read_recipe,
 }
-NASTY = (None, True, -1.5, float("inf"), 10**400, "", "1/0", [], {})
+NASTY = (None, float("inf"), "1/0", [], {})
 
 
 def damages(content: bytes, count: int) -> Iterator[bytes]:
@@ -310,17 +268,16 @@ def is_read_or_refused(read: Callable[[str], Any], path: Path) -> bool:
     return True
 
 
-@pytest.mark.parametrize("count", [25, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", READERS)
-def test_a_damaged_file_is_read_or_refused_with_its_name(made, tmp_path, name, count):
+def test_a_damaged_file_is_read_or_refused_with_its_name(made, tmp_path, name):
     content = (made / name.replace("orbits.npy", "starts.npy")).read_bytes()
     path = tmp_path / name
-    for damaged in damages(content, count):
+    for damaged in damages(content, 25):
         path.write_bytes(damaged)
         assert is_read_or_refused(READERS[name], path)
 
 
-@pytest.mark.parametrize("name", ["heights.json", "degrees.json", "orbit.jsonl"])
+@pytest.mark.parametrize("name", ["degrees.json", "orbit.jsonl"])
 def test_a_record_with_any_other_value_is_read_or_refused_with_its_name(made, tmp_path, name):
     path = tmp_path / name
     records = [json.loads(line) for line in (made / name).read_text().splitlines()]
@@ -329,19 +286,6 @@ def test_a_record_with_any_other_value_is_read_or_refused_with_its_name(made, tm
             before, table[key] = table[key], nasty
             path.write_text("\n".join(map(json.dumps, records)))
             assert is_read_or_refused(READERS[name], path)
-            table[key] = before
-
-
-def test_an_npz_file_with_any_other_value_beside_the_orbit_is_read_or_refused_with_its_name(made, tmp_path):
-    path = tmp_path / "x.npz"
-    with np.load(made / "float.npz") as held:
-        arrays = dict(held)
-    told = [json.loads(str(arrays["meta"]))]
-    for table, key in list(places(told)):
-        for nasty in NASTY:
-            before, table[key] = table[key], nasty
-            np.savez(path, **{**arrays, "meta": np.array(json.dumps(told[0]))})
-            assert is_read_or_refused(lambda path: read_orbits(path, None).ended, path)
             table[key] = before
 
 
@@ -408,13 +352,6 @@ def test_a_batch_goes_on_when_nobody_reads_its_records(unread, kahanmaps, least_
     assert kahanmaps("batch status --db new.db --json").json["experiments"][0]["missing"] == 0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("words", [words for words in LEAST if words not in ("version", "manual")])
-def test_a_reader_that_has_left_changes_the_exit_status_of_no_command(kahanmaps, unread, least_folder, words):
-    line = f"{words} {LEAST[words]}"
-    assert unread(line) == kahanmaps(line).status
-
-
 def test_an_orbit_ends_early_when_its_reader_leaves(unread):
     assert unread("orbit harmonic --start 1,2 --eps 1/10 --steps 1000000000 --arithmetic mod:10007") == 3
 
@@ -426,11 +363,6 @@ def test_a_command_ends_early_when_the_reader_of_its_pipe_leaves(tmp_path):
 
 
 # Disks and limits
-
-LIMITS = [
-    *((resource.RLIMIT_FSIZE, size) for size in (0, 4000)),
-    *((resource.RLIMIT_NOFILE, count) for count in (5, 7)),  # with fewer Python itself does not come to us
-]
 
 
 def source_of(words: str, name: str) -> str:
@@ -444,40 +376,6 @@ def line_to(words: str, target: str) -> str:
     name = next(iter(lines), "")
     line = lines[name].replace("IN", source_of(words, name)) if lines else "family new --m 1"
     return f"{line} -o {target}"
-
-
-def limited(line: str, limit: tuple[int, int] | None) -> tuple[int, str]:
-    """Run a line in a process of its own with a limit: exit status and standard error."""
-    done = subprocess.run(
-        [sys.executable, "-m", "kahanmaps_cli", *shlex.split(line)],
-        preexec_fn=None if limit is None else lambda: resource.setrlimit(limit[0], (limit[1], limit[1])),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    return done.returncode, done.stderr
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("words", [*READS, "orbit npz"])
-def test_a_limit_leaves_the_old_file_or_the_whole_new_one(given, words):
-    line, ending = ("orbit", ".npz") if words == "orbit npz" else (words, READS[words][0])
-    target = Path("out" + ending)
-    line = line_to(line, str(target))
-    usual, _ = limited(line, None)
-    whole = target.read_bytes()
-    beside = set(given.iterdir())
-    for limit in LIMITS:
-        target.write_bytes(b"before")
-        status, told = limited(line, limit)
-        assert "Traceback" not in told
-        if status == usual:
-            assert target.read_bytes() == whole
-        else:
-            assert status in (2, 3), (limit, told)
-            is_stream = words in ("orbit", "ensemble")  # valid as far as it goes
-            assert is_stream or target.read_bytes() == b"before"
-        assert set(given.iterdir()) == beside
 
 
 @needs_full_device

@@ -80,10 +80,6 @@ def test_json_is_one_object_with_all_that_is_needed_to_redo_it(kahanmaps):
     assert kahanmaps("find-density lotka_volterra --eps 1/7 --seed 2 --json -q").json == found
 
 
-def test_latex(kahanmaps):
-    assert kahanmaps("find-density lotka_volterra --latex").out.startswith("phi = ")
-
-
 @pytest.mark.parametrize(
     ("command", "words"),
     [
@@ -139,10 +135,3 @@ def test_wrong_use_gives_2(kahanmaps, options, words):
     assert (outcome.status, outcome.out) == (2, "")
     assert words in outcome.err
     assert "Traceback" not in outcome.err
-
-
-def test_the_help_fits_a_terminal(kahanmaps):
-    outcome = kahanmaps("find-density --help")
-    assert outcome.status == 0
-    assert max(map(len, outcome.out.splitlines())) <= 80
-    assert outcome.out.count("kahanmaps find-density") >= 3

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 
 import pytest
-from cli_helpers import shell
 from schema_helpers import mistakes
 
 from kahanmaps.documents.catalog import load
@@ -119,17 +118,6 @@ def test_latex(kahanmaps):
     outcome = kahanmaps("find-integrals nahm_tetrahedral --latex")
     assert outcome.out.startswith("I1 = \\frac{")
     assert outcome.status == 0
-
-
-def test_the_time_step_is_two_eps(kahanmaps):
-    by_step = kahanmaps("find-integrals euler_top --time-step 2/3 --json").json
-    assert by_step == kahanmaps("find-integrals euler_top --eps 1/3 --json").json
-    assert (by_step["eps"], by_step["time_step"]) == ("1/3", "2/3")
-
-
-def test_where_none_are_found_nothing_is_printed_as_toml(kahanmaps):
-    outcome = kahanmaps("find-integrals --vars x,y --rhs x --rhs 2*y --toml")
-    assert (outcome.status, outcome.out) == (0, "")
 
 
 @pytest.mark.parametrize(("command", "steps"), [(f"{OSCILLATOR} --eps 1", 4), ("--vars x --rhs 1+x^2 --eps 1/2", 4)])
@@ -252,19 +240,6 @@ def test_symbols_in_a_family_file_are_refused(kahanmaps, tmp_path):
     path.write_text(load("paper_m2").to_toml().replace("[family]", '[parameters]\nt = "1"\n[family]'))
     outcome = kahanmaps("find-integrals", path, "--symbolic t")
     assert (outcome.status, "write the system as [hamiltonian]" in outcome.err) == (2, True)
-
-
-def test_progress_goes_to_standard_error(tmp_path):
-    outcome = shell("kahanmaps find-integrals euler_top > out; cat out", tmp_path)
-    assert outcome.status == 0
-    assert outcome.out.startswith("find-integrals: euler_top")
-
-
-def test_the_help_fits_a_terminal(kahanmaps):
-    outcome = kahanmaps("find-integrals --help")
-    assert outcome.status == 0
-    assert max(map(len, outcome.out.splitlines())) <= 80
-    assert outcome.out.count("kahanmaps find-integrals") >= 4
 
 
 def test_integrals_of_the_flow(kahanmaps):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import click
 import pytest
-from cli_helpers import shell
 from command_tree import all_commands, all_examples, examples_in, words_of
 
 from kahanmaps_cli.main import COMMANDS, SECTIONS, cli
@@ -23,14 +22,6 @@ QUICK = [
     "kahanmaps batch tasks check-commute",
     "kahanmaps completion bash",
     "kahanmaps version --json",
-]
-SLOW = [
-    example
-    for example in all_examples()
-    if example not in QUICK
-    and not any(
-        name in example for name in (".toml", ".csv", ".db", ".npy", ".npz", "|", ">", "eval", "plot", "report")
-    )
 ]
 COMMANDS_AND_GROUPS = [words for words, _ in all_commands()]
 
@@ -81,22 +72,10 @@ def test_an_example_with_a_wrong_option_would_be_noticed():
         parsed(words_of("kahanmaps orbit euler_top --strat 1,2,3  # no such option"))
 
 
-def test_an_example_goes_on_behind_a_backslash():
-    assert examples_in("  kahanmaps orbit x \\\n      --eps 1\n") == ["kahanmaps orbit x --eps 1"]
-
-
 @pytest.mark.parametrize("example", QUICK)
 def test_an_example_that_needs_no_file_runs(kahanmaps, example):
     assert example in all_examples()
     assert kahanmaps(example.removeprefix("kahanmaps")).status == 0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("example", SLOW)
-def test_every_other_example_that_needs_no_file_runs(tmp_path, example):
-    expected = 1 if "henon_heiles    #" in example else 0  # the one that is there because it fails
-    outcome = shell(example, tmp_path)
-    assert outcome.status == expected, outcome.err
 
 
 def test_every_command_stands_under_one_heading():
@@ -107,12 +86,6 @@ def test_every_command_stands_under_one_heading():
 def test_the_headings_are_in_the_help(kahanmaps):
     lines = kahanmaps("--help").out.splitlines()
     assert [f"{heading}:" for heading in SECTIONS if f"{heading}:" not in lines] == []
-
-
-def test_the_lines_of_the_list_of_commands_are_not_broken(kahanmaps, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    lines = kahanmaps("--help").out.splitlines()
-    assert [line for _, line in COMMANDS.values() if not any(shown.endswith(line) for shown in lines)] == []
 
 
 @pytest.mark.parametrize("group", ["family", "batch", "plot"])

@@ -63,17 +63,6 @@ def test_an_option_has_the_same_metavar_everywhere():
     assert {name: several for name, several in found.items() if len(several) > 1 and name not in exceptions} == {}
 
 
-def test_an_option_takes_a_value_everywhere_or_nowhere():
-    flags = {name: {option.is_flag for words, option in options if own(words)} for name, options in by_name().items()}
-    assert {name for name, several in flags.items() if len(several) > 1} <= {"--jsonl"}
-
-
-@pytest.mark.parametrize("pair", [("-q", "--quiet"), ("-o", "--output"), ("-p", "--parameter"), ("-v", "--verbose")])
-def test_a_short_option_and_its_long_name_go_together(pair):
-    options = by_name()
-    assert [words for words, _ in options[pair[0]]] == [words for words, _ in options[pair[1]]]
-
-
 def test_whoever_takes_eps_takes_the_time_step():
     options = by_name()
     with_eps = {words for words, _ in options["--eps"] if own(words)}
@@ -107,16 +96,3 @@ def test_a_time_that_is_none_is_refused_by_every_command(kahanmaps, words, value
 def test_the_old_name_of_an_option_still_works(kahanmaps):
     new = kahanmaps("heights weierstrass --eps 1/10 --random 1 --steps 20")
     assert kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20") == new
-
-
-def test_the_old_name_of_an_option_is_not_shown(kahanmaps):
-    assert "--starts" not in kahanmaps("heights --help").out
-
-
-def test_cycles_take_time_steps_as_well(kahanmaps):
-    assert kahanmaps("cycles weierstrass -p 31 --time-step 1/5") == kahanmaps("cycles weierstrass -p 31 --eps 1/10")
-
-
-def test_family_show_takes_an_inline_system(kahanmaps):
-    inline = "--vars x1,x2,x3,x4 --rhs x3^2 --rhs x4^2 --rhs x1^2 --rhs x2^2"
-    assert "found, not declared" in kahanmaps("family show", inline).out

@@ -10,7 +10,6 @@ import random
 
 import pytest
 
-from kahanmaps.errors import SingularStep
 from kahanmaps.version import __version__
 
 PAIR = "--start 1/2,-1/5,0,1 --eps 1/10"
@@ -144,11 +143,6 @@ def test_over_the_rationals_an_orbit_is_proved_aperiodic(kahanmaps, pair):
     assert "period\tnone\n" in kahanmaps("period", pair, PAIR).out
 
 
-def test_a_fixed_point_has_period_1(kahanmaps, pair):
-    outcome = kahanmaps("period", pair, "--start 0,0,0,0 --eps 1 --json")
-    assert (outcome.status, outcome.json["period"], outcome.json["meets_pole"]) == (0, "1", False)
-
-
 def test_modulo_two_the_map_is_the_identity(kahanmaps, pair):
     options = "--start 1,0,1,1 --eps 1/7 --arithmetic mod:2"
     assert walked(kahanmaps, ("orbit", pair, options), 9)["period"] == 1
@@ -179,12 +173,6 @@ def test_hidden_members_have_periods(kahanmaps):
     hidden = kahanmaps(f"period {command}").json
     assert hidden["structure"].startswith("a hidden member")
     assert hidden["period"] == kahanmaps(f"period {M3} --arithmetic mod:10007 --json").json["period"]
-
-
-def test_verbose_says_what_was_found_and_quiet_says_nothing(kahanmaps, pair):
-    command = ("period", pair, PAIR, "--arithmetic mod:10007 -v")
-    assert kahanmaps(*command).err == "a member of the family, chi = (t + 2)*(t - 1)\n"
-    assert kahanmaps(*command, "-q").err == ""
 
 
 @pytest.mark.parametrize(
@@ -218,12 +206,3 @@ def test_wrong_use_gives_2(kahanmaps, command, words):
 def test_a_prime_that_the_coordinates_of_the_normal_form_do_not_have_is_refused(kahanmaps, files):
     outcome = kahanmaps("period", files / "scaled.toml", "--start 1,2 --eps 1 --arithmetic mod:3")
     assert (outcome.status, "the prime 3 divides" in outcome.err) == (2, True)
-
-
-def test_an_error_on_the_way_is_a_message(kahanmaps, pair, monkeypatch):
-    def fail(*_):
-        raise SingularStep("no value")
-
-    monkeypatch.setattr("kahanmaps.maps.normal_form.periods.period_over_rationals", fail)
-    outcome = kahanmaps("period", pair, PAIR)
-    assert (outcome.status, outcome.err) == (3, "Error: no value\n")

@@ -34,19 +34,10 @@ def test_counts_are_bars(kahanmaps, study):
         assert word in done.out
 
 
-def test_without_by_a_group_is_an_experiment(kahanmaps, study):
-    assert "study" in kahanmaps("plot batch", study).out
-
-
 def test_numbers_are_boxes(kahanmaps, study, tmp_path):
     done = kahanmaps("plot batch --db", study, "--by m --value c -o", tmp_path / "c.pdf")
     assert (done.status, (tmp_path / "c.pdf").read_bytes()[:4]) == (0, b"%PDF")
     assert "3 tasks have no result yet" in done.err
-
-
-def test_the_database_may_stand_in_the_environment(kahanmaps, study, monkeypatch):
-    monkeypatch.setenv("KAHANMAPS_DB", str(study))
-    assert kahanmaps("plot batch --by m").status == 0
 
 
 def test_one_number_against_another(kahanmaps, study):
@@ -60,11 +51,6 @@ def test_numbers_beyond_doubles_are_told(kahanmaps, study):
     assert "1 numbers are beyond" not in kahanmaps("plot batch", study, "--x eps --y c").err
     assert "beyond the range of machine floats" in kahanmaps("plot batch", study, "--x eps --y far").err
     assert "far: 1 group with numbers beyond" in kahanmaps("plot batch", study, "--by m --value far").err
-
-
-def test_a_batch_that_is_running_may_be_drawn(kahanmaps, study):
-    with Store.open(study):
-        assert kahanmaps("plot batch", study, "--by m").status == 0
 
 
 def test_an_empty_database_is_said_to_be_empty(kahanmaps, tmp_path):
@@ -91,9 +77,3 @@ def test_wrong_use_is_refused(kahanmaps, study, more, expected):
     done = kahanmaps("plot batch", study, more)
     assert (done.status, done.out) == (2, "")
     assert expected in done.err
-
-
-def test_a_database_is_needed(kahanmaps, monkeypatch):
-    monkeypatch.delenv("KAHANMAPS_DB", raising=False)
-    assert "missing DB" in kahanmaps("plot batch").err
-    assert "there is no database nosuch.db" in kahanmaps("plot batch nosuch.db").err

@@ -22,13 +22,6 @@ def test_the_associated_maps_close_and_the_control_does_not(kahanmaps, tmp_path)
     assert (tmp_path / "square.pdf").read_bytes().startswith(b"%PDF")
 
 
-def test_the_terminal_says_so_as_well(kahanmaps):
-    outcome = kahanmaps(PAIR, "-q --steps 3")
-    assert outcome.status == 0
-    assert "closes exactly" in outcome.out
-    assert "gap" in outcome.out
-
-
 @pytest.mark.usefixtures("unrendered")
 def test_two_systems_are_one_panel(kahanmaps, tmp_path):
     words = "plot commute euler_top zhukovski_volterra_1 --start 1,1/2,-1 --eps 1/10 -o"
@@ -42,13 +35,6 @@ def test_a_system_commutes_with_itself_but_not_at_another_step(kahanmaps, tmp_pa
     words = "plot commute lorenz lorenz --start 1,2,3 --eps 1/100"
     assert "closes exactly" in kahanmaps(words, "-o", tmp_path / "a.png").err
     assert ": gap " in kahanmaps(words, "--eps2 1/50 --axes x,z -o", tmp_path / "b.png").err
-
-
-@pytest.mark.usefixtures("unrendered")
-def test_an_inline_system_is_the_first(kahanmaps, tmp_path):
-    words = "plot commute --vars x,y,z --rhs=y*z --rhs=-2*z*x --rhs=x*y euler_top --start 1,2,3 --eps 1/10 -o"
-    outcome = kahanmaps(words, tmp_path / "a.png")
-    assert "f = inline, g = euler_top: closes exactly" in outcome.err
 
 
 @pytest.mark.usefixtures("unrendered")

@@ -7,13 +7,6 @@ import re
 import pytest
 
 
-@pytest.fixture
-def unrendered(monkeypatch):
-    """Figures are made but not rendered: for tests of what is said."""
-    monkeypatch.setattr("kahanmaps.plots.figures.picture_bytes", lambda *_: b"")
-    monkeypatch.setattr("kahanmaps.plots.terminal.draw_in_characters", lambda *_: [])
-
-
 def test_all_methods_are_drawn(kahanmaps):
     done = kahanmaps("plot drift weierstrass --eps 1/20 --start 1/4,1/8 --steps 300")
     assert done.status == 0
@@ -35,19 +28,6 @@ def test_methods_and_functions_are_as_asked_for(kahanmaps):
     assert "Kahan" not in done.out
 
 
-def test_the_time_step_is_twice_eps(kahanmaps, tmp_path):
-    first, second = tmp_path / "a.svg", tmp_path / "b.svg"
-    for target, eps in ((first, "--eps 1/20"), (second, "--time-step 1/10")):
-        kahanmaps(f"plot drift harmonic {eps} --method generic --steps 9 --size 4 -q -o", target)
-    assert first.read_text().split("</metadata>")[1] == second.read_text().split("</metadata>")[1]
-
-
-@pytest.mark.usefixtures("unrendered")
-def test_another_seed_is_another_start(kahanmaps):
-    command = "plot drift harmonic --eps 1/20 --steps 5 --method generic"
-    assert kahanmaps(command).err != kahanmaps(f"{command} --seed 1").err
-
-
 def test_an_orbit_that_ends_early_is_told_and_drawn(kahanmaps):
     done = kahanmaps("plot drift --vars x --rhs x^2 --eps 1/20 --start 1 --steps 100 --integral I=x")
     assert done.status == 3
@@ -60,15 +40,6 @@ def test_an_absolute_error_is_told(kahanmaps):
     done = kahanmaps("plot drift --vars x,y --rhs y --rhs=-x --eps 1/20 --start 1,0 --steps 9 --integral I=y")
     assert "absolute error of I" in done.out
     assert "I: absolute errors, for it is 0 at the start" in done.err
-
-
-def test_a_picture_carries_its_recipe(kahanmaps, tmp_path):
-    target = tmp_path / "d.pdf"
-    kahanmaps("plot drift harmonic --eps 1/20 --steps 9 --size 4 -q -o", target)
-    assert (
-        kahanmaps("plot recipe", target).out
-        == f"kahanmaps plot drift harmonic --eps 1/20 --steps 9 --size 4 -q -o {target}\n"
-    )
 
 
 @pytest.mark.parametrize(

@@ -37,11 +37,6 @@ def test_several_systems_are_one_picture(kahanmaps, tmp_path):
     assert target.read_bytes().startswith(b"<?xml")
 
 
-def test_an_inline_system_is_drawn(kahanmaps):
-    done = kahanmaps("plot degrees --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)'")
-    assert (done.status, "inline: lambda = 2" in done.out) == (0, True)
-
-
 def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, piped):
     first, second = tmp_path / "a.png", tmp_path / "b.png"
     record = kahanmaps("degrees euler_top --json").out
@@ -56,22 +51,11 @@ def test_degrees_of_a_record_are_the_same_picture(kahanmaps, tmp_path, piped):
     assert (image.imread(first) == image.imread(second)).all()
 
 
-def test_two_records_of_one_name_are_told_apart(kahanmaps, tmp_path):
-    (tmp_path / "r.json").write_text(kahanmaps("degrees euler_top --json").out)
-    done = kahanmaps("plot degrees --from", tmp_path / "r.json", "--from", tmp_path / "r.json")
-    assert "euler_top (2): " in done.out
-
-
 def test_a_system_that_is_stopped_early_is_told_and_drawn(kahanmaps):
     done = kahanmaps("plot degrees euler_top clebsch_first_flow --max-degree 300")
     assert done.status == 3
     assert "clebsch_first_flow: stopped early: the degree of iterate 9 is above 300" in done.err
     assert "euler_top: stopped" not in done.err
-
-
-@pytest.mark.usefixtures("unrendered")
-def test_terms_that_were_asked_for_are_no_early_end(kahanmaps):
-    assert kahanmaps("plot degrees henon_heiles --terms 3").status == 0
 
 
 @pytest.mark.parametrize(
@@ -132,14 +116,6 @@ def test_orbits_that_reach_the_digit_budget_are_told(kahanmaps):
     done = kahanmaps("plot heights lotka_volterra --eps 1/10 --random 2 --max-digits 500")
     assert done.status == 0
     assert "2 of 2 orbits ended where the numbers exceed --max-digits 500" in done.err
-
-
-@pytest.mark.usefixtures("unrendered")
-def test_the_digit_budget_of_a_record_is_its_own(kahanmaps, tmp_path):
-    record = kahanmaps("heights lotka_volterra --eps 1/10 --starts 1 --max-digits 300 --json").out
-    (tmp_path / "r.json").write_text(record)
-    done = kahanmaps("plot heights --from", tmp_path / "r.json")
-    assert "1 of 1 orbits ended where the numbers exceed --max-digits 300" in done.err
 
 
 @pytest.mark.usefixtures("unrendered")

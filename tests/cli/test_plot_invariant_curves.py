@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
 POLE = "--vars x,y --rhs=-6*x*y --rhs '3*y^2 - 3*x^2' --start 3/5,4/5 --eps 1/6"
@@ -23,19 +21,6 @@ def test_a_picture_is_written_and_the_structure_said(kahanmaps, tmp_path):
     assert outcome.out == ""
     assert "a member of the family, chi = (t - 1)*(t - 2); eps = 1/20 (time step 2 eps = 1/10)" in outcome.err
     assert (tmp_path / "curves.svg").read_text().count("<svg") == 1
-
-
-@pytest.mark.usefixtures("unrendered")
-def test_quiet_says_nothing(kahanmaps, tmp_path):
-    outcome = kahanmaps(PAIR, "-q -o", tmp_path / "curves.png")
-    assert (outcome.status, outcome.out, outcome.err) == (0, "", "")
-
-
-def test_the_terminal_shows_the_panels(kahanmaps):
-    outcome = kahanmaps(PAIR, "-q")
-    assert outcome.status == 0
-    assert "lambda1 = 1" in outcome.out
-    assert "step" in outcome.out
 
 
 @pytest.mark.usefixtures("unrendered")
@@ -75,13 +60,6 @@ def test_the_orbit_itself_is_shown_in_two_variables(kahanmaps, tmp_path):
     outcome = kahanmaps(PAIR, "--original x1,y -o", tmp_path / "b.pdf")
     assert outcome.status == 2
     assert "found --original x1,y, expected two of the variables x1, x2, x3, x4, as X,Y" in outcome.err
-
-
-def test_the_picture_knows_how_it_was_made(kahanmaps, tmp_path):
-    kahanmaps(PAIR, "-q -o", tmp_path / "a.png")
-    recipe = json.loads(kahanmaps("plot recipe --json", tmp_path / "a.png").out)
-    assert recipe["command"].startswith("kahanmaps plot invariant-curves paper_m2 --start 1/2,-1/3,0,1")
-    assert "[family]" in recipe["system"]
 
 
 @pytest.mark.parametrize(

@@ -57,12 +57,6 @@ def test_a_long_title_is_set_in_lines_and_no_formula(kahanmaps, monkeypatch):
     assert third
 
 
-def test_letters_that_no_font_has_are_told_in_a_sentence(kahanmaps, tmp_path):
-    outcome = kahanmaps(LV + " --size 4 --title '\u6570' -o", tmp_path / "a.png")
-    assert outcome.status == 0
-    assert outcome.err.splitlines()[1] == "the fonts lack some letters of the texts: they are drawn as boxes"
-
-
 def test_starts_are_chosen_where_none_are_given(kahanmaps, drawn):
     outcome = kahanmaps("plot portrait lotka_volterra --eps 1/20 --steps 20")
     assert outcome.err.startswith("lotka_volterra: 16 orbits from chosen starts, 20 steps")
@@ -99,13 +93,6 @@ def test_of_more_than_two_variables_the_axes_are_chosen_and_said(kahanmaps, draw
     assert len(drawn[0][0].labels) == 2
 
 
-def test_axes_are_drawn_in_the_order_they_are_named_in(kahanmaps, drawn):
-    kahanmaps(LV + " --axes y,x*y")
-    kahanmaps("plot portrait euler_top --eps 1/10 --start 1,1/2,1/3 --steps 5 --3d")
-    assert drawn[0][0].points[0, 0].tolist() == [2, 2]
-    assert len(drawn[1][0].labels) == 3
-
-
 def test_one_variable_is_drawn_over_the_step(kahanmaps, drawn):
     assert "1 orbit, 100 steps" in kahanmaps("plot portrait riccati --eps 1/10 --start 0").err
     assert drawn[0][0].labels == ("step", "$x$")
@@ -133,10 +120,6 @@ def test_points_outside_are_counted_on_standard_error_and_in_the_picture(kahanma
     outcome = kahanmaps("plot portrait --vars x,y --rhs x --rhs y --eps 1/4 --start 1,1 --steps 40")
     assert "points lie outside the window" in outcome.err
     assert drawn[0][1]["note"] == f"{drawn[0][0].left_out} points outside"
-
-
-def test_nothing_is_said_when_quiet(kahanmaps):
-    assert kahanmaps(LV + " -q").err == ""
 
 
 def test_an_orbit_that_ends_early_is_drawn_and_the_status_is_3(kahanmaps, tmp_path):
@@ -217,13 +200,6 @@ def test_the_steps_of_a_file_are_kept_and_those_of_npy_are_records(kahanmaps, dr
     assert [found.points[:, 0, 0].tolist() for found, _ in drawn] == [[0, 4, 8], [0, 1, 2]]
 
 
-def test_a_stored_orbit_that_ended_early_has_status_3(kahanmaps, tmp_path):
-    kahanmaps("orbit lotka_volterra --eps 1/20 --start 1,2 --steps 50 --max-digits 99 -q -o", tmp_path / "a.jsonl")
-    outcome = kahanmaps("plot portrait --from", tmp_path / "a.jsonl")
-    assert outcome.status == 3
-    assert "1 of 1 orbit ended early: step 6 has numbers of" in outcome.err
-
-
 def test_exact_numbers_of_any_length_are_read(tmp_path):
     header = '# {"variables": ["x"]}\nstep,x\n'
     (tmp_path / "long.csv").write_text(f"{header}0,1{'0' * 9000}/3{'0' * 9000}\n")
@@ -292,13 +268,6 @@ def test_wrong_use_is_refused_in_a_sentence(kahanmaps, words, message):
     outcome = kahanmaps(f"plot portrait {words}")
     assert (outcome.status, outcome.out) == (2, "")
     assert message in outcome.err
-
-
-def test_walking_and_stored_orbits_do_not_mix(kahanmaps, tmp_path):
-    np.save(tmp_path / "o.npy", np.ones((3, 2)))
-    outcome = kahanmaps("plot portrait --steps 5 --from", tmp_path / "o.npy")
-    assert outcome.status == 2
-    assert "it does not go with --steps" in outcome.err
 
 
 def test_a_file_of_another_system_is_refused(kahanmaps, tmp_path):

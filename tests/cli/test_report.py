@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from cli_helpers import shell, terminal
+from cli_helpers import shell
 from page_helpers import require_sound
 from small_databases import ok, planned
 
@@ -24,10 +24,6 @@ def test_a_file_is_written_and_told(kahanmaps, tmp_path):
     assert outcome.err == f"{path}: {path.stat().st_size} bytes\n"
     assert kahanmaps(SMALL, "-q -o", path).err == ""
     require_sound(path.read_text())
-
-
-def test_the_same_command_gives_the_same_bytes(kahanmaps):
-    assert kahanmaps(SMALL).out == kahanmaps(SMALL).out
 
 
 def test_a_title_parameters_and_eps_are_taken_over(kahanmaps):
@@ -102,9 +98,3 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(kahanmaps, tmp_
     outcome = kahanmaps(SMALL, "-o", tmp_path / "a.html")
     assert (outcome.status, outcome.out) == (2, "")
     assert "Permission denied: " in outcome.err
-
-
-def test_a_terminal_is_no_place_for_a_page():
-    outcome = terminal("report", "euler_top")
-    assert outcome.status == 2
-    assert "give -o FILE.html" in outcome.err

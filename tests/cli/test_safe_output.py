@@ -8,10 +8,7 @@ import re
 from pathlib import Path
 
 import pytest
-from cli_helpers import shell, terminal
-
-from kahanmaps.plots.recipe import Recipe, read_recipe
-from kahanmaps_cli.progress import as_typed, say
+from cli_helpers import shell
 
 FREE = "T\\u001b[31m\\u009b2J\\u202e\\n<script>t</script>\\r=cmd() | `x` <img src=x onerror=y>"
 NAME = "=cmd()<script>a</script>,=b|`c`"
@@ -69,7 +66,6 @@ PAGES = ("report", "svg", "--markdown")
 TAGS = re.compile(r"<script|<img")
 # What a terminal obeys, but for the colours of a terminal.
 OBEYED = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]")
-COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
 @pytest.fixture(scope="module")
@@ -102,14 +98,6 @@ def test_no_text_of_a_file_moves_a_terminal_or_becomes_a_tag(line, folder, monke
         assert TAGS.findall(re.sub(r"(`+).*?\1", "", out)) == []
 
 
-@pytest.mark.parametrize("line", ["systems s.toml", "check-integrals s.toml -v", "verify s.toml --section 2"])
-def test_a_terminal_gets_colours_of_ours_only(line, folder, monkeypatch):
-    monkeypatch.chdir(folder)
-    out = terminal(*line.split(), columns=200).out
-    assert OBEYED.findall(COLOUR.sub("", out)) == []
-    assert "\x1b[31m" not in out or line.startswith("check")  # red: what is refuted
-
-
 @pytest.mark.parametrize("line", [f"orbit {ORBIT} --integral known --format csv", "batch export --db r.db --csv"])
 def test_no_cell_of_a_table_is_a_formula(line, folder, monkeypatch, capsys):
     from kahanmaps_cli.main import main
@@ -132,43 +120,3 @@ def test_the_commands_that_a_batch_prints_can_be_pasted_whatever_its_files_are_c
     assert repeated.err.splitlines()[0].startswith("1 task to do, results go to $(touch")
     assert repeated.err.splitlines()[-1] == first.err.splitlines()[-1]
     assert not (tmp_path / "PWNED").exists()
-
-
-def test_the_command_in_a_hint_can_be_pasted(kahanmaps):
-    assert kahanmaps("'a b;x.toml'").err.rstrip().endswith("kahanmaps analyze 'a b;x.toml'")
-
-
-def test_a_terminal_gets_a_command_on_one_line(monkeypatch, capsys):
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    command = f"to continue: {as_typed(['kahanmaps', 'a  b', 'word ' * 40])}"
-    say(command)
-    assert capsys.readouterr().err == command + "\n"
-
-
-@pytest.mark.parametrize("option", ["", "--system"])
-def test_the_recipe_of_a_picture_of_somebody_else_moves_no_terminal(option, folder, kahanmaps, monkeypatch):
-    monkeypatch.chdir(folder)
-    assert kahanmaps("plot drift", ORBIT, "-o theirs.svg -q").status == 3  # an integral drifts
-    picture = Path("theirs.svg")
-    recipe = read_recipe("theirs.svg")
-    hostile = Recipe(recipe.command.replace("plot", "\u202e plot"), recipe.system.replace("x1^3", "\u202e"))
-    words = [one.metadata("svg")["Keywords"] for one in (recipe, hostile)]
-    picture.write_text(picture.read_text().replace(*words))
-    outcome = kahanmaps("plot recipe theirs.svg", option)
-    assert outcome.status == 0
-    assert r"\u202e" in outcome.out
-    assert OBEYED.findall(outcome.out) == []
-
-
-@pytest.mark.parametrize("ending", ["svg", "text"])
-def test_pictures_of_records_have_nothing_that_a_terminal_obeys(kahanmaps, tmp_path, ending):
-    """An SVG file with a control character in it is none."""
-    pytest.importorskip("matplotlib")
-    degrees, orbit = (tmp_path / name for name in ("degrees.json", "orbit.jsonl"))
-    degrees.write_text(kahanmaps("degrees harmonic --json").out.replace('"harmonic"', '"a\\u001b[31m"'))
-    points = kahanmaps("orbit harmonic --start 1,2 --eps 1/10 --steps 3 --format jsonl").out
-    orbit.write_text(points.replace('"harmonic"', '"a\\u001b[31m"'))
-    for command, record in (("plot degrees --from", degrees), ("plot portrait --from", orbit)):
-        picture = tmp_path / "picture"
-        assert kahanmaps(command, record, "--format", ending, "-o", picture).status == 0
-        assert "\x1b" not in picture.read_text()

@@ -124,13 +124,3 @@ def test_a_schema_is_printed_by_its_name_or_that_of_its_command(kahanmaps: Run, 
 @pytest.mark.parametrize("command", ["commute", "integrals", "measure", "poisson"])
 def test_the_checks_share_a_schema(kahanmaps: Run, command: str) -> None:
     assert kahanmaps(f"schema check-{command}").json == schema("check")
-
-
-@pytest.mark.parametrize(
-    ("name", "hint"),
-    [("orbits", "did you mean orbit"), ("family shoe", "did you mean family-show"), ("xyz", "'kahanmaps schema'")],
-)
-def test_a_misspelt_name_gets_a_suggestion(kahanmaps: Run, name: str, hint: str) -> None:
-    told = kahanmaps(f"schema {name}")
-    assert (told.status, told.out) == (2, "")
-    assert hint in told.err

@@ -162,7 +162,6 @@ def test_what_batch_commands_print_satisfies_their_schemas(kahanmaps: Run, tmp_p
         ],
         "batch-status": [kahanmaps("batch status --json --db", db), kahanmaps("batch status --json --db", other)],
         "batch-summary": [kahanmaps("batch summary --json --by task,eps --db", db)],
-        "batch-check": [kahanmaps("batch check --json --db", db)],
         "batch-merge": [kahanmaps("batch merge --json", tmp_path / "all.db", db, other)],
     }
     [key] = {row["key"] for row in outputs["batch-export"][0].records if row.get("experiment") == "orbit"}
@@ -321,17 +320,3 @@ def test_a_report_of_a_proof_with_a_claim_that_is_not_proved_is_refused(lines: C
     report["claims"][0]["verdict"] = "undecided"
     assert mistakes("check", report)
     assert mistakes("check", {**report, "verdict": "undecided", "holds": None}) == []
-
-
-@pytest.mark.parametrize("degrees", [[], [2, 4], [1, -1]])
-def test_degrees_that_do_not_start_with_1_are_refused(lines: Callable[[str], list[Any]], degrees: list[int]) -> None:
-    [report] = lines("degrees weierstrass --terms 1 --json -q")
-    assert mistakes("degrees", report) == []
-    assert mistakes("degrees", {**report, "degrees": degrees})
-
-
-@pytest.mark.parametrize("matrix", [[], [[]], [["1/0"]], ["1"]])
-def test_what_is_no_matrix_is_refused(lines: Callable[[str], list[Any]], matrix: list[Any]) -> None:
-    [report] = lines("family space --matrix 1,0;0,1 --json")
-    assert mistakes("family-space", report) == []
-    assert mistakes("family-space", {**report, "A": matrix})

@@ -44,10 +44,6 @@ def test_nothing_is_suggested_for_what_is_like_nothing(kahanmaps, command):
     assert "Did you mean" not in outcome.err
 
 
-def test_an_unknown_parameter_is_told_with_those_that_there_are(kahanmaps):
-    assert "unknown parameter 'a4', this system has: a1, a2, a3" in kahanmaps("systems euler_top -p a4=1").err
-
-
 @pytest.mark.parametrize("command", ["check-measure {}", "systems {}", "check-commute euler_top {}", "family show {}"])
 def test_files_named_like_one_that_is_not_there_are_suggested(kahanmaps, tmp_path, command):
     (tmp_path / "my_system.toml").touch()
@@ -55,16 +51,6 @@ def test_files_named_like_one_that_is_not_there_are_suggested(kahanmaps, tmp_pat
     outcome = kahanmaps(command.format(tmp_path / "my_sytem.toml"))
     assert outcome.status == 2
     assert f"No such file or directory, did you mean {tmp_path / 'my_system.toml'}?" in outcome.err
-
-
-def test_a_folder_that_is_not_there_is_told(kahanmaps, tmp_path):
-    outcome = kahanmaps("systems", tmp_path / "nowhere" / "a.toml")
-    assert f"there is no folder {tmp_path / 'nowhere'}" in outcome.err
-
-
-def test_no_file_is_suggested_where_none_is_close(kahanmaps, tmp_path):
-    (tmp_path / "zebra.toml").touch()
-    assert "did you mean" not in kahanmaps("systems", tmp_path / "my.toml").err
 
 
 @pytest.mark.parametrize(
@@ -81,18 +67,3 @@ def test_what_is_missing_is_told_with_its_help(kahanmaps):
     outcome = kahanmaps("orbit euler_top --eps 1/10 --steps 1")
     assert outcome.status == 2
     assert "Error: Missing option '--start': The start, e.g. 1/2,-1/3,0.25.\n" in outcome.err
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        (f"orbit euler_top {ORBIT}5.5", "found '15.5', expected an integer"),
-        ("batch run x.toml --jobs 0", "found 0, expected 1 to 1024"),
-        ("batch run x.toml --max-tasks 0", "found 0, expected at least 1"),
-        ("lyapunov lorenz --eps 1/10 --steps 1", "found --steps 1 and --transient 0, expected 2 to"),
-    ],
-)
-def test_numbers_are_refused_with_what_was_found_and_expected(kahanmaps, command, words):
-    outcome = kahanmaps(command)
-    assert outcome.status == 2
-    assert words in outcome.err

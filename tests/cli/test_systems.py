@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from pathlib import Path
 
 import pytest
 from schema_helpers import mistakes
@@ -21,12 +20,6 @@ over_names = pytest.mark.parametrize("name", catalog.names())
 def test_every_system_has_a_line(kahanmaps):
     listed = {line.split()[0]: int(line.split()[1]) for line in kahanmaps("systems").out.splitlines()}
     assert listed == {name: catalog.load(name).dim for name in (*catalog.names(), *catalog.map_names())}
-
-
-def test_the_list_for_scripts_has_the_same_systems(kahanmaps):
-    systems = kahanmaps("systems --json").json["systems"]
-    assert [system["name"] for system in systems] == [*catalog.names(), *catalog.map_names()]
-    assert all(set(system) == {"name", "dim", "kind", "title", "parameters"} for system in systems)
 
 
 @pytest.mark.parametrize("name", catalog.map_names())
@@ -98,12 +91,6 @@ def test_a_file_of_ones_own_is_shown_as_well(kahanmaps, tmp_path):
     assert kahanmaps("systems", path).out == "mine\nx' = x^2\n"
 
 
-def test_the_catalogue_is_found_from_every_folder(kahanmaps, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("lorenz").write_text("not this one")
-    assert kahanmaps("systems lorenz --json").json["dim"] == 3
-
-
 # Structured facts
 
 
@@ -130,12 +117,6 @@ def test_structured_facts_are_there_for_scripts(kahanmaps):
     }
 
 
-def test_a_file_without_structured_facts_has_nulls(kahanmaps, tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text('variables = ["x"]\n[system]\nrhs = ["x^2"]\n')
-    assert set(kahanmaps("systems", path, "--json").json["known"].values()) == {None}
-
-
 @pytest.mark.parametrize(
     ("keys", "line"),
     [
@@ -151,16 +132,6 @@ def test_each_structured_fact_can_stand_alone(kahanmaps, tmp_path, keys, line):
 
 
 # Terminals
-
-
-def test_on_a_terminal_lines_end_between_words(kahanmaps, monkeypatch):
-    whole = kahanmaps("systems lagrange_top").out
-    monkeypatch.setattr("kahanmaps_cli.commands.systems.on_terminal", lambda: True)
-    monkeypatch.setattr("kahanmaps_cli.terminal.on_terminal", lambda: True)
-    monkeypatch.setenv("COLUMNS", "60")
-    shown = kahanmaps("systems lagrange_top").out
-    assert max(map(len, shown.splitlines())) <= 60 < max(map(len, whole.splitlines()))
-    assert shown.split() == whole.split()
 
 
 # LaTeX
@@ -199,10 +170,6 @@ def test_every_system_is_written_in_latex_with_balanced_braces(kahanmaps, name):
     formulas = 1 + len(file.integrals) + (file.density is not None) + (file.hamiltonian is not None)
     assert text.count("\\[\n") == text.count("\\]\n") == formulas
     assert text.count(r"\dot{") == file.system.dim
-
-
-def test_parameters_are_set_in_latex(kahanmaps):
-    assert r"\dot{x_1} &= \frac{1}{2} x_2 x_3" in kahanmaps("systems euler_top -p a1=1/2 --latex").out
 
 
 @pytest.mark.parametrize("options", ["--latex --toml", "--latex --json", "--toml --json"])

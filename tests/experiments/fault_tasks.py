@@ -137,13 +137,6 @@ def _twins() -> dict[str, Any]:
     return {"forked": True}
 
 
-def _heir() -> dict[str, Any]:
-    if os.fork() == 0:  # keeps the pipes of its parent open
-        time.sleep(60)
-        os._exit(0)
-    return _kill(signal.SIGABRT)
-
-
 def _reader() -> dict[str, Any]:
     return {"read": sys.stdin.read()}
 
@@ -180,7 +173,6 @@ FAULTS = {
     13: _large,
     14: _deaf,
     15: _twins,
-    16: _heir,
     17: _reader,
     18: _not_plain,
     19: _verdict_of_no_text,

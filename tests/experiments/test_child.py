@@ -53,10 +53,6 @@ def test_any_other_error_is_a_failure_with_its_traceback(error: Exception):
     assert "stderr" in found
 
 
-def test_an_error_on_purpose_is_a_sentence_without_a_traceback():
-    assert _failure(InputError("found no system")) == {"outcome": Outcome.FAILED, "message": "found no system"}
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is no limit of memory")
 def test_the_limit_of_memory_ends_with_the_task_so_that_its_result_can_be_told():
     import resource
@@ -79,13 +75,6 @@ def test_a_verdict_that_is_no_text_is_a_failure_of_the_task(monkeypatch, verdict
         Outcome.FAILED,
         f"found the verdict {verdict}, expected a text",
     )
-
-
-@pytest.mark.parametrize("result", [{}, {"verdict": None}, {"verdict": "proved"}])
-def test_a_verdict_is_kept_beside_the_result(monkeypatch, result):
-    monkeypatch.setattr("kahanmaps.experiments.child._result", lambda task, documents: {**result, "n": 1})
-    done = perform(SPACE, None, {})
-    assert (done["outcome"], done["verdict"], done["result"]) == (Outcome.OK, result.get("verdict"), {"n": 1})
 
 
 def test_what_json_lacks_is_a_failure_of_the_task():

@@ -17,25 +17,25 @@ def row(number, result, options=None, outcome=Outcome.OK, verdict=None):
 
 def test_exact_numbers_are_doubles():
     found = value_pairs([row(0, {"h": "7/2"}), row(1, {"h": 3}), row(2, {"h": 0.25})], "eps", "h")
-    assert found.x.values.tolist() == [1.0, 1 / 2, 1 / 3]
-    assert found.y.values.tolist() == [3.5, 3.0, 0.25]
+    assert found.x.values == [1.0, 1 / 2, 1 / 3]
+    assert found.y.values == [3.5, 3.0, 0.25]
     assert (found.x.categories, found.missing, found.left_out) == (None, 0, 0)
 
 
 def test_numbers_beyond_doubles_are_infinite():
-    assert value_pairs([row(0, {"h": "1" + "0" * 400})], "eps", "h").y.values.tolist() == [float("inf")]
+    assert value_pairs([row(0, {"h": "1" + "0" * 400})], "eps", "h").y.values == [float("inf")]
 
 
 def test_words_have_places_in_their_order():
     rows = [row(0, {"h": 1}, verdict="refuted"), row(1, {"h": 2}, verdict="proved"), row(2, {"h": 3}, verdict="proved")]
     found = value_pairs(rows, "verdict", "h")
     assert found.x.categories == ("proved", "refuted")
-    assert found.x.values.tolist() == [1.0, 0.0, 0.0]
+    assert found.x.values == [1.0, 0.0, 0.0]
 
 
 def test_series_are_words_even_if_they_are_numbers():
     found = value_pairs([row(k, {"h": k}) for k in range(3)], "eps", "h", "m")
-    assert (found.series.categories, found.series.values.tolist()) == (("1", "2"), [0.0, 1.0, 0.0])
+    assert (found.series.categories, found.series.values) == (("1", "2"), [0.0, 1.0, 0.0])
 
 
 def test_what_has_no_number_is_counted():
@@ -44,24 +44,11 @@ def test_what_has_no_number_is_counted():
     assert (len(found.y.values), found.missing, found.left_out) == (1, 1, 3)
 
 
-def test_the_time_of_the_run_is_a_number():
-    assert value_pairs([row(2, {"h": 1})], "m", "seconds").y.values.tolist() == [2.5]
-
-
 def test_a_result_of_that_name_comes_before_the_run():
-    assert value_pairs([row(0, {"seconds": 7})], "m", "result.seconds").y.values.tolist() == [7.0]
+    assert value_pairs([row(0, {"seconds": 7})], "m", "result.seconds").y.values == [7.0]
 
 
 @pytest.mark.parametrize(("x", "y"), [("epsi", "h"), ("eps", "hh"), ("eps", "word")])
 def test_names_without_numbers_are_refused(x, y):
     with pytest.raises(InputError, match="found the unknown name"):
         value_pairs([row(0, {"h": 1, "word": "many"})], x, y)
-
-
-def test_too_many_words_are_refused():
-    with pytest.raises(InputError, match="found 61 different values of w"):
-        value_pairs([row(k, {"h": k, "w": f"w{k}"}) for k in range(61)], "w", "h")
-
-
-def test_nothing_is_no_pair():
-    assert len(value_pairs([], "eps", "h").y.values) == 0

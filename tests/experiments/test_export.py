@@ -26,7 +26,6 @@ FAMILY = Task("check-commute", {"family": {"m": 3, "seed": 7}}, {"eps": "1/10", 
 FILE = Task("check-commute", {"document": "d1", "parameters": {"a": "1/2"}}, {"eps": None, "steps": 5})
 FIRST_COLUMNS = ["experiment", "number", "key", "task"]
 LAST_COLUMNS = ["message", "seconds", "peak_memory", "host", "finished"]
-OF_THE_RUN = {"seconds", "peak_memory", "host", "versions", "finished", "stderr"}
 
 
 def row(number=0, task=FAMILY, result=None, outcome=Outcome.OK, **more):
@@ -142,11 +141,6 @@ def test_lines_parse_back_to_what_was_put_in(rows):
             assert Record.from_json(of_record) == source.record
 
 
-def test_a_line_does_not_depend_on_the_order_in_which_a_task_was_written():
-    turned = Task(FAMILY.kind, {"family": {"seed": 7, "m": 3}}, {"steps": 5, "eps": "1/10"})
-    assert jsonl([row(task=turned, result={"b": 1, "a": 2})]) == jsonl([row(result={"a": 2, "b": 1})])
-
-
 def test_loading_the_module_does_not_load_flint():
     code = "import sys, kahanmaps.experiments.export; sys.exit('flint' in sys.modules or 'pyarrow' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
@@ -165,24 +159,6 @@ def test_columns_come_in_the_documented_order():
     assert columns(rows) == [*FIRST_COLUMNS, *expected, *LAST_COLUMNS]
 
 
-def test_a_stable_table_leaves_out_the_columns_of_the_run():
-    assert columns([row()], stable=True) == [
-        *FIRST_COLUMNS,
-        "m",
-        "seed",
-        "eps",
-        "steps",
-        "outcome",
-        "verdict",
-        "message",
-    ]
-
-
-def test_no_rows_give_a_header_only():
-    assert csv_text([]) == ",".join([*FIRST_COLUMNS, "outcome", "verdict", *LAST_COLUMNS]) + "\n"
-    assert [json.loads(line)["record"] for line in jsonl([]).splitlines()] == ["header", "end"]
-
-
 def test_a_clash_of_names_is_settled_for_options_then_the_recipe_then_the_result():
     task = Task("orbit", {"family": {"seed": 1, "m": 2}}, {"seed": 2, "verdict": "v", "host": "h"})
     (found,) = table([row(task=task, result={"seed": 3, "m": 4, "system": 5, "verdict": 6}, verdict="proved")])
@@ -190,18 +166,6 @@ def test_a_clash_of_names_is_settled_for_options_then_the_recipe_then_the_result
     assert [found[name] for name in names] == ["2", "1", "3", "2", "4", "5"]
     names = ["verdict", "option.verdict", "result.verdict", "host", "option.host"]
     assert [found[name] for name in names] == ["proved", "v", "6", "hilbert", "h"]
-
-
-def test_names_are_the_same_whether_or_not_the_export_is_stable():
-    rows = [row(result={"seconds": 1, "claims": 2})]
-    assert set(columns(rows)) - set(columns(rows, stable=True)) == {"seconds", "peak_memory", "host", "finished"}
-    assert "result.seconds" in columns(rows, stable=True)
-
-
-def test_no_two_columns_share_a_name():
-    result = {"a": {"b": 1}, "a.b": 2, "result.a.b": 3, "seed": 4, "result.seed": 5, "result": {"seed": 6}}
-    (found,) = table([row(result=result)])
-    assert sorted(value for name, value in found.items() if "a.b" in name or "result" in name) == list("123456")[:6]
 
 
 # Cells
@@ -270,11 +234,6 @@ def test_lines_end_in_a_newline_alone_and_cells_keep_their_line_ends():
     assert [cells["message"] for cells in table(rows)] == ["a\r\nb", "c\rd", "e\nf"]
 
 
-def test_a_missing_task_leaves_its_cells_empty():
-    (cells,) = table([Row("e", 4, FAMILY, None)])
-    assert {name for name, text in cells.items() if text} == {*FIRST_COLUMNS, "m", "seed", "eps", "steps"}
-
-
 def test_a_new_column_in_the_second_reading_is_refused():
     readings = iter([[row()], [row(result={"late": 1})]])
     with pytest.raises(InputError, match="'late' of task 0 changed"):
@@ -295,14 +254,6 @@ def test_stable_exports_are_the_same_bytes_whatever_the_timings(rows, data):
     others = [elsewhere(source) for source in rows]
     assert jsonl(rows, stable=True) == jsonl(others, stable=True)
     assert csv_text(rows, stable=True) == csv_text(others, stable=True)
-
-
-@pytest.mark.parametrize("export", [jsonl, csv_text])
-def test_a_stable_export_does_not_tell_where_and_when(export):
-    rows = [row(result={"claims": 3})]
-    tells = ["hilbert", "1.5", "4096", "2025-01-01", "3.11.7", "a warning", *OF_THE_RUN]
-    assert not [word for word in [*tells, __version__] if word in export(rows, stable=True)]
-    assert {"hilbert", "1.5", "4096", "2025-01-01"} <= {word for word in tells if word in export(rows)}
 
 
 # Memory, and streams that fail
@@ -346,20 +297,6 @@ def test_many_rows_are_never_held_together(write, extra_lines, count):
         tracemalloc.stop()
     assert sink.lines == count + extra_lines
     assert peak < 300_000  # measured: 4 kB and 140 kB, for any count; 10,000 rows in a list take 7 MB
-
-
-class Full:
-    """A disk without space."""
-
-    def write(self, text):
-        raise OSError(28, "No space left on device")
-
-
-def test_a_full_disk_is_told_as_such():
-    with pytest.raises(OSError, match="No space"):
-        write_jsonl([row()], Full())
-    with pytest.raises(OSError, match="No space"):
-        write_csv(lambda: [row()], Full())
 
 
 # Parquet
@@ -408,38 +345,6 @@ def test_parquet_has_the_columns_of_the_csv_file(parquet):
         assert [{name: cell(value) for name, value in line.items()} for line in found.to_pylist()] == table(
             rows, stable=stable
         )
-
-
-def test_parquet_without_rows_has_the_types_of_its_columns(parquet):
-    found = parquet([]).read()
-    assert found.num_rows == 0
-    assert [str(found.schema.field(name).type) for name in ("number", "seconds", "host")] == [
-        "int64",
-        "double",
-        "string",
-    ]
-
-
-def test_parquet_is_written_in_row_groups(parquet):
-    metadata = parquet(list(stream_of_rows(10_002))).metadata
-    assert [metadata.row_group(place).num_rows for place in range(metadata.num_row_groups)] == [10_000, 2]
-
-
-def test_a_parquet_file_that_fails_leaves_the_old_one(tmp_path):
-    pytest.importorskip("pyarrow")
-    path = tmp_path / "results.parquet"
-    path.write_text("old")
-    readings = iter([[row(result={"x": 1})], [row(result={"x": "one"})]])
-    with pytest.raises(InputError, match="'x' of task 0 changed"):
-        write_parquet(lambda: next(readings), path)
-    assert [(entry.name, entry.read_text()) for entry in tmp_path.iterdir()] == [("results.parquet", "old")]
-
-
-def test_a_stable_parquet_file_is_the_same_bytes(tmp_path):
-    pytest.importorskip("pyarrow")
-    for name, seconds in (("a", 1.0), ("b", 2.0)):
-        write_parquet(lambda seconds=seconds: [row(seconds=seconds)], tmp_path / name, stable=True)
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
 def test_without_pyarrow_the_error_says_what_to_install(tmp_path, monkeypatch):

@@ -6,8 +6,6 @@ degrees 2 and 3 of maps without cancellation, the integrals and densities of the
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections import Counter
 from pathlib import Path
@@ -20,7 +18,6 @@ import kahanmaps as km
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
 from kahanmaps.errors import InputError
-from kahanmaps.experiments.export import write_csv
 from kahanmaps.experiments.registry import task_kind
 from kahanmaps.experiments.store import Store
 from kahanmaps.experiments.summary import summarise
@@ -142,11 +139,6 @@ def test_degrees_end_where_they_are_told_to(asked, status, degrees):
     assert (found["status"], found["degrees"]) == (status, degrees)
 
 
-def test_a_result_that_the_time_cut_short_says_so():
-    found = perform("degrees", of_catalogue("paper_m3"), seconds=1, terms=400)
-    assert (found["status"], len(found["degrees"]) < 400) == ("time", True)
-
-
 def test_growth_without_a_recurrence_is_estimated_and_not_more():
     found = perform("degrees", of_catalogue("clebsch_first_flow"), max_degree=100)
     assert (found["growth"], found["looks_exponential"], found["status"]) == ("unknown", False, "degree")
@@ -184,22 +176,11 @@ def test_formulas_contain_the_parameters_that_are_asked_for():
     assert not any("a3" in text for text in found["formulas"])
 
 
-def test_formulas_for_one_eps_do_not_contain_it():
-    found = perform("find-integrals", NAHM, eps="1/10")
-    assert found["verdict"] == "proved"
-    assert "eps" not in found["formulas"][0]
-
-
 def test_what_is_missing_has_a_reason():
     # Four integrals by petrera-pfadler-suris-2009, not all of them quotients of small degree.
     found = perform("find-integrals", of_catalogue("clebsch_first_flow"), seconds=30, max_degree=2)
     assert (found["status"], found["codimension"] > found["integrals"] > 0) == ("formulas missing", True)
     assert "no closed form" in found["reason"]
-
-
-def test_a_search_of_low_degree_only_says_how_far_it_went():
-    found = perform("find-integrals", TOP, max_degree=1)
-    assert (found["integrals"], found["nullities"]) == (0, [0])
 
 
 def test_a_map_without_values_has_no_orbits_to_measure():
@@ -215,11 +196,6 @@ def test_densities_are_those_of_the_literature():
     found = perform("find-density", RIVALS)
     assert (found["status"], found["verdict"], found["degree_tried"]) == ("found", "proved", 2)
     assert found["formulas"] == ["x*y"]
-
-
-def test_no_density_up_to_a_degree_is_measured_and_has_no_verdict():
-    found = perform("find-density", LORENZ, max_degree=2)
-    assert (found["status"], found["verdict"], found["densities"], found["degree_tried"]) == ("none", None, 0, 2)
 
 
 def test_a_hamiltonian_system_has_a_density():
@@ -245,11 +221,6 @@ def test_a_member_commutes_with_its_associated_maps_and_others_with_nothing():
     assert found["systems"] == [one.rhs for one in direct.nontrivial]
     alone = perform("find-commuting", RIVALS)
     assert (alone["commuting"], alone["status"], alone["verdict"]) == (0, "complete", "proved")
-
-
-def test_the_shape_of_commuting_systems_may_be_chosen():
-    found = perform("find-commuting", ZERO, shape="quadratic")
-    assert found["every_g_commutes"]
 
 
 # Singularities, cycles, exponents
@@ -287,13 +258,6 @@ def test_a_census_is_that_of_the_library():
     assert (run["lost"], run["falling"], run["periodic"], found["points"]) == (3, 613, 377, "993")
     assert run["reasons"] == dict(compare(census).reasons)
     assert "lengths" not in perform("cycles", WEIERSTRASS, prime=31, eps="1/10")["runs"][0]
-
-
-def test_points_may_be_sampled():
-    found = perform("cycles", WEIERSTRASS, prime=10007, eps="1/10", samples=20, steps=50)
-    assert found["status"] == "sampled"
-    assert found["random_permutation"] == "not tried"
-    assert found["runs"][0]["looked_at"] == 20
 
 
 def test_exponents_are_those_of_the_library():
@@ -416,35 +380,6 @@ def test_batches_are_grouped_by_what_was_found(small):
     }
     assert [group.values[0] for group in by_count.groups] == [0, 1, 2, None]
     assert {("weierstrass", "compatible"), ("lotka_volterra", "not compatible")} <= {g.values for g in by_law.groups}
-
-
-def test_the_budget_is_another_column_than_the_time_a_task_took(small):
-    stream = io.StringIO()
-    with Store.open(small, readonly=True) as store:
-        write_csv(store.rows, stream)
-    header, *rows = csv.reader(io.StringIO(stream.getvalue()))
-    assert {"seconds", "option.seconds", "growth", "dynamical_degree", "integrals", "codimension"} <= set(header)
-    assert not any(name.startswith("result.") for name in header)
-    assert rows[0][header.index("option.seconds")] == "20"
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ("{ second = 5 }", "degrees has no such option"),
-        ("{ seconds = 0 }", "found 0, expected a whole number from 1"),
-        ('{ symbolic = "a1" }', "degrees has no such option"),
-        ("{ prime = 7 }", "degrees has no such option"),
-    ],
-)
-def test_an_option_that_a_task_has_not_is_refused(options, words):
-    with pytest.raises(InputError, match=words):
-        list(km.run(f'[experiments.a]\ntask = "degrees"\nsystem = "lorenz"\noptions = {options}'))
-
-
-def test_the_survey_of_the_catalogue_is_a_spec():
-    spec = km.read_spec(SURVEY)
-    assert spec.size == 27 + 17 + 7 + 10 + 30
 
 
 @pytest.mark.slow

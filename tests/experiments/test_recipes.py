@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 from flint import fmpq, fmpq_poly
@@ -80,29 +79,12 @@ def test_a_recipe_of_a_member_is_complete():
     assert family_recipe({"chi": "t^2 - 2"})["family"]["size"] == 1
 
 
-def test_a_recipe_says_what_it_would_say_in_full():
-    assert drawn(m=2, seed=3) == system_from({"family": {"draw": "eigenvalues", "m": 2, "seed": 3}}, {}.__getitem__)
-
-
-def test_the_name_of_a_random_member_says_how_it_was_drawn():
-    assert drawn(m=2, seed=3).name == "random member, m = 2, seed 3"
-    assert drawn(m=2, seed=3, draw="generic").name == "random member, generic, m = 2, seed 3"
-
-
 # Files
 
 
 @pytest.mark.parametrize("name", names())
 def test_every_system_of_the_catalogue_comes_back_equal(name):
     assert again(load(name)) == load(name)
-
-
-def test_parameters_replace_those_of_the_file():
-    assert again(load("lorenz"), s="1/2") == load("lorenz", {"s": "1/2"})
-
-
-def test_a_recipe_has_all_parameters():
-    assert recipe_of(load("lorenz"), {})["parameters"] == {"s": "10", "r": "28", "b": "8/3"}
 
 
 def test_documents_are_known_by_what_the_file_says():
@@ -130,15 +112,6 @@ def test_a_recipe_is_another_one_when_the_file_says_something_else(text, is_same
     assert (recipe_of(parse_system(text), {}) == recipe_of(parse_system(ROTOR), {})) is is_same
 
 
-def test_facts_of_the_catalogue_are_not_in_documents():
-    assert "facts" not in document_text(load("lorenz"))
-
-
-def test_a_parameter_that_the_system_has_not_is_told():
-    with pytest.raises(InputError, match="unknown parameter 'q'"):
-        again(load("lorenz"), q="1")
-
-
 @pytest.mark.parametrize("reference", ["./lorenz.toml", "lorenz.toml", "sub/../lorenz.toml"])
 def test_a_path_is_relative_to_the_folder(tmp_path, reference):
     (tmp_path / "sub").mkdir()
@@ -149,16 +122,3 @@ def test_a_path_is_relative_to_the_folder(tmp_path, reference):
 def test_a_name_is_that_of_the_catalogue(tmp_path):
     (tmp_path / "lorenz").write_text(ROTOR)
     assert find_file("lorenz", tmp_path).name == "lorenz"
-
-
-@pytest.mark.parametrize("reference", ["sub/rotor", "./rotor", "/rotor", "rotor"])
-def test_a_file_ends_in_toml(tmp_path, monkeypatch, reference):
-    (tmp_path / "rotor").write_text(ROTOR)
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match=r"expected a name of the catalogue or a path that ends in \.toml"):
-        find_file(reference, tmp_path)
-
-
-def test_an_unknown_name_is_told_with_a_suggestion():
-    with pytest.raises(InputError, match="did you mean lorenz"):
-        find_file("lorens", Path())

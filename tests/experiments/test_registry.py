@@ -15,7 +15,7 @@ from flint import fmpq
 from kahanmaps.errors import InputError
 from kahanmaps.experiments import registry
 from kahanmaps.experiments.options import VOCABULARY
-from kahanmaps.experiments.registry import ENVIRONMENT, MEMBER, SYSTEM, task, task_kind, task_kinds
+from kahanmaps.experiments.registry import ENVIRONMENT, MEMBER, task, task_kind, task_kinds
 
 LIBRARY = (
     "check-commute", "check-integrals", "check-measure", "check-poisson", "verify", "verify-universal", "family-space",
@@ -93,12 +93,6 @@ def test_a_signature_says_what_a_task_can_be_asked():
     assert dict(kind.defaults) == {"steps": 5, "start": None}
 
 
-def test_a_task_needs_a_system_if_it_has_a_parameter_of_that_name():
-    task("with-system")(lambda system: {})
-    task("without-system")(lambda seed=0: {})
-    assert (task_kind("with-system").needs, task_kind("without-system").needs) == (SYSTEM, None)
-
-
 def test_a_task_is_done_with_what_its_options_stand_for():
     asked = {}
 
@@ -111,14 +105,6 @@ def test_a_task_is_done_with_what_its_options_stand_for():
     assert task_kind("a-task").perform("S", options) == {"verdict": "proved"}
     expected = {"system": "S", "eps": fmpq(1, 10), "start": (fmpq(1, 2), fmpq(0)), "at": None, "other": "a system"}
     assert {name: asked[name] for name in expected} == expected
-
-
-def test_a_registered_function_is_still_a_function():
-    @task("a-task")
-    def f(seed: int = 3) -> dict[str, Any]:
-        return {"seed": seed}
-
-    assert f() == {"seed": 3}
 
 
 def test_an_option_that_is_none_is_told_with_a_suggestion():
@@ -148,19 +134,6 @@ def test_tasks_of_ones_own_are_brought_in_by_the_environment(modules, monkeypatc
     assert "one" in task_kinds()
 
 
-@pytest.mark.parametrize("value", ["", ",", " , ", "own_one,", " own_one ,own_one"])
-def test_blanks_and_empty_names_in_the_environment_do_no_harm(modules, monkeypatch, value):
-    named(modules, monkeypatch, own_one=TASK.replace("NAME", "one"))
-    monkeypatch.setenv(ENVIRONMENT, value)
-    assert set(LIBRARY) <= set(task_kinds())
-
-
-def test_a_module_imported_under_two_names_is_the_same_tasks(modules, monkeypatch):
-    # As happens where a folder of tasks lies on the path and is part of a package as well.
-    named(modules, monkeypatch, own_one=TASK.replace("NAME", "one"), own_two=TASK.replace("NAME", "one"))
-    assert "one" in task_kinds()
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -179,10 +152,3 @@ def test_a_module_that_cannot_be_imported_is_told_in_a_sentence(modules, monkeyp
     with pytest.raises(InputError) as caught:
         task_kinds()
     assert str(caught.value).startswith(f"{ENVIRONMENT} names the module own_one, which cannot be imported: {words}")
-
-
-def test_the_tasks_of_the_tests_can_be_brought_in(monkeypatch):
-    monkeypatch.syspath_prepend(Path(__file__).parent)
-    monkeypatch.setenv(ENVIRONMENT, "fault_tasks")
-    sys.modules.pop("fault_tasks", None)  # as in a process of its own
-    assert task_kind("fault").perform(None, {"seed": 4}) == {"seed_squared": 16, "verdict": "proved"}

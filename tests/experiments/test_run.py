@@ -28,11 +28,11 @@ name = "mixed"
 limits = { time = "30 s", memory = "150 MB" }
 [experiments.faults]
 task = "fault"
-axes = { order = [2, 6, 8, 11], seed = "0..2" }
+axes = { order = [2, 6, 8, 11], seed = "0..1" }
 [experiments.space]
 task = "family-space"
 system = "family"
-axes = { m = "2..3", seed = "0..4", draw = ["generic", "eigenvalues"] }
+axes = { m = "2..3", seed = "0..4" }
 [experiments.top]
 task = "check-integrals"
 system = ["euler_top", "lorenz", "henon_heiles"]
@@ -68,7 +68,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
     """What MIXED gives, one child at a time."""
     db = tmp_path_factory.mktemp("undisturbed") / "results.db"
     records = list(run(MIXED, db))
-    assert len(records) == 12 + 20 + 6
+    assert len(records) == 8 + 10 + 6
     assert {record.outcome for record in records} == {
         Outcome.OK,
         Outcome.CRASHED,
@@ -78,21 +78,12 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
     return exported(db)
 
 
-def test_results_do_not_depend_on_the_number_of_children(undisturbed: str, tmp_path: Path):
-    list(run(MIXED, tmp_path / "b.db", jobs=2))
-    assert exported(tmp_path / "b.db") == undisturbed
-
-
-def test_results_do_not_depend_on_the_order_of_tasks(undisturbed: str, tmp_path: Path):
+def test_results_depend_neither_on_children_nor_on_the_order_of_tasks_nor_on_interruptions(
+    undisturbed: str, tmp_path: Path
+):
     for name in ("top", "faults", "space"):
-        list(run(MIXED, tmp_path / "b.db", jobs=2, only=[name]))
-    assert exported(tmp_path / "b.db") == undisturbed
-
-
-def test_results_do_not_depend_on_interruptions(undisturbed: str, tmp_path: Path):
-    for _ in range(3):
-        found = run(MIXED, tmp_path / "b.db", jobs=2)
-        assert len(list(islice(found, 11))) == 11
+        found = run(MIXED, tmp_path / "b.db", jobs=2, only=[name])
+        assert len(list(islice(found, 3))) == 3
         found.close()  # type: ignore[attr-defined]
     list(run(MIXED, tmp_path / "b.db", jobs=2))
     assert exported(tmp_path / "b.db") == undisturbed
@@ -100,7 +91,7 @@ def test_results_do_not_depend_on_interruptions(undisturbed: str, tmp_path: Path
 
 def test_shards_merged_are_the_whole(undisturbed: str, tmp_path: Path):
     counts = [len(list(run(MIXED, tmp_path / f"{i}.db", jobs=2, shard=(i, 3)))) for i in (1, 2, 3)]
-    assert counts == [13, 13, 12]
+    assert counts == [8, 8, 8]
     with Store.open(tmp_path / "all.db", create=True) as store:
         for i in (2, 3, 1):
             store.merge(tmp_path / f"{i}.db")
@@ -157,6 +148,12 @@ def test_wrong_specs_and_missing_files_are_told(tmp_path: Path):
         list(run(tmp_path / "no.toml"))
 
 
+@pytest.fixture
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Records are handed on as they come."""
+    monkeypatch.setattr("kahanmaps.experiments.run._GATHER", 0.0)
+
+
 class Scripted:
     """An executor that hands back what was submitted, one at a time, and writes down what it was asked."""
 
@@ -195,6 +192,7 @@ def test_no_more_is_handed_out_than_the_executor_takes():
     assert executor.closed == 1
 
 
+@pytest.mark.usefixtures("_at_once")
 def test_nothing_is_handed_out_after_an_interrupt():
     executor = Scripted()
     batch = Batch(jobs(50), executor)
@@ -203,7 +201,7 @@ def test_nothing_is_handed_out_after_an_interrupt():
         seen += len(records)
         if seen == 10:
             batch.interrupt()
-    assert seen == 12  # the two in flight are done
+    assert seen == 13  # the three in flight are done
     assert batch.was_interrupted
     assert batch.abandoned == 0
 
@@ -225,6 +223,7 @@ def test_what_is_not_done_within_the_grace_is_given_up():
     assert batch.abandoned == 2
 
 
+@pytest.mark.usefixtures("_at_once")
 def test_jobs_are_taken_one_by_one_as_they_are_needed():
     taken = 0
 

@@ -5,10 +5,6 @@ Plans with tasks that come twice, shards and retries are compared with a model i
 
 from __future__ import annotations
 
-import sqlite3
-import time
-import weakref
-from contextlib import closing
 from dataclasses import replace
 from tempfile import TemporaryDirectory
 
@@ -17,11 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_databases import LIMITS, MEMORY, failed, ok, seed, seeds, small_chunks, task, tasks
 
-from kahanmaps.experiments import tables as tables_module
-from kahanmaps.experiments.database import StoreError, Unavailable
-from kahanmaps.experiments.records import Limits, Outcome, Record, Row, Task, digest
+from kahanmaps.experiments.database import StoreError
+from kahanmaps.experiments.records import Limits, Outcome, Record, Row, digest
 from kahanmaps.experiments.store import ExperimentStatus, Store
-from kahanmaps.experiments.tables import PLAN_CHUNK, Planned
+from kahanmaps.experiments.tables import Planned
 
 # Records
 
@@ -52,13 +47,6 @@ def test_a_failure_comes_back_as_it_was(store):
     assert list(store.rows()) == [Row("a", 0, task(1), record)]
 
 
-def test_equal_results_are_equal_bytes_in_the_file(store, path):
-    store.plan("a", "1", LIMITS, tasks(1, 2), {})
-    store.add([replace(ok(1), result={"a": 1, "b": 2}), replace(ok(2), result={"b": 2, "a": 1})])
-    with closing(sqlite3.connect(path)) as other:
-        assert other.execute("SELECT DISTINCT result FROM result").fetchall() == [('{"a":1,"b":2}',)]
-
-
 @pytest.mark.parametrize(
     "bad", [{"result": {"x": float("nan")}}, {"result": {"x": float("inf")}}, {"seconds": float("nan")}]
 )
@@ -67,13 +55,6 @@ def test_numbers_that_are_not_finite_stay_outside_with_all_that_came_along(store
     with pytest.raises(ValueError, match=r"JSON compliant|nan seconds"):
         store.add([ok(1), replace(ok(2), **bad)])
     assert list(store.rows()) == []
-
-
-def test_a_verdict_that_is_no_text_of_utf8_does_no_harm(store):
-    store.plan("a", "1", LIMITS, tasks(1), {})
-    store.add([replace(ok(1), verdict="\ud800")])
-    (row,) = store.rows()
-    assert row.record.verdict == "\\ud800"
 
 
 def test_a_child_that_printed_no_text_does_no_harm(store):
@@ -192,38 +173,6 @@ def test_a_document_under_a_wrong_digest_is_refused(store):
     assert store.experiments() == []
 
 
-def test_a_plan_is_written_while_it_is_made_and_not_held_in_memory(store):
-    alive: weakref.WeakSet[Task] = weakref.WeakSet()
-    most = 0
-
-    class Counted(Task):
-        __hash__ = object.__hash__
-
-    def made():
-        nonlocal most
-        for number in range(10 * PLAN_CHUNK):
-            one = Counted("orbit", None, {"n": number})
-            alive.add(one)
-            if number % 100 == 0:
-                most = max(most, len(alive))
-            yield one
-
-    assert store.plan("a", "1", LIMITS, made(), {}).total == 10 * PLAN_CHUNK
-    assert most <= 2 * PLAN_CHUNK + 100
-
-
-def test_twenty_thousand_tasks_are_planned_and_read_in_no_time(store):
-    """Measured 0.2 s and 0.07 s; the bounds are for a busy machine, and fail what is quadratic (minutes)."""
-    start = time.perf_counter()
-    store.plan("a", "1", LIMITS, (task(number) for number in range(20_000)), {})
-    made = time.perf_counter()
-    assert sum(1 for _ in store.pending()) == 20_000
-    read = time.perf_counter()
-    assert store.count_pending(shard=(1, 2)) == 10_000
-    assert store.status()[0].missing == 20_000
-    assert (made - start < 3, read - made < 1, time.perf_counter() - read < 1) == (True, True, True)
-
-
 # What is pending
 
 
@@ -237,15 +186,6 @@ def test_results_added_meanwhile_change_nothing_about_what_has_been_handed_out(s
             store.add([Record(job.task.key, Outcome.OK, {})])
         assert seen == list(range(11))
         assert store.count_pending() == 0
-
-
-def test_tasks_done_by_then_are_passed_over(store):
-    with small_chunks():
-        store.plan("a", "1", LIMITS, tasks(*range(12)), {})
-        jobs = store.pending()
-        assert seed(next(jobs).task) == 0
-        store.add([ok(7), ok(8)])
-        assert seeds(jobs) == [1, 2, 3, 4, 5, 6, 9, 10, 11]
 
 
 def test_a_retried_task_that_fails_again_does_not_come_twice(store):
@@ -276,12 +216,6 @@ def test_an_unknown_experiment_is_named_with_those_there_are_before_anything_is_
     for ask in (store.pending, store.count_pending, store.rows):
         with pytest.raises(StoreError, match="has no experiment c: it has a"):
             ask(["a", "c"])
-
-
-@pytest.mark.parametrize("shard", [(0, 2), (3, 2), (1, 0), (-1, 2)])
-def test_a_part_that_there_is_not_is_refused(store, shard):
-    with pytest.raises(StoreError, match="there is no part"):
-        store.pending(shard=shard)
 
 
 numbers = st.integers(0, 12)
@@ -356,46 +290,7 @@ def test_a_task_is_found_by_the_beginning_of_its_key(store):
     assert store.find(task(3).key) == []
 
 
-def test_at_most_twenty_are_found_and_all_of_them_begin_as_asked(store, monkeypatch):
-    class Similar(Task):
-        key = property(lambda self: f"abcdf{self.options['n']:027x}")  # type: ignore[assignment]
-
-    similar = [Similar("orbit", None, {"n": number}) for number in range(30)]
-    keys = {task.text: task.key for task in similar}
-    monkeypatch.setattr(tables_module, "digest", lambda text: keys.get(text, text))
-    store.plan("a", "1", LIMITS, similar, {})
-    assert [found.task.options["n"] for found in store.find("abcd")] == list(range(20))
-    assert [found.task.options["n"] for found in store.find(f"abcdf{1:026x}")] == list(range(16, 30))
-    assert store.find("abce") == []
-
-
 @pytest.mark.parametrize("prefix", ["abc", "", "xyzw", "abcd%", "a" * 33])
 def test_what_is_no_beginning_of_a_key_is_refused(store, prefix):
     with pytest.raises(StoreError, match="at least 4 of its 32 hexadecimal digits"):
         store.find(prefix)
-
-
-@pytest.mark.parametrize("is_replaced", [False, True])
-def test_a_database_that_is_taken_away_while_it_is_written_to_is_told(store, path, is_replaced):
-    store.plan("a", "1", LIMITS, tasks(1, 2), {})
-    store.add([ok(1)])
-    path.rename(path.with_name("elsewhere.db"))
-    if is_replaced:
-        path.write_bytes(b"")
-    with pytest.raises(Unavailable, match="has been removed or replaced while it was being written to"):
-        store.add([ok(2)])
-
-
-def test_an_experiment_that_is_planned_while_somebody_asks_for_the_status_does_no_harm(store, path):
-    with Store.open(path, readonly=True) as reader:
-        fetch = reader._database.fetch
-
-        def fetch_and_be_late(*question, **how):
-            answer = fetch(*question, **how)
-            if not store.experiments():
-                store.plan("new", "1", LIMITS, tasks(1, 2), {})
-            return answer
-
-        reader._database.fetch = fetch_and_be_late
-        reader.status()
-        assert [one.name for one in reader.status()] == ["new"]

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import pytest
 
 import kahanmaps as km
-from kahanmaps.languages.convert import LANGUAGES, PARTS, convert
+from kahanmaps.languages.convert import LANGUAGES, convert
 
 CALL = "import kahanmaps as km; from kahanmaps.languages.convert import convert, PARTS; "
 CALL += "print(convert(km.load('weierstrass'), 'julia', PARTS), end='')"
@@ -29,17 +26,6 @@ def test_wrong_arguments_are_refused(language, what, more, told):
     with pytest.raises(km.InputError) as error:
         convert(km.load("euler_top"), language, what, **more)
     assert told in str(error.value)
-
-
-def test_another_process_writes_the_same_text():
-    done = subprocess.run([sys.executable, "-c", CALL], capture_output=True, text=True, check=True)
-    assert done.stdout == convert(km.load("weierstrass"), "julia", PARTS)
-
-
-@pytest.mark.parametrize("language", LANGUAGES)
-def test_a_part_that_is_asked_for_twice_is_written_once(language):
-    file = km.load("euler_top")
-    assert convert(file, language, ["map", "map", "system"]) == convert(file, language, ["system", "map"])
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

@@ -81,17 +81,3 @@ def test_python_takes_no_word_of_a_title_for_an_encoding(language, where):
     assert "coding :" in text or "coding =" in text
     assert "-p coding=3" in text
     compile(text.replace("^", "**").encode(), "file", "exec")
-
-
-def test_functions_of_mathematica_start_with_a_small_letter():
-    text = 'variables = ["x"]\n[system]\nrhs = ["1"]\n[integrals]\n"" = "1/7"'
-    shown = convert(km.parse_system(text, "nameless"), "mathematica", name="Sin")
-    assert "sinIntegral[point_List, eps_] :=" in shown
-    assert "SinIntegral" not in shown
-
-
-@pytest.mark.parametrize("language", LANGUAGES)
-def test_an_integral_without_a_name_is_written_too(language):
-    text = 'variables = ["x"]\n[system]\nrhs = ["1"]\n[integrals]\n"" = "1/7"'
-    shown = convert(km.parse_system(text, "nameless"), language, ["integrals"])
-    assert "7" in shown

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from flint import fmpq
+from helpers import quick
 
 from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import GF, QQ, RR
@@ -133,7 +134,7 @@ def test_forms_on_projective_space_are_those_of_the_formula(name):
     assert (one >= 0).sum() > 0.9 * len(one)
 
 
-@every_word
+@pytest.mark.parametrize("name", quick(WORDS, ["a power"]))
 def test_degrees_and_singularities_are_those_of_the_formula(name):
     found, expected = (degree_growth(map_, EPS, max_terms=4, seconds=30) for map_ in (WORDS[name], out(name)))
     assert found.degrees == expected.degrees

@@ -224,20 +224,6 @@ def test_kernels_give_the_same_numbers_next_to_a_pole_of_one_plane(name):
 
 
 @over_kernels
-@over_members
-def test_orbits_do_not_depend_on_their_company(name, kernel):
-    starts = starts_of(MEMBERS[name].chosen.system.dim, 40)
-    starts[7] *= 1e160
-    together = ensemble(name, starts, kernel=kernel)
-    together.advance(150)
-    for orbit in (0, 6, 7, 8, 39):
-        alone = ensemble(name, starts[orbit : orbit + 1], kernel=kernel)
-        alone.advance(150)
-        assert np.array_equal(alone.x[0], together.x[orbit], equal_nan=True)
-        assert alone.end(0) == together.end(orbit)
-
-
-@over_kernels
 def test_orbits_of_general_blocks_do_not_depend_on_their_company(kernel):
     member = member_of_repeated_factor()
     form = normal_form(member)
@@ -289,45 +275,14 @@ def test_orbits_beyond_the_first_group_are_walked_sampled_and_recorded_as_alone(
     starts[4150] *= 1e200  # for its sake the others of its group are taken twice
     together = ensemble("one plane", starts, kernel=kernel, sampled=5)
     alone = ensemble("one plane", starts[4097:], kernel=kernel, sampled=5)
-    assert np.array_equal(together.run(20, 10)[:, 4097:], alone.run(20, 10), equal_nan=True)
+    assert np.array_equal(
+        np.concatenate(list(together.records(20, 10)))[:, 4097:],
+        np.concatenate(list(alone.records(20, 10))),
+        equal_nan=True,
+    )
     assert np.array_equal(together.x[4097:], alone.x, equal_nan=True)
     for whole, part in zip(together.drift, alone.drift, strict=True):
         assert np.array_equal(whole.largest[4097:], part.largest)
-
-
-@over_kernels
-def test_portions_and_records_do_not_change_the_numbers(kernel):
-    starts = starts_of(6, 30)
-    whole = ensemble("three real roots", starts, kernel=kernel, sampled=70)
-    portions = ensemble("three real roots", starts, kernel=kernel, sampled=70)
-    recorded = ensemble("three real roots", starts, kernel=kernel, sampled=70)
-    whole.advance(500)
-    for steps in (1, 0, 69, 256, 3, 171):
-        portions.advance(steps)
-    points = recorded.run(500, 9)
-    same(whole, portions)
-    same(whole, recorded)
-    sparse = ensemble("three real roots", starts, kernel=kernel).run(500, 45)
-    assert np.array_equal(points[::5], sparse)
-
-
-@over_kernels
-def test_a_single_orbit_is_that_of_the_ensemble(kernel):
-    start = start_of(6)
-    points = dict(
-        FloatOrbit(
-            MEMBERS["three real roots"].chosen.system,
-            EPS,
-            start,
-            700,
-            form=FORMS["three real roots"],
-            every=7,
-            kernel=kernel,
-        )
-    )
-    recorded = ensemble("three real roots", [start, start_of(6, 33)], kernel="numpy").run(700, 7)
-    assert list(points) == list(range(0, 701, 7))
-    assert np.array_equal(np.array(list(points.values())), recorded[:, 0])
 
 
 # Ends.
@@ -446,7 +401,7 @@ def test_a_function_that_is_no_integral_drifts_and_one_that_is_does_not(kernel):
     }
     starts = np.array([[1, 1 / 2, 1 / 3], [1 / 2, 1, 1 / 4]])
     orbits = FloatEnsemble(top, EPS, starts, integrals=integrals, kernel=kernel)
-    orbits.run(2000, 10)
+    list(orbits.records(2000, 10))
     of_map, of_flow = orbits.drift
     assert (of_map.name, of_flow.name) == ("of the map", "of the flow")
     assert (of_map.largest < 2000 * 4 * 2.0**-53).all()  # four roundings a step, all in one direction at worst

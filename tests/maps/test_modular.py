@@ -141,19 +141,6 @@ def test_modulo_2_there_is_one_kernel():
     assert_exact(ensemble, system, 3, starts, 4)
 
 
-@over_kernels
-def test_large_ensembles_go_in_pieces_with_the_same_result(kernel):
-    system, form = SPLIT.chosen.system, FORMS["1,-2"]
-    x = np.random.default_rng(1).integers(0, 97, (9001, 4))
-    whole = ModularEnsemble(system, "1/10", x, 97, form=form, kernel=kernel)
-    whole.advance(20)
-    part = ModularEnsemble(system, "1/10", x[8000:], 97, kernel="numpy")
-    part.advance(20)
-    assert whole.x[8000:].tolist() == part.x.tolist()
-    assert whole.singular_at[8000:].tolist() == part.singular_at.tolist()
-    assert 0 < (whole.singular_at < 0).sum() < 9001
-
-
 def test_threads_share_the_orbits_among_them_numba():
     system, form = SPLIT.chosen.system, FORMS["1,-2"]
     x = np.random.default_rng(1).integers(0, 97, (101, 4))
@@ -167,20 +154,6 @@ def test_threads_share_the_orbits_among_them_numba():
         assert one.singular_at.tolist() == three.singular_at.tolist()
     with pytest.raises(InputError, match="0 threads"):
         ModularEnsemble(system, "1/10", x, 97, threads=0)
-
-
-def test_starts_are_exact_numbers_or_integers_of_any_sign():
-    system = SPLIT.chosen.system
-    numbers = ModularEnsemble(system, "1/10", [["1/2", -3, 0, 1]], 101, kernel="numpy")
-    integers = ModularEnsemble(system, "1/10", np.array([[51, -3, 101, -100]]), 101, kernel="numpy")
-    assert numbers.x.tolist() == integers.x.tolist() == [[51, 98, 0, 1]]
-    assert numbers.x.dtype == np.int64
-
-
-def test_no_orbit_at_all_is_an_ensemble_too():
-    ensemble = ModularEnsemble(LORENZ, "1/10", [], 101, kernel="numpy")
-    ensemble.advance(2)
-    assert ensemble.x.shape == (0, 3)
 
 
 WRONG = [

@@ -10,7 +10,6 @@ from kahanmaps.experiments.columns import value_pairs
 from kahanmaps.experiments.records import Outcome, Record, Row, Task
 from kahanmaps.experiments.summary import summarise
 from kahanmaps.plots.batch import clipped, draw_batch, draw_pairs, groups_beyond
-from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.style import Style
 
 
@@ -49,11 +48,6 @@ def test_bars_stand_one_after_the_other():
     [axes] = draw_batch(summarise([row(0, verdict="proved"), row(1, missing=True)], ["m"])).axes
     proved, missing = axes.containers
     assert (proved.patches[0].get_x(), missing.patches[0].get_x()) == (0, 1)
-
-
-def test_verdicts_that_nobody_knows_are_drawn_too():
-    [axes] = draw_batch(summarise([row(0, verdict="perhaps")], ["m"])).axes
-    assert bars(axes) == {"perhaps": [1]}
 
 
 def test_a_box_is_made_of_the_quantiles_of_the_summary():
@@ -121,14 +115,6 @@ def test_a_number_that_nobody_has_is_refused():
         draw_batch(summarise(numbers([1]), ["m"]), ["d"])
 
 
-def test_names_of_groups_are_no_formulas_and_short():
-    rows = [Row(r"e$\frac$_b" + "x" * 100, 0, Task("orbit", None, {}), None)]
-    figure = draw_batch(summarise(rows, ["experiment"]))
-    [label] = figure.axes[0].get_yticklabels()
-    assert label.get_text().endswith("...")
-    picture_bytes(figure, "svg", Style())
-
-
 def test_pairs_are_dots():
     [axes] = draw_pairs(value_pairs(numbers([3, 1, 2]), "eps", "c")).axes
     assert axes.lines[0].get_ydata().tolist() == [3, 1, 2]
@@ -157,15 +143,3 @@ def test_infinite_numbers_are_left_out_and_counted():
     pairs = value_pairs(numbers(["1" + "0" * 400, 1]), "eps", "c")
     assert clipped(pairs) == 1
     assert draw_pairs(pairs).axes[0].lines[0].get_ydata().tolist() == [1]
-
-
-def test_no_pair_is_refused():
-    with pytest.raises(InputError, match="found no task with both eps and c"):
-        draw_pairs(value_pairs([], "eps", "c"))
-
-
-@pytest.mark.slow
-def test_the_same_summary_is_the_same_bytes():
-    rows = [*numbers(range(9)), row(7, verdict="refuted")]
-    first, second = (picture_bytes(draw_batch(summarise(rows, ["m"])), "png", Style(dpi=50)) for _ in range(2))
-    assert first == second

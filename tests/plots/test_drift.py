@@ -19,7 +19,6 @@ from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.plots.draw_drift import clipped_from, draw_drift
 from kahanmaps.plots.drift import BINS, _Bins, _edges, small_start, survey_drift
 from kahanmaps.plots.drift_functions import OfTheImage, asked_functions, functions_of, known_functions
-from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -231,11 +230,6 @@ def test_an_exact_0_is_in_the_band_and_not_left_out():
     assert len(axes.patches) == 1
 
 
-def test_there_is_no_band_without_an_exact_0():
-    [axes] = drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")])).axes
-    assert (len(axes.texts), len(axes.patches)) == (0, 0)
-
-
 def test_what_blows_up_is_an_arrow_and_flattens_nothing():
     found = survey(SQUARE, ["1/10"], 2000, [("E", "x")], ("generic", "rk4"))
     [axes] = drawn(found).axes
@@ -254,24 +248,3 @@ def test_an_orbit_that_ends_early_has_a_cross():
 @pytest.mark.parametrize(("scale", "expected"), [("loglog", "log"), ("semilog", "linear")])
 def test_the_axis_of_steps_is_as_asked_for(scale, expected):
     assert drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")]), scale=scale).axes[0].get_xscale() == expected
-
-
-def test_another_scale_is_refused():
-    with pytest.raises(InputError, match="expected loglog or semilog"):
-        drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")]), scale="polar")
-
-
-@pytest.mark.slow
-def test_the_same_survey_is_the_same_bytes():
-    first, second = (
-        picture_bytes(drawn(survey(CIRCLE, [1, 1], 20, [("E", "x")])), "png", Style(dpi=50)) for _ in range(2)
-    )
-    assert first == second
-
-
-def test_the_name_of_a_long_function_is_set_in_two_lines():
-    found = survey(CIRCLE, [1, 1], 20, [("a_name_" * 9, "x^2 + y^2"), ("E", "x")])
-    first, second = draw_drift(found, Style(width=8.6, font_size=8)).axes
-    assert first.get_ylabel().startswith("relative error of\na_name_")
-    assert first.get_ylabel().endswith("...")
-    assert second.get_ylabel() == "relative error of $E$"

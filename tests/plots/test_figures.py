@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 from functools import cache
-from itertools import pairwise
 
 import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from kahanmaps.errors import InputError
 from kahanmaps.plots.figures import (
@@ -122,36 +120,10 @@ def test_names_of_users_are_labels_and_no_formulas():
     assert picture_bytes(figure, "svg", STYLE)
 
 
-def test_titles_of_two_lines_stay_inside_where_axes_are_squares_and_a_legend_is_below():
-    style = Style(width=8.6, height=5.5, font_size=8)
-
-    def beyond(layout):
-        """How many dots of the titles are cut off."""
-        with drawing(style):
-            figure = new_figure(style)
-            for axes in figure.subplots(1, 2):
-                axes.set_box_aspect(1)
-                axes.set_title("two\nlines")
-                axes.set(xlabel="x", ylabel="y")
-                axes.plot([0, 1], [0, 1], label="a line")
-            figure.legend(loc="outside lower center")
-            if layout is not None:
-                figure.set_layout_engine(layout)
-            FigureCanvasAgg(figure).draw()
-            return max(axes.title.get_window_extent().y1 - figure.bbox.y1 for axes in figure.axes)
-
-    assert beyond("constrained") > 1  # what matplotlib does by itself
-    assert beyond(None) <= 0
-
-
 def test_long_texts_are_cut_into_lines_and_what_is_left_becomes_dots():
     assert wrapped("one two three four", width=40, size=8, most=3) == "one two\nthree four"
     assert wrapped("one two three four five six", width=40, size=8, most=2) == "one two\nthree f..."
     assert wrapped("x" * 99, width=40, size=8) == "x" * 7 + "..."
-
-
-def test_no_text_is_set_smaller_than_six_points_unless_all_are():
-    assert [Style(font_size=size).smallest for size in (5, 7, 8, 12)] == [5, 6, 6, 10]
 
 
 def test_pictures_of_more_dots_than_fit_into_memory_are_refused():
@@ -162,25 +134,5 @@ def test_pictures_of_more_dots_than_fit_into_memory_are_refused():
         picture_bytes(new_figure(tall, aspect=3), "png", tall)
 
 
-def lightness(colour):
-    """CIE L* of an sRGB colour, by the definition."""
-    channels = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
-    y = sum(w * c for w, c in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
-    return 116 * y ** (1 / 3) - 16 if y > 0.008856 else 903.3 * y
-
-
-def test_neighbouring_colours_differ_on_a_grey_printer():
-    levels = [lightness(colour) for colour in COLOURS]
-    assert all(abs(a - b) >= 4 for a, b in pairwise(levels))
-    assert all(abs(a - b) >= 10 for k, a in enumerate(levels[:4]) for b in levels[:k])
-
-
 def test_every_colour_has_a_line_style_and_a_mark_of_its_own():
     assert len({str(line) for line in LINES}) == len(set(MARKS)) == len(set(COLOURS)) == len(COLOURS)
-
-
-def test_sizes_out_of_range_are_refused():
-    for wrong in ({"width": 1}, {"width": float("nan")}, {"height": 1e9}, {"font_size": 0}, {"dpi": 10**6}):
-        with pytest.raises(InputError, match="expected"):
-            Style(**wrong)

@@ -14,10 +14,8 @@ from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import height_survey
-from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.growth import draw_degrees, draw_heights
 from kahanmaps.plots.height_curves import HeightCurve, curves_of_record, fit_of, height_curves
-from kahanmaps.plots.style import Style
 
 SQUARES = tuple(2 * n * n + 1 for n in range(12))  # of the Kahan map of the Euler top
 POWERS = tuple(2**n for n in range(10))
@@ -99,39 +97,15 @@ def test_a_degree_0_lies_in_the_band_marked_0():
     assert [text.get_text() for text in axes.texts] == ["0"]
 
 
-def test_there_is_no_band_without_a_0():
-    [axes] = draw_degrees({"x": growth(POWERS)}).axes
-    assert (len(axes.texts), len(axes.patches)) == (0, 0)
-
-
 def test_on_two_logarithmic_scales_the_first_iterate_is_the_first():
     [axes] = draw_degrees({"top": growth(SQUARES)}, scale="loglog").axes
     assert marks(axes)[0].get_xdata()[0] == 1
-
-
-def test_a_single_degree_can_be_drawn():
-    assert draw_degrees({"x": growth((1,), "time")}).axes
-
-
-def test_names_of_users_are_no_formulas():
-    picture_bytes(draw_degrees({r"a_b$\frac$": growth(SQUARES)}), "svg", Style())
 
 
 @pytest.mark.parametrize("wrong", [{}, {str(k): growth(POWERS) for k in range(8)}])
 def test_no_system_and_too_many_are_refused(wrong):
     with pytest.raises(InputError, match="expected 1 to 7"):
         draw_degrees(wrong)
-
-
-def test_another_scale_is_refused():
-    with pytest.raises(InputError, match="expected linear, log or loglog"):
-        draw_degrees({"x": growth(POWERS)}, scale="cubic")
-
-
-@pytest.mark.slow
-def test_the_same_degrees_are_the_same_bytes():
-    first, second = (picture_bytes(draw_degrees({"top": growth(SQUARES)}), "png", Style(dpi=50)) for _ in range(2))
-    assert first == second
 
 
 @pytest.fixture(scope="module")
@@ -188,16 +162,6 @@ def test_undecided_heights_have_no_fit():
 def test_orbits_that_disagree_are_counted():
     figure = draw_heights([curve(Growth.UNDECIDED, [1, 2]), curve(Growth.BOUNDED, [1, 2]), curve(Growth.BOUNDED, [2])])
     assert labels(figure)[0].endswith(": 1 undecided, 2 bounded")
-
-
-def test_no_orbit_is_refused():
-    with pytest.raises(InputError, match="found no orbit"):
-        draw_heights([])
-
-
-def test_too_many_eps_are_refused():
-    with pytest.raises(InputError, match="found 8 values of eps"):
-        draw_heights([curve(Growth.BOUNDED, [1], eps=fmpq(1, k)) for k in range(1, 9)])
 
 
 @pytest.mark.parametrize(

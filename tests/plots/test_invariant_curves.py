@@ -15,16 +15,14 @@ from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves, panels_of
-from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.invariant_curves import MAX_POINTS, find_invariant_curves
-from kahanmaps.plots.plane_views import Disc, Rectangle, view_of
+from kahanmaps.plots.plane_views import Disc, view_of
 from kahanmaps.plots.style import Style
 from kahanmaps.plots.symmetric_planes import ONE_LINE, THREE_LINES, ZERO
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 STYLE = Style(width=12)
-COARSE = Style(width=12, dpi=50)
 START = {2: ["1/3", "1/5"], 4: ["1/2", "-1/3", 0, 1], 6: [1, 0, "1/2", 0, "1/3", 1]}
 # Dots and coefficients are right to 2^-53; the defect is relative to the terms of the equation, about ten of them.
 ROUNDING = 1e-14
@@ -236,13 +234,6 @@ def test_the_lines_drawn_lie_on_the_curve(curves):
     assert found.planes[0].orbits[0].cubic.defect(u[inside], v[inside]) < 1e-7
 
 
-def test_panels_are_named_by_root_and_coordinates(curves):
-    figure = draw_invariant_curves(curves("one real root of three"), STYLE)
-    assert figure.axes[0].get_title() == r"$\lambda_{1} = 0.75488$"
-    assert figure.axes[1].get_title() == r"$\lambda_{2,3} = -0.877 \pm 0.745\,\mathrm{i}$"
-    assert [axes.get_xlabel() for axes in figure.axes[:2]] == ["$u_{1}$", r"$\mathrm{Re}\,u_{2}$"]
-
-
 def test_a_pole_is_said_in_the_picture():
     found = find_invariant_curves(SystemFile.from_system(monkey_saddle()), [["3/5", "4/5"], [1, 3]], "1/6", 5)
     figure = draw_invariant_curves(found, STYLE, labels=("one", "two"))
@@ -279,24 +270,6 @@ def test_a_threefold_curve_is_drawn_with_equal_scales(curves):
     assert shapes[ONE_LINE].half[0] != shapes[ONE_LINE].half[1]
 
 
-def test_one_dot_has_a_window():
-    view = Rectangle.around([(np.array([3.0]), np.array([0.0]))])
-    assert view.outside == 0
-    assert all(half > 0 for half in view.half)
-
-
-def test_the_flow_is_dashed(curves):
-    axes = draw_invariant_curves(curves("m = 2"), STYLE, flow=True).axes[0]
-    assert any(line.is_dashed() for line in axes.lines)
-    assert not any(line.is_dashed() for line in draw_invariant_curves(curves("m = 2"), STYLE).axes[0].lines)
-
-
 def test_wrong_variables_are_refused(curves):
     with pytest.raises(InputError, match="two numbers from 0 to 3"):
         draw_invariant_curves(curves("m = 2"), STYLE, original=(0, 4))
-
-
-@pytest.mark.slow
-def test_the_same_picture_is_the_same_bytes(curves):
-    first, second = (picture_bytes(draw_invariant_curves(curves("m = 2"), STYLE), "png", COARSE) for _ in range(2))
-    assert first == second

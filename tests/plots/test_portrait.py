@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.collections import PathCollection
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.plots.density import density_of
-from kahanmaps.plots.draw_portrait import cells_for, draw_density, draw_portrait
-from kahanmaps.plots.figures import RASTERISE_ABOVE, picture_bytes
+from kahanmaps.plots.draw_portrait import draw_density, draw_portrait
+from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.level_sets import level_curves
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portrait import portrait_of
-from kahanmaps.plots.style import COLOURS, Style
+from kahanmaps.plots.style import Style
 from kahanmaps.plots.trajectories import MAX_POINTS, Trajectories, ensemble_for, euler_orbits, require_points, walked
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -28,10 +28,6 @@ LOTKA_VOLTERRA = load("lotka_volterra", {}).system
 def orbits(count, steps=20):
     starts = np.stack([np.ones(count), 1.5 + np.arange(count) / count], axis=1)
     return walked(ensemble_for(LOTKA_VOLTERRA, "1/20", starts, steps), steps)
-
-
-def lines_with(figure, length):
-    return [line for line in figure.axes[0].lines if len(line.get_xdata()) == length]
 
 
 def test_all_points_of_all_orbits_are_there():
@@ -86,12 +82,6 @@ def test_more_points_than_can_be_drawn_are_refused():
         require_points(MAX_POINTS + 1, 1, 2)
 
 
-@pytest.mark.parametrize("count", [1, 3, 7])
-def test_up_to_seven_orbits_have_a_colour_each(count):
-    figure = draw_portrait(portrait_of(orbits(count, 100), AXES), STYLE)
-    assert [line.get_color() for line in lines_with(figure, 101)] == list(COLOURS[:count])
-
-
 def test_more_orbits_are_one_cloud_with_a_colour_for_each():
     figure = draw_portrait(portrait_of(orbits(8), AXES), STYLE)
     (cloud,) = (c for c in figure.axes[0].collections if isinstance(c, PathCollection))
@@ -105,13 +95,6 @@ def test_the_widest_orbits_are_drawn_first():
     assert figure.axes[0].collections[0].get_array().tolist() == [k for k in range(7, -1, -1) for _ in range(21)]
 
 
-def test_lines_join_the_points_of_each_orbit():
-    shown = portrait_of(orbits(8), AXES)
-    (lines,) = draw_portrait(shown, STYLE, lines=True).axes[0].collections
-    assert isinstance(lines, LineCollection)
-    assert len(lines.get_segments()) == 8 * 20
-
-
 def test_millions_of_points_are_not_joined():
     found = Trajectories(("x", "y"), np.zeros((1_000_001, 1, 2)), np.arange(1_000_001))
     with pytest.raises(InputError, match="draw dots"):
@@ -123,18 +106,6 @@ def test_no_line_goes_through_a_missing_point():
     found = Trajectories(("x", "y"), points, np.arange(4))
     shown = portrait_of(found, AXES, colour="step")
     assert len(draw_portrait(shown, STYLE, lines=True).axes[0].collections[0].get_segments()) == 1
-
-
-def test_a_colour_has_a_bar_with_its_name():
-    figure = draw_portrait(portrait_of(orbits(2), AXES, colour=point_function("x*y", "xy")), STYLE)
-    assert [axes.get_ylabel() for axes in figure.axes] == ["$y$", "$x y$"]
-
-
-def test_colours_beyond_the_bar_are_said_by_its_ends():
-    values = np.append(np.linspace(0, 1, 50), 1e6)
-    found = Trajectories(("x", "y"), np.stack([0 * values, values], axis=1)[:, None], np.arange(51))
-    figure = draw_portrait(portrait_of(found, ["step", AXES[0]], colour=AXES[1]), STYLE)
-    assert figure.axes[0].collections[0].colorbar.extend == "max"
 
 
 def test_points_outside_the_window_do_not_spoil_the_colours():
@@ -171,26 +142,6 @@ def test_points_outside_the_window_are_not_drawn_in_space():
     assert np.nanmin(x) >= 0
 
 
-@pytest.mark.parametrize("count", [2, 12])
-def test_many_points_are_an_image_however_few_each_orbit_has(count):
-    steps = RASTERISE_ABOVE // count
-    figure = draw_portrait(portrait_of(orbits(count, steps), AXES), STYLE)
-    drawn = lines_with(figure, steps + 1) if count == 2 else figure.axes[0].collections
-    assert all(artist.get_rasterized() for artist in drawn)
-
-
-def test_the_same_portrait_is_the_same_bytes():
-    first, second = (picture_bytes(draw_portrait(portrait_of(orbits(3), AXES), STYLE), "pdf", STYLE) for _ in "ab")
-    assert first == second
-
-
-@pytest.mark.parametrize("value", [0.0, 1e300, 1e-300])
-def test_a_single_point_is_drawn_whatever_its_size(value):
-    found = Trajectories(("x", "y"), np.full((1, 1, 2), value), np.arange(1))
-    figure = draw_portrait(portrait_of(found, AXES), STYLE)
-    assert picture_bytes(figure, "png", Style(width=8.6, dpi=50))
-
-
 def test_no_points_at_all_are_an_empty_picture():
     found = Trajectories(("x", "y"), np.full((2, 1, 2), np.nan), np.arange(2))
     assert picture_bytes(draw_portrait(portrait_of(found, AXES, colour="step"), STYLE), "png", STYLE)
@@ -207,8 +158,3 @@ def test_the_lowest_row_of_a_density_is_below():
     image = draw_density(found, STYLE).axes[0].images[0]
     assert image.origin == "lower"
     assert image.get_extent() == [0, 1, 0, 1]
-
-
-def test_a_larger_picture_has_more_cells():
-    small, large = cells_for(Style(width=8.6)), cells_for(Style(width=17))
-    assert small < large

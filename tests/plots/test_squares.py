@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flint import fmpq
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.text import Text
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile
@@ -17,7 +15,6 @@ from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues, parse_ch
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.plots import squares as module
 from kahanmaps.plots.draw_squares import _in_two_digits, draw_squares, widest_axes
-from kahanmaps.plots.figures import picture_bytes
 from kahanmaps.plots.squares import Pair, pair_of_systems, pairs_of_member, squares
 from kahanmaps.plots.style import Style
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -194,29 +191,6 @@ def test_how_much_a_gap_is_magnified_is_a_number_and_no_computer_notation():
     ]
 
 
-@pytest.mark.parametrize("width", [8.6, 17])
-def test_titles_and_names_of_corners_stay_inside(width):
-    style = Style(width=width, font_size=8)
-    figure = draw_squares([squares(pair, START, "1/50") for pair in pairs_of_member(load("paper_m2"))], style)
-    FigureCanvasAgg(figure).draw()
-    for axes in figure.axes:
-        assert axes.title.get_window_extent().y1 <= figure.bbox.y1
-        for text in axes.texts:
-            box = Text.get_window_extent(text)
-            assert axes.bbox.x0 <= box.x0 <= box.x1 <= axes.bbox.x1
-            assert axes.bbox.y0 <= box.y0 <= box.y1 <= axes.bbox.y1
-
-
-def test_a_title_of_three_lines_stays_inside():
-    start = [1, 0, "1/2", 0, "1/3", 1]
-    found = [squares(pair, start, "1/50", 3) for pair in pairs_of_member(load("paper_m3"))]
-    style = Style(width=8.6, font_size=8)
-    figure = draw_squares(found, style)
-    assert figure.axes[1].get_title().endswith("\n4 of 32 points outside")
-    FigureCanvasAgg(figure).draw()
-    assert figure.axes[1].title.get_window_extent().y1 <= figure.bbox.y1
-
-
 def test_a_square_has_four_arrows_and_named_corners():
     found = [squares(pair, START, "1/50") for pair in pairs_of_member(load("paper_m2"))]
     closed, open_ = draw_squares(found, STYLE).axes
@@ -224,26 +198,3 @@ def test_a_square_has_four_arrows_and_named_corners():
     names = {text.get_text() for text in closed.texts}
     assert names == {"$x$", r"$\Phi_f x$", r"$\Phi_g x$", r"$\Phi_g\Phi_f x = \Phi_f\Phi_g x$"}
     assert r"$\Phi_g\Phi_f x \neq \Phi_f\Phi_g x$" in {text.get_text() for text in open_.texts}
-
-
-def test_missing_points_leave_a_picture():
-    found = squares(plane_pair(["x^2", "0"], ["0", "y^2"]), [5, 2], "1/10")
-    (axes,) = draw_squares([found], STYLE).axes
-    assert axes.get_title().endswith("no fourth corner")
-    assert len(axes.patches) == 1
-
-
-def test_wrong_axes_are_refused(both):
-    with pytest.raises(InputError, match="two numbers from 0 to 3"):
-        draw_squares(both, STYLE, axes=(0, 7))
-
-
-def test_a_start_that_cannot_be_drawn_is_refused():
-    with pytest.raises(InputError, match="cannot be drawn"):
-        draw_squares([squares(plane_pair(["x", "0"], ["0", "y"]), [10**200, 1], "1/10")], STYLE)
-
-
-@pytest.mark.slow
-def test_the_same_picture_is_the_same_bytes(both):
-    first, second = (picture_bytes(draw_squares(both, STYLE), "png", Style(width=12, dpi=50)) for _ in range(2))
-    assert first == second

@@ -106,25 +106,6 @@ def test_a_picture_that_does_not_fit_is_refused_and_may_be_tried_with_more_rows(
     assert len(draw_in_characters(figure, 60, 60, STYLE)) == 60
 
 
-def test_panels_of_two_rows_show_nothing_and_are_refused():
-    with drawing(STYLE):
-        figure = new_figure(STYLE)
-        for axes in figure.subplots(2, 2).flat:
-            axes.set_box_aspect(1)
-            axes.set_title("a title")
-            axes.set_xlabel("x")
-    with pytest.raises(InputError, match="expected more for this picture"):
-        draw_in_characters(figure, 60, 16, STYLE)
-
-
-def test_the_name_of_a_point_covers_no_number_at_the_axis():
-    figure = a_figure()
-    figure.axes[0].annotate("corner", (0.5, 0), xytext=(0, -12), textcoords="offset points")
-    drawn = lines(figure)
-    named = next(k for k, line in enumerate(drawn) if "corner" in line)
-    assert named < next(k for k, line in enumerate(drawn) if "0.5" in line and k > 12)
-
-
 def test_powers_of_ten_below_a_logarithmic_axis_are_not_written():
     with drawing(STYLE):
         figure = new_figure(STYLE)

@@ -52,10 +52,6 @@ def test_values_at_both_ends_of_the_range_of_doubles_do_not_overflow():
     assert high >= 1e307
 
 
-def test_no_points_at_all_have_a_window():
-    assert window_of(np.empty((0, 2))) == window_of(np.full((3, 2), np.nan))
-
-
 def test_the_axes_are_those_that_are_filled_and_in_order():
     t = np.linspace(0, 50, 3000)
     points = np.stack([t, 0 * t, np.sin(np.sqrt(2) * t), 2 * t, np.cos(t)], axis=1)
@@ -72,10 +68,6 @@ def test_the_scale_of_a_variable_does_not_matter():
 @pytest.mark.parametrize(("dim", "count"), [(2, 2), (5, 2), (5, 3)])
 def test_of_points_that_do_not_move_the_first_variables_are_chosen(dim, count):
     assert fullest_axes(np.ones((4, dim)), count) == tuple(range(count))
-
-
-def test_a_hundred_variables_are_chosen_from_in_a_moment():
-    assert len(fullest_axes(np.random.default_rng(1).random((500, 100)), 2)) == 2
 
 
 @pytest.mark.parametrize(

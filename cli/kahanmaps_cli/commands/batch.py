@@ -1,4 +1,4 @@
-"""kahanmaps batch run | status | show | export | summary | merge | check | tasks."""
+"""kahanmaps batch run | status | show | export | summary | merge | tasks."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from kahanmaps_cli.complete import complete_task, complete_toml
+from kahanmaps_cli.complete import complete_toml
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import OptionType
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import echo
 
 if TYPE_CHECKING:
@@ -257,14 +257,13 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
     """
     from kahanmaps.errors import counted
     from kahanmaps.experiments.store import Store
-    from kahanmaps.version import __version__
 
     with Store.open(target, create=True) as store:
         merged = [(source, store.merge(source)) for source in sources]
     conflicts = sum(found.conflicts for _, found in merged)
     if as_json:
         data = [{"source": source, **asdict(found)} for source, found in merged]
-        print_json({"command": "batch merge", "version": __version__, "target": target, "merged": data})
+        print_json({**envelope("batch merge"), "target": target, "merged": data})
     else:
         for source, found in merged:
             counts = f"new results: {found.results}\tfailures replaced: {found.replaced}\tconflicts: {found.conflicts}"
@@ -278,30 +277,8 @@ def merge(target: str, sources: tuple[str, ...], as_json: bool, quiet: bool) -> 
     return 3 if conflicts else 0
 
 
-@command.command("check", short_help="Is all of a database what was written to it?")
-@_database()
-@output_options
-def check(db: str, as_json: bool, quiet: bool) -> int:
-    """Read all of a database, and say what is damaged and what is whole.
-
-    \b
-      kahanmaps batch check --db study.db
-      kahanmaps batch check --db study.db --json | jq .results.damaged
-
-    Damaged results are done again by 'batch run'; for anything else take a copy from before. Exit status: 0 all is
-    whole, 2 not a database of results, 3 something is damaged.
-    """
-    from kahanmaps.experiments.store import Store
-    from kahanmaps_cli.batch_show import print_checked
-
-    with Store.open(db, readonly=True, is_checked=False) as store:
-        found = store.check()
-    print_checked(db, found, as_json, quiet)
-    return 0 if found.is_whole else 3
-
-
 @command.command("tasks", short_help="What an experiment can do, with all options.")
-@click.argument("name", required=False, shell_complete=complete_task)
+@click.argument("name", required=False)
 @json_option
 def tasks(name: str | None, as_json: bool) -> None:
     """What an experiment can do: the kinds of tasks, and their options with defaults.

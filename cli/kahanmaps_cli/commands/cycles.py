@@ -15,7 +15,7 @@ from kahanmaps_cli.options import (
     system_or_prime_options,
 )
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
@@ -186,11 +186,9 @@ def _record(
 ) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
     from kahanmaps.checks.settings import convention
-    from kahanmaps.version import __version__
 
     return {
-        "command": "cycles",
-        "version": __version__,
+        **envelope("cycles"),
         "system": file.name,
         "convention": convention(file.map),
         "arithmetic": "exact modulo primes",

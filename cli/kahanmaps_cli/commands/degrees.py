@@ -16,7 +16,7 @@ from kahanmaps_cli.options import (
     the_eps,
 )
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
@@ -110,11 +110,9 @@ def _time_step(file: SystemFile, found: DegreeGrowth) -> str | None:
 
 def _record(file: SystemFile, options: dict[str, Any], found: DegreeGrowth) -> dict[str, Any]:
     from kahanmaps.checks.settings import convention
-    from kahanmaps.version import __version__
 
     return {
-        "command": "degrees",
-        "version": __version__,
+        **envelope("degrees"),
         "system": file.name,
         "time_step": _time_step(file, found),
         "convention": convention(file.map),

@@ -23,7 +23,7 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.terminal import tell
 
@@ -200,7 +200,6 @@ def _print(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> Non
 def _record(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
     from kahanmaps.checks.settings import eps_record
-    from kahanmaps.version import __version__
 
     steps, output = options["steps"], options["output"]
     drawn_at_random = options["starts"] is None
@@ -209,8 +208,7 @@ def _record(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> di
         box = "1" if options["box"] is None else format_number(options["box"])
     every = options["every"] or max(1, steps)
     return {
-        "command": "ensemble",
-        "version": __version__,
+        **envelope("ensemble"),
         "system": file.name,
         "variables": list(file.variables),
         **eps_record(eps, file.map),

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps.errors import quoted
-from kahanmaps.version import __version__
 from kahanmaps_cli.draw import draw_member, draw_options
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import (
@@ -23,7 +22,7 @@ from kahanmaps_cli.options import (
 )
 from kahanmaps_cli.outputs import OutputFile, OutputFolder, will_write
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import on_terminal, shorten, tell
 
 if TYPE_CHECKING:
@@ -100,8 +99,7 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
 
     file, member, hidden = _member_or_hidden(load_system(system, options))
     data: dict[str, Any] = {
-        "command": "family show",
-        "version": __version__,
+        **envelope("family show"),
         "system": file.name,
         "m": member.m,
         "dim": member.dim,
@@ -164,8 +162,7 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
         A, variables = member.A, member.variables
     found = cubic_space(A, variables)
     data: dict[str, Any] = {
-        "command": "family space",
-        "version": __version__,
+        **envelope("family space"),
         "A": _rows(A),
         "dim": A.nrows(),
         "dimension": found.dimension,
@@ -231,8 +228,7 @@ def associated(
     if as_json:
         print_json(
             {
-                "command": "family associated",
-                "version": __version__,
+                **envelope("family associated"),
                 "system": file.name,
                 "factors": [str(f) for f in member.factors],
                 "associated": rows,

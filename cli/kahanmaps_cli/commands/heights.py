@@ -18,7 +18,7 @@ from kahanmaps_cli.options import (
 )
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
@@ -120,12 +120,10 @@ def _print(file: SystemFile, found: HeightSurvey) -> None:
 def _record(file: SystemFile, options: dict[str, Any], found: HeightSurvey) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
     from kahanmaps.checks.settings import convention
-    from kahanmaps.version import __version__
 
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
     return {
-        "command": "heights",
-        "version": __version__,
+        **envelope("heights"),
         "system": file.name,
         "eps": [format_number(value) for value in values],
         "time_step": [format_number(2 * value) for value in values if file.map.has_time_step],

@@ -18,7 +18,7 @@ from kahanmaps_cli.options import (
     system_options,
 )
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import on_terminal, print_table, tell
 
 if TYPE_CHECKING:
@@ -124,13 +124,11 @@ def _numbers(values: Any) -> list[float | None]:
 def _record(file: SystemFile, eps: Any, options: dict[str, Any], found: Lyapunov) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
     from kahanmaps.checks.settings import eps_record
-    from kahanmaps.version import __version__
 
     random = options["starts"] is None
     box = "1" if options["box"] is None else format_number(options["box"])
     return {
-        "command": "lyapunov",
-        "version": __version__,
+        **envelope("lyapunov"),
         "system": file.name,
         "variables": list(file.variables),
         **eps_record(eps, file.map),

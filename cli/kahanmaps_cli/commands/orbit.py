@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -133,11 +132,10 @@ def command(
         return _stream(run, output, quiet)
     with (
         _opened(output, form) as stream,
-        _waiting(form, stream) as rows,
         interruptible(run.walk.interrupt),
         Progress(hidden) as progress,
     ):
-        writer = _writer(form, stream, rows, run, to_file=output is not None)
+        writer = _writer(form, stream, run, to_file=output is not None)
         writer.header(run.header())
         try:
             for step, texts, values in run.points():
@@ -204,14 +202,14 @@ def _end_record(end: OrbitEnd, run: OrbitRun) -> dict[str, Any]:
     return record
 
 
-def _writer(form: str, stream: IO[Any], rows: IO[str] | None, run: OrbitRun, to_file: bool) -> Writer:
+def _writer(form: str, stream: IO[Any], run: OrbitRun, to_file: bool) -> Writer:
     columns, integrals = run.file.variables, [name for name, _ in run.columns]
     if form == "jsonl":
         return JsonLines(stream, columns, integrals)
     if form == "csv":
         return Csv(stream, columns, integrals)
-    if rows is not None:
-        return Npz(stream, columns, integrals, run.storage, rows)
+    if form == "npz":
+        return Npz(stream, columns, integrals, run.storage)
     on_terminal = not to_file and sys.stdout.isatty()
     return Text(stream, columns, integrals, get_terminal_size().columns if on_terminal else None)
 
@@ -245,14 +243,3 @@ def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
             yield held
             held.seek(0)
             copyfileobj(held, sys.stdout.buffer)
-
-
-@contextmanager
-def _waiting(form: str, stream: IO[Any]) -> Iterator[IO[str] | None]:
-    """Where the rows of an npz file wait for their number, on the same disk; it has no name, and goes in any case."""
-    if form != "npz":
-        yield None
-        return
-    folder = os.path.dirname(stream.name) if isinstance(stream.name, str) else None
-    with TemporaryFile("w+", dir=folder, encoding="ascii") as rows:
-        yield rows

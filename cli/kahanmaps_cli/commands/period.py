@@ -9,7 +9,7 @@ import click
 from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
 from kahanmaps_cli.params import Arithmetic, PointText
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
@@ -132,11 +132,9 @@ def _record(
     """Numbers are text: periods exceed what readers of JSON hold exactly."""
     from kahanmaps.algebra.text import format_number
     from kahanmaps.checks.settings import CONVENTION
-    from kahanmaps.version import __version__
 
     return {
-        "command": "period",
-        "version": __version__,
+        **envelope("period"),
         "system": file.name,
         "structure": structure.text,
         "eps": format_number(eps),

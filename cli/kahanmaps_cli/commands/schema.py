@@ -6,7 +6,7 @@ import json
 
 import click
 
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 
 
 def _complete(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
@@ -30,7 +30,6 @@ def command(names: tuple[str, ...], as_json: bool) -> None:
     NAME is that of a command, or system-file or batch-spec. A schema is complete in itself and strict: a key that it
     does not name is an error. Where a command prints one JSON object a line, the schema is that of a line.
     """
-    from kahanmaps.version import __version__
     from kahanmaps_cli.schema_files import DIALECT, schema, schema_titles
 
     if names:
@@ -39,7 +38,7 @@ def command(names: tuple[str, ...], as_json: bool) -> None:
     titles = schema_titles()
     if as_json:
         rows = [{"name": name, "title": title} for name, title in titles.items()]
-        print_json({"command": "schema", "version": __version__, "dialect": DIALECT, "schemas": rows})
+        print_json({**envelope("schema"), "dialect": DIALECT, "schemas": rows})
         return
     width = max(map(len, titles))
     for name, title in titles.items():

@@ -16,7 +16,7 @@ from kahanmaps_cli.options import (
     the_eps,
 )
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import on_terminal, shorten, tell
 
 if TYPE_CHECKING:
@@ -147,11 +147,9 @@ def _record(
     from kahanmaps.algebra.text import format_number
     from kahanmaps.checks.settings import convention
     from kahanmaps.laboratory.singular.singularities import steps_by_default
-    from kahanmaps.version import __version__
 
     return {
-        "command": "singularities",
-        "version": __version__,
+        **envelope("singularities"),
         "system": file.name,
         "convention": convention(file.map),
         "arithmetic": "exact; series modulo primes",

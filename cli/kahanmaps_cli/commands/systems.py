@@ -6,10 +6,9 @@ from typing import Any
 
 import click
 
-from kahanmaps.version import __version__
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.options import json_option, load_reference, parameter_option
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import on_terminal, shorten, tell, tell_entry
 
 
@@ -39,7 +38,7 @@ def command(
             raise click.UsageError("--toml, --latex and -p need the NAME of a system")
         if as_json:
             systems = [_summary(load(key)) for key in titles()]
-            print_json({"command": "systems", "version": __version__, "systems": systems})
+            print_json({**envelope("systems"), "systems": systems})
             return
         found = titles()
         width = max(map(len, found))
@@ -54,8 +53,7 @@ def command(
     elif as_json:
         print_json(
             {
-                "command": "systems",
-                "version": __version__,
+                **envelope("systems"),
                 **_summary(file),
                 **_equations(file),
                 "known": _known(file),

@@ -6,7 +6,7 @@ from typing import Any
 
 from kahanmaps.experiments.options import VOCABULARY
 from kahanmaps.experiments.registry import TaskKind, task_kinds
-from kahanmaps.experiments.schema import SCHEMA, UPGRADE
+from kahanmaps.experiments.schema import SCHEMA
 from kahanmaps_docs.markdown import block, code, plain, table
 
 
@@ -40,4 +40,4 @@ def default(value: Any) -> str:
 
 def database_tables() -> str:
     """The tables, as SQLite is told to make them."""
-    return block(SCHEMA.strip() + UPGRADE.rstrip(), "sql")
+    return block(SCHEMA.strip(), "sql")

@@ -96,7 +96,7 @@ class Stepping:
 
     A system stands for its Kahan map.
 
-    `kernel` is "numpy", "numba" or None: numba if it is installed and `long` says that compiling pays.
+    `kernel` is "numpy", "numba" or None: numba if it is installed.
     """
 
     def __init__(
@@ -108,11 +108,10 @@ class Stepping:
         form: NormalForm | None,
         kernel: str | None,
         threads: int | None = 1,
-        long: bool = True,
     ) -> None:
         if to_float(eps) == 0.0:
             raise InputError("eps is 0 in machine numbers, and the Kahan map the identity: take a larger eps")
-        compiled = choose_kernel(kernel, long) == "numba"
+        compiled = choose_kernel(kernel, long=True) == "numba"
         if threads is not None and threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
         map_ = as_map(system)
@@ -283,7 +282,7 @@ class FloatEnsemble:
         return end_of(self._lanes, orbit, self.step, self._stepping.matrix_name)
 
     def interrupt(self) -> None:
-        """Ask `advance` or `run` to return after the portion in hand (safe to call from a signal handler)."""
+        """Ask `advance` or `records` to return after the portion in hand (safe to call from a signal handler)."""
         self._interrupted = True
 
     def advance(self, steps: int, *, progress: Callable[[int], None] | None = None) -> None:
@@ -292,34 +291,18 @@ class FloatEnsemble:
         for _ in self._recorded(steps, 0, progress):
             pass
 
-    def run(
-        self,
-        steps: int,
-        every: int,
-        out: str | Path | None = None,
-        *,
-        progress: Callable[[int], None] | None = None,
-    ) -> FloatArray | None:
-        """Take `steps` steps and record the points at multiples of `every`, the start among them: (count, n, dim).
-
-        Orbits that have ended are NaN. With `out` they go to this .npy file as they come, and nothing is returned.
-        """
-        require_steps(steps)
-        require_every(every)
-        if out is not None:
-            self.stream(out, steps, every, progress=progress)
-            return None
-        return np.concatenate(list(self.records(steps, every, progress=progress)))
-
     def stream(self, out: str | Path, steps: int, every: int, *, progress: Callable[[int], None] | None = None) -> int:
-        """The same into a .npy file of shape (records, n, dim); returns how many records were written."""
+        """Write the `records` to a .npy file of shape (records, n, dim) as they come; returns how many there are."""
         with NpyFile(out, (self.n, self.system.dim)) as file:
             for x in self.records(steps, every, progress=progress):
                 file.append(x)
             return file.rows
 
     def records(self, steps: int, every: int, *, progress: Callable[[int], None] | None = None) -> Iterator[FloatArray]:
-        """The same in portions (count, n, dim), computed as they are asked for."""
+        """The points at multiples of `every`, the start among them, in portions (count, n, dim); NaN after the end.
+
+        They are computed as they are asked for, `steps` steps in all.
+        """
         require_steps(steps)
         require_every(every)
         if self.step == 0:

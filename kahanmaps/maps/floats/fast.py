@@ -1,9 +1,8 @@
 """Float orbits: the Kahan map in machine numbers.
 
 A second implementation, apart from the exact one and tested against it. The only road from exact numbers to machine
-numbers is `to_floats`. What users need is gathered here; the parts are the modules float_*.py: `float_steps` says what
-a step is, `float_blocks` what the normal form is in doubles, `float_numpy` and `float_numba` are the kernels,
-`float_ensemble` advances many orbits, `float_stream` writes them to disk.
+numbers is `to_floats`. What users need is gathered here: `steps` says what a step is, `blocks` what the normal form is
+in doubles, `numpy_kernel` and `numba_kernel` do the steps, `ensemble` advances many orbits, `stream` writes them.
 """
 
 from __future__ import annotations
@@ -26,15 +25,11 @@ from kahanmaps.maps.floats.ensemble import (
     Drift,
     FloatEnsemble,
     Function,
-    Stepping,
-    Watched,
-    block_drifts,
-    end_of,
     require_every,
 )
-from kahanmaps.maps.floats.steps import RUNNING
 from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kernels import choose_kernel
 from kahanmaps.maps.orbits import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -56,7 +51,7 @@ class FloatOrbit:
     `start` holds exact numbers, `eps` is half the time step, `steps` how many steps to take (None: no limit), `every`
     says which of them are delivered, `backward` steps by the inverse map. With `form`, the normal form of the system,
     steps are much faster and lose fewer digits. `kernel` is "numpy" or "numba"; by default numba, if it is installed,
-    for more than 100,000 steps: it makes no difference to the numbers. Points are computed some ahead of the one
+    for more than 100,000 steps. Points are computed some ahead of the one
     delivered; what the attributes say about near-singular steps and drift is about what was computed. See FloatEnsemble
     for many orbits and for `integrals` and `sampled`.
 
@@ -87,97 +82,74 @@ class FloatOrbit:
             raise InputError(
                 f"found a point with {len(start)} coordinates, expected {system.dim}: {', '.join(system.variables)}"
             )
-        epsilon = rational(eps)
         self.start = to_floats(start)
         self.steps = steps
         self.every = every
-        self.backward = backward
         self.dim = system.dim
         self.end: OrbitEnd | None = None
-        self._stepping = Stepping(
+        self._ensemble = FloatEnsemble(
             system,
-            epsilon,
+            eps,
+            self.start[None],
             backward=backward,
             form=form,
-            kernel=kernel,
-            long=steps is None or steps > _LONG,
+            kernel=choose_kernel(kernel, long=steps is None or steps > _LONG),
+            threads=1,
+            integrals=integrals,
+            sampled=sampled,
         )
-        self._lanes = self._stepping.lanes(self.start[None])
-        self._watched = [Watched(name, function, self.start[None]) for name, function in (integrals or {}).items()]
-        self._sampled = sampled
         self._interrupted = False
 
     @property
     def kernel(self) -> str:
         """What computes: "numpy generic", "numba normal form, 1 thread"."""
-        return self._stepping.name
+        return self._ensemble.kernel
 
     @property
     def near_singular(self) -> int:
         """How many near-singular steps were taken (see steps.py), counted for each block."""
-        return int(self._lanes.near[0])
+        return int(self._ensemble.near_singular[0])
 
     @property
     def near_singular_at(self) -> int | None:
         """The index of the point from which the first of them was taken."""
-        return int(self._lanes.near_at[0]) if self._lanes.near[0] else None
+        return int(self._ensemble.near_singular_at[0]) if self.near_singular else None
 
     @property
     def drift(self) -> tuple[Drift, ...]:
         """Of the block integrals h/(1 + eps^2 D), by root of chi, and of the functions that are watched."""
-        drifts = (*block_drifts(self._stepping, self._lanes), *(watched.drift for watched in self._watched))
-        return tuple(drift.of(0) for drift in drifts)
+        return tuple(drift.of(0) for drift in self._ensemble.drift)
 
     def interrupt(self) -> None:
         """Ask a running orbit to end after the step in flight."""
         self._interrupted = True
 
     def __iter__(self) -> Iterator[tuple[int, FloatArray]]:
-        reached = 0
-        for step, points in self._portions(_AHEAD):
-            first = reached // self.every * self.every + self.every if step else 0
-            for row, x in enumerate(points):
-                reached = first + row * self.every
+        reached = -self.every
+        for _, points in self.portions():
+            for x in points:
+                reached += self.every
                 yield reached, x
                 if self._interrupted:
                     self.end = OrbitEnd("interrupted", reached, f"interrupted after step {reached}")
                     return
-            reached = step
 
     def portions(self) -> Iterator[tuple[int, FloatArray]]:
         """The same in portions: the step reached, and the points (count, dim) delivered on the way."""
-        return self._portions(None)
-
-    def _portions(self, ahead: int | None) -> Iterator[tuple[int, FloatArray]]:
-        """With `ahead`, the first portions are short: as many points as have been asked for already, up to `ahead`."""
-        stepping, lanes, every = self._stepping, self._lanes, self.every
-        for watched in self._watched:
-            watched.look(self.start[None, None])
-        yield 0, self.start[None].copy()
-        step, rows = 0, 1
-        while (self.steps is None or step < self.steps) and lanes.status[0] == RUNNING:
-            if self._interrupted:
-                self.end = OrbitEnd("interrupted", step, f"interrupted after step {step}")
+        ensemble = self._ensemble
+        for x in ensemble.records(_FOR_EVER if self.steps is None else self.steps, self.every):
+            points = x[:, 0]
+            yield ensemble.step, points[~np.isnan(points).any(axis=1)]
+            if ensemble.failed_at[0] >= 0:
+                break
+            if self._interrupted and ensemble.step != self.steps:
+                self.end = OrbitEnd("interrupted", ensemble.step, f"interrupted after step {ensemble.step}")
                 return
-            piece = stepping.piece(1)
-            stop = step + min(piece, every * rows if ahead else max(1, 200_000 // self.dim) * every)
-            stop = stop if self.steps is None else min(stop, self.steps)
-            record = np.empty((stop // every - step // every, len(lanes.z), 1))
-            stepping.advance(lanes, step, stop - step, every, self._sampled, record)
-            x = stepping.points(record)
-            if lanes.status[0] != RUNNING:
-                x = x[: (int(lanes.failed_at[0]) - 1) // every - step // every]
-            for watched in self._watched:
-                watched.look(x)
-            step = stop
-            yield step, x[:, 0]
-            if ahead:
-                rows = min(2 * rows, ahead)
-        self.end = end_of(lanes, 0, step, stepping.matrix_name)
+        self.end = ensemble.end(0)
 
 
 _LONG = 100_000  # steps, from which on loading compiled code pays
-_AHEAD = 4096  # points
+_FOR_EVER = 1 << 62
 
 
 class _Floats:
