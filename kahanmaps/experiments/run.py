@@ -19,17 +19,16 @@ from kahanmaps.experiments.spec import Spec, parse_spec, read_spec
 from kahanmaps.experiments.store import Store
 from kahanmaps.experiments.tables import Planned
 
-# Seconds for which records are gathered, so that short tasks share a transaction, which waits for the disk; after them
-# an interrupt is noticed, and it is said that nothing has come.
-_GATHER = 0.1
+_TICK = 0.1  # seconds after which an interrupt is noticed, and it is said that nothing has come
+_SHARED = 4  # times as long as the last list took to be written, records go to the same list
 GRACE = 10.0  # seconds that tasks in flight have after an interrupt
 
 
 class Batch:
-    """Iterate over it for lists of records, ten times a second; some of them are empty.
+    """Iterate over it for lists of records as they come in; at least ten a second, some of them empty.
 
-    Whoever writes a list down before asking for the next one loses at most the tasks of a tenth of a second, and those
-    in flight.
+    Writing waits for the disk. So short tasks share a list for four times as long as writing the last one took, which
+    is milliseconds. Whoever writes a list down before asking for the next one loses at most that and what is in flight.
     """
 
     def __init__(self, jobs: Iterable[Job], executor: Executor, grace: float = GRACE) -> None:
@@ -49,21 +48,23 @@ class Batch:
         self._until = time.monotonic() + self._grace
 
     def __iter__(self) -> Iterator[list[Record]]:
-        executor = self._executor
+        executor, took = self._executor, 0.0
         try:
             self._hand_out()
             while executor.in_flight:
                 if self._until is not None and time.monotonic() > self._until:
                     self.abandoned = executor.in_flight
                     return
-                records: list[Record] = []
-                end = time.monotonic() + _GATHER
-                while True:
-                    records += executor.wait(max(0.0, end - time.monotonic()))
+                records = executor.wait(_TICK)
+                end = time.monotonic() + _SHARED * took
+                while records and executor.in_flight and time.monotonic() < end:
                     self._hand_out()
-                    if not executor.in_flight or time.monotonic() >= end:
-                        break
+                    records += executor.wait(max(0.0, end - time.monotonic()))
+                self._hand_out()
+                began = time.monotonic()
                 yield records
+                if records:
+                    took = min(time.monotonic() - began, _TICK)
         finally:
             executor.close()
 

@@ -151,7 +151,7 @@ def test_wrong_specs_and_missing_files_are_told(tmp_path: Path):
 @pytest.fixture
 def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Records are handed on as they come."""
-    monkeypatch.setattr("kahanmaps.experiments.run._GATHER", 0.0)
+    monkeypatch.setattr("kahanmaps.experiments.run._SHARED", 0)
 
 
 class Scripted:
@@ -221,6 +221,16 @@ def test_what_is_not_done_within_the_grace_is_given_up():
     batch.interrupt()
     assert not any(batch)
     assert batch.abandoned == 2
+
+
+def test_records_share_a_list_while_writing_takes_long():
+    batch, sizes = iter(Batch(jobs(10**9), Scripted())), []
+    for seconds in (0.02, 0.0, 0.0):
+        sizes.append(len(next(batch)))
+        time.sleep(seconds)
+    assert sizes[0] == 1  # nothing has been written yet
+    assert sizes[1] > 100
+    assert sizes[2] < sizes[1]
 
 
 @pytest.mark.usefixtures("_at_once")
