@@ -84,7 +84,10 @@ class Database:
     def fetch(self, sql: str, values: Sequence[Any] = ()) -> list[Any]:
         """All rows at once: a statement half read would keep its lock, and hold the writer up."""
         with self._errors():
-            return self.execute(sql, values).fetchall()
+            rows = self.execute(sql, values).fetchall()
+        if any(isinstance(value, bytes) for row in rows for value in row):
+            raise StoreError(f"{self.name} is damaged (bytes in place of a text or a number): take a copy from before")
+        return rows
 
     def chunks(self, table: str, id: str, columns: str, size: int, join: str = "") -> Iterator[list[Any]]:
         """Rows of the table `r` with their numbers, some at a time, in their order."""

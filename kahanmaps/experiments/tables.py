@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import islice
+from operator import index
 from typing import Any
 
 from kahanmaps.errors import quoted
@@ -77,7 +78,10 @@ class Chosen:
 
 def choose(database: Database, experiments: Sequence[str] | None) -> list[Chosen]:
     """These experiments, or all, in their order in the database."""
-    rows = database.fetch("SELECT id, name, limits, total, tasks FROM experiment ORDER BY id")
+    rows = database.fetch(
+        "SELECT id, name, limits, total, tasks, (SELECT max(number) + 1 FROM plan WHERE experiment = e.id) "
+        "FROM experiment AS e ORDER BY id"
+    )
     if experiments is not None:
         known = [row[1] for row in rows]
         for name in experiments:
@@ -87,10 +91,12 @@ def choose(database: Database, experiments: Sequence[str] | None) -> list[Chosen
                 )
     chosen: list[Chosen] = []
     offset = 0
-    for id, name, limits, total, tasks in rows:
+    for id, name, limits, total, tasks, planned in rows:
         if experiments is None or name in experiments:
             with database.making(f"the experiment {quoted(name)}"):
-                chosen.append(Chosen(id, name, Limits(**database.table(limits)), total, tasks, offset))
+                if total != (planned or 0):
+                    raise ValueError(f"{total} tasks are said to be planned, and {planned or 0} are")
+                chosen.append(Chosen(id, name, Limits(**database.table(limits)), total, index(tasks), offset))
                 offset += total
     return chosen
 
@@ -261,4 +267,6 @@ def record_of(database: Database, key: str, row: Sequence[Any]) -> Record | None
             )
         known["result"] = None if known["result"] is None else database.table(known["result"])
         known["versions"] = database.table(known["versions"])
+        known["seconds"] = float(known["seconds"])
+        known["peak_memory"] = None if known["peak_memory"] is None else index(known["peak_memory"])
         return Record(key=key, **known)
