@@ -16,9 +16,6 @@ from typing import Any
 
 import numpy as np
 
-TOO_LARGE = -2  # in the place of a degree: the next curve has more coefficients than there is room for
-NOWHERE = -1  # no point of the line has an image
-
 _LOCK = Lock()
 
 
@@ -223,7 +220,8 @@ def walk(
     """degrees[m, s] becomes the degree of the image of the line start[m] by s + 1 steps of map m.
 
     start[m, j] are the two coefficients of coordinate j, values[m] the coefficients of the equation, in GF(p^2);
-    `weights` (steps, 2, 2, n + 1) mix coordinates. Polynomials longer than `room` end a line with TOO_LARGE.
+    `weights` (steps, 2, 2, n + 1) mix coordinates. A line ends before polynomials longer than `room`, and with degrees
+    -1 where the iterate exists nowhere.
     """
     n = start.shape[1] - 1
     power = exponents[0].sum()
@@ -240,7 +238,6 @@ def walk(
         length = 2
         for step in range(degrees.shape[1]):
             if n * power * (length - 1) + 1 > room:
-                degrees[m, step:] = TOO_LARGE
                 break
             size = _entries(X, length, exponents, terms, values[m], p, nu, M)
             top = _minors(M, size, minors, p, nu)
@@ -251,5 +248,5 @@ def walk(
             length = _without_common_factor(X, top, weights[step], p, nu, inverses, work)
             degrees[m, step] = length - 1
             if length == 0:
-                degrees[m, step:] = NOWHERE
+                degrees[m, step:] = -1
                 break

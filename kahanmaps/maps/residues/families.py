@@ -8,21 +8,24 @@ can only give degrees that are too small: who wants to be certain takes several 
 from __future__ import annotations
 
 import random
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import reduce
+from math import prod
 from typing import Any
 
 import numpy as np
-from flint import fmpq, fmpz
+from flint import fmpq, fmpz, fmpz_mod_ctx, fmpz_mod_poly_ctx, fq_default_ctx, fq_default_poly_ctx
 from numpy.typing import NDArray
 
 from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kernels import choose_kernel
 
 MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, and times nu, stay below 2^53
 MAX_DIMENSION = 6
+NOWHERE, TOO_LARGE = -1, -2  # in the place of degrees
 _CHUNK = 128
 _LONG = 200  # members from which on compiling pays
 
@@ -78,8 +81,8 @@ class Family:
             members: residues of the symbols, one member a row.
             eps: an exact number, or None for a random element of GF(p^2) for each member.
             terms: how many steps.
-            room: the largest degree that is worked out before common factors are removed; beyond it the degrees are -2,
-                and -1 where the iterate exists nowhere.
+            room: the largest degree that is worked out before common factors are removed; beyond it the degrees are -2
+                (TOO_LARGE), and -1 (NOWHERE) where the iterate exists nowhere.
             rng: of the lines.
             kernel: "numpy" or "numba".
             jobs: threads.
@@ -91,7 +94,7 @@ class Family:
         start[:, -1] = 0.0
         start[:, -1, 0, 0] = 1.0
         weights = draw.integers(0, p, (terms, 2, 2, self.dim + 1)).astype(float)
-        found = np.full((count, terms), -2, dtype=np.int64)
+        found = np.full((count, terms), TOO_LARGE, dtype=np.int64)
         walk = _walk(choose_kernel(kernel, long=count >= _LONG))
         exponents = np.array(self._exponents, dtype=np.int64)
         layout = np.array(self._terms, dtype=np.int64)
@@ -133,6 +136,41 @@ class Family:
 
 
 def _walk(kernel: str) -> Any:
-    from kahanmaps.maps.residues import curve_kernel
+    if kernel == "numba":
+        from kahanmaps.maps.residues.curve_kernel import kernel as compiled
 
-    return curve_kernel.kernel() if kernel == "numba" else curve_kernel.walk
+        return compiled()
+    return _walk_in_flint
+
+
+def _walk_in_flint(
+    start: Any, exponents: Any, layout: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float, room: int,
+    degrees: Any,
+) -> None:  # fmt: skip
+    """What `walk` of curve_kernel.py does, without numba."""
+    modulus = fmpz_mod_poly_ctx(fmpz_mod_ctx(int(p)))([-int(nu), 0, 1])
+    field = fq_default_ctx(modulus=modulus, var="w")
+    context = fq_default_poly_ctx(field)
+
+    def polynomial(pairs: Any) -> Any:
+        return context([field([int(a), int(b)]) for a, b in pairs.T])
+
+    zero, power = context([]), int(exponents[0].sum())
+    for m in range(len(start)):
+        X = [polynomial(entry) for entry in start[m]]
+        for step in range(degrees.shape[1]):
+            n = len(X) - 1
+            if n * power * max(entry.degree() for entry in X) + 1 > room:
+                break
+            rows: list[list[Any]] = [[None] * (n + 1) for _ in range(n)]
+            monomials = [prod((x**int(e) for x, e in zip(X, row, strict=True)), start=context([1])) for row in exponents]
+            for i, j, k, place in layout:
+                term = monomials[k] * polynomial(values[m][:, place : place + 1])
+                rows[i][j] = term if rows[i][j] is None else rows[i][j] + term
+            image = [zero if minor is None else minor for minor in kernel_minors(rows)]
+            common = reduce(lambda a, b: a.gcd(b), image)
+            if common.is_zero():
+                degrees[m, step:] = NOWHERE
+                break
+            X = [entry // common for entry in image]
+            degrees[m, step] = max(entry.degree() for entry in X)

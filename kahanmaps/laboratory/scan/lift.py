@@ -1,0 +1,122 @@
+"""Pieces modulo several small primes that belong to one variety over Q: by Chinese remainders and reconstruction.
+
+What is reconstructed from some primes has to be there modulo the others. Nothing here proves that it is a piece of the
+family over Q: that is tried on members of it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from functools import reduce
+from itertools import combinations, product
+from math import isqrt, prod
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import primitive_part, ring
+from kahanmaps.algebra.residues import chinese, rational_reconstruction, rational_vector
+from kahanmaps.laboratory.modular_points import exponents_up_to, product_of
+from kahanmaps.laboratory.scan.pieces import Pieces, Rows
+
+_MOST_PAIRS = 40_000  # of flats modulo two primes
+_LOW = 12  # heights up to which one prime may be bad
+_AT_LEAST = 3  # primes
+
+
+def height_bound(primes: Sequence[int]) -> int:
+    """The numerators and denominators that two of the primes suffice for."""
+    low = sorted(primes)[:2]
+    return isqrt((prod(low) - 1) // 2)
+
+
+def lifted_flats(
+    found: Mapping[int, Sequence[Rows]], names: Sequence[str]
+) -> list[tuple[tuple[fmpq_mpoly, ...], tuple[int, ...]]]:
+    """Affine subspaces over Q whose residues are among those found modulo the primes: equations, and these primes.
+
+    >>> modulo = {p: [((1, 0, -pow(2, -1, p) % p), (0, 1, p - 3))] for p in (31, 37, 41)}
+    >>> lifted_flats(modulo, ["a", "b"])
+    [((2*a - 1, b - 3), (31, 37, 41))]
+    """
+    sets = {p: set(flats) for p, flats in found.items()}
+    done: dict[tuple[tuple[fmpq, ...], ...], tuple[int, ...]] = {}
+    for p, q in combinations(sorted(found), 2):
+        if len(found[p]) * len(found[q]) > _MOST_PAIRS:
+            continue
+        for one, other in product(found[p], found[q]):
+            lifted = _lifted_rows(one, p, other, q)
+            if lifted is None or lifted in done:
+                continue
+            at = tuple(r for r in sorted(sets) if _residues(lifted, r) in sets[r])
+            height = max(max(abs(int(x.p)), int(x.q)) for row in lifted for x in row)
+            missing = sum(_residues(lifted, r) is not None for r in sets) - len(at)
+            if len(at) >= _AT_LEAST and missing <= (height <= _LOW):
+                done[lifted] = at
+    context = ring(names)
+    variables = [*context.gens(), context.constant(1)]
+
+    def equation(row: Sequence[fmpq]) -> fmpq_mpoly:
+        total = sum((c * x for c, x in zip(row, variables, strict=True)), context.constant(0))
+        return primitive_part(total)[1]
+
+    return [(tuple(equation(row) for row in rows), at) for rows, at in done.items()]
+
+
+def _lifted_rows(one: Rows, p: int, other: Rows, q: int) -> tuple[tuple[fmpq, ...], ...] | None:
+    rows = []
+    for a, b in zip(one, other, strict=True):
+        row = []
+        for entry in chinese(a, p, b, q):
+            value = rational_reconstruction(entry, p * q)
+            if value is None:
+                return None
+            row.append(value)
+        rows.append(tuple(row))
+    return tuple(rows)
+
+
+def _residues(rows: Sequence[Sequence[fmpq]], p: int) -> Rows | None:
+    """The rows modulo a prime, None where it divides a denominator."""
+    if any(int(x.q) % p == 0 for row in rows for x in row):
+        return None
+    return tuple(tuple(int(x.p) * pow(int(x.q), -1, p) % p for x in row) for row in rows)
+
+
+def lifted_forms(found: Sequence[Pieces], names: Sequence[str]) -> list[tuple[fmpq_mpoly, tuple[int, ...]]]:
+    """The irreducible hypersurfaces over Q behind those of degree 2 and more modulo the primes, and these primes.
+
+    Their product is lifted from all primes but one, where it has to vanish too, and factored.
+    """
+    products = {one.prime: _product(one, len(names)) for one in found if one.forms}
+    sizes = Counter(len(form) for form in products.values())
+    if not sizes:
+        return []
+    size = sizes.most_common(1)[0][0]
+    products = {p: form for p, form in products.items() if len(form) == size}
+    lead = [max((k for k, c in enumerate(form) if c), default=0) for form in products.values()]
+    if len(products) < _AT_LEAST or len(set(lead)) > 1:
+        return []
+    scaled = {p: [c * pow(form[lead[0]], -1, p) % p for c in form] for p, form in products.items()}
+    *first, last = sorted(scaled)
+    residues, modulus = scaled[first[0]], first[0]
+    for p in first[1:]:
+        residues, modulus = chinese(residues, modulus, scaled[p], p), modulus * p
+    values = rational_vector(residues, modulus)
+    if values is None or _residues([values], last) != (tuple(scaled[last]),):
+        return []
+    degree = next(d for d in range(100) if len(exponents_up_to(len(names), d)) == size)
+    terms = {e: c for e, c in zip(exponents_up_to(len(names), degree), values, strict=True) if c != 0}
+    factors = ring(names).from_dict(terms).factor()[1]
+    return [(primitive_part(factor)[1], tuple(sorted(scaled))) for factor, _ in factors]
+
+
+def _product(one: Pieces, count: int) -> list[int]:
+    """The coefficients of the product of the forms, up to its degree."""
+
+    def degree_of(form: Sequence[int]) -> int:
+        return next(d for d in range(100) if len(exponents_up_to(count, d)) == len(form))
+
+    top = sum(map(degree_of, one.forms))
+    found = reduce(lambda a, b: product_of(a, b, count, top, one.prime) or [], one.forms, [1])
+    return found
