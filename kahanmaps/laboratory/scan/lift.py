@@ -17,7 +17,9 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.polynomials import primitive_part, ring
 from kahanmaps.algebra.residues import chinese, rational_reconstruction, rational_vector
 from kahanmaps.laboratory.modular_points import exponents_up_to, product_of
-from kahanmaps.laboratory.scan.pieces import Pieces, Rows
+from kahanmaps.laboratory.scan.pieces import Rows
+
+RationalRows = tuple[tuple[fmpq, ...], ...]
 
 _MOST_PAIRS = 40_000  # of flats modulo two primes
 _LOW = 12  # heights up to which one prime may be bad
@@ -30,17 +32,15 @@ def height_bound(primes: Sequence[int]) -> int:
     return isqrt((prod(low) - 1) // 2)
 
 
-def lifted_flats(
-    found: Mapping[int, Sequence[Rows]], names: Sequence[str]
-) -> list[tuple[tuple[fmpq_mpoly, ...], tuple[int, ...]]]:
-    """Affine subspaces over Q whose residues are among those found modulo the primes: equations, and these primes.
+def lifted_flats(found: Mapping[int, Sequence[Rows]]) -> dict[RationalRows, tuple[int, ...]]:
+    """Affine subspaces over Q whose residues are among those found modulo the primes: reduced rows, and these primes.
 
     >>> modulo = {p: [((1, 0, -pow(2, -1, p) % p), (0, 1, p - 3))] for p in (31, 37, 41)}
-    >>> lifted_flats(modulo, ["a", "b"])
-    [((2*a - 1, b - 3), (31, 37, 41))]
+    >>> lifted_flats(modulo)
+    {((1, 0, -1/2), (0, 1, -3)): (31, 37, 41)}
     """
     sets = {p: set(flats) for p, flats in found.items()}
-    done: dict[tuple[tuple[fmpq, ...], ...], tuple[int, ...]] = {}
+    done: dict[RationalRows, tuple[int, ...]] = {}
     for p, q in combinations(sorted(found), 2):
         if len(found[p]) * len(found[q]) > _MOST_PAIRS:
             continue
@@ -48,22 +48,27 @@ def lifted_flats(
             lifted = _lifted_rows(one, p, other, q)
             if lifted is None or lifted in done:
                 continue
-            at = tuple(r for r in sorted(sets) if _residues(lifted, r) in sets[r])
-            height = max(max(abs(int(x.p)), int(x.q)) for row in lifted for x in row)
-            missing = sum(_residues(lifted, r) is not None for r in sets) - len(at)
+            at = tuple(r for r in sorted(sets) if residues(lifted, r) in sets[r])
+            height = max((max(abs(int(x.p)), int(x.q)) for row in lifted for x in row), default=0)
+            missing = sum(residues(lifted, r) is not None for r in sets) - len(at)
             if len(at) >= _AT_LEAST and missing <= (height <= _LOW):
                 done[lifted] = at
+    return done
+
+
+def flat_equations(rows: RationalRows, names: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
+    """The equations of an affine subspace, primitive polynomials.
+
+    >>> flat_equations(((fmpq(1), fmpq(0), fmpq(-1, 2)),), ["a", "b"])
+    (2*a - 1,)
+    """
     context = ring(names)
     variables = [*context.gens(), context.constant(1)]
-
-    def equation(row: Sequence[fmpq]) -> fmpq_mpoly:
-        total = sum((c * x for c, x in zip(row, variables, strict=True)), context.constant(0))
-        return primitive_part(total)[1]
-
-    return [(tuple(equation(row) for row in rows), at) for rows, at in done.items()]
+    sums = (sum((c * x for c, x in zip(row, variables, strict=True)), context.constant(0)) for row in rows)
+    return tuple(primitive_part(one)[1] for one in sums)
 
 
-def _lifted_rows(one: Rows, p: int, other: Rows, q: int) -> tuple[tuple[fmpq, ...], ...] | None:
+def _lifted_rows(one: Rows, p: int, other: Rows, q: int) -> RationalRows | None:
     rows = []
     for a, b in zip(one, other, strict=True):
         row = []
@@ -76,19 +81,25 @@ def _lifted_rows(one: Rows, p: int, other: Rows, q: int) -> tuple[tuple[fmpq, ..
     return tuple(rows)
 
 
-def _residues(rows: Sequence[Sequence[fmpq]], p: int) -> Rows | None:
+def residues(rows: Sequence[Sequence[fmpq]], p: int) -> Rows | None:
     """The rows modulo a prime, None where it divides a denominator."""
     if any(int(x.q) % p == 0 for row in rows for x in row):
         return None
     return tuple(tuple(int(x.p) * pow(int(x.q), -1, p) % p for x in row) for row in rows)
 
 
-def lifted_forms(found: Sequence[Pieces], names: Sequence[str]) -> list[tuple[fmpq_mpoly, tuple[int, ...]]]:
+def lifted_forms(
+    found: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
+) -> list[tuple[fmpq_mpoly, tuple[int, ...]]]:
     """The irreducible hypersurfaces over Q behind those of degree 2 and more modulo the primes, and these primes.
 
-    Their product is lifted from all primes but one, where it has to vanish too, and factored.
+    Their product is lifted from all primes but one, where it has to agree, and factored.
+
+    >>> circle = {p: [[p - 1, 0, 0, 1, 0, 1]] for p in (31, 37, 41)}
+    >>> lifted_forms(circle, ["a", "b"])
+    [(a^2 + b^2 - 1, (31, 37, 41))]
     """
-    products = {one.prime: _product(one, len(names)) for one in found if one.forms}
+    products = {p: _product(forms, p, len(names)) for p, forms in found.items() if forms}
     sizes = Counter(len(form) for form in products.values())
     if not sizes:
         return []
@@ -99,11 +110,11 @@ def lifted_forms(found: Sequence[Pieces], names: Sequence[str]) -> list[tuple[fm
         return []
     scaled = {p: [c * pow(form[lead[0]], -1, p) % p for c in form] for p, form in products.items()}
     *first, last = sorted(scaled)
-    residues, modulus = scaled[first[0]], first[0]
+    together, modulus = scaled[first[0]], first[0]
     for p in first[1:]:
-        residues, modulus = chinese(residues, modulus, scaled[p], p), modulus * p
-    values = rational_vector(residues, modulus)
-    if values is None or _residues([values], last) != (tuple(scaled[last]),):
+        together, modulus = chinese(together, modulus, scaled[p], p), modulus * p
+    values = rational_vector(together, modulus)
+    if values is None or residues([values], last) != (tuple(scaled[last]),):
         return []
     degree = next(d for d in range(100) if len(exponents_up_to(len(names), d)) == size)
     terms = {e: c for e, c in zip(exponents_up_to(len(names), degree), values, strict=True) if c != 0}
@@ -111,12 +122,11 @@ def lifted_forms(found: Sequence[Pieces], names: Sequence[str]) -> list[tuple[fm
     return [(primitive_part(factor)[1], tuple(sorted(scaled))) for factor, _ in factors]
 
 
-def _product(one: Pieces, count: int) -> list[int]:
-    """The coefficients of the product of the forms, up to its degree."""
+def _product(forms: Sequence[Sequence[int]], p: int, count: int) -> list[int]:
+    """The coefficients of the product of polynomials, up to its degree."""
 
     def degree_of(form: Sequence[int]) -> int:
         return next(d for d in range(100) if len(exponents_up_to(count, d)) == len(form))
 
-    top = sum(map(degree_of, one.forms))
-    found = reduce(lambda a, b: product_of(a, b, count, top, one.prime) or [], one.forms, [1])
-    return found
+    top = sum(map(degree_of, forms))
+    return reduce(lambda a, b: product_of(a, b, count, top, p) or [], forms, [1])

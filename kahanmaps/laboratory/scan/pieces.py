@@ -1,4 +1,4 @@
-"""What a set of points of GF(p)^k is made of: hypersurfaces, affine subspaces, single points.
+"""What a set of points of GF(p)^k is made of: affine subspaces, hypersurfaces of them, single points.
 
 The points with one degree sequence are the points of some varieties without those of smaller ones, and may hold points
 by chance besides. So pieces are found from few random points, and count where they hold about as many points as a
@@ -8,7 +8,7 @@ variety of their dimension has, p^d.
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,13 +28,14 @@ class Pieces:
     """The pieces of a set of points modulo `prime`.
 
     `flats` has affine subspaces by dimension: reduced rows (c_1, ..., c_k, c_0) of equations c_1 a_1 + ... + c_0 = 0.
-    `forms` are hypersurfaces of degree 2 and more, coefficients of the monomials of `exponents_up_to` in their order.
+    `forms` has hypersurfaces of degree 2 and more by the affine subspace they are in (no rows: the whole space). Each
+    is the coefficients of the monomials of `exponents_up_to`, in their order, in the variables that are free there.
     `left` points are in none of them.
     """
 
     prime: int
     flats: dict[int, list[Rows]] = field(default_factory=dict)
-    forms: list[tuple[int, ...]] = field(default_factory=list)
+    forms: dict[Rows, list[tuple[int, ...]]] = field(default_factory=dict)
     left: int = 0
 
 
@@ -52,49 +53,66 @@ def pieces(points: Sequence[Point], prime: int, seen: int, complete: bool, rng: 
     found = Pieces(prime)
     rest = np.array(points, dtype=np.int64)
 
-    def take(flats_or_forms: list[Any], what: Any, inside: Any) -> None:
-        nonlocal rest
-        flats_or_forms.append(what)
-        rest = rest[~inside]
-
-    def flats(dimension: int, needed: float) -> None:
+    def flats(dimension: int, needed: float) -> Iterator[tuple[Rows, Any]]:
+        """Affine subspaces with so many of the points, and which of these are in them."""
         for _ in _tries(lambda: len(rest) >= needed):
-            sample = [rest[i].tolist() for i in rng.sample(range(len(rest)), dimension + 1)]
-            rows = null_space([[*point, 1] for point in sample], count + 1, prime)
+            sample = [[*rest[i].tolist(), 1] for i in rng.sample(range(len(rest)), dimension + 1)]
+            rows = null_space(sample, count + 1, prime)
             if len(rows) == count - dimension:
-                values = np.column_stack([rest, np.ones(len(rest), dtype=np.int64)]) @ np.array(rows).T % prime
-                inside = ~values.any(axis=1)
+                ones = np.ones((len(rest), 1), dtype=np.int64)
+                inside = ~(np.hstack([rest, ones]) @ np.array(rows).T % prime).any(axis=1)
                 if inside.sum() >= needed:
-                    take(found.flats.setdefault(dimension, []), tuple(map(tuple, rows)), inside)
+                    yield tuple(map(tuple, rows)), inside
 
-    def hypersurfaces(degree: int, needed: float) -> None:
-        size = len(exponents_up_to(count, degree))
-        for attempt in _tries(lambda: len(rest) >= max(needed, _SPARE * size)):
-            table = np.array([monomial_values(tuple(x), degree, prime) for x in rest.tolist()])
-            chosen = range(len(rest)) if attempt == 0 else rng.sample(range(len(rest)), size - 1)
-            basis = null_space([table[i].tolist() for i in chosen], size, prime)
-            if len(basis) == 1:
-                inside = table @ np.array(basis[0]) % prime == 0
-                if inside.sum() >= max(needed, _SPARE * size):
-                    take(found.forms, tuple(basis[0]), inside)
-
-    most = seen / prime  # points of a hypersurface
-    if count > 1:
-        flats(count - 1, max(_SHARE * most, count + 2))
+    def forms(here: Any, needed: float) -> Iterator[tuple[tuple[int, ...], Any]]:
+        """Hypersurfaces of degree 2 and more with so many of the points `here`, and which of these are in them."""
         for degree in range(2, MAX_DEGREE + 1):
-            hypersurfaces(degree, _SHARE * most)
-    if complete:
-        for dimension in range(count - 2, 0, -1):
-            flats(dimension, max(_SHARE * prime**dimension, dimension + 3))
-        if len(rest) <= _MOST_POINTS:
-            single = [tuple(map(tuple, echelon(_equations(x), prime))) for x in rest.tolist()]
-            found.flats.setdefault(0, []).extend(single)
-            rest = rest[:0]
+            size = len(exponents_up_to(here.shape[1], degree))
+            enough = max(needed, _SPARE * size)
+            for attempt in _tries(lambda enough=enough: len(here) >= enough):
+                table = np.array([monomial_values(tuple(x), degree, prime) for x in here.tolist()])
+                chosen = range(len(here)) if attempt == 0 else rng.sample(range(len(here)), size - 1)
+                basis = null_space([table[i].tolist() for i in chosen], size, prime)
+                inside = table @ np.array(basis[0]) % prime == 0 if len(basis) == 1 else np.zeros(len(here), dtype=bool)
+                if inside.sum() >= enough:
+                    yield tuple(basis[0]), inside
+                    here = here[~inside]
+
+    for dimension in range(count - 1, 0, -1):
+        # Of the dimension that is looked for: affine ones, then others in affine ones of one dimension more.
+        needed = max(_SHARE * seen / prime ** (count - dimension), dimension + 3)
+        for rows, inside in flats(dimension, needed):
+            found.flats.setdefault(dimension, []).append(rows)
+            rest = rest[~inside]
+        if dimension == count - 1:
+            for form, inside in forms(rest, needed):
+                found.forms.setdefault((), []).append(form)
+                rest = rest[~inside]
+            if not complete:
+                break
+            continue
+        for rows, inside in flats(dimension + 1, needed):
+            free = [k for k in range(count) if k not in pivots(rows)]
+            places, kept = np.flatnonzero(inside), np.ones(len(rest), dtype=bool)
+            for form, some in forms(rest[inside][:, free], needed):
+                found.forms.setdefault(rows, []).append(form)
+                kept[places[some]] = False
+                places = places[~some]
+            rest = rest[kept]
+    if complete and len(rest) <= _MOST_POINTS:
+        single = [tuple(map(tuple, echelon(_equations(x), prime))) for x in rest.tolist()]
+        found.flats.setdefault(0, []).extend(single)
+        rest = rest[:0]
     found.left = len(rest)
     return found
 
 
-def _tries(go_on: Any) -> Iterator[int]:
+def pivots(rows: Sequence[Sequence[Any]]) -> list[int]:
+    """The variables that reduced equations say by the others."""
+    return [next(k for k, c in enumerate(row) if c) for row in rows]
+
+
+def _tries(go_on: Callable[[], bool]) -> Iterator[int]:
     """Numbers of attempts, as long as there is something to try them on."""
     for attempt in range(_TRIES):
         if not go_on():

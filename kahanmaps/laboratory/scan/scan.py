@@ -21,7 +21,7 @@ from flint import fmpq, fmpq_mpoly, fmpz
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, QQ, Field, rational
 from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.polynomials import evaluate, ring
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.files import SystemFile
@@ -29,10 +29,11 @@ from kahanmaps.documents.symbols import map_with_symbols, member_of
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
-from kahanmaps.laboratory.scan.lift import height_bound, lifted_flats, lifted_forms
+from kahanmaps.laboratory.scan.lift import flat_equations, height_bound, lifted_flats, lifted_forms, residues
 from kahanmaps.laboratory.scan.members import degrees_on, point_on
-from kahanmaps.laboratory.scan.pieces import pieces
+from kahanmaps.laboratory.scan.pieces import pieces, pivots
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep, TimeOver, sweep
+from kahanmaps.maps.implicit import BirationalMap
 
 DEFAULT_SECONDS = 120.0
 MAX_PARAMETERS = 8
@@ -40,10 +41,12 @@ _PRIMES = {1: (389, 397, 401, 409), 2: (53, 59, 61, 67), 3: (19, 23, 29, 31)}
 _PRIMES_OF_LINES, _LINES = (199, 211, 223, 227), 40  # where there are more parameters
 _ROOM = 220  # for the degrees before common factors are removed
 _MOST_ROOM = 4096
+_TRIAL_PRIME = 8179  # modulo which hardly a member is special
 _MOST_TERMS = 7
 _MEMBERS = 3  # that confirm a component
+_SHARE = 0.5  # of the prime, points of a curve at least
 _TRIES = 20  # for a rational member
-_GROWTH_SECONDS, _STEPS = 2.0, 100
+_GROWTH_SECONDS, _STEPS = 2.0, 40
 _MEASURED_EACH = (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
 _ORDER = (*(c for c in GrowthClass if c is not GrowthClass.UNKNOWN), GrowthClass.UNKNOWN)
 
@@ -249,7 +252,7 @@ def scan(
         raise InputError(f"found the primes {', '.join(map(str, chosen))}, expected three or more different ones from 5")
     rng = random.Random(f"scan {seed_for(seed, names, map_.subject, exact)}")
     began = time.monotonic()
-    terms, room = _terms(map_, exact, terms, max(chosen), rng)
+    terms, room = _terms(map_, exact, terms, rng)
     sweeps: list[Sweep] = []
     ended = "complete"
     total = sum(p ** len(names) if lines is None else p * lines for p in chosen)
@@ -295,18 +298,16 @@ def scan(
     return Scan(file, names, exact, seed, generic, tuple(known), tuple(sweeps), left, symmetric, ended)
 
 
-def _terms(
-    map_: Any, eps: fmpq | None, terms: int | None, prime: int, rng: random.Random
-) -> tuple[int, int]:
-    """How many iterates are measured, and the room that they need: tried on a few members."""
+def _terms(map_: BirationalMap, eps: fmpq | None, terms: int | None, rng: random.Random) -> tuple[int, int]:
+    """How many iterates are measured, and the room that they need: tried on members modulo a larger prime."""
     import numpy as np
 
     from kahanmaps.maps.residues.families import NOWHERE, Family
 
     if terms is not None and not 1 <= terms <= 2 * _MOST_TERMS:
         raise InputError(f"found {terms} terms, expected 1 to {2 * _MOST_TERMS}")
-    family = Family(map_, prime)
-    tried = np.array([[rng.randrange(prime) for _ in map_.symbols] for _ in range(8)])
+    family = Family(map_, _TRIAL_PRIME)
+    tried = np.array([[rng.randrange(_TRIAL_PRIME) for _ in map_.symbols] for _ in range(8)])
     room = _ROOM if terms is None else _MOST_ROOM
     found = family.degrees(tried, eps, terms or _MOST_TERMS, room, rng).max(axis=0).tolist()
     if found[0] == NOWHERE:
@@ -314,8 +315,7 @@ def _terms(
     measured = sum(degree >= 0 for degree in found)
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
-    needed = max(family.dim * family.degree * d + 1 for d in [1, *found[: measured - 1]])
-    return measured, needed
+    return measured, max(family.dim * family.degree * d + 1 for d in [1, *found[: measured - 1]])
 
 
 def _components(sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random) -> list[Component]:
@@ -329,13 +329,32 @@ def _components(sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Ran
         ]
         for dimension in range(len(names)):
             flats = {part.prime: part.flats[dimension] for part in parts if part.flats.get(dimension)}
-            found += [Component(eqs, dimension, degrees, at) for eqs, at in lifted_flats(flats, names)]
-        found += [Component((form,), len(names) - 1, degrees, at) for form, at in lifted_forms(parts, names)]
+            if dimension == 0 and _is_a_curve({p: len(points) for p, points in flats.items()}):
+                continue
+            for rows, at in lifted_flats(flats).items():
+                found.append(Component(flat_equations(rows, names), dimension, degrees, at))
+        for size in {len(rows) for part in parts for rows in part.forms}:
+            inside = {part.prime: [rows for rows in part.forms if len(rows) == size] for part in parts}
+            for rows in lifted_flats(inside):
+                forms = {part.prime: part.forms.get(residues(rows, part.prime) or (), []) for part in parts}
+                equations = flat_equations(rows, names)
+                free = [name for k, name in enumerate(names) if k not in pivots(rows)]
+                for form, at in lifted_forms(forms, free):
+                    whole = form.project_to_context(ring(names))
+                    found.append(Component((whole, *equations), len(free) - 1, degrees, at))
     return found
 
 
+def _is_a_curve(counts: dict[int, int]) -> bool:
+    """Whether numbers of points modulo primes grow as those of a curve do."""
+    if len(counts) < 2:
+        return False
+    low, high = min(counts), max(counts)
+    return counts[low] >= _SHARE * low and counts[high] - counts[low] >= _SHARE * (high - low)
+
+
 def _confirmed(
-    one: Component, names: Sequence[str], map_: Any, eps: fmpq | None, others: Sequence[Component], rng: random.Random
+    one: Component, names: Sequence[str], map_: BirationalMap, eps: fmpq | None, others: Sequence[Component], rng: random.Random
 ) -> Component:
     """The component with what random members on it say, and a rational one that is on no smaller component."""
     measured = [degrees_on(map_, one.equations, eps, one.degrees, rng) for _ in range(_MEMBERS)]
@@ -370,7 +389,8 @@ def _with_growth(
         left = deadline - time.monotonic()
         if one.values is not None and one.degrees not in enough and left > 0 and one.degrees[-1] >= 0:
             member = member_of(file, one.values).map
-            growth = degree_growth(member, eps, seconds=min(_GROWTH_SECONDS, max(0.1, left)), steps=_STEPS, seed=seed)
+            part = min(_GROWTH_SECONDS, max(0.1, left))
+            growth = degree_growth(member, eps, seconds=part, steps=_STEPS, seed=seed, enclosed=False)
             one = replace(one, growth=growth)
             if growth.growth not in _MEASURED_EACH:
                 enough.add(one.degrees)
