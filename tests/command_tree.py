@@ -23,6 +23,7 @@ LEAST = {
     "check-poisson": "harmonic",
     "analyze": "harmonic --seconds 1",
     "degrees": "harmonic --terms 3 --seconds 1",
+    "scan": "henon_heiles --over c --primes 5,7,11 --terms 2",
     "heights": "harmonic --steps 20 --seconds 1",
     "find-integrals": "harmonic --seconds 1",
     "find-density": "harmonic --seconds 1",

@@ -8,7 +8,7 @@ variety of their dimension has, p^d.
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -55,7 +55,9 @@ def pieces(points: Sequence[Point], prime: int, seen: int, complete: bool, rng: 
 
     def flats(dimension: int, needed: float) -> Iterator[tuple[Rows, Any]]:
         """Affine subspaces with so many of the points, and which of these are in them."""
-        for _ in _tries(lambda: len(rest) >= needed):
+        for _ in range(_TRIES):
+            if len(rest) < needed:
+                return
             sample = [[*rest[i].tolist(), 1] for i in rng.sample(range(len(rest)), dimension + 1)]
             rows = null_space(sample, count + 1, prime)
             if len(rows) == count - dimension:
@@ -69,7 +71,9 @@ def pieces(points: Sequence[Point], prime: int, seen: int, complete: bool, rng: 
         for degree in range(2, MAX_DEGREE + 1):
             size = len(exponents_up_to(here.shape[1], degree))
             enough = max(needed, _SPARE * size)
-            for attempt in _tries(lambda enough=enough: len(here) >= enough):
+            for attempt in range(_TRIES):
+                if len(here) < enough:
+                    break
                 table = np.array([monomial_values(tuple(x), degree, prime) for x in here.tolist()])
                 chosen = range(len(here)) if attempt == 0 else rng.sample(range(len(here)), size - 1)
                 basis = null_space([table[i].tolist() for i in chosen], size, prime)
@@ -110,14 +114,6 @@ def pieces(points: Sequence[Point], prime: int, seen: int, complete: bool, rng: 
 def pivots(rows: Sequence[Sequence[Any]]) -> list[int]:
     """The variables that reduced equations say by the others."""
     return [next(k for k, c in enumerate(row) if c) for row in rows]
-
-
-def _tries(go_on: Callable[[], bool]) -> Iterator[int]:
-    """Numbers of attempts, as long as there is something to try them on."""
-    for attempt in range(_TRIES):
-        if not go_on():
-            return
-        yield attempt
 
 
 def _equations(x: Sequence[int]) -> list[list[int]]:

@@ -12,28 +12,30 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly, fmpz
+from flint import fmpq, fmpz
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.fields import GF, QQ, Field, rational
-from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.polynomials import evaluate, ring
-from kahanmaps.algebra.text import format_number, format_polynomial
-from kahanmaps.displayed import Displayed
+from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols, member_of
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
-from kahanmaps.laboratory.scan.lift import flat_equations, height_bound, lifted_flats, lifted_forms, residues
+from kahanmaps.laboratory.scan.lift import flat_equations, lifted_flats, lifted_forms, residues
 from kahanmaps.laboratory.scan.members import degrees_on, point_on
 from kahanmaps.laboratory.scan.pieces import pieces, pivots
+from kahanmaps.laboratory.scan.result import Component, Scan
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep, TimeOver, sweep
 from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kernels import processors
+
+Progress = Callable[[str], None]
 
 DEFAULT_SECONDS = 120.0
 MAX_PARAMETERS = 8
@@ -51,152 +53,6 @@ _MEASURED_EACH = (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOM
 _ORDER = (*(c for c in GrowthClass if c is not GrowthClass.UNKNOWN), GrowthClass.UNKNOWN)
 
 
-@dataclass(frozen=True)
-class Component:
-    """A condition on the parameters: `equations`, polynomials over Q that vanish on it, found modulo `primes`.
-
-    `degrees` are d_1, ..., d_N there. `confirmed` of `tried` random members have them. `values` are those of a rational
-    member, None where none was found, and `growth` what its degrees do, None where that was not measured.
-    """
-
-    equations: tuple[fmpq_mpoly, ...]
-    dimension: int
-    degrees: Degrees
-    primes: tuple[int, ...]
-    confirmed: int = 0
-    tried: int = 0
-    values: dict[str, fmpq] | None = None
-    growth: DegreeGrowth | None = None
-
-    @property
-    def is_confirmed(self) -> bool:
-        """Whether all members tried have the degrees."""
-        return 0 < self.tried == self.confirmed
-
-    @property
-    def text(self) -> str:
-        """The condition: values of a point, else equations."""
-        if self.dimension == 0 and self.values is not None:
-            return f"({', '.join(map(format_number, self.values.values()))})"
-        return ", ".join(f"{format_polynomial(equation)} = 0" for equation in self.equations)
-
-    def contains(self, other: Component) -> bool:
-        """Whether a smaller component, with a rational member, lies on this one: known from that member."""
-        if self.dimension <= other.dimension or other.values is None:
-            return False
-        return _vanishes(self, list(other.values.values()))
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data; equations as text."""
-        growth = self.growth
-        return {
-            **attributes(self, "equations", "dimension", "primes", "confirmed", "tried", "is_confirmed", "values"),
-            "growth": None if growth is None else str(growth.growth),
-            "growth_text": None if growth is None else growth.growth_text,
-        }
-
-
-@dataclass(frozen=True)
-class Scan(Displayed):
-    """What a scan found: components, the ones with the slowest growth first.
-
-    `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
-    the number of slow members on no component modulo each of them: points over number fields, of a height above
-    `height`, or there by chance. `symmetric` are pairs of parameters whose exchange permutes the slow members.
-    `ended` is "complete" or "time".
-    """
-
-    file: SystemFile
-    over: tuple[str, ...]
-    eps: fmpq | None
-    seed: int
-    generic: Degrees
-    components: tuple[Component, ...]
-    sweeps: tuple[Sweep, ...]
-    left: tuple[int, ...]
-    symmetric: tuple[tuple[str, str], ...]
-    ended: str
-
-    @property
-    def height(self) -> int:
-        """Numerators and denominators of single points up to which they are found."""
-        return height_bound([one.prime for one in self.sweeps])
-
-    @property
-    def complete(self) -> bool:
-        """Whether all members modulo the primes were tried, rather than those on random lines of parameter space."""
-        return all(one.complete for one in self.sweeps)
-
-    @property
-    def classes(self) -> list[tuple[Degrees, list[Component]]]:
-        """The components by degrees, in their order."""
-        found: dict[Degrees, list[Component]] = {}
-        for one in self.components:
-            found.setdefault(one.degrees, []).append(one)
-        return list(found.items())
-
-    @property
-    def coverage(self) -> str:
-        """What was tried, and what can have been missed: a sentence or two."""
-        parts = [f"{one.seen} modulo {one.prime}" for one in self.sweeps]
-        if self.complete:
-            return (
-                f"all members with parameters modulo the primes: {', '.join(parts)}; single points are found with "
-                f"numerators and denominators up to {self.height}, hypersurfaces of a degree up to 6"
-            )
-        return f"members on random lines of parameter space: {', '.join(parts)}; only hypersurfaces are looked for"
-
-    @property
-    def text(self) -> str:
-        """Lines for people, a word and a tab at the front."""
-        lines = [("in general", ", ".join(map(str, self.generic)))]
-        for degrees, members in self.classes:
-            growth = next((one.growth for one in members if one.growth is not None), None)
-            told = ", ".join("none" if d < 0 else str(d) for d in degrees)
-            lines.append(("degrees", told + (f"\t{growth.growth_text}" if growth is not None else "")))
-            for dimension in sorted({one.dimension for one in members}, reverse=True):
-                here = [one for one in members if one.dimension == dimension]
-                for confirmed in (True, False):
-                    some = [one.text for one in here if one.is_confirmed is confirmed]
-                    if some:
-                        where = f"at ({', '.join(self.over)}) =" if dimension == 0 else "where"
-                        mark = "" if confirmed else "\tnot confirmed"
-                        lines.append((where, f"{(', ' if dimension == 0 else '; ').join(some)}{mark}"))
-        if not self.components:
-            lines.append(("found", "no condition on the parameters under which degrees are smaller"))
-        lines += [("symmetry", f"exchanging {a} and {b} permutes the slow members") for a, b in self.symmetric]
-        lines.append(("tried", self.coverage))
-        rest = ", ".join(f"{n} modulo {one.prime}" for n, one in zip(self.left, self.sweeps, strict=True))
-        lines.append(("left", f"slow members on no component: {rest}"))
-        return "\n".join(f"{word}\t{rest}" for word, rest in lines)
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            **attributes(self, "over", "seed", "generic"),
-            "classes": [
-                {"degrees": list(degrees), "components": [one.to_json() for one in some]}
-                for degrees, some in self.classes
-            ],
-            "symmetric": [list(pair) for pair in self.symmetric],
-            "sweeps": [
-                {
-                    **attributes(one, "prime", "seen", "complete", "accidents"),
-                    "slow": sum(map(len, one.classes.values())),
-                    "left": left,
-                }
-                for one, left in zip(self.sweeps, self.left, strict=True)
-            ],
-            **attributes(self, "height", "coverage", "ended"),
-        }
-
-    def member(self, component: Component) -> SystemFile:
-        """The system of a rational member on a component. Raises InputError where none is known."""
-        if component.values is None:
-            raise InputError(f"no rational member is known where {component.text}")
-        return member_of(self.file, component.values)
-
-
 def scan(
     file: SystemFile,
     over: Sequence[str],
@@ -206,8 +62,9 @@ def scan(
     primes: Sequence[int] | None = None,
     seconds: float = DEFAULT_SECONDS,
     seed: int = 0,
-    jobs: int = 1,
-    progress: Callable[[str], None] = lambda _: None,
+    jobs: int | None = None,
+    analysis: float | None = None,
+    progress: Progress = lambda _: None,
 ) -> Scan:
     """The conditions on parameters under which the degrees of the iterates are smaller than in general.
 
@@ -219,7 +76,9 @@ def scan(
         primes: at least three primes, by default such that the members are some ten thousand.
         seconds: time for everything, about.
         seed: of everything random.
-        jobs: threads.
+        jobs: threads, by default as many as processors; they need numba.
+        analysis: seconds for an analysis of a member on each component whose degrees do not grow exponentially; of
+            points with the same degrees one is enough. None for none.
         progress: is told what is being done.
 
     Returns:
@@ -246,10 +105,12 @@ def scan(
     exact = None if eps is None else rational(eps)
     if exact == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+    if jobs is not None and jobs < 1:
+        raise InputError(f"found {jobs} jobs, expected at least 1")
     lines = None if len(names) in _PRIMES else _LINES
     chosen = tuple(primes) if primes is not None else _PRIMES.get(len(names), _PRIMES_OF_LINES)
     if len(set(chosen)) < 3 or any(p < 5 or not fmpz(p).is_prime() for p in chosen):
-        raise InputError(f"found the primes {', '.join(map(str, chosen))}, expected three or more different ones from 5")
+        raise InputError(f"found the primes {', '.join(map(str, chosen))}, expected three different ones or more")
     rng = random.Random(f"scan {seed_for(seed, names, map_.subject, exact)}")
     began = time.monotonic()
     terms, room = _terms(map_, exact, terms, rng)
@@ -273,7 +134,7 @@ def scan(
                     room,
                     lines=lines,
                     seed=f"{rng.getrandbits(64)} {p}",
-                    jobs=jobs,
+                    jobs=jobs or processors(),
                     deadline=began + 0.8 * seconds,
                     progress=told,
                 )
@@ -289,8 +150,10 @@ def scan(
     known = []
     for k, one in enumerate(found):
         progress(f"scan: confirms component {k + 1} of {len(found)}")
-        known.append(_confirmed(one, names, map_, exact, found, rng))
-    known = _with_growth(sorted(known, key=lambda one: one.degrees[::-1]), file, exact, began + seconds, seed, progress)
+        known.append(_confirmed(one, map_, exact, found, rng))
+    known = _with_growth(known, file, exact, began + seconds, seed, progress)
+    if analysis is not None:
+        known = _with_verdicts(known, file, exact, analysis, seed, progress)
     left = tuple(_left(one, known) for one in sweeps)
     symmetric = tuple(
         (names[i], names[j]) for i, j in combinations(range(len(names)), 2) if _is_symmetric(sweeps, i, j)
@@ -354,37 +217,32 @@ def _is_a_curve(counts: dict[int, int]) -> bool:
 
 
 def _confirmed(
-    one: Component, names: Sequence[str], map_: BirationalMap, eps: fmpq | None, others: Sequence[Component], rng: random.Random
+    one: Component, map_: BirationalMap, eps: fmpq | None, others: Sequence[Component], rng: random.Random
 ) -> Component:
     """The component with what random members on it say, and a rational one that is on no smaller component."""
     measured = [degrees_on(map_, one.equations, eps, one.degrees, rng) for _ in range(_MEMBERS)]
     known = [degrees for degrees in measured if degrees is not None]
     values = None
     for _ in range(_TRIES):
-        point = point_on(one.equations, len(names), QQ, rng)
+        point = point_on(one.equations, len(map_.symbols), QQ, rng)
         if point is None:
             break
-        if not any(other.dimension < one.dimension and _vanishes(other, point) for other in others):
-            values = dict(zip(names, point, strict=True))
+        if not any(other.dimension < one.dimension and other.contains(point) for other in others):
+            values = dict(zip(map_.symbols, point, strict=True))
             break
     return replace(one, tried=len(known), confirmed=known.count(one.degrees), values=values)
 
 
 def _with_growth(
-    components: list[Component],
-    file: SystemFile,
-    eps: fmpq | None,
-    deadline: float,
-    seed: int,
-    progress: Callable[[str], None],
+    components: list[Component], file: SystemFile, eps: fmpq | None, deadline: float, seed: int, progress: Progress
 ) -> list[Component]:
-    """The components with the growth at a rational member, slow ones first, as long as there is time.
+    """The components with the growth at a rational member, as long as there is time; those with the slowest first.
 
     Where it is bounded or exponential, one member of each class is enough.
     """
-    found = []
+    found: list[Component] = []
     enough: set[Degrees] = set()
-    for k, one in enumerate(components):
+    for k, one in enumerate(sorted(components, key=lambda one: one.degrees[::-1])):
         progress(f"scan: growth on component {k + 1} of {len(components)}")
         left = deadline - time.monotonic()
         if one.values is not None and one.degrees not in enough and left > 0 and one.degrees[-1] >= 0:
@@ -403,16 +261,28 @@ def _with_growth(
     return sorted(found, key=order)
 
 
-def _vanishes(one: Component, point: Sequence[Any], prime: int | None = None) -> bool:
-    """Whether the component contains a rational point, or one modulo a prime."""
-    field: Field = QQ if prime is None else GF(prime)
-    return all(field.is_zero(evaluate(equation, field, [field.convert(x) for x in point])) for equation in one.equations)
+def _with_verdicts(
+    components: list[Component], file: SystemFile, eps: fmpq | None, seconds: float, seed: int, progress: Progress
+) -> list[Component]:
+    """The components with what an analysis says of a member, where degrees do not grow exponentially."""
+    found: list[Component] = []
+    points: set[Degrees] = set()
+    for one in components:
+        asked = one.values is not None and one.growth is not None and one.growth.growth is not GrowthClass.EXPONENTIAL
+        if asked and one.values is not None and one.degrees not in points:
+            progress(f"scan: analyzes a member where {one.text}")
+            verdict = analyze(member_of(file, one.values), eps=eps, seconds=seconds, seed=seed).conclusion
+            one = replace(one, verdict=verdict)
+            if one.dimension == 0:
+                points.add(one.degrees)
+        found.append(one)
+    return found
 
 
 def _left(one: Sweep, components: Sequence[Component]) -> int:
     """The number of slow members modulo a prime that are on no component with their degrees."""
     return sum(
-        not any(_vanishes(other, point, one.prime) for other in components if other.degrees == degrees)
+        not any(other.contains(point, one.prime) for other in components if other.degrees == degrees)
         for degrees, points in one.classes.items()
         for point in points
     )

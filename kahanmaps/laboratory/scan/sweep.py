@@ -11,23 +11,19 @@ import random
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice, product
-from typing import TYPE_CHECKING
+from itertools import product
+from typing import Any
 
 from flint import fmpq
 
 from kahanmaps.errors import InputError
 from kahanmaps.maps.implicit import BirationalMap
 
-if TYPE_CHECKING:
-    from kahanmaps.maps.residues.families import Family
-
 Point = tuple[int, ...]
 Degrees = tuple[int, ...]
 
 _SLICE = 2048
 _LINES = (3, 12)  # of a slow member: at least, at most
-_LINE_LENGTH_BITS = 8  # members on one line of parameter space, where they are too many to try all
 
 
 class TimeOver(Exception):
@@ -102,22 +98,20 @@ def sweep(
 
     from kahanmaps.maps.residues.families import TOO_LARGE, Family
 
-    family, rng, count = Family(map_, prime), random.Random(seed), len(map_.symbols)
-    total = prime**count if lines is None else prime * lines
+    family, rng = Family(map_, prime), random.Random(seed)
 
-    def measure(points: Sequence[Point]) -> np.ndarray:
-        if deadline is not None and time.monotonic() > deadline:
-            raise TimeOver
-        return family.degrees(np.array(points, dtype=np.int64), eps, terms, room, rng, jobs=jobs)
+    def measure(points: Sequence[Point], told: Callable[[int, int], None] = lambda done, of: None) -> Any:
+        parts = []
+        for low in range(0, len(points), _SLICE):
+            if deadline is not None and time.monotonic() > deadline:
+                raise TimeOver
+            some = np.array(points[low : low + _SLICE], dtype=np.int64)
+            parts.append(family.degrees(some, eps, terms, room, rng, jobs=jobs))
+            told(low + len(some), len(points))
+        return np.concatenate(parts)
 
-    members = members_of(prime, count, lines, rng)
-    points: list[Point] = []
-    parts = []
-    while part := list(islice(members, _SLICE)):
-        parts.append(measure(part))
-        points += part
-        progress(len(points), total)
-    found = np.concatenate(parts)
+    points = list(members_of(prime, len(map_.symbols), lines, rng))
+    found = measure(points, progress)
     if (found == TOO_LARGE).any():
         raise InputError(f"the degrees of {terms} iterates are too large to be scanned, expected fewer terms")
     generic = found.max(axis=0)
@@ -125,15 +119,14 @@ def sweep(
         raise InputError("the map has no value anywhere, whatever the parameters are")
     slow, accidents = np.flatnonzero((found != generic).any(axis=1)), 0
     for line in range(1, _LINES[1]):
-        again = np.concatenate([measure([points[i] for i in slow[k : k + _SLICE]]) for k in range(0, len(slow), _SLICE)]) \
-            if len(slow) else found[:0]
-        changed = (again > found[slow]).any()
-        found[slow] = np.maximum(found[slow], again)
+        if not len(slow):
+            break
+        before, found[slow] = found[slow], np.maximum(found[slow], measure([points[i] for i in slow]))
         kept = slow[(found[slow] != generic).any(axis=1)]
         accidents += len(slow) - len(kept)
-        slow = kept
-        if line >= _LINES[0] and not changed:
+        if line >= _LINES[0] and (before == found[slow]).all():
             break
+        slow = kept
     classes: dict[Degrees, list[Point]] = {}
     for i in slow:
         classes.setdefault(tuple(int(d) for d in found[i]), []).append(points[i])

@@ -26,9 +26,9 @@ def _compiled() -> Any:
     from kahanmaps.maps.kept_code import compiled
 
     module, inner = globals(), numba.njit(nogil=True)
-    for name in ("_reduce", "_add_product", "_clear", "_copy", "_stripped", "_subtract", "_inverse_of_last", "_gcd", "_divide", "_entries", "_minors",
-                 "_without_common_factor"):  # fmt: skip
-        module[name] = inner(module[name])
+    names = "reduce add_product clear copy stripped subtract inverse_of_last gcd divide entries minors "
+    for name in f"{names} without_common_factor".split():
+        module[f"_{name}"] = inner(module[f"_{name}"])
     return compiled(walk, nogil=True)
 
 
@@ -180,9 +180,7 @@ def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
     return size
 
 
-def _without_common_factor(
-    X: Any, length: int, weights: Any, p: float, nu: float, inverses: Any, work: Any
-) -> int:
+def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: float, inverses: Any, work: Any) -> int:
     """Divides the polynomials of the curve by their gcd, in place; the length that they have then, 0 for none."""
     a, b, c, common = work[0], work[1], work[2], work[3]
     count = X.shape[0]

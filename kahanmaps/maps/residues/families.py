@@ -149,13 +149,13 @@ def _walk_in_flint(
 ) -> None:  # fmt: skip
     """What `walk` of curve_kernel.py does, without numba."""
     modulus = fmpz_mod_poly_ctx(fmpz_mod_ctx(int(p)))([-int(nu), 0, 1])
-    field = fq_default_ctx(modulus=modulus, var="w")
-    context = fq_default_poly_ctx(field)
+    field: Any = fq_default_ctx(modulus=modulus, var="w")
+    context: Any = fq_default_poly_ctx(field)
 
     def polynomial(pairs: Any) -> Any:
         return context([field([int(a), int(b)]) for a, b in pairs.T])
 
-    zero, power = context([]), int(exponents[0].sum())
+    zero, one, power = context([]), context([1]), int(exponents[0].sum())
     for m in range(len(start)):
         X = [polynomial(entry) for entry in start[m]]
         for step in range(degrees.shape[1]):
@@ -163,7 +163,7 @@ def _walk_in_flint(
             if n * power * max(entry.degree() for entry in X) + 1 > room:
                 break
             rows: list[list[Any]] = [[None] * (n + 1) for _ in range(n)]
-            monomials = [prod((x**int(e) for x, e in zip(X, row, strict=True)), start=context([1])) for row in exponents]
+            monomials = [prod((x**e for x, e in zip(X, row, strict=True)), start=one) for row in exponents.tolist()]
             for i, j, k, place in layout:
                 term = monomials[k] * polynomial(values[m][:, place : place + 1])
                 rows[i][j] = term if rows[i][j] is None else rows[i][j] + term

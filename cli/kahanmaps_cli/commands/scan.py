@@ -1,0 +1,144 @@
+"""kahanmaps scan."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.complete import complete_symbols
+from kahanmaps_cli.options import (
+    eps_options,
+    is_inline,
+    load_system,
+    output_options,
+    seconds_option,
+    seed_option,
+    system_options,
+    the_eps,
+)
+from kahanmaps_cli.outputs import OutputFolder, file_name, will_write
+from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import tell
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.scan.result import Scan
+
+
+@click.command("scan")
+@system_options
+@click.option(
+    "--over",
+    required=True,
+    metavar="A,B,...",
+    help="The parameters that vary, up to 8; an inline system need not declare them.",
+    shell_complete=complete_symbols,
+)
+@eps_options
+@click.option("--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: as many as are small, up to 7).")
+@click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters).")
+@click.option(
+    "--analyze", "analysis", type=float, metavar="T", help="Analyze a member of each slow class, T seconds each."
+)
+@click.option(
+    "--toml", "folder", type=OutputFolder(), metavar="DIR", help="Write a member of each component as a file to DIR."
+)
+@seconds_option(120.0, "Stop about then, and say what was seen.")
+@click.option("-j", "--jobs", type=int, metavar="N", help="Threads, with numba (default: all processors).")
+@seed_option
+@output_options
+def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
+    """Which members of a family are integrable: where in parameter space degrees grow more slowly.
+
+    \b
+      kahanmaps scan henon_heiles --over c
+      kahanmaps scan zhukovski_volterra_2 --over b1,b2
+      kahanmaps scan --rhs "x' = x*(C*y+z); y' = y*(x+A*z); z' = z*(B*x+y)" --over A,B,C
+      kahanmaps scan --rhs "x' = x*(x+2*y); y' = -y*((g+1)*x+g*y)" --over g --toml cases
+
+    The degrees of the first iterates of all members with parameters in GF(p), for several small primes p. Members with
+    smaller degrees than the others form points, lines, curves and surfaces; what is there modulo all primes is written
+    as a condition over Q. It is confirmed at random members by the computation of `degrees`, and a rational member
+    tells the kind of growth. Found modulo primes and confirmed is evidence, and no proof.
+
+    Without --eps: conditions that hold for every eps. With more than three parameters members on random lines of
+    parameter space are tried, which finds hypersurfaces only. What can have been missed is told.
+
+    Exit status: 0 done, whatever was found; 2 wrong use; 3 the time was over.
+    """
+    from kahanmaps.laboratory.scan.scan import scan
+
+    names = [name.strip() for name in options["over"].split(",") if name.strip()]
+    if is_inline(options):
+        given = {name for name, _ in options["parameters"]}
+        options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
+    file = load_system(system, options)
+    with Progress(quiet) as progress:
+        found = scan(
+            file,
+            names,
+            eps=the_eps(options["eps"], options["time_step"], required=False),
+            terms=options["terms"],
+            primes=_primes(options["primes"]),
+            analysis=options["analysis"],
+            seconds=options["seconds"],
+            seed=options["seed"],
+            jobs=options["jobs"],
+            progress=progress,
+        )
+    if options["folder"] is not None:
+        _write(found, options["folder"], quiet)
+    if as_json:
+        print_json(_record(found, options))
+    else:
+        from kahanmaps.checks.settings import eps_record, eps_words
+
+        tell(f"# scan: {file.name} over {', '.join(found.over)}{eps_words(eps_record(found.eps, file.map))}")
+        tell(found.text)
+    if found.ended == "complete":
+        return 0
+    if not quiet:
+        say(f"stopped early: the time was over after the members modulo {found.sweeps[-1].prime}")
+    return 3
+
+
+def _primes(text: str | None) -> list[int] | None:
+    if text is None:
+        return None
+    pieces = [piece.strip() for piece in text.split(",")]
+    if not all(piece.isascii() and piece.isdigit() and len(piece) < 10 for piece in pieces):
+        raise click.UsageError(f"found --primes {text[:60]!r}, expected primes separated by commas")
+    return [int(piece) for piece in pieces]
+
+
+def _write(found: Scan, folder: str, quiet: bool) -> None:
+    """A system file for every component that has a rational member."""
+    from kahanmaps.whole_files import write_whole
+
+    known = [one for one in found.components if one.values is not None]
+    paths = [Path(folder) / f"{file_name(found.file.name)}-{k}.toml" for k in range(1, len(known) + 1)]
+    for path in paths:
+        will_write(str(path))
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for path, one in zip(paths, known, strict=True):
+        write_whole(str(path), found.member(one).to_toml().encode())
+    if not quiet:
+        say(f"{folder}: {len(known)} system files")
+
+
+def _record(found: Scan, options: dict[str, Any]) -> dict[str, Any]:
+    from kahanmaps.checks.settings import eps_record
+    from kahanmaps.version import __version__
+
+    return {
+        "command": "scan",
+        "version": __version__,
+        "system": found.file.name,
+        **eps_record(found.eps, found.file.map),
+        "arithmetic": "modulo primes",
+        "seconds": options["seconds"],
+        **found.to_json(),
+        "document": dict(found.file.document),
+    }

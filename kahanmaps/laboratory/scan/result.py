@@ -1,0 +1,176 @@
+"""What a scan finds: components of parameter space, and what was seen of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.fields import GF, QQ, Field
+from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.displayed import Displayed
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.symbols import member_of
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.conclusion import Conclusion
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.scan.lift import height_bound
+from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
+
+
+@dataclass(frozen=True)
+class Component:
+    """A condition on the parameters: `equations`, polynomials over Q that vanish on it, found modulo `primes`.
+
+    `degrees` are d_1, ..., d_N there. `confirmed` of `tried` random members have them. `values` are those of a rational
+    member, None where none was found; `growth` what its degrees do, `verdict` what its analysis says, None where that
+    was not asked.
+    """
+
+    equations: tuple[fmpq_mpoly, ...]
+    dimension: int
+    degrees: Degrees
+    primes: tuple[int, ...]
+    confirmed: int = 0
+    tried: int = 0
+    values: dict[str, fmpq] | None = None
+    growth: DegreeGrowth | None = None
+    verdict: Conclusion | None = None
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether all members tried have the degrees."""
+        return 0 < self.tried == self.confirmed
+
+    @property
+    def text(self) -> str:
+        """The condition: values of a point, else equations."""
+        if self.dimension == 0 and self.values is not None:
+            return f"({', '.join(map(format_number, self.values.values()))})"
+        return ", ".join(f"{format_polynomial(equation)} = 0" for equation in self.equations)
+
+    def contains(self, point: Sequence[Any], prime: int | None = None) -> bool:
+        """Whether the equations hold at a rational point, or at one modulo a prime."""
+        field: Field = QQ if prime is None else GF(prime)
+        values = [field.convert(x) for x in point]
+        return all(field.is_zero(evaluate(equation, field, values)) for equation in self.equations)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; equations as text."""
+        growth = self.growth
+        return {
+            **attributes(self, "equations", "dimension", "primes", "confirmed", "tried", "is_confirmed", "values"),
+            "growth": None if growth is None else str(growth.growth),
+            "growth_text": None if growth is None else growth.growth_text,
+            "verdict": None if self.verdict is None else attributes(self.verdict, "kind", "ground", "sentence"),
+        }
+
+
+@dataclass(frozen=True)
+class Scan(Displayed):
+    """What a scan found: components, the ones with the slowest growth first.
+
+    `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
+    the number of slow members on no component modulo each of them: points over number fields, of a height above
+    `height`, or there by chance. `symmetric` are pairs of parameters whose exchange permutes the slow members.
+    `ended` is "complete" or "time".
+    """
+
+    file: SystemFile
+    over: tuple[str, ...]
+    eps: fmpq | None
+    seed: int
+    generic: Degrees
+    components: tuple[Component, ...]
+    sweeps: tuple[Sweep, ...]
+    left: tuple[int, ...]
+    symmetric: tuple[tuple[str, str], ...]
+    ended: str
+
+    @property
+    def height(self) -> int:
+        """Numerators and denominators of single points up to which they are found."""
+        return height_bound([one.prime for one in self.sweeps])
+
+    @property
+    def complete(self) -> bool:
+        """Whether all members modulo the primes were tried, rather than those on random lines of parameter space."""
+        return all(one.complete for one in self.sweeps)
+
+    @property
+    def classes(self) -> list[tuple[Degrees, list[Component]]]:
+        """The components by degrees, in their order."""
+        found: dict[Degrees, list[Component]] = {}
+        for one in self.components:
+            found.setdefault(one.degrees, []).append(one)
+        return list(found.items())
+
+    @property
+    def coverage(self) -> str:
+        """What was tried, and what can have been missed: a sentence or two."""
+        parts = [f"{one.seen} modulo {one.prime}" for one in self.sweeps]
+        if self.complete:
+            return (
+                f"all members with parameters modulo the primes: {', '.join(parts)}; single points are found with "
+                f"numerators and denominators up to {self.height}, hypersurfaces of a degree up to 6"
+            )
+        return f"members on random lines of parameter space: {', '.join(parts)}; only hypersurfaces are looked for"
+
+    @property
+    def text(self) -> str:
+        """Lines for people, a word and a tab at the front."""
+        lines = [("in general", ", ".join(map(str, self.generic)))]
+        for degrees, members in self.classes:
+            growth = next((one.growth for one in members if one.growth is not None), None)
+            told = ", ".join("none" if d < 0 else str(d) for d in degrees)
+            lines.append(("degrees", told + (f"\t{growth.growth_text}" if growth is not None else "")))
+            for dimension in sorted({one.dimension for one in members}, reverse=True):
+                here = [one for one in members if one.dimension == dimension]
+                for confirmed in (True, False):
+                    some = [one.text for one in here if one.is_confirmed is confirmed]
+                    if some:
+                        where = f"at ({', '.join(self.over)}) =" if dimension == 0 else "where"
+                        mark = "" if confirmed else "\tnot confirmed"
+                        lines.append((where, f"{(', ' if dimension == 0 else '; ').join(some)}{mark}"))
+            lines += [
+                ("verdict", f"{one.verdict.sentence}\tat ({', '.join(map(format_number, one.values.values()))})")
+                for one in members
+                if one.verdict is not None and one.values is not None
+            ]
+        if not self.components:
+            lines.append(("found", "no condition on the parameters under which degrees are smaller"))
+        lines += [("symmetry", f"exchanging {a} and {b} permutes the slow members") for a, b in self.symmetric]
+        lines.append(("tried", self.coverage))
+        rest = ", ".join(f"{n} modulo {one.prime}" for n, one in zip(self.left, self.sweeps, strict=True))
+        lines.append(("left", f"slow members on no component: {rest}"))
+        return "\n".join(f"{word}\t{rest}" for word, rest in lines)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            **attributes(self, "over", "seed", "generic"),
+            "classes": [
+                {"degrees": list(degrees), "components": [one.to_json() for one in some]}
+                for degrees, some in self.classes
+            ],
+            "symmetric": [list(pair) for pair in self.symmetric],
+            "sweeps": [
+                {
+                    **attributes(one, "prime", "seen", "complete", "accidents"),
+                    "slow": sum(map(len, one.classes.values())),
+                    "left": left,
+                }
+                for one, left in zip(self.sweeps, self.left, strict=True)
+            ],
+            **attributes(self, "height", "coverage", "ended"),
+        }
+
+    def member(self, component: Component) -> SystemFile:
+        """The system of a rational member on a component. Raises InputError where none is known."""
+        if component.values is None:
+            raise InputError(f"no rational member is known where {component.text}")
+        return member_of(self.file, component.values)
