@@ -100,7 +100,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if found.ended == "complete":
         return 0
     if not quiet:
-        say(f"stopped early: the time was over after the members modulo {found.sweeps[-1].prime}")
+        say(f"stopped early: the time was over after the members modulo {len(found.sweeps)} of the primes")
     return 3
 
 

@@ -47,10 +47,16 @@ class Component:
         return 0 < self.tried == self.confirmed
 
     @property
+    def member_text(self) -> str:
+        """The values of the rational member, as a point where there are several; empty where none is known."""
+        values = [format_number(value) for value in (self.values or {}).values()]
+        return f"({', '.join(values)})" if len(values) > 1 else "".join(values)
+
+    @property
     def text(self) -> str:
         """The condition: values of a point, else equations."""
         if self.dimension == 0 and self.values is not None:
-            return f"({', '.join(map(format_number, self.values.values()))})"
+            return self.member_text
         return ", ".join(f"{format_polynomial(equation)} = 0" for equation in self.equations)
 
     def contains(self, point: Sequence[Any], prime: int | None = None) -> bool:
@@ -93,8 +99,8 @@ class Scan(Displayed):
 
     @property
     def height(self) -> int:
-        """Numerators and denominators of single points up to which they are found."""
-        return height_bound([one.prime for one in self.sweeps])
+        """Numerators and denominators of single points up to which they are found; 0 where too little was tried."""
+        return height_bound([one.prime for one in self.sweeps]) if len(self.sweeps) > 2 else 0
 
     @property
     def complete(self) -> bool:
@@ -112,6 +118,8 @@ class Scan(Displayed):
     @property
     def coverage(self) -> str:
         """What was tried, and what can have been missed: a sentence or two."""
+        if not self.height:
+            return f"members modulo three primes are needed, those modulo {len(self.sweeps)} were tried"
         parts = [f"{one.seen} modulo {one.prime}" for one in self.sweeps]
         if self.complete:
             return (
@@ -123,6 +131,9 @@ class Scan(Displayed):
     @property
     def text(self) -> str:
         """Lines for people, a word and a tab at the front."""
+        if not self.height:
+            return f"tried\t{self.coverage}"
+        names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
         lines = [("in general", ", ".join(map(str, self.generic)))]
         for degrees, members in self.classes:
             growth = next((one.growth for one in members if one.growth is not None), None)
@@ -133,20 +144,23 @@ class Scan(Displayed):
                 for confirmed in (True, False):
                     some = [one.text for one in here if one.is_confirmed is confirmed]
                     if some:
-                        where = f"at ({', '.join(self.over)}) =" if dimension == 0 else "where"
+                        where = f"at {names} =" if dimension == 0 else "where"
                         mark = "" if confirmed else "\tnot confirmed"
                         lines.append((where, f"{(', ' if dimension == 0 else '; ').join(some)}{mark}"))
             lines += [
-                ("verdict", f"{one.verdict.sentence}\tat ({', '.join(map(format_number, one.values.values()))})")
+                ("verdict", f"{names} = {one.member_text}: {one.verdict.sentence}")
                 for one in members
-                if one.verdict is not None and one.values is not None
+                if one.verdict is not None
             ]
         if not self.components:
             lines.append(("found", "no condition on the parameters under which degrees are smaller"))
         lines += [("symmetry", f"exchanging {a} and {b} permutes the slow members") for a, b in self.symmetric]
         lines.append(("tried", self.coverage))
-        rest = ", ".join(f"{n} modulo {one.prime}" for n, one in zip(self.left, self.sweeps, strict=True))
-        lines.append(("left", f"slow members on no component: {rest}"))
+        if any(self.left):
+            rest = ", ".join(f"{n} modulo {one.prime}" for n, one in zip(self.left, self.sweeps, strict=True))
+            lines.append(("left", f"slow members on no component: {rest}"))
+        else:
+            lines.append(("left", "none: every slow member that was seen is on a component"))
         return "\n".join(f"{word}\t{rest}" for word, rest in lines)
 
     def to_json(self) -> dict[str, Any]:

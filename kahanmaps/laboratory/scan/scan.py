@@ -40,7 +40,7 @@ Progress = Callable[[str], None]
 DEFAULT_SECONDS = 120.0
 MAX_PARAMETERS = 8
 _PRIMES = {1: (389, 397, 401, 409), 2: (53, 59, 61, 67), 3: (19, 23, 29, 31)}
-_PRIMES_OF_LINES, _LINES = (199, 211, 223, 227), 40  # where there are more parameters
+_PRIMES_OF_LINES, _LINES = (79, 83, 89, 97), 150  # where there are more parameters
 _ROOM = 220  # for the degrees before common factors are removed
 _MOST_ROOM = 4096
 _TRIAL_PRIME = 8179  # modulo which hardly a member is special
@@ -48,7 +48,7 @@ _MOST_TERMS = 7
 _MEMBERS = 3  # that confirm a component
 _SHARE = 0.5  # of the prime, points of a curve at least
 _TRIES = 20  # for a rational member
-_GROWTH_SECONDS, _STEPS = 2.0, 40
+_GROWTH_SECONDS, _STEPS, _ATTEMPTS = 2.0, 40, 2
 _MEASURED_EACH = (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
 _ORDER = (*(c for c in GrowthClass if c is not GrowthClass.UNKNOWN), GrowthClass.UNKNOWN)
 
@@ -142,9 +142,7 @@ def scan(
         except TimeOver:
             ended = "time"
             break
-    if not sweeps:
-        raise InputError(f"found {seconds} seconds, which is not enough for the members modulo {chosen[0]}")
-    generic = max(one.generic for one in sweeps)
+    generic = max((one.generic for one in sweeps), default=())
     sweeps = [one for one in sweeps if one.generic == generic]
     found = _components(sweeps, names, rng)
     known = []
@@ -248,7 +246,10 @@ def _with_growth(
         if one.values is not None and one.degrees not in enough and left > 0 and one.degrees[-1] >= 0:
             member = member_of(file, one.values).map
             part = min(_GROWTH_SECONDS, max(0.1, left))
-            growth = degree_growth(member, eps, seconds=part, steps=_STEPS, seed=seed, enclosed=False)
+            for attempt in range(_ATTEMPTS):  # the singularities are followed at a random eps, which may be special
+                growth = degree_growth(member, eps, seconds=part, steps=_STEPS, seed=seed + attempt, enclosed=False)
+                if growth.growth is not GrowthClass.UNKNOWN:
+                    break
             one = replace(one, growth=growth)
             if growth.growth not in _MEASURED_EACH:
                 enough.add(one.degrees)
