@@ -229,7 +229,9 @@ def scan_html(found: Scan) -> str:
         rows.append((_text(where), _text(", ".join(map(str, degrees))), _text(growth)))
     notes = _notes([_rest(found.classes), found.coverage])
     more = _words(f"over {', '.join(found.over)}", eps_sentence(found.eps, found.file.map))
-    return markup.titled(f"scan of {_name(found.file)}", markup.table(["where", "degrees", "growth"], rows) + notes, more)
+    return markup.titled(
+        f"scan of {_name(found.file)}", markup.table(["where", "degrees", "growth"], rows) + notes, more
+    )
 
 
 @html_form.register

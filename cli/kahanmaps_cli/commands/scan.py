@@ -19,6 +19,7 @@ from kahanmaps_cli.options import (
     the_eps,
 )
 from kahanmaps_cli.outputs import OutputFolder, file_name, will_write
+from kahanmaps_cli.params import Seconds
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 @click.option("--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: as many as are small, up to 7).")
 @click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters).")
 @click.option(
-    "--analyze", "analysis", type=float, metavar="T", help="Analyze a member of each slow class, T seconds each."
+    "--analyze", "analysis", type=Seconds(), metavar="T", help="Analyze a member of each slow class, T seconds each."
 )
 @click.option(
     "--toml", "folder", type=OutputFolder(), metavar="DIR", help="Write a member of each component as a file to DIR."
@@ -55,8 +56,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     \b
       kahanmaps scan henon_heiles --over c
       kahanmaps scan zhukovski_volterra_2 --over b1,b2
-      kahanmaps scan --rhs "x' = x*(C*y+z); y' = y*(x+A*z); z' = z*(B*x+y)" --over A,B,C
-      kahanmaps scan --rhs "x' = x*(x+2*y); y' = -y*((g+1)*x+g*y)" --over g --toml cases
+      kahanmaps scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b
+      kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze 5 --toml cases
 
     The degrees of the first iterates of all members with parameters in GF(p), for several small primes p. Members with
     smaller degrees than the others form points, lines, curves and surfaces; what is there modulo all primes is written

@@ -21,6 +21,8 @@ from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.scan.lift import height_bound
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
 
+STEPS = 40  # for which singularities are followed where the growth at a member is asked
+
 
 @dataclass(frozen=True)
 class Component:
@@ -138,7 +140,8 @@ class Scan(Displayed):
         for degrees, members in self.classes:
             growth = next((one.growth for one in members if one.growth is not None), None)
             told = ", ".join("none" if d < 0 else str(d) for d in degrees)
-            lines.append(("degrees", told + (f"\t{growth.growth_text}" if growth is not None else "")))
+            known = "" if growth is None else "explained" if growth.explained else "measured"
+            lines.append(("degrees", told + (f"\t{growth.kind_text}, {known}" if growth is not None else "")))
             for dimension in sorted({one.dimension for one in members}, reverse=True):
                 here = [one for one in members if one.dimension == dimension]
                 for confirmed in (True, False):
@@ -154,6 +157,8 @@ class Scan(Displayed):
             ]
         if not self.components:
             lines.append(("found", "no condition on the parameters under which degrees are smaller"))
+        if self.components:
+            lines.append(("growth", f"at a rational member, singularities followed for {STEPS} steps"))
         lines += [("symmetry", f"exchanging {a} and {b} permutes the slow members") for a, b in self.symmetric]
         lines.append(("tried", self.coverage))
         if any(self.left):

@@ -30,7 +30,7 @@ from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.scan.lift import flat_equations, lifted_flats, lifted_forms, residues
 from kahanmaps.laboratory.scan.members import degrees_on, point_on
 from kahanmaps.laboratory.scan.pieces import pieces, pivots
-from kahanmaps.laboratory.scan.result import Component, Scan
+from kahanmaps.laboratory.scan.result import STEPS, Component, Scan
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep, TimeOver, sweep
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kernels import processors
@@ -48,7 +48,7 @@ _MOST_TERMS = 7
 _MEMBERS = 3  # that confirm a component
 _SHARE = 0.5  # of the prime, points of a curve at least
 _TRIES = 20  # for a rational member
-_GROWTH_SECONDS, _STEPS, _ATTEMPTS = 2.0, 40, 2
+_GROWTH_SECONDS, _ATTEMPTS = 10.0, 2
 _MEASURED_EACH = (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
 _ORDER = (*(c for c in GrowthClass if c is not GrowthClass.UNKNOWN), GrowthClass.UNKNOWN)
 
@@ -245,9 +245,9 @@ def _with_growth(
         left = deadline - time.monotonic()
         if one.values is not None and one.degrees not in enough and left > 0 and one.degrees[-1] >= 0:
             member = member_of(file, one.values).map
-            part = min(_GROWTH_SECONDS, max(0.1, left))
+            part = min(_GROWTH_SECONDS, left)
             for attempt in range(_ATTEMPTS):  # the singularities are followed at a random eps, which may be special
-                growth = degree_growth(member, eps, seconds=part, steps=_STEPS, seed=seed + attempt, enclosed=False)
+                growth = degree_growth(member, eps, seconds=part, steps=STEPS, seed=seed + attempt, enclosed=False)
                 if growth.growth is not GrowthClass.UNKNOWN:
                     break
             one = replace(one, growth=growth)
