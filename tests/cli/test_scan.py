@@ -75,6 +75,8 @@ def test_the_time_may_be_over(kahanmaps):
         ("henon_heiles --over c --primes 5,7,9973", "expected an odd prime below 8192"),
         ("henon_heiles --over c --terms 99", "expected 1 to 14"),
         ("henon_heiles --over c --analyze -1", "expected a number of seconds above 0"),
+        ("henon_heiles --over c,eps --toml here", "a system file holds no eps"),
+        ("lyness --over a,eps", "expected a map that depends on it"),
         ("henon_heiles --over c --jobs 0", "expected at least 1"),
         ("paper_m2 --over c", "found the symbol 'c'"),
     ],

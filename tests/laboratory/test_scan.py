@@ -91,7 +91,7 @@ def test_a_wrong_condition_is_not_confirmed():
     g1, g2 = ring(["g1", "g2"]).gens()
     good = Component((g1 + g2 - 1,), 1, (2, 4, 7, 12, 20, 33, 54), (43, 47, 53))
     wrong = replace(good, equations=(g1 + g2 - 7,))
-    found = [_confirmed(one, map_, None, [], random.Random(1)) for one in (good, wrong)]
+    found = [_confirmed(one, ["g1", "g2"], map_, None, [], random.Random(1)) for one in (good, wrong)]
     assert [(one.confirmed, one.tried, one.is_confirmed) for one in found] == [(3, 3, True), (0, 3, False)]
 
 
@@ -122,6 +122,24 @@ def test_one_eps_may_have_more_slow_members_than_every_eps():
     assert found.generic[1] < 7  # at eps = 1 the fourth iterate is the identity, whatever c is
 
 
+REPAIRED = """variables = ["x", "y"]
+parameters = { A = 1 }
+[system]
+rhs = ["2*x*y", "A*y^2 - 4*x^2 - 6*x - 6"]"""
+
+
+def test_a_condition_with_eps_is_found_where_eps_varies_too():
+    found = scan(parse_system(REPAIRED), ["eps", "A"], primes=(43, 47, 53), terms=5)
+    assert found.over == ("A", "eps")
+    # the catalogue's repaired_octahedral
+    one = next(one for one in found.components if one.text == "24*eps^2 + A + 2 = 0")
+    assert one.is_confirmed
+    assert one.growth.growth is GrowthClass.QUADRATIC
+    assert one.values["A"] == -2 - 24 * one.values["eps"] ** 2
+    without = scan(parse_system(REPAIRED), ["A"], primes=(43, 47, 53), terms=5)
+    assert [one.text for one in without.components] == ["-1"]  # the one that holds for every eps
+
+
 def test_more_parameters_than_can_be_tried_give_hypersurfaces():
     text = LOTKA_VOLTERRA.replace("C = 1", "C = 1, D = 1").replace("x + A*z", "D*x + A*z")
     found = scan(parse_system(text), ["A", "B", "C", "D"], primes=(61, 67, 71), terms=3)
@@ -140,12 +158,12 @@ def test_the_time_may_be_over_before_anything_is_known():
     found = scan(load("henon_heiles"), ["c"], seconds=1e-6)
     assert (found.ended, found.components, found.height) == ("time", (), 0)
     with pytest.raises(TimeOver):
-        sweep(map_with_symbols(load("henon_heiles"), ["c"]), 31, None, 2, 99, deadline=0.0)
+        sweep(map_with_symbols(load("henon_heiles"), ["c"]), 1, 31, None, 2, 99, deadline=0.0)
 
 
 def test_a_sweep_is_the_same_for_the_same_seed_and_generic_members_are_not_slow():
     map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
-    found = [sweep(map_, 13, None, 5, 99, seed=seed) for seed in ("a", "a", "b")]
+    found = [sweep(map_, 2, 13, None, 5, 99, seed=seed) for seed in ("a", "a", "b")]
     assert found[0] == found[1]
     assert found[0].classes == found[2].classes  # lines in special position were replaced
     assert found[0].accidents > 0  # of which there are some modulo 13
@@ -158,6 +176,7 @@ def test_a_sweep_is_the_same_for_the_same_seed_and_generic_members_are_not_slow(
         ({"over": []}, "no parameter"),
         ({"over": ["d"]}, "found the symbol 'd'"),
         ({"eps": 0}, "found eps = 0"),
+        ({"over": ["c", "eps"], "eps": 1}, "found eps both"),
         ({"primes": (31, 37)}, "three different ones"),
         ({"primes": (31, 37, 39)}, "three different ones"),
         ({"terms": 0}, "expected 1 to 14"),

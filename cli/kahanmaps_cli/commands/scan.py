@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     "--over",
     required=True,
     metavar="A,B,...",
-    help="The parameters that vary, up to 8; an inline system need not declare them.",
+    help="The parameters that vary, up to 8, eps perhaps among them; an inline system need not declare them.",
     shell_complete=complete_symbols,
 )
 @eps_options
@@ -64,8 +64,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     as a condition over Q. It is confirmed at random members by the computation of `degrees`, and a rational member
     tells the kind of growth. Found modulo primes and confirmed is evidence, and no proof.
 
-    Without --eps: conditions that hold for every eps. With more than three parameters members on random lines of
-    parameter space are tried, which finds hypersurfaces only. What can have been missed is told.
+    Without --eps: conditions that hold for every eps; with eps among the parameters also those that contain it. With
+    more than three parameters members on random lines of parameter space are tried, which finds hypersurfaces only.
+    What can have been missed is told.
 
     Exit status: 0 done, whatever was found; 2 wrong use; 3 the time was over.
     """
@@ -73,8 +74,10 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     names = [name.strip() for name in options["over"].split(",") if name.strip()]
     if is_inline(options):
-        given = {name for name, _ in options["parameters"]}
+        given = {"eps", *(name for name, _ in options["parameters"])}
         options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
+    if "eps" in names and options["folder"] is not None:
+        raise click.UsageError("found --toml and eps among the parameters: a system file holds no eps")
     file = load_system(system, options)
     with Progress(quiet) as progress:
         found = scan(
@@ -96,7 +99,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     else:
         from kahanmaps.checks.settings import eps_record, eps_words
 
-        tell(f"# scan: {file.name} over {', '.join(found.over)}{eps_words(eps_record(found.eps, file.map))}")
+        at = "" if "eps" in names else eps_words(eps_record(found.eps, file.map))
+        tell(f"# scan: {file.name} over {', '.join(found.over)}{at}")
         tell(found.text)
     if found.ended == "complete":
         return 0

@@ -68,21 +68,24 @@ def _univariate(coefficients: Sequence[Any], field: Field) -> Any:
 def degrees_on(
     map_: BirationalMap,
     equations: Sequence[fmpq_mpoly],
+    count: int,
     eps: fmpq | None,
     expected: Sequence[int],
     rng: random.Random,
 ) -> tuple[int, ...] | None:
     """The degrees of a random member on a component modulo a random prime of 63 bits; None where none is found.
 
-    On one line; -1 where the iterate exists nowhere. `expected` says how many, and about how large.
+    Of `count` parameters eps is the last one where that are more than symbols. On one line; -1 where the iterate exists
+    nowhere. `expected` says how many, and about how large.
     """
     while True:
         field = random_prime_field(rng)
         try:
-            values = point_on(equations, len(map_.symbols), field, rng)
+            values = point_on(equations, count, field, rng)
             if values is None:
                 return None
-            over = map_.at(field.random(rng) if eps is None else field.convert(eps), field, values)
+            *parameters, step = values if count > len(map_.symbols) else (*values, eps)
+            over = map_.at(field.random(rng) if step is None else field.convert(step), field, parameters)
             break
         except BadPrime:
             continue

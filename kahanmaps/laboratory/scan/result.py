@@ -192,4 +192,4 @@ class Scan(Displayed):
         """The system of a rational member on a component. Raises InputError where none is known."""
         if component.values is None:
             raise InputError(f"no rational member is known where {component.text}")
-        return member_of(self.file, component.values)
+        return member_of(self.file, {name: x for name, x in component.values.items() if name != "eps"})

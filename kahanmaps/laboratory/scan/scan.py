@@ -70,7 +70,7 @@ def scan(
 
     Args:
         file: the family; its claims are not looked at.
-        over: names of its parameters that vary, the others have the values of the file.
+        over: names of its parameters that vary, the others have the values of the file; eps may be one of them.
         eps: an exact number, or None for generic eps: conditions that hold for every eps.
         terms: how many iterates are measured, by default as many as have small degrees, at most 7.
         primes: at least three primes, by default such that the members are some ten thousand.
@@ -101,8 +101,14 @@ def scan(
         raise InputError("found no parameter to scan over, expected at least one")
     if len(names) > MAX_PARAMETERS:
         raise InputError(f"found {len(names)} parameters to scan over, expected at most {MAX_PARAMETERS}")
-    map_ = map_with_symbols(file, names)
+    if "eps" in names:
+        names = (*(name for name in names if name != "eps"), "eps")
+    map_ = map_with_symbols(file, [name for name in names if name != "eps"])
     exact = None if eps is None else rational(eps)
+    if exact is not None and "eps" in names:
+        raise InputError("found eps both as a number and as a parameter to scan over, expected one of the two")
+    if "eps" in names and not map_.has_eps:
+        raise InputError("found eps as a parameter to scan over, expected a map that depends on it")
     if exact == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     if jobs is not None and jobs < 1:
@@ -113,7 +119,7 @@ def scan(
         raise InputError(f"found the primes {', '.join(map(str, chosen))}, expected three different ones or more")
     rng = random.Random(f"scan {seed_for(seed, names, map_.subject, exact)}")
     began = time.monotonic()
-    terms, room = _terms(map_, exact, terms, rng)
+    terms, room = _terms(map_, len(names), exact, terms, rng)
     sweeps: list[Sweep] = []
     ended = "complete"
     total = sum(p ** len(names) if lines is None else p * lines for p in chosen)
@@ -128,6 +134,7 @@ def scan(
             sweeps.append(
                 sweep(
                     map_,
+                    len(names),
                     p,
                     exact,
                     terms,
@@ -148,7 +155,7 @@ def scan(
     known = []
     for k, one in enumerate(found):
         progress(f"scan: confirms component {k + 1} of {len(found)}")
-        known.append(_confirmed(one, map_, exact, found, rng))
+        known.append(_confirmed(one, names, map_, exact, found, rng))
     known = _with_growth(known, file, exact, began + seconds, seed, progress)
     if analysis is not None:
         known = _with_verdicts(known, file, exact, analysis, seed, progress)
@@ -159,7 +166,7 @@ def scan(
     return Scan(file, names, exact, seed, generic, tuple(known), tuple(sweeps), left, symmetric, ended)
 
 
-def _terms(map_: BirationalMap, eps: fmpq | None, terms: int | None, rng: random.Random) -> tuple[int, int]:
+def _terms(map_: BirationalMap, count: int, eps: fmpq | None, terms: int | None, rng: random.Random) -> tuple[int, int]:
     """How many iterates are measured, and the room that they need: tried on members modulo a larger prime."""
     import numpy as np
 
@@ -168,7 +175,7 @@ def _terms(map_: BirationalMap, eps: fmpq | None, terms: int | None, rng: random
     if terms is not None and not 1 <= terms <= 2 * _MOST_TERMS:
         raise InputError(f"found {terms} terms, expected 1 to {2 * _MOST_TERMS}")
     family = Family(map_, _TRIAL_PRIME)
-    tried = np.array([[rng.randrange(_TRIAL_PRIME) for _ in map_.symbols] for _ in range(8)])
+    tried = np.array([[rng.randrange(1, _TRIAL_PRIME) for _ in range(count)] for _ in range(8)])
     room = _ROOM if terms is None else _MOST_ROOM
     found = family.degrees(tried, eps, terms or _MOST_TERMS, room, rng).max(axis=0).tolist()
     if found[0] == NOWHERE:
@@ -215,20 +222,32 @@ def _is_a_curve(counts: dict[int, int]) -> bool:
 
 
 def _confirmed(
-    one: Component, map_: BirationalMap, eps: fmpq | None, others: Sequence[Component], rng: random.Random
+    one: Component,
+    names: Sequence[str],
+    map_: BirationalMap,
+    eps: fmpq | None,
+    others: Sequence[Component],
+    rng: random.Random,
 ) -> Component:
     """The component with what random members on it say, and a rational one that is on no smaller component."""
-    measured = [degrees_on(map_, one.equations, eps, one.degrees, rng) for _ in range(_MEMBERS)]
+    measured = [degrees_on(map_, one.equations, len(names), eps, one.degrees, rng) for _ in range(_MEMBERS)]
     known = [degrees for degrees in measured if degrees is not None]
     values = None
     for _ in range(_TRIES):
-        point = point_on(one.equations, len(map_.symbols), QQ, rng)
+        point = point_on(one.equations, len(names), QQ, rng)
         if point is None:
             break
+        if names[-1] == "eps" and point[-1] == 0:
+            continue
         if not any(other.dimension < one.dimension and other.contains(point) for other in others):
-            values = dict(zip(map_.symbols, point, strict=True))
+            values = dict(zip(names, point, strict=True))
             break
     return replace(one, tried=len(known), confirmed=known.count(one.degrees), values=values)
+
+
+def _member(file: SystemFile, values: dict[str, fmpq], eps: fmpq | None) -> tuple[SystemFile, fmpq | None]:
+    """The system of a member and its eps."""
+    return member_of(file, {name: value for name, value in values.items() if name != "eps"}), values.get("eps", eps)
 
 
 def _with_growth(
@@ -244,10 +263,10 @@ def _with_growth(
         progress(f"scan: growth on component {k + 1} of {len(components)}")
         left = deadline - time.monotonic()
         if one.values is not None and one.degrees not in enough and left > 0 and one.degrees[-1] >= 0:
-            member = member_of(file, one.values).map
+            member, step = _member(file, one.values, eps)
             part = min(_GROWTH_SECONDS, left)
             for attempt in range(_ATTEMPTS):  # the singularities are followed at a random eps, which may be special
-                growth = degree_growth(member, eps, seconds=part, steps=STEPS, seed=seed + attempt, enclosed=False)
+                growth = degree_growth(member.map, step, seconds=part, steps=STEPS, seed=seed + attempt, enclosed=False)
                 if growth.growth is not GrowthClass.UNKNOWN:
                     break
             one = replace(one, growth=growth)
@@ -272,7 +291,8 @@ def _with_verdicts(
         asked = one.values is not None and one.growth is not None and one.growth.growth is not GrowthClass.EXPONENTIAL
         if asked and one.values is not None and one.degrees not in points:
             progress(f"scan: analyzes a member where {one.text}")
-            verdict = analyze(member_of(file, one.values), eps=eps, seconds=seconds, seed=seed).conclusion
+            member, step = _member(file, one.values, eps)
+            verdict = analyze(member, eps=step, seconds=seconds, seed=seed).conclusion
             one = replace(one, verdict=verdict)
             if one.dimension == 0:
                 points.add(one.degrees)

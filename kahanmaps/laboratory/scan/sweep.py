@@ -63,6 +63,7 @@ def members_of(prime: int, count: int, lines: int | None, rng: random.Random) ->
 
 def sweep(
     map_: BirationalMap,
+    count: int,
     prime: int,
     eps: fmpq | None,
     terms: int,
@@ -78,6 +79,7 @@ def sweep(
 
     Args:
         map_: a map with symbols, the parameters of the family.
+        count: how many parameters vary: the symbols, and perhaps eps as the last one, which is never 0.
         prime: below 2^13.
         eps: an exact number, or None for generic eps, in GF(p^2).
         terms, room: see `Family.degrees`.
@@ -110,7 +112,9 @@ def sweep(
             told(low + len(some), len(points))
         return np.concatenate(parts)
 
-    points = list(members_of(prime, len(map_.symbols), lines, rng))
+    points = list(members_of(prime, count, lines, rng))
+    if count > len(map_.symbols):
+        points = [point for point in points if point[-1]]
     found = measure(points, progress)
     if (found == TOO_LARGE).any():
         raise InputError(f"the degrees of {terms} iterates are too large to be scanned, expected fewer terms")

@@ -78,8 +78,8 @@ class Family:
         """The degrees d_1, ..., d_terms of each member, one a row, on one random line each.
 
         Args:
-            members: residues of the symbols, one member a row.
-            eps: an exact number, or None for a random element of GF(p^2) for each member.
+            members: residues of the symbols, one member a row; with one more column, that of eps.
+            eps: an exact number, or None for a random element of GF(p^2) for each member, where eps is no column.
             terms: how many steps.
             room: the largest degree that is worked out before common factors are removed; beyond it the degrees are -2
                 (TOO_LARGE), and -1 (NOWHERE) where the iterate exists nowhere.
@@ -112,7 +112,9 @@ class Family:
     def _coefficients(self, members: Members, eps: fmpq | None, draw: np.random.Generator) -> NDArray[np.float64]:
         """The coefficients of the equation, an array (members, 2, places)."""
         p, count = self.prime, len(members)
-        if eps is None:
+        if members.shape[1] > len(self.symbols):
+            step = np.stack([members[:, -1], np.zeros(count, dtype=np.int64)])
+        elif eps is None:
             step = draw.integers(0, p, (2, count))
             step[0, ~step.any(axis=0)] = 1
         else:
