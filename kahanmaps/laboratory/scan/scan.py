@@ -23,7 +23,7 @@ from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols, member_of
-from kahanmaps.errors import InputError
+from kahanmaps.errors import BadPrime, InputError
 from kahanmaps.laboratory.analysis import analyze
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
@@ -39,8 +39,16 @@ Progress = Callable[[str], None]
 
 DEFAULT_SECONDS = 120.0
 MAX_PARAMETERS = 8
-_PRIMES = {1: (389, 397, 401, 409), 2: (53, 59, 61, 67), 3: (19, 23, 29, 31)}
-_PRIMES_OF_LINES, _LINES = (79, 83, 89, 97), 150  # where there are more parameters
+# By the number of parameters, 0 standing for more, where members on random lines are tried: the ones that are wished,
+# then those for families that take their time.
+_PRIMES = {
+    1: ((307, 311, 313, 317, 331, 337, 347, 349, 353, 359), (101, 103, 107, 109)),
+    2: ((53, 59, 61, 67), (29, 31, 37, 41)),
+    3: ((19, 23, 29, 31), (11, 13, 17, 19)),
+    0: ((79, 83, 89, 97), (31, 37, 41, 43)),
+}
+_LINES = 150
+_PART = 0.4  # of the time, for all members on their first line
 _ROOM = 220  # for the degrees before common factors are removed
 _MOST_ROOM = 4096
 _TRIAL_PRIME = 8179  # modulo which hardly a member is special
@@ -113,39 +121,35 @@ def scan(
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     if jobs is not None and jobs < 1:
         raise InputError(f"found {jobs} jobs, expected at least 1")
-    lines = None if len(names) in _PRIMES else _LINES
-    chosen = tuple(primes) if primes is not None else _PRIMES.get(len(names), _PRIMES_OF_LINES)
-    if len(set(chosen)) < 3 or any(p < 5 or not fmpz(p).is_prime() for p in chosen):
-        raise InputError(f"found the primes {', '.join(map(str, chosen))}, expected three different ones or more")
+    if primes is not None and (len(set(primes)) < 3 or any(p < 5 or not fmpz(p).is_prime() for p in primes)):
+        raise InputError(f"found the primes {', '.join(map(str, primes))}, expected three different ones or more")
     rng = random.Random(f"scan {seed_for(seed, names, map_.subject, exact)}")
     began = time.monotonic()
-    terms, room = _terms(map_, len(names), exact, terms, rng)
+    terms, room, cost = _terms(map_, len(names), exact, terms, rng)
+    lines = None if len(names) in _PRIMES else _LINES
+    jobs = jobs or processors()
+
+    def count(some: Sequence[int]) -> int:
+        return sum(p ** len(names) if lines is None else p * lines for p in some)
+
+    if primes is None:
+        wished, fewer = _PRIMES[len(names) if lines is None else 0]
+        primes = wished if cost * count(wished) / jobs < _PART * seconds else fewer
     sweeps: list[Sweep] = []
     ended = "complete"
-    total = sum(p ** len(names) if lines is None else p * lines for p in chosen)
 
     def told(done: int, _: int) -> None:
-        done += sum(one.seen for one in sweeps)
+        done, total = done + sum(one.seen for one in sweeps), count(primes)
         left = (time.monotonic() - began) * (total - done) / done
         progress(f"scan: {done} of {total} members, {left:.0f} s left")
 
-    for p in chosen:
+    limits: dict[str, Any] = {"lines": lines, "jobs": jobs, "deadline": began + 0.8 * seconds, "progress": told}
+    for p in primes:
         try:
-            sweeps.append(
-                sweep(
-                    map_,
-                    len(names),
-                    p,
-                    exact,
-                    terms,
-                    room,
-                    lines=lines,
-                    seed=f"{rng.getrandbits(64)} {p}",
-                    jobs=jobs or processors(),
-                    deadline=began + 0.8 * seconds,
-                    progress=told,
-                )
-            )
+            name = f"{rng.getrandbits(64)} {p}"
+            sweeps.append(sweep(map_, len(names), p, exact, terms, room, seed=name, **limits))
+        except BadPrime:
+            continue
         except TimeOver:
             ended = "time"
             break
@@ -166,11 +170,16 @@ def scan(
     return Scan(file, names, exact, seed, generic, tuple(known), tuple(sweeps), left, symmetric, ended)
 
 
-def _terms(map_: BirationalMap, count: int, eps: fmpq | None, terms: int | None, rng: random.Random) -> tuple[int, int]:
-    """How many iterates are measured, and the room that they need: tried on members modulo a larger prime."""
+def _terms(
+    map_: BirationalMap, count: int, eps: fmpq | None, terms: int | None, rng: random.Random
+) -> tuple[int, int, float]:
+    """How many iterates are measured, the room that they need, and the seconds for a member.
+
+    Tried on members modulo a larger prime.
+    """
     import numpy as np
 
-    from kahanmaps.maps.residues.families import NOWHERE, Family
+    from kahanmaps.maps.residues.families import LONG, NOWHERE, Family
 
     if terms is not None and not 1 <= terms <= 2 * _MOST_TERMS:
         raise InputError(f"found {terms} terms, expected 1 to {2 * _MOST_TERMS}")
@@ -183,7 +192,11 @@ def _terms(map_: BirationalMap, count: int, eps: fmpq | None, terms: int | None,
     measured = sum(degree >= 0 for degree in found)
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
-    return measured, max(family.dim * family.degree * d + 1 for d in [1, *found[: measured - 1]])
+    room = max(family.dim * family.degree * d + 1 for d in [1, *found[: measured - 1]])
+    family.degrees(np.repeat(tried, LONG, axis=0)[:LONG], eps, 1, room, rng)  # which compiles
+    began = time.monotonic()
+    family.degrees(np.repeat(tried, LONG, axis=0)[:LONG], eps, measured, room, rng)
+    return measured, room, (time.monotonic() - began) / LONG
 
 
 def _components(sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random) -> list[Component]:

@@ -27,7 +27,7 @@ MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, and times nu
 MAX_DIMENSION = 6
 NOWHERE, TOO_LARGE = -1, -2  # in the place of degrees
 _CHUNK = 128
-_LONG = 200  # members from which on compiling pays
+LONG = 200  # members from which on compiling pays
 
 Members = NDArray[np.int64]
 
@@ -95,7 +95,7 @@ class Family:
         start[:, -1, 0, 0] = 1.0
         weights = draw.integers(0, p, (terms, 2, 2, self.dim + 1)).astype(float)
         found = np.full((count, terms), TOO_LARGE, dtype=np.int64)
-        walk = _walk(choose_kernel(kernel, long=count >= _LONG))
+        walk = _walk(choose_kernel(kernel, long=count >= LONG))
         exponents = np.array(self._exponents, dtype=np.int64)
         layout = np.array(self._terms, dtype=np.int64)
 
