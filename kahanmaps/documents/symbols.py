@@ -39,7 +39,7 @@ def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
     >>> lyness = 'variables = ["x", "y"]\\nparameters.a = 2\\n[map]\\nimage = ["y", "(a + y)/x"]'
     >>> print(member_of(parse_system(lyness), {"a": fmpq(1, 3)}).map)
     x~ = y
-    y~ = (3*y + 1)/(3*x)
+    y~ = (y + 1/3)/x
     """
     _parameters(file, list(values))
     document = {key: value for key, value in file.document.items() if key not in ("catalog", "integrals", "density")}

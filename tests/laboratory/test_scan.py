@@ -122,6 +122,21 @@ def test_one_eps_may_have_more_slow_members_than_every_eps():
     assert found.generic[1] < 7  # at eps = 1 the fourth iterate is the identity, whatever c is
 
 
+def test_points_over_quadratic_fields_have_their_minimal_polynomial():
+    text = """variables = ["x", "y"]
+    parameters = { a = 1 }
+    [system]
+    rhs = ["x*(x + 2*y)", "-y*(a^2*x + (a^2 - 1)*y)"]"""
+    found = scan(parse_system(text), ["a"], terms=5)
+    quadratic = {one.text: one for one in found.components if one.growth and one.growth.growth is GrowthClass.QUADRATIC}
+    assert set(quadratic) == {"a^2 - 2 = 0", "a^2 - 3 = 0"}  # g = a^2 - 1 is 1 and 2
+    assert all(one.is_confirmed and one.values is None for one in quadratic.values())
+    assert quadratic["a^2 - 2 = 0"].growth.degrees[:8] == (1, 2, 4, 8, 13, 20, 28, 38)
+    assert "where\ta^2 - 2 = 0" in found.text.splitlines()
+    assert any(one.text == "a^2 + 1 = 0" for one in found.components)  # where the primes are 1 modulo 4
+    assert found.left == (0,) * 10
+
+
 REPAIRED = """variables = ["x", "y"]
 parameters = { A = 1 }
 [system]

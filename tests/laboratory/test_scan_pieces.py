@@ -10,7 +10,7 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.laboratory.scan.lift import height_bound, lifted_flats, lifted_forms
+from kahanmaps.laboratory.scan.lift import height_bound, lifted_conjugates, lifted_flats, lifted_forms
 from kahanmaps.laboratory.scan.members import point_on
 from kahanmaps.laboratory.scan.pieces import pieces
 
@@ -81,6 +81,27 @@ def test_a_point_of_low_height_may_be_missing_modulo_one_of_four_primes():
     assert lifted_flats({**low, 43: [((1, 5),)]}) == {((fmpq(1), fmpq(-2)),): PRIMES}
     high = {p: [((1, p - 15),)] for p in PRIMES}
     assert lifted_flats({**high, 43: [((1, 5),)]}) == {}
+
+
+def roots(p, c):
+    return [[t] for t in range(p) if (t * t - c) % p == 0]
+
+
+@pytest.mark.parametrize(("c", "expected"), [(5, {((0, -5),)}), (4, {}), (-1, {((0, 1),)})])
+def test_conjugate_points_are_told_from_rational_ones(c, expected):
+    primes = (11, 13, 17, 19, 29, 31, 37, 41)
+    assert set(lifted_conjugates({p: roots(p, c) for p in primes}, 1)) == set(expected)
+
+
+def test_conjugate_points_have_to_be_there_modulo_all_primes_that_split():
+    found = {p: roots(p, 5) for p in (11, 13, 17, 19, 29, 31, 37, 41)}
+    assert lifted_conjugates({**found, 29: [[7], [9]], 31: []}, 1) == {}  # one is let off
+    assert lifted_conjugates({**found, 13: [[7], [9]]}, 1) != {}  # 5 is no square modulo 13
+
+
+def test_conjugate_points_of_a_plane_are_on_a_rational_line():
+    found = {p: [[t, (2 * t + 1) % p] for (t,) in roots(p, 5)] for p in (11, 19, 29, 31, 41)}
+    assert lifted_conjugates(found, 2) == {((fmpq(1), fmpq(-1, 2), fmpq(1, 2)), (-2, -19)): (11, 19, 29, 31, 41)}
 
 
 def test_the_height_bound_is_that_of_two_primes():

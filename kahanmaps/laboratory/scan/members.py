@@ -12,12 +12,12 @@ from flint import fmpq, fmpq_mpoly, fmpq_poly, nmod_poly
 from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.errors import BadPrime
-from kahanmaps.laboratory.growth.curves import Line
+from kahanmaps.laboratory.growth.curves import Line, Stopped
 from kahanmaps.maps.implicit import BirationalMap
 
 _TRIES = 200
-_MOST_DEGREE = 1 << 20
-_HEIGHT = 12
+_PRIMES = 40
+_HEIGHTS = (12, 120)  # of values at random, for roots of higher degree and others
 
 
 def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: random.Random) -> tuple[Any, ...] | None:
@@ -33,8 +33,9 @@ def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: ran
     1
     """
     pivots = [_pivot(equation) for equation in equations]
-    for _ in range(_TRIES):
-        values = [field.random(rng, _HEIGHT) for _ in range(count)]
+    height = _HEIGHTS[all(int(equation.degrees()[k]) == 1 for equation, k in zip(equations, pivots, strict=True))]
+    for _ in range(_TRIES if len(equations) < count else 1):
+        values = [field.random(rng, height) for _ in range(count)]
         for equation, pivot in zip(equations, pivots, strict=True):
             coefficients = [field.zero] * (1 + max(int(m[pivot]) for m in equation.monoms()))
             for monomial, coefficient in equation.terms():
@@ -72,29 +73,34 @@ def degrees_on(
     eps: fmpq | None,
     expected: Sequence[int],
     rng: random.Random,
+    most: int = 1 << 20,
 ) -> tuple[int, ...] | None:
     """The degrees of a random member on a component modulo a random prime of 63 bits; None where none is found.
 
     Of `count` parameters eps is the last one where that are more than symbols. On one line; -1 where the iterate exists
-    nowhere. `expected` says how many, and about how large.
+    nowhere. `expected` says how many, and about how large; they end before one above `most`.
     """
-    while True:
+    for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
         field = random_prime_field(rng)
         try:
             values = point_on(equations, count, field, rng)
             if values is None:
-                return None
+                continue
             *parameters, step = values if count > len(map_.symbols) else (*values, eps)
             over = map_.at(field.random(rng) if step is None else field.convert(step), field, parameters)
             break
         except BadPrime:
             continue
-    line = Line(over, rng, math.inf, _MOST_DEGREE)
+    else:
+        return None
+    line = Line(over, rng, math.inf, most)
     found: list[int] = []
     try:
         for degree in expected:
             line.step(max(1, degree))
             found.append(line.degree)
+    except Stopped:
+        pass
     except ZeroDivisionError:
         found += [-1] * (len(expected) - len(found))
     return tuple(found)

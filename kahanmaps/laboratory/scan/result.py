@@ -49,6 +49,11 @@ class Component:
         return 0 < self.tried == self.confirmed
 
     @property
+    def is_rational_point(self) -> bool:
+        """Whether it is one member, with rational parameters."""
+        return self.dimension == 0 and self.values is not None
+
+    @property
     def member_text(self) -> str:
         """The values of the rational member, as a point where there are several; empty where none is known."""
         values = [format_number(value) for value in (self.values or {}).values()]
@@ -57,7 +62,7 @@ class Component:
     @property
     def text(self) -> str:
         """The condition: values of a point, else equations."""
-        if self.dimension == 0 and self.values is not None:
+        if self.is_rational_point:
             return self.member_text
         return ", ".join(f"{format_polynomial(equation)} = 0" for equation in self.equations)
 
@@ -142,14 +147,15 @@ class Scan(Displayed):
             told = ", ".join("none" if d < 0 else str(d) for d in degrees)
             known = "" if growth is None else "explained" if growth.explained else "measured"
             lines.append(("degrees", told + (f"\t{growth.kind_text}, {known}" if growth is not None else "")))
-            for dimension in sorted({one.dimension for one in members}, reverse=True):
-                here = [one for one in members if one.dimension == dimension]
-                for confirmed in (True, False):
-                    some = [one.text for one in here if one.is_confirmed is confirmed]
-                    if some:
-                        where = f"at {names} =" if dimension == 0 else "where"
-                        mark = "" if confirmed else "\tnot confirmed"
-                        lines.append((where, f"{(', ' if dimension == 0 else '; ').join(some)}{mark}"))
+            for where, sign, here in (
+                ("where", "; ", [one for one in members if not one.is_rational_point]),
+                (f"at {names} =", ", ", [one for one in members if one.is_rational_point]),
+            ):
+                for some, mark in (
+                    ([one.text for one in here if one.is_confirmed], ""),
+                    ([one.text for one in here if not one.is_confirmed], "\tnot confirmed"),
+                ):
+                    lines += [(where, sign.join(some) + mark)] if some else []
             lines += [
                 ("verdict", f"{names} = {one.member_text}: {one.verdict.sentence}")
                 for one in members
@@ -158,7 +164,7 @@ class Scan(Displayed):
         if not self.components:
             lines.append(("found", "no condition on the parameters under which degrees are smaller"))
         if self.components:
-            lines.append(("growth", f"at a rational member, singularities followed for {STEPS} steps"))
+            lines.append(("growth", f"that of one member; singularities were followed for {STEPS} steps"))
         lines += [("symmetry", f"exchanging {a} and {b} permutes the slow members") for a, b in self.symmetric]
         lines.append(("tried", self.coverage))
         if any(self.left):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import random
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import Any
@@ -20,22 +20,25 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
-from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.polynomials import primitive_part, ring
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.documents.symbols import map_with_symbols, member_of
+from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError
-from kahanmaps.laboratory.analysis import analyze
-from kahanmaps.laboratory.growth.degrees import degree_growth
-from kahanmaps.laboratory.growth.recurrences import GrowthClass
-from kahanmaps.laboratory.scan.lift import flat_equations, lifted_flats, lifted_forms, residues
+from kahanmaps.laboratory.scan.growth import Progress, with_growth, with_verdicts
+from kahanmaps.laboratory.scan.lift import (
+    RationalRows,
+    flat_equations,
+    lifted_conjugates,
+    lifted_flats,
+    lifted_forms,
+    residues,
+)
 from kahanmaps.laboratory.scan.members import degrees_on, point_on
-from kahanmaps.laboratory.scan.pieces import pieces, pivots
-from kahanmaps.laboratory.scan.result import STEPS, Component, Scan
+from kahanmaps.laboratory.scan.pieces import Rows, pieces, pivots
+from kahanmaps.laboratory.scan.result import Component, Scan
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep, TimeOver, sweep
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kernels import processors
-
-Progress = Callable[[str], None]
 
 DEFAULT_SECONDS = 120.0
 MAX_PARAMETERS = 8
@@ -56,9 +59,6 @@ _MOST_TERMS = 7
 _MEMBERS = 3  # that confirm a component
 _SHARE = 0.5  # of the prime, points of a curve at least
 _TRIES = 20  # for a rational member
-_GROWTH_SECONDS, _ATTEMPTS = 10.0, 2
-_MEASURED_EACH = (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
-_ORDER = (*(c for c in GrowthClass if c is not GrowthClass.UNKNOWN), GrowthClass.UNKNOWN)
 
 
 def scan(
@@ -102,7 +102,7 @@ def scan(
     ... rhs = ["x*(x + 2*y)", "-y*((g + 1)*x + g*y)"]''')
     >>> found = scan(lines, ["g"], terms=5)
     >>> [one.text for one in found.components if one.growth.growth == "quadratic"]
-    ['(1)', '(1/2)', '(2)']
+    ['2', '1']
     """
     names = tuple(dict.fromkeys(over))
     if not names:
@@ -160,9 +160,9 @@ def scan(
     for k, one in enumerate(found):
         progress(f"scan: confirms component {k + 1} of {len(found)}")
         known.append(_confirmed(one, names, map_, exact, found, rng))
-    known = _with_growth(known, file, exact, began + seconds, seed, progress)
+    known = with_growth(known, file, map_, exact, began + seconds, seed, progress)
     if analysis is not None:
-        known = _with_verdicts(known, file, exact, analysis, seed, progress)
+        known = with_verdicts(known, file, exact, analysis, seed, progress)
     left = tuple(_left(one, known) for one in sweeps)
     symmetric = tuple(
         (names[i], names[j]) for i, j in combinations(range(len(names)), 2) if _is_symmetric(sweeps, i, j)
@@ -212,8 +212,11 @@ def _components(sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Ran
             flats = {part.prime: part.flats[dimension] for part in parts if part.flats.get(dimension)}
             if dimension == 0 and _is_a_curve({p: len(points) for p, points in flats.items()}):
                 continue
-            for rows, at in lifted_flats(flats).items():
+            lifted = lifted_flats(flats)
+            for rows, at in lifted.items():
                 found.append(Component(flat_equations(rows, names), dimension, degrees, at))
+            if dimension == 0:
+                found += _conjugates(flats, set(lifted), degrees, names)
         for size in {len(rows) for part in parts for rows in part.forms}:
             inside = {part.prime: [rows for rows in part.forms if len(rows) == size] for part in parts}
             for rows in lifted_flats(inside):
@@ -224,6 +227,19 @@ def _components(sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Ran
                     whole = form.project_to_context(ring(names))
                     found.append(Component((whole, *equations), len(free) - 1, degrees, at))
     return found
+
+
+def _conjugates(
+    points: Mapping[int, Sequence[Rows]], rational: Iterable[RationalRows], degrees: Degrees, names: Sequence[str]
+) -> Iterator[Component]:
+    """The points over quadratic fields among those that are not rational."""
+    known = {p: {residues(rows, p) for rows in rational} for p in points}
+    rest = {p: [[-row[-1] % p for row in rows] for rows in some if rows not in known[p]] for p, some in points.items()}
+    for (*line, (s, q)), at in lifted_conjugates(rest, len(names)).items():
+        context = ring(names)
+        t = context.gen(next(k for k in range(len(names)) if k not in pivots(line)))
+        equation = primitive_part(t**2 + s * t + q)[1]
+        yield Component((equation, *flat_equations(tuple(line), names)), 0, degrees, at)
 
 
 def _is_a_curve(counts: dict[int, int]) -> bool:
@@ -256,61 +272,6 @@ def _confirmed(
             values = dict(zip(names, point, strict=True))
             break
     return replace(one, tried=len(known), confirmed=known.count(one.degrees), values=values)
-
-
-def _member(file: SystemFile, values: dict[str, fmpq], eps: fmpq | None) -> tuple[SystemFile, fmpq | None]:
-    """The system of a member and its eps."""
-    return member_of(file, {name: value for name, value in values.items() if name != "eps"}), values.get("eps", eps)
-
-
-def _with_growth(
-    components: list[Component], file: SystemFile, eps: fmpq | None, deadline: float, seed: int, progress: Progress
-) -> list[Component]:
-    """The components with the growth at a rational member, as long as there is time; those with the slowest first.
-
-    Where it is bounded or exponential, one member of each class is enough.
-    """
-    found: list[Component] = []
-    enough: set[Degrees] = set()
-    for k, one in enumerate(sorted(components, key=lambda one: one.degrees[::-1])):
-        progress(f"scan: growth on component {k + 1} of {len(components)}")
-        left = deadline - time.monotonic()
-        if one.values is not None and one.degrees not in enough and left > 0 and one.degrees[-1] >= 0:
-            member, step = _member(file, one.values, eps)
-            part = min(_GROWTH_SECONDS, left)
-            for attempt in range(_ATTEMPTS):  # the singularities are followed at a random eps, which may be special
-                growth = degree_growth(member.map, step, seconds=part, steps=STEPS, seed=seed + attempt, enclosed=False)
-                if growth.growth is not GrowthClass.UNKNOWN:
-                    break
-            one = replace(one, growth=growth)
-            if growth.growth not in _MEASURED_EACH:
-                enough.add(one.degrees)
-        found.append(one)
-    kinds = {one.degrees: one.growth.growth for one in reversed(found) if one.growth is not None}
-
-    def order(one: Component) -> tuple[int, Degrees]:
-        return _ORDER.index(kinds.get(one.degrees, GrowthClass.UNKNOWN)), one.degrees[::-1]
-
-    return sorted(found, key=order)
-
-
-def _with_verdicts(
-    components: list[Component], file: SystemFile, eps: fmpq | None, seconds: float, seed: int, progress: Progress
-) -> list[Component]:
-    """The components with what an analysis says of a member, where degrees do not grow exponentially."""
-    found: list[Component] = []
-    points: set[Degrees] = set()
-    for one in components:
-        asked = one.values is not None and one.growth is not None and one.growth.growth is not GrowthClass.EXPONENTIAL
-        if asked and one.values is not None and one.degrees not in points:
-            progress(f"scan: analyzes a member where {one.text}")
-            member, step = _member(file, one.values, eps)
-            verdict = analyze(member, eps=step, seconds=seconds, seed=seed).conclusion
-            one = replace(one, verdict=verdict)
-            if one.dimension == 0:
-                points.add(one.degrees)
-        found.append(one)
-    return found
 
 
 def _left(one: Sweep, components: Sequence[Component]) -> int:

@@ -54,7 +54,8 @@ class Family:
                 for monomial, coefficient in entry.terms():
                     value = int(field.convert(coefficient))
                     if value:
-                        found.setdefault(tuple(monomial[:n]), []).append((tuple(monomial[n:]), value))
+                        exponents = tuple(int(e) for e in monomial)
+                        found.setdefault(exponents[:n], []).append((exponents[n:], value))
                 for exponent, polynomial in found.items():
                     place = places.setdefault(exponent, len(places))
                     self._terms.append((i, j, place, len(self._values)))
