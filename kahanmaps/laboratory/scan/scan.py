@@ -52,7 +52,7 @@ _PRIMES = {
 }
 _LINES = 150
 _PART = 0.4  # of the time, for all members on their first line
-_ROOM = 220  # for the degrees before common factors are removed
+_ROOM, _ROOM_OF_MANY = 260, 220  # for degrees before common factors are removed: up to 2 parameters, and more
 _MOST_ROOM = 4096
 _TRIAL_PRIME = 8179  # modulo which hardly a member is special
 _MOST_TERMS = 7
@@ -185,7 +185,8 @@ def _terms(
         raise InputError(f"found {terms} terms, expected 1 to {2 * _MOST_TERMS}")
     family = Family(map_, _TRIAL_PRIME)
     tried = np.array([[rng.randrange(1, _TRIAL_PRIME) for _ in range(count)] for _ in range(8)])
-    room = _ROOM if terms is None else _MOST_ROOM
+    usual = _ROOM if count <= 2 else _ROOM_OF_MANY
+    room = usual if terms is None else _MOST_ROOM
     found = family.degrees(tried, eps, terms or _MOST_TERMS, room, rng).max(axis=0).tolist()
     if found[0] == NOWHERE:
         raise InputError("the map has no value anywhere, whatever the parameters are")
