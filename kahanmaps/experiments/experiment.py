@@ -279,9 +279,7 @@ class ExperimentReader:
             for k in range(1, 1 + min(lengths.values()) * any(has_repeats(axes[name]) for name in names)):
                 row = tuple(repr(axes[name][k - 1]) for name in names)
                 if rows.setdefault(row, k) != k:
-                    self.mistake(
-                        place, f"found the same values in places {rows[row]} and {k}: expected them once"
-                    )
+                    self.mistake(place, f"found the same values in places {rows[row]} and {k}: expected them once")
                     break
             zips.append(tuple(names))
         return zips

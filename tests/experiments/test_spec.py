@@ -82,9 +82,11 @@ def test_the_time_step_is_twice_eps(axes, eps):
 
 
 def test_values_of_zipped_axes_may_repeat():
-    text = LORENZ + 'zip = [["parameters.s", "parameters.r"]]\naxes = {eps = 1, parameters = {s = [1, 1, "2"], r = [5, 6, 5]}}'
-    found = only(text)
-    rows = [(found[k].options["parameters.s"], found[k].options["parameters.r"]) for k in range(found.size)]
+    text = (
+        LORENZ
+        + 'zip = [["parameters.s", "parameters.r"]]\naxes = {eps = 1, parameters = {s = [1, 1, "2"], r = [5, 6, 5]}}'
+    )
+    rows = [(task.value("parameters.s"), task.value("parameters.r")) for task in tasks(text)]
     assert rows == [("1", "5"), ("1", "6"), ("2", "5")]
 
 
