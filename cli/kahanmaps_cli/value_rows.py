@@ -28,9 +28,7 @@ def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[R
         text, colon, step = value.partition(":")
         axes.append(RationalRange.from_text(f"{text} step {step}" if colon else text) if is_range(value) else [value])
     if (size := prod(map(len, axes))) > _MOST:
-        raise click.UsageError(
-            f"found {size} combinations of values, expected at most {_MOST}: kahanmaps batch does more"
-        )
+        raise click.UsageError(f"found {size} combinations of values, expected at most {_MOST}")
     names = [name for name, _ in parameters]
     return [
         tuple((name, x if isinstance(x, str) else format_number(x)) for name, x in zip(names, row, strict=True))

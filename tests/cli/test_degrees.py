@@ -151,7 +151,7 @@ def test_a_table_says_how_many_values_are_undecided(kahanmaps):
     ("options", "message"),
     [
         ("henon_heiles -p c=2..0", "found a range without values"),
-        ("henon_heiles -p c=0..2:x", "expected a number"),
+        ("henon_heiles -p c=0..2:x", "expected an integer, p/q or a decimal"),
         ("henon_heiles -p c=0..2:0", "range of step 0"),
         ("henon_heiles -p c=0..100000", "found 100001 combinations of values, expected at most 10000"),
         ("henon_heiles -p d=0..2", "unknown parameter 'd'"),

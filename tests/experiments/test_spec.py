@@ -82,10 +82,8 @@ def test_the_time_step_is_twice_eps(axes, eps):
 
 
 def test_values_of_zipped_axes_may_repeat():
-    text = (
-        LORENZ
-        + 'zip = [["parameters.s", "parameters.r"]]\naxes = {eps = 1, parameters = {s = [1, 1, "2"], r = [5, 6, 5]}}'
-    )
+    axes = 'axes = {eps = 1, parameters = {s = [1, 1, "2"], r = [5, 6, 5]}}'
+    text = LORENZ + 'zip = [["parameters.s", "parameters.r"]]\n' + axes
     rows = [(task.value("parameters.s"), task.value("parameters.r")) for task in tasks(text)]
     assert rows == [("1", "5"), ("1", "6"), ("2", "5")]
 
