@@ -51,6 +51,7 @@ LEAST = {
     "plot drift": "harmonic --start 1,2 --eps 1/10 --steps 2 --format text",
     "plot heights": "harmonic --start 1,2 --eps 1/10 --steps 3 --seconds 1 --format text",
     "plot invariant-curves": "paper_m2 --start 1,2,3,4 --eps 1/100 --steps 2 --format text",
+    "plot scan": "zhukovski_volterra_2 --over b1,b2 --primes 5,7,11 --terms 2 --format text",
     "plot portrait": "harmonic --start 1,2 --eps 1/10 --steps 2 --format text",
     "plot batch": "DB --format text",
     "plot recipe": "PICTURE",

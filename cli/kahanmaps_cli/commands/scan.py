@@ -7,21 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.complete import complete_symbols
-from kahanmaps_cli.options import (
-    eps_options,
-    is_inline,
-    load_system,
-    output_options,
-    seconds_option,
-    seed_option,
-    system_options,
-    the_eps,
-)
+from kahanmaps_cli.options import output_options
 from kahanmaps_cli.outputs import OutputFolder, file_name, will_write
 from kahanmaps_cli.params import Seconds
-from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json
+from kahanmaps_cli.scan_run import scan_options, scanned
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
@@ -29,26 +20,13 @@ if TYPE_CHECKING:
 
 
 @click.command("scan")
-@system_options
-@click.option(
-    "--over",
-    required=True,
-    metavar="A,B,...",
-    help="The parameters that vary, up to 8, eps perhaps among them; an inline system need not declare them.",
-    shell_complete=complete_symbols,
-)
-@eps_options
-@click.option("--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: as many as are small, up to 7).")
-@click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters).")
+@scan_options
 @click.option(
     "--analyze", "analysis", type=Seconds(), metavar="T", help="Analyze a member of each slow class, T seconds each."
 )
 @click.option(
     "--toml", "folder", type=OutputFolder(), metavar="DIR", help="Write a member of each component as a file to DIR."
 )
-@seconds_option(120.0, "Stop about then, and say what was seen.")
-@click.option("-j", "--jobs", type=int, metavar="N", help="Threads, with numba (default: all processors).")
-@seed_option
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Which members of a family are integrable: where in parameter space degrees grow more slowly.
@@ -70,28 +48,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 done, whatever was found; 2 wrong use; 3 the time was over.
     """
-    from kahanmaps.laboratory.scan.scan import scan
-
-    names = [name.strip() for name in options["over"].split(",") if name.strip()]
-    if is_inline(options):
-        given = {"eps", *(name for name, _ in options["parameters"])}
-        options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
-    if "eps" in names and options["folder"] is not None:
-        raise click.UsageError("found --toml and eps among the parameters: a system file holds no eps")
-    file = load_system(system, options)
-    with Progress(quiet) as progress:
-        found = scan(
-            file,
-            names,
-            eps=the_eps(options["eps"], options["time_step"], required=False),
-            terms=options["terms"],
-            primes=_primes(options["primes"]),
-            analysis=options["analysis"],
-            seconds=options["seconds"],
-            seed=options["seed"],
-            jobs=options["jobs"],
-            progress=progress,
-        )
+    found = scanned(system, quiet, options)
     if options["folder"] is not None:
         _write(found, options["folder"], quiet)
     if as_json:
@@ -99,23 +56,14 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     else:
         from kahanmaps.checks.settings import eps_record, eps_words
 
-        at = "" if "eps" in names else eps_words(eps_record(found.eps, file.map))
-        tell(f"# scan: {file.name} over {', '.join(found.over)}{at}")
+        at = "" if "eps" in found.over else eps_words(eps_record(found.eps, found.file.map))
+        tell(f"# scan: {found.file.name} over {', '.join(found.over)}{at}")
         tell(found.text)
     if found.ended == "complete":
         return 0
     if not quiet:
         say(f"stopped early: the time was over after the members modulo {len(found.sweeps)} of the primes")
     return 3
-
-
-def _primes(text: str | None) -> list[int] | None:
-    if text is None:
-        return None
-    pieces = [piece.strip() for piece in text.split(",")]
-    if not all(piece.isascii() and piece.isdigit() and len(piece) < 10 for piece in pieces):
-        raise click.UsageError(f"found --primes {text[:60]!r}, expected primes separated by commas")
-    return [int(piece) for piece in pieces]
 
 
 def _write(found: Scan, folder: str, quiet: bool) -> None:
