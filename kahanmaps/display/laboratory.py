@@ -21,7 +21,7 @@ from kahanmaps.laboratory.preserve.densities import DensitySearch
 from kahanmaps.laboratory.preserve.hamiltonian_structure import ConstantStructures
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch
-from kahanmaps.laboratory.scan.result import Scan
+from kahanmaps.laboratory.scan.result import Scan, growth_on
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries
@@ -225,8 +225,9 @@ def scan_html(found: Scan) -> str:
     rows = [("in general", _text(", ".join(map(str, found.generic))), "")]
     for degrees, some in found.classes[:_ROWS]:
         where = "; ".join(one.text if one.is_confirmed else f"{one.text} (not confirmed)" for one in some)
-        growth = next((one.growth.kind_text for one in some if one.growth is not None), "")
-        rows.append((_text(where), _text(", ".join(map(str, degrees))), _text(growth)))
+        growth = growth_on(some)
+        told = "" if growth is None else growth.kind_text
+        rows.append((_text(where), _text(", ".join(map(str, degrees))), _text(told)))
     notes = _notes([_rest(found.classes), found.coverage])
     more = _words(f"over {', '.join(found.over)}", eps_sentence(found.eps, found.file.map))
     return markup.titled(

@@ -9,7 +9,7 @@ import numpy as np
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
-from kahanmaps.laboratory.scan.result import Component, Scan
+from kahanmaps.laboratory.scan.result import Component, Scan, growth_on
 from kahanmaps.plots.figures import drawing, label_of, legend_above, legend_height, new_figure
 from kahanmaps.plots.level_sets import level_curves
 from kahanmaps.plots.point_functions import PointFunction
@@ -64,8 +64,9 @@ def _kinds(found: Scan) -> dict[str, list[Component]]:
     """The components by the growth of their blocks, the slowest first."""
     kinds: dict[str, list[Component]] = {}
     for _, some in found.classes:
-        growth = next((one.growth.growth for one in some if one.growth is not None), GrowthClass.UNKNOWN)
-        kinds.setdefault(f"{growth} growth", []).extend(some)
+        growth = growth_on(some)
+        kind = GrowthClass.UNKNOWN if growth is None else growth.growth
+        kinds.setdefault(f"{kind} growth", []).extend(some)
     return kinds
 
 

@@ -46,6 +46,7 @@ SAME = [
     ("signs", ["1,-1", "+1, -1"], "1,-1"),
     ("signs", ["-1,1"], "-1,1"),
     ("symbolic", ["a1,a2", "a2, a1", " a1 ,a2,a1"], "a1,a2"),
+    ("over", ["a1,eps", "eps, a1", "a1,eps,a1"], "a1,eps"),
     ("seconds", [60, "60", "60.0", "120/2"], 60),
     ("terms", [8, "8"], 8),
     ("max_degree", [0, "0"], 0),
@@ -96,6 +97,7 @@ def test_a_canonical_value_is_what_json_gives_back(name, written, canonical):
         ("chi", "t^2 - 2", fmpq_poly([-2, 0, 1])),
         ("eigenvalues", "1,1/2", (fmpq(1), fmpq(1, 2))),
         ("symbolic", "a1,a2", ["a1", "a2"]),
+        ("over", "a1,eps", ["a1", "eps"]),
         ("seconds", 60, 60),
     ],
 )

@@ -83,6 +83,11 @@ class Component:
         }
 
 
+def growth_on(some: Sequence[Component]) -> DegreeGrowth | None:
+    """The growth on components with the same degrees: that of the first of them where it is known."""
+    return next((one.growth for one in some if one.growth is not None), None)
+
+
 @dataclass(frozen=True)
 class Scan(Displayed):
     """What a scan found: components, the ones with the slowest growth first.
@@ -143,10 +148,10 @@ class Scan(Displayed):
         names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
         lines = [("in general", ", ".join(map(str, self.generic)))]
         for degrees, members in self.classes:
-            growth = next((one.growth for one in members if one.growth is not None), None)
+            growth = growth_on(members)
             told = ", ".join("none" if d < 0 else str(d) for d in degrees)
-            known = "" if growth is None else "explained" if growth.explained else "measured"
-            lines.append(("degrees", told + (f"\t{growth.kind_text}, {known}" if growth is not None else "")))
+            known = "" if growth is None or growth.recurrence is None else f", {growth.basis.partition(':')[0]}"
+            lines.append(("degrees", told + (f"\t{growth.kind_text}{known}" if growth is not None else "")))
             for where, sign, here in (
                 ("where", "; ", [one for one in members if not one.is_rational_point]),
                 (f"at {names} =", ", ", [one for one in members if one.is_rational_point]),
