@@ -17,6 +17,7 @@ from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirmed, scan
 from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
+from kahanmaps.maps.residues import families
 
 THREE_LINES = """variables = ["x", "y"]
 parameters = { g1 = 1, g2 = 1 }
@@ -115,6 +116,14 @@ def test_henon_heiles_keeps_one_case_of_three():
     found = scan(load("henon_heiles"), ["c"], primes=(101, 103, 107))
     assert [one.text for one in found.components] == ["-1"]
     assert found.components[0].growth.growth is GrowthClass.QUADRATIC
+
+
+def test_a_scan_needs_no_numba(monkeypatch):
+    asked = {"primes": (31, 37, 41), "terms": 3}
+    compiled = scan(load("henon_heiles"), ["c"], **asked)
+    monkeypatch.setattr(families, "choose_kernel", lambda kernel, long: "numpy")
+    slow = scan(load("henon_heiles"), ["c"], **asked)
+    assert (slow.text, slow.sweeps) == (compiled.text, compiled.sweeps)
 
 
 def test_one_eps_may_have_more_slow_members_than_every_eps():
