@@ -53,8 +53,8 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
     if is_inline(options):
         given = {"eps", *(name for name, _ in options["parameters"])}
         options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
-    if "eps" in names and options.get("folder") is not None:
-        raise click.UsageError("found --toml and eps among the parameters: a system file holds no eps")
+    if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):
+        raise click.UsageError("found eps among the parameters of system files that are asked for: they hold no eps")
     file = load_system(system, options)
     with Progress(quiet) as progress:
         return scan(

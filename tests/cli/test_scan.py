@@ -42,7 +42,7 @@ def test_the_json_has_what_is_needed_to_run_it_again(kahanmaps):
 
 def test_an_inline_system_need_not_declare_what_varies(kahanmaps, tmp_path):
     folder = tmp_path / "cases"
-    outcome = kahanmaps(f"scan {PLANE} --toml {folder}")
+    outcome = kahanmaps(f"scan {PLANE} --write-to {folder}")
     assert outcome.status == 0
     assert "at g =\t1" in outcome.out.splitlines()
     files = sorted(folder.iterdir())
@@ -50,6 +50,12 @@ def test_an_inline_system_need_not_declare_what_varies(kahanmaps, tmp_path):
     assert {"-2", "-1", "0", "1", "2"} <= values
     assert outcome.err == f"{folder}: {len(files)} system files\n"
     assert kahanmaps(f"degrees {files[0]} --terms 2").status == 0
+
+
+def test_members_are_printed_as_system_files(kahanmaps):
+    found = kahanmaps(f"scan {QUICK} --toml").out
+    assert found.startswith("# -1\n")
+    assert tomllib.loads(found)["parameters"] == {"c": "-1"}
 
 
 def test_verdicts_are_asked_for(kahanmaps):
@@ -75,7 +81,9 @@ def test_the_time_may_be_over(kahanmaps):
         ("henon_heiles --over c --primes 5,7,9973", "expected an odd prime below 8192"),
         ("henon_heiles --over c --terms 99", "expected 1 to 14"),
         ("henon_heiles --over c --analyze -1", "expected a number of seconds above 0"),
-        ("henon_heiles --over c,eps --toml here", "a system file holds no eps"),
+        ("henon_heiles --over c,eps --write-to here", "they hold no eps"),
+        ("henon_heiles --over c,eps --toml", "they hold no eps"),
+        ("henon_heiles --over c --toml --json", "not both"),
         ("lyness --over a,eps", "expected a map that depends on it"),
         ("henon_heiles --over c --jobs 0", "expected at least 1"),
         ("paper_m2 --over c", "found the symbol 'c'"),

@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 @click.option(
     "--analyze", "analysis", type=Seconds(), metavar="T", help="Analyze a member of each slow class, T seconds each."
 )
-@click.option(
-    "--toml", "folder", type=OutputFolder(), metavar="DIR", help="Write a member of each component as a file to DIR."
-)
+@click.option("--toml", "as_toml", is_flag=True, help="A member of each component as a system file, one after another.")
+@click.option("--write-to", "folder", type=OutputFolder(), metavar="DIR", help="Write these to files in DIR.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Which members of a family are integrable: where in parameter space degrees grow more slowly.
@@ -35,7 +34,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps scan henon_heiles --over c
       kahanmaps scan zhukovski_volterra_2 --over b1,b2
       kahanmaps scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b
-      kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze 5 --toml cases
+      kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze 5 --write-to cases
 
     The degrees of the first iterates of all members with parameters in GF(p), for several small primes p. Members with
     smaller degrees than the others form points, lines, curves and surfaces; what is there modulo all primes is written
@@ -48,10 +47,16 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     Exit status: 0 done, whatever was found; 2 wrong use; 3 the time was over.
     """
+    if as_json and options["as_toml"]:
+        raise click.UsageError("give --toml or --json, not both")
     found = scanned(system, quiet, options)
     if options["folder"] is not None:
         _write(found, options["folder"], quiet)
-    if as_json:
+    if options["as_toml"]:
+        for one in found.components:
+            if one.values is not None:
+                click.echo(f"# {one.text}\n{found.member(one).to_toml()}")
+    elif as_json:
         print_json(_record(found, options))
     else:
         from kahanmaps.checks.settings import eps_record, eps_words
