@@ -14,6 +14,7 @@ from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.laboratory.scan.growth import _goes_on
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirmed, scan
 from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
@@ -94,6 +95,16 @@ def test_a_wrong_condition_is_not_confirmed():
     wrong = replace(good, equations=(g1 + g2 - 7,))
     found = [_confirmed(one, ["g1", "g2"], map_, None, [], random.Random(1)) for one in (good, wrong)]
     assert [(one.confirmed, one.tried, one.is_confirmed) for one in found] == [(3, 3, True), (0, 3, False)]
+
+
+def test_one_member_speaks_for_others_only_as_long_as_their_degrees_agree(three_lines):
+    points = {one.text: one for one in three_lines.components}
+    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
+    known = points["(2, 3)"].growth
+    assert _goes_on(points["(3, 2)"], known, map_, None, 0)
+    # as if the first degrees of two components were the same and the further ones were not
+    assert not _goes_on(points["(1, 2)"], known, map_, None, 0)
+    assert not _goes_on(points["(3, 2)"], None, map_, None, 0)
 
 
 def test_the_conditions_of_lotka_volterra_in_space_are_found():

@@ -23,6 +23,7 @@ Progress = Callable[[str], None]
 
 _SECONDS, _ATTEMPTS = 10.0, 2
 _TERMS, _LARGE = 26, 1000  # where no rational member is known: so many degrees, as far as they are not above this
+_SOME = 100  # the degree up to which they are compared, at least
 _MEASURED_EACH = (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
 _ORDER = (*(c for c in GrowthClass if c is not GrowthClass.UNKNOWN), GrowthClass.UNKNOWN)
 
@@ -38,18 +39,18 @@ def with_growth(
 ) -> list[Component]:
     """The components with the growth at a rational member, as long as there is time; those with the slowest first.
 
-    Where it is bounded or exponential, one member of each class is enough.
+    Where it is bounded or exponential one member of each class is enough, if further degrees of the others are its own.
     """
     found: list[Component] = []
-    enough: set[Degrees] = set()
+    enough: dict[Degrees, DegreeGrowth] = {}
     for k, one in enumerate(sorted(components, key=lambda one: one.degrees[::-1])):
         progress(f"scan: growth on component {k + 1} of {len(components)}")
         left = deadline - time.monotonic()
-        if one.degrees not in enough and left > 0 and one.degrees[-1] >= 0:
+        if left > 0 and one.degrees[-1] >= 0 and not _goes_on(one, enough.get(one.degrees), map_, eps, seed):
             known = _beyond(one, map_, eps, seed) if one.values is None else _growth(one.values, file, eps, left, seed)
             one = replace(one, growth=known)
             if known is not None and known.growth not in _MEASURED_EACH:
-                enough.add(one.degrees)
+                enough[one.degrees] = known
         found.append(one)
     kinds = {one.degrees: one.growth.growth for one in reversed(found) if one.growth is not None}
 
@@ -71,13 +72,23 @@ def _growth(values: dict[str, fmpq], file: SystemFile, eps: fmpq | None, left: f
     return found
 
 
-def _beyond(one: Component, map_: BirationalMap, eps: fmpq | None, seed: int) -> DegreeGrowth | None:
+def _beyond(
+    one: Component, map_: BirationalMap, eps: fmpq | None, seed: int, most: int = _LARGE
+) -> DegreeGrowth | None:
     """The growth that more degrees fit, measured modulo a prime; None where there is no member."""
     count = one.equations[0].context().nvars()
-    found = degrees_on(map_, one.equations, count, eps, [one.degrees[-1]] * _TERMS, random.Random(seed), _LARGE)
+    found = degrees_on(map_, one.equations, count, eps, [one.degrees[-1]] * _TERMS, random.Random(seed), most)
     if found is None:
         return None
     return DegreeGrowth((1, *found), eps, "terms", f"{len(found)} iterates measured", seed, (), ())
+
+
+def _goes_on(one: Component, known: DegreeGrowth | None, map_: BirationalMap, eps: fmpq | None, seed: int) -> bool:
+    """Whether degrees go on as they do at a member of another component with the same first ones."""
+    if known is None:
+        return False
+    found = _beyond(one, map_, eps, seed, max(_SOME, 2 * one.degrees[-1]))
+    return found is not None and all(a == b for a, b in zip(found.degrees, known.degrees, strict=False))
 
 
 def _member(file: SystemFile, values: dict[str, fmpq], eps: fmpq | None) -> tuple[SystemFile, fmpq | None]:
