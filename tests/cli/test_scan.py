@@ -24,8 +24,9 @@ def test_blocks_say_degrees_growth_and_where(kahanmaps):
         "degrees\t3, 5, 9, 13\tquadratic growth, dynamical degree 1, explained",
         "at c =\t-1",
         "growth\tthat of one member; singularities were followed for 40 steps",
-        "tried\tall members with parameters modulo the primes: 101 modulo 101, 103 modulo 103, 107 modulo 107; single "
-        "points are found with numerators and denominators up to 72, hypersurfaces of a degree up to 6",
+        "tried\tall members with parameters modulo the primes: 101 modulo 101, 103 modulo 103, 107 modulo 107; found "
+        "are single points with numerators and denominators up to 72, and hypersurfaces of a degree up to 6, where one "
+        "of the first 4 degrees is smaller",
         "left\tnone: every slow member that was seen is on a component",
     ]
 

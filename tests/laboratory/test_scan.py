@@ -180,7 +180,7 @@ def test_more_parameters_than_can_be_tried_give_hypersurfaces():
     found = scan(parse_system(text), ["A", "B", "C", "D"], primes=(61, 67, 71), terms=3)
     assert not found.complete
     assert "A*B*C + D = 0" in {one.text for one in found.components if one.is_confirmed}
-    assert "only hypersurfaces" in found.coverage
+    assert "found are only hypersurfaces" in found.coverage
 
 
 def test_a_family_without_special_members_says_so():

@@ -133,12 +133,13 @@ class Scan(Displayed):
         if not self.height:
             return f"members modulo three primes are needed, those modulo {len(self.sweeps)} were tried"
         parts = [f"{one.seen} modulo {one.prime}" for one in self.sweeps]
+        where = f"where one of the first {len(self.generic)} degrees is smaller"
         if self.complete:
             return (
-                f"all members with parameters modulo the primes: {', '.join(parts)}; single points are found with "
-                f"numerators and denominators up to {self.height}, hypersurfaces of a degree up to 6"
+                f"all members with parameters modulo the primes: {', '.join(parts)}; found are single points with "
+                f"numerators and denominators up to {self.height}, and hypersurfaces of a degree up to 6, {where}"
             )
-        return f"members on random lines of parameter space: {', '.join(parts)}; only hypersurfaces are looked for"
+        return f"members on random lines of parameter space: {', '.join(parts)}; found are only hypersurfaces, {where}"
 
     @property
     def text(self) -> str:

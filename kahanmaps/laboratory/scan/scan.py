@@ -194,9 +194,9 @@ def _terms(
     if measured == 0 or (terms is not None and measured < terms):
         raise InputError(f"the degrees of {terms or 1} iterates are too large to be scanned, expected fewer")
     room = max(family.dim * family.degree * d + 1 for d in [1, *found[: measured - 1]])
-    family.degrees(np.repeat(tried, LONG, axis=0)[:LONG], eps, 1, room, rng)  # which compiles
+    family.degrees(np.resize(tried, (LONG, count)), eps, 1, room, rng)  # which compiles
     began = time.monotonic()
-    family.degrees(np.repeat(tried, LONG, axis=0)[:LONG], eps, measured, room, rng)
+    family.degrees(np.resize(tried, (LONG, count)), eps, measured, room, rng)
     return measured, room, (time.monotonic() - began) / LONG
 
 
