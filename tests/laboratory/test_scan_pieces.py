@@ -65,6 +65,13 @@ def test_a_surface_and_a_line_of_space_are_found():
     assert found.flats[1] == [((0, 1, 0, 17), (0, 0, 1, 16))]
 
 
+def test_three_hyperplanes_of_a_space_of_dimension_6_are_told_apart():
+    rng = random.Random(3)
+    points = [tuple(0 if i == k else rng.randrange(1, 79) for i in range(6)) for k in range(3) for _ in range(150)]
+    found = pieces(points, 79, 79 * 150, False, random.Random(0))
+    assert sorted(found.flats[5]) == [(tuple(int(i == k) for i in range(7)),) for k in (2, 1, 0)]
+
+
 def test_single_points_are_not_looked_for_where_not_all_members_were_tried():
     found = pieces([(1, 2, 3, 4)], 31, 31 * 40, False, random.Random(0))
     assert (found.flats, found.left) == ({}, 1)

@@ -19,7 +19,7 @@ Rows = tuple[tuple[int, ...], ...]
 MAX_DEGREE = 6
 _SHARE = 0.5  # of the points of a piece that must be there: special ones are missing
 _SPARE = 1.5  # points for each coefficient of a hypersurface
-_TRIES = 80
+_TRIES, _MANY = 80, 3000  # samples; of more than 3 parameters, where all points of one have to be on one piece
 _MOST_POINTS = 400  # that are taken for single ones
 
 
@@ -55,7 +55,7 @@ def pieces(points: Sequence[Point], prime: int, seen: int, complete: bool, rng: 
 
     def flats(dimension: int, needed: float) -> Iterator[tuple[Rows, Any]]:
         """Affine subspaces with so many of the points, and which of these are in them."""
-        for _ in range(_TRIES):
+        for _ in range(_TRIES if count <= 3 else _MANY):
             if len(rest) < needed:
                 return
             sample = [[*rest[i].tolist(), 1] for i in rng.sample(range(len(rest)), dimension + 1)]
