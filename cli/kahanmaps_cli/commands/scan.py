@@ -34,7 +34,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps scan henon_heiles --over c
       kahanmaps scan zhukovski_volterra_2 --over b1,b2
       kahanmaps scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b
-      kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze 5 --write-to cases
+      kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze 5 --write-to out
 
     The degrees of the first iterates of all members with parameters in GF(p), for several small primes p. Members with
     smaller degrees than the others form points, lines, curves and surfaces; what is there modulo all primes is written
