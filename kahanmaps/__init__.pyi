@@ -80,6 +80,8 @@ from kahanmaps.laboratory.preserve.integrals import find_integrals as find_integ
 from kahanmaps.laboratory.preserve.limits import flow_and_map as flow_and_map
 from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch as PoissonSearch
 from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson as find_poisson
+from kahanmaps.laboratory.scan.result import Scan as Scan
+from kahanmaps.laboratory.scan.scan import scan as scan
 from kahanmaps.laboratory.singular.singularities import SingularityRun as SingularityRun
 from kahanmaps.laboratory.singular.singularities import singularities as singularities
 from kahanmaps.laboratory.symmetry.commuting import CommutingSystems as CommutingSystems

@@ -140,15 +140,12 @@ def _do(jobs: Iterator[Job], store: Store, progress: BatchProgress, options: Map
 
 def _executor(store: Store, options: Mapping[str, Any]) -> Executor:
     from kahanmaps.experiments.run import executor_for
+    from kahanmaps.maps.kernels import processors
 
-    try:
-        processors = len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
-        processors = os.cpu_count() or 1
     talk = (lambda text: None) if options["quiet"] else say
     return executor_for(
         store.document,
-        options["jobs"] or processors,
+        options["jobs"] or processors(),
         options["scheduler"],
         options["worker_python"],
         options["group_seconds"],

@@ -46,6 +46,7 @@ SECTIONS = {
     "Laboratory": {
         "analyze": ("analyze", "What a map preserves, how it grows: all of it, a verdict."),
         "degrees": ("degrees", "Degrees of the iterates, recurrence, dynamical degree."),
+        "scan": ("scan", "Which members of a family are integrable?"),
         "heights": ("heights", "How fast the heights of exact orbits grow."),
         "find-integrals": ("find_integrals", "Integrals in closed form, with their proofs."),
         "find-density": ("find_density", "Invariant measures dx/phi, phi in closed form."),

@@ -85,6 +85,11 @@ class OutputFolder(click.Path):
         return super().convert(value, param, ctx)
 
 
+def file_name(name: str) -> str:
+    """The name with everything replaced that might lead out of a folder, or that no file should be called."""
+    return "".join(c if c.isalnum() or c in "._+-" else "_" for c in name)
+
+
 def will_write(path: str) -> None:
     """Refuse a file that this command has read."""
     _files(click.get_current_context()).writes(path)

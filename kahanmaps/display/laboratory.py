@@ -21,6 +21,7 @@ from kahanmaps.laboratory.preserve.densities import DensitySearch
 from kahanmaps.laboratory.preserve.hamiltonian_structure import ConstantStructures
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch
+from kahanmaps.laboratory.scan.result import Scan, growth_on
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries
@@ -216,6 +217,22 @@ def census_html(census: Census) -> str:
     ]
     title = f"cycles on P^{census.dim} over GF({census.prime})"
     return markup.titled(title, markup.definitions(rows), eps_sentence(census.eps))
+
+
+@html_form.register
+def scan_html(found: Scan) -> str:
+    """The conditions on the parameters by degrees, those with the slowest growth first."""
+    rows = [("in general", _text(", ".join(map(str, found.generic))), "")]
+    for degrees, some in found.classes[:_ROWS]:
+        where = "; ".join(one.text if one.is_confirmed else f"{one.text} (not confirmed)" for one in some)
+        growth = growth_on(some)
+        told = "" if growth is None else growth.kind_text
+        rows.append((_text(where), _text(", ".join(map(str, degrees))), _text(told)))
+    notes = _notes([_rest(found.classes), found.coverage])
+    more = _words(f"over {', '.join(found.over)}", eps_sentence(found.eps, found.file.map))
+    return markup.titled(
+        f"scan of {_name(found.file)}", markup.table(["where", "degrees", "growth"], rows) + notes, more
+    )
 
 
 @html_form.register

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from flint import fmpq
+
+from kahanmaps.algebra.text import format_number
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, quoted
@@ -27,6 +30,22 @@ def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> Birationa
     if not symbols:
         return file.map
     return DocumentReader(dict(file.document), file.name, {}).read_map(file.kind, symbols)
+
+
+def member_of(file: SystemFile, values: Mapping[str, fmpq]) -> SystemFile:
+    """The system of a file with other values of some of its parameters, and without its claims.
+
+    >>> from kahanmaps.documents.files import parse_system
+    >>> lyness = 'variables = ["x", "y"]\\nparameters.a = 2\\n[map]\\nimage = ["y", "(a + y)/x"]'
+    >>> print(member_of(parse_system(lyness), {"a": fmpq(1, 3)}).map)
+    x~ = y
+    y~ = (y + 1/3)/x
+    """
+    _parameters(file, list(values))
+    document = {key: value for key, value in file.document.items() if key not in ("catalog", "integrals", "density")}
+    given = {name: format_number(value) for name, value in {**file.parameters, **values}.items()}
+    title = f"{file.name} at {', '.join(f'{name} = {given[name]}' for name in values)}"
+    return SystemFile(*DocumentReader({**document, "name": title, "parameters": given}, file.name, {}).read())
 
 
 def with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> QuadraticSystem:

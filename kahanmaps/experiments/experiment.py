@@ -13,7 +13,7 @@ from typing import Any
 
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, suggestion
-from kahanmaps.experiments.grid import Grid, RationalRange, Values, read_values
+from kahanmaps.experiments.grid import Grid, RationalRange, Values, has_repeats, read_values
 from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of, show
 from kahanmaps.experiments.recipes import family_recipe, find_file, recipe_of
 from kahanmaps.experiments.records import Limits, Task, canonical
@@ -224,7 +224,8 @@ class ExperimentReader:
         if place.endswith(f".{TIME_STEP}"):
             read_eps = option.read  # of half the time step
             option = replace(option, read=lambda value: read_eps(number_of(value) / 2))
-        values, mistakes = read_values(option, raw)
+        zipped = {"eps" if name == TIME_STEP else name for names in self.sound("zip") or [] for name in names or []}
+        values, mistakes = read_values(option, raw, repeats=option.name in zipped)
         for position, sentence in mistakes:
             self.mistake(place + "".join(f"[{k}]" for k in position), sentence)
         return values
@@ -264,6 +265,12 @@ class ExperimentReader:
                 told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
                 self.mistake(place, f"{told} values, expected as many in each: a zip takes them together")
                 continue
+            rows: dict[tuple[str, ...], int] = {}
+            for k in range(1, 1 + min(lengths.values()) * any(has_repeats(axes[name]) for name in names)):
+                row = tuple(repr(axes[name][k - 1]) for name in names)
+                if rows.setdefault(row, k) != k:
+                    self.mistake(place, f"found the same values in places {rows[row]} and {k}: expected them once")
+                    break
             zips.append(tuple(names))
         return zips
 

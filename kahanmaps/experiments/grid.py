@@ -92,10 +92,10 @@ def is_range(raw: Any) -> bool:
     return isinstance(raw, str) and ".." in raw
 
 
-def read_values(option: Option, raw: Any) -> tuple[Values | None, list[Mistake]]:
+def read_values(option: Option, raw: Any, repeats: bool = False) -> tuple[Values | None, list[Mistake]]:
     """The values that a spec gives to an option, and the mistakes with their places (from 1) in a list.
 
-    `raw` is one value, a range or a list of both.
+    `raw` is one value, a range or a list of both. With `repeats` a single value may be there several times.
     """
     pieces: list[Sequence[Any]] = []
     mistakes: list[Mistake] = []
@@ -116,7 +116,7 @@ def read_values(option: Option, raw: Any) -> tuple[Values | None, list[Mistake]]
                 pieces.append(found)
                 continue
             value = option.read(item)
-            if value in seen:
+            if value in seen and not repeats:
                 raise InputError(f"found {show(item)}, the same value as in place {seen[value]}: expected it once")
             seen[value] = number
             pieces.append((value,))
@@ -125,6 +125,12 @@ def read_values(option: Option, raw: Any) -> tuple[Values | None, list[Mistake]]
     if not mistakes and sum(map(len, pieces)) > _MOST:
         mistakes.append(((), f"found {_TOO_MANY}"))
     return (None if mistakes else Values(option, pieces)), mistakes
+
+
+def has_repeats(values: Values) -> bool:
+    """Whether a single value is there several times: those of ranges are not looked at."""
+    single = [repr(piece[0]) for piece in values.pieces if not isinstance(piece, RationalRange)]
+    return len(set(single)) < len(single)
 
 
 class Grid:

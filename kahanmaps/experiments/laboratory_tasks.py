@@ -58,6 +58,34 @@ def degrees(
     }
 
 
+@task("scan")
+def scan_parameters(
+    system: SystemFile,
+    over: list[str],
+    eps: Any = None,
+    terms: int | None = None,
+    seconds: int = 120,
+    seed: int = 0,
+    report: bool = False,
+) -> Result:
+    """The conditions on parameters under which degrees are smaller, with the growth there; the others have values."""
+    from kahanmaps.laboratory.scan.result import growth_on
+    from kahanmaps.laboratory.scan.scan import scan
+
+    found = scan(system, over, eps=eps, terms=terms, seconds=seconds, seed=seed, jobs=1)
+    kinds = [(str(growth.growth), some) for _, some in found.classes if (growth := growth_on(some)) is not None]
+    return {
+        "status": found.ended,
+        "growth": kinds[0][0] if kinds else None,  # the slowest
+        "components": len(found.components),
+        "confirmed": sum(one.is_confirmed for one in found.components),
+        "integrable": [one.text for kind, some in kinds if kind != "exponential" for one in some if one.is_confirmed],
+        "generic": list(found.generic),
+        "left": max(found.left, default=0),
+        **whole_report(found, report),
+    }
+
+
 @task("find-integrals")
 def integrals(
     system: SystemFile,

@@ -128,11 +128,15 @@ def _read_prime(value: Any) -> str:
 
 
 def _read_names(value: Any) -> str:
+    if "eps" in (found := _read_names_or_eps(value)).split(","):
+        raise InputError("found eps, expected names of parameters: without a value of eps it is in all formulas")
+    return found
+
+
+def _read_names_or_eps(value: Any) -> str:
     expected = 'names of parameters in one text, e.g. "a1,a2"'
     names = sorted({name.strip() for name in _text(value, expected).split(",")})
     for name in names:
-        if name == "eps":
-            raise InputError("found eps, expected names of parameters: without a value of eps it is in all formulas")
         if not _NAME.fullmatch(name):
             raise InputError(f"found the name {show(name)}, expected {expected}")
     return ",".join(names)
@@ -215,6 +219,7 @@ VOCABULARY = {
         whole("terms", "measure so many degrees (default: until a recurrence is certain)", 1, 10_000),
         whole("max_degree", "the largest degree that is tried", most=10**6),
         Option("symbolic", "parameters that formulas contain, e.g. a1,a2", _read_names, lambda text: text.split(",")),
+        Option("over", "parameters that vary, e.g. a1,a2", _read_names_or_eps, lambda text: text.split(",")),
         choice("shape", "linear: g = B f with a constant B; quadratic: any g", ("linear", "quadratic")),
         whole("samples", "follow so many random points instead of all", 1, 100_000),
         whole("transient", "steps before those that count (default: a tenth)", most=10**9),

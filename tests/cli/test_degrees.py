@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from schema_helpers import mistakes
 
 from kahanmaps.version import __version__
 
@@ -116,3 +117,51 @@ def test_a_pattern_longer_than_the_degrees_explains_them(kahanmaps):
     assert "characteristic polynomial\t(t - 1) (t^7 - t^6 - t^5 - t^4 - t^3 - t^2 - t - 1)\n" in outcome.out
     assert "a hypersurface again after 8 steps; costs 1 at step 8; meets C1 at step 7, C3 at step 7\n" in outcome.out
     assert "\nproved\tdynamical degree between 1.566299 and 2: " in outcome.out
+
+
+# -- a table over values
+
+
+def test_a_range_of_values_gives_a_table(kahanmaps):
+    outcome = kahanmaps("degrees henon_heiles -p c=-2..0:1 --terms 4")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert [line.split("\t")[:2] for line in outcome.out.splitlines()] == [
+        ["c = -2", "1, 3, 7, 17, 39"],
+        ["c = -1", "1, 3, 5, 9, 13"],
+        ["c = 0", "1, 3, 7, 17, 39"],
+    ]
+
+
+def test_all_combinations_of_ranges_are_measured(kahanmaps):
+    line = """degrees --rhs "x' = a*x^2; y' = b*x*y" -p a=1..2 -p b=0..1:1/2 --terms 1"""
+    assert [row[0] for row in kahanmaps(line).rows] == [
+        f"a = {a}, b = {b}" for a in ("1", "2") for b in ("0", "1/2", "1")
+    ]
+
+
+def test_a_table_in_json_has_a_record_for_each_value(kahanmaps):
+    records = kahanmaps("degrees henon_heiles -p c=-1..0 --terms 2 --json").records
+    assert [record["document"]["parameters"] for record in records] == [{"c": "-1"}, {"c": "0"}]
+    assert [mistakes("degrees", record) for record in records] == [[], []]
+
+
+def test_a_table_says_how_many_values_are_undecided(kahanmaps):
+    outcome = kahanmaps("degrees henon_heiles -p c=-1..0 --terms 40 --max-degree 20")
+    assert (outcome.status, outcome.err) == (3, "undecided, or stopped early: 2 of 2\n")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("henon_heiles -p c=2..0", "found a range without values"),
+        ("henon_heiles -p c=0..2:x", "expected an integer, p/q or a decimal"),
+        ("henon_heiles -p c=0..2:0", "range of step 0"),
+        ("henon_heiles -p c=0..100000", "found 100001 combinations of values, expected at most 10000"),
+        ("henon_heiles -p d=0..2", "unknown parameter 'd'"),
+        ("- -p c=0..2", "the system on standard input"),
+    ],
+)
+def test_a_wrong_range_is_one_line(kahanmaps, options, message):
+    outcome = kahanmaps(f"degrees {options}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert message in outcome.err

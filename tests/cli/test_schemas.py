@@ -59,6 +59,8 @@ CASES = [
     "degrees henon_heiles --max-degree 50 --json -q",  # ended early
     "degrees weierstrass --eps 1/10 --terms 3 --json -q",
     "degrees weierstrass --terms 0 --json -q",
+    "scan henon_heiles --over c --primes 11,13,17 --terms 3 --json -q",
+    "scan henon_heiles --over c --eps 1/10 --seconds 0.001 --json -q",  # nothing tried
     "heights weierstrass --steps 20 --starts 1 --json -q",
     "heights henon_heiles --starts 1 --max-digits 200 --json -q",
     "find-integrals weierstrass --json -q",

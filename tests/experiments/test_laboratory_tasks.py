@@ -295,6 +295,13 @@ def test_an_analysis_that_could_not_finish_says_what():
     assert "integrals" in found["unfinished"] or any("integrals" in text for text in found["skipped"])
 
 
+def test_a_scan_has_the_conditions_whose_growth_is_not_exponential():
+    found = perform("scan", of_catalogue("henon_heiles"), over="c", terms=3)
+    assert (found["status"], found["growth"], found["integrable"]) == ("complete", "quadratic", ["-1"])
+    assert (found["components"], found["confirmed"], found["left"]) == (1, 1, 0)
+    assert found["generic"] == [3, 7, 17]
+
+
 # What cannot be done
 
 
@@ -302,6 +309,7 @@ def test_an_analysis_that_could_not_finish_says_what():
     ("name", "system", "asked", "words"),
     [
         ("find-integrals", TOP, {"symbolic": "b"}, "b"),
+        ("scan", TOP, {"over": "b"}, "found the symbol 'b'"),
         ("find-integrals", TOP, {"max_degree": 0}, "found the largest degree 0, expected at least 1"),
         ("find-integrals", member(), {"symbolic": "a"}, "found"),
         ("degrees", TOP, {"max_degree": 0}, "found the largest degree 0, expected at least 1"),

@@ -45,6 +45,7 @@ SAME = [
     ("signs", ["1,-1", "+1, -1"], "1,-1"),
     ("signs", ["-1,1"], "-1,1"),
     ("symbolic", ["a1,a2", "a2, a1", " a1 ,a2,a1"], "a1,a2"),
+    ("over", ["a1,eps", "eps, a1", "a1,eps,a1"], "a1,eps"),
     ("seconds", [60, "60", "60.0", "120/2"], 60),
     ("terms", [8, "8"], 8),
     ("max_degree", [0, "0"], 0),
@@ -85,6 +86,7 @@ def test_one_value_has_one_canonical_form_however_it_is_written(name, written, c
         ("chi", "t^2 - 2", fmpq_poly([-2, 0, 1])),
         ("eigenvalues", "1,1/2", (fmpq(1), fmpq(1, 2))),
         ("symbolic", "a1,a2", ["a1", "a2"]),
+        ("over", "a1,eps", ["a1", "eps"]),
         ("seconds", 60, 60),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 import tracemalloc
 from itertools import islice, product
@@ -13,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from specs import COMMUTE, FAMILY, LORENZ, ROTOR, SPACE, UNIVERSAL, mistakes, only, option, task_of, tasks
 
+from kahanmaps.errors import InputError
 from kahanmaps.experiments.experiment import DEFAULT_LIMITS
 from kahanmaps.experiments.records import Limits
 from kahanmaps.experiments.spec import parse_spec, read_spec
@@ -72,6 +74,25 @@ def test_the_seed_of_the_family_is_that_of_the_task():
 )
 def test_the_time_step_is_twice_eps(axes, eps):
     assert option(LORENZ + f"axes = {{{axes}}}", "eps") == eps
+
+
+def test_values_of_zipped_axes_may_repeat():
+    axes = 'axes = {eps = 1, parameters = {s = [1, 1, "2"], r = [5, 6, 5]}}'
+    text = LORENZ + 'zip = [["parameters.s", "parameters.r"]]\n' + axes
+    rows = [(task.value("parameters.s"), task.value("parameters.r")) for task in tasks(text)]
+    assert rows == [("1", "5"), ("1", "6"), ("2", "5")]
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ('zip = [["parameters.s", "parameters.r"]]', "zip[1]: found the same values in places 1 and 2"),
+        ("", "axes.parameters.s[2]: found 1, the same value as in place 1"),
+    ],
+)
+def test_rows_of_a_zip_may_not_repeat_nor_values_of_other_axes(line, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        only(LORENZ + f"{line}\naxes = {{eps = 1, parameters = {{s = [1, 1, 2], r = [5, 5, 6]}}}}")
 
 
 @pytest.mark.parametrize("name", ["eps", "time_step"])

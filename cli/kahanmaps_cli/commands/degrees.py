@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,10 +19,13 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.value_rows import Row, rows_of
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+
+_SHOWN = 8  # degrees in a line of a table
 
 
 @click.command("degrees")
@@ -47,6 +51,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps degrees lotka_volterra --seconds 20 --json
       kahanmaps degrees weierstrass --eps 1/10 --terms 60
       kahanmaps degrees --rhs "x' = x*(1-y); y' = y*(x-1)"
+      kahanmaps degrees henon_heiles -p c=-2..0:1/2 --terms 6
 
     The degree of Phi^n as a map of projective space, measured on random lines modulo random primes of 63 bits, two of
     each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
@@ -59,24 +64,19 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     In the plane a dynamical degree above 1 is proved: its bounds are then exact.
 
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
+    combination of values; with --json a record a line.
+
     Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
     vary; 2 wrong use; 3 undecided, or stopped early.
     """
-    from kahanmaps.laboratory.growth.degrees import degree_growth
-
     eps = the_eps(options["eps"], options["time_step"], required=False)
+    rows = rows_of(options["parameters"], system)
+    if rows is not None:
+        return _table(system, eps, rows, options, as_json, quiet)
     file = load_system(system, options)
     with Progress(quiet) as progress:
-        found = degree_growth(
-            file.map,
-            eps,
-            seconds=options["seconds"],
-            max_terms=options["terms"],
-            max_degree=options["max_degree"],
-            seed=options["seed"],
-            steps=options["steps"],
-            progress=progress,
-        )
+        found = _measured(file, eps, options, progress)
     if as_json:
         print_json(_record(file, options, found))
     else:
@@ -92,6 +92,42 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if not quiet:
         say(f"undecided: {found.unconfirmed}" if found.unconfirmed else f"stopped early: {found.message}")
     return 3
+
+
+def _measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> DegreeGrowth:
+    from kahanmaps.laboratory.growth.degrees import degree_growth
+
+    return degree_growth(
+        file.map,
+        eps,
+        seconds=options["seconds"],
+        max_terms=options["terms"],
+        max_degree=options["max_degree"],
+        seed=options["seed"],
+        steps=options["steps"],
+        progress=progress,
+    )
+
+
+def _table(
+    system: str | None, eps: Any, rows: Sequence[Row], options: dict[str, Any], as_json: bool, quiet: bool
+) -> int:
+    """A line for each combination of values: these, the degrees and their growth; in JSON a record each."""
+    files = [load_system(system, {**options, "parameters": row}) for row in rows]
+    done = 0
+    for row, file in zip(rows, files, strict=True):
+        at = ", ".join(f"{name} = {value}" for name, value in row)
+        with Progress(quiet) as progress:
+            found = _measured(file, eps, options, progress)
+        if as_json:
+            print_json(_record(file, options, found))
+        else:
+            more = ", ..." if len(found.degrees) > _SHOWN else ""
+            tell(f"{at}\t{', '.join(map(str, found.degrees[:_SHOWN]))}{more}\t{found.kind_text}")
+        done += _is_done(found, options["terms"])
+    if done < len(rows) and not quiet:
+        say(f"undecided, or stopped early: {len(rows) - done} of {len(rows)}")
+    return 0 if done == len(rows) else 3
 
 
 def _is_done(found: DegreeGrowth, terms: int | None) -> bool:

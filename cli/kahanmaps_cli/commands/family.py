@@ -20,7 +20,7 @@ from kahanmaps_cli.options import (
     system_argument,
     system_options,
 )
-from kahanmaps_cli.outputs import OutputFile, OutputFolder, will_write
+from kahanmaps_cli.outputs import OutputFile, OutputFolder, file_name, will_write
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import on_terminal, shorten, tell
@@ -71,7 +71,7 @@ def new(output: str | None, quiet: bool, signs: str | None, name: str | None, **
     if name is not None and not name.isprintable():
         raise click.UsageError(f"found --name {quoted(name)}, expected printable text")
     member = _with_signs(draw_member(**options), signs)
-    file = SystemFile.from_member(member, name or (_file_name(Path(output).stem) if output else "member"))
+    file = SystemFile.from_member(member, name or (file_name(Path(output).stem) if output else "member"))
     _write(file, output)
     if not quiet:
         where = f"{output}: " if output else ""
@@ -215,7 +215,7 @@ def associated(
         }
         if write_to is not None:
             text = "".join("p" if sign > 0 else "m" for sign in associate.signs)
-            path = Path(write_to) / f"{_file_name(file.name)}-{text}.toml"
+            path = Path(write_to) / f"{file_name(file.name)}-{text}.toml"
             one = FamilyMember(member.A, member.H, associate.signs)
             written[str(path)] = SystemFile.from_member(one, path.stem)
             will_write(str(path))
@@ -355,11 +355,6 @@ def _write(file: SystemFile, output: str | None) -> None:
         click.echo(text, nl=False)
         return
     write_whole(output, text.encode())
-
-
-def _file_name(name: str) -> str:
-    """The name with everything replaced that might lead out of a folder, or that no file should be called."""
-    return "".join(c if c.isalnum() or c in "._+-" else "_" for c in name)
 
 
 def _rows(matrix: fmpq_mat) -> list[list[str]]:

@@ -1,11 +1,11 @@
-"""kahanmaps plot portrait | invariant-curves | drift | heights | degrees | commute | batch | recipe."""
+"""kahanmaps plot portrait | invariant-curves | drift | heights | degrees | scan | commute | batch | recipe."""
 
 from __future__ import annotations
 
 import click
 
 from kahanmaps_cli.groups import SuggestingGroup
-from kahanmaps_cli.pictures import batch, commute, degrees, drift, heights, invariant_curves, portrait, recipe
+from kahanmaps_cli.pictures import batch, commute, degrees, drift, heights, invariant_curves, portrait, recipe, scan
 
 
 @click.group("plot", cls=SuggestingGroup)
@@ -22,5 +22,5 @@ def command() -> None:
     """
 
 
-for _module in (portrait, invariant_curves, drift, heights, degrees, commute, batch, recipe):
+for _module in (portrait, invariant_curves, drift, heights, degrees, scan, commute, batch, recipe):
     command.add_command(_module.command)

@@ -234,6 +234,7 @@ def degree_growth(
     seed: int = 0,
     steps: int | None = None,
     patterns: Patterns | None = None,
+    enclosed: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> DegreeGrowth:
     """The degrees of the iterates of a map, for one exact `eps` or generic eps; a system stands for its Kahan map.
@@ -241,9 +242,10 @@ def degree_growth(
     Stops when a recurrence is found with at least 6 terms, and as many as its order, to spare, and it is explained by
     the singularities or there are terms enough beyond the last confinement; with `max_terms` instead after the degrees
     d_1, ..., d_max_terms. Stops in any case after about `seconds`, or before a degree above `max_degree`. `patterns`
-    are those of the singularities, which are followed here, for `steps` steps, where they are not given. Modulo random
-    primes of 63 bits, so the answer is measured and not proved, but for the bounds of the dynamical degree of planar
-    maps; the same for the same `seed`, except for where the time ends it. Raises InputError for wrong values.
+    are those of the singularities, which are followed here, for `steps` steps, where they are not given. Unless
+    `enclosed` is false, exponential growth in the plane is proved. Modulo random primes of 63 bits, so the answer is
+    measured and not proved, but for the bounds of the dynamical degree of planar maps; the same for the same `seed`,
+    except for where the time ends it. Raises InputError for wrong values.
 
     Source: bellon-viallet-1999.
 
@@ -264,7 +266,7 @@ def degree_growth(
     if max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
     return _Search(as_map(system), exact, time.monotonic() + seconds, max_degree, seed, steps, patterns).run(
-        max_terms, progress
+        max_terms, enclosed, progress
     )
 
 
@@ -288,7 +290,7 @@ class _Search:
         self.degrees = [1]
         self.notes: list[str] = []
 
-    def run(self, max_terms: int | None, progress: Callable[[str], None]) -> DegreeGrowth:
+    def run(self, max_terms: int | None, enclosed: bool, progress: Callable[[str], None]) -> DegreeGrowth:
         """Step after step until something ends it."""
         lines = [self._line() for _ in range(_LINES)]
         try:
@@ -310,7 +312,7 @@ class _Search:
         found = replace(
             self._so_far(), ended=ended, message=message, primes=primes, residues=residues, notes=tuple(self.notes)
         )
-        if found.growth is not GrowthClass.EXPONENTIAL and not found.looks_exponential:
+        if not enclosed or (found.growth is not GrowthClass.EXPONENTIAL and not found.looks_exponential):
             return found
         left = max(1.0, self._deadline - time.monotonic())
         return replace(found, enclosure=enclose(self._map, self._eps, seed=self._seed, seconds=left, progress=progress))

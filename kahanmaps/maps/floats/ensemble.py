@@ -7,7 +7,6 @@ numbers; the kernel, the threads and the way steps are portioned only settle how
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +33,7 @@ from kahanmaps.maps.floats.steps import (
 from kahanmaps.maps.floats.stream import NpyFile
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
-from kahanmaps.maps.kernels import choose_kernel
+from kahanmaps.maps.kernels import choose_kernel, processors
 from kahanmaps.maps.orbits import OrbitEnd, require_steps
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -124,7 +123,7 @@ class Stepping:
             require_same_system(form, map_)
             self.blocks = planar_blocks(form, -eps if backward else eps)
         self.compiled = compiled
-        self.threads = (threads or _cores()) if compiled else 1
+        self.threads = (threads or processors()) if compiled else 1
         method = "generic" if form is None else "normal form"
         self.name = f"numba {method}, {counted(self.threads, 'thread')}" if compiled else f"numpy {method}"
         self._engine = self._made()
@@ -402,13 +401,6 @@ def require_every(every: int) -> None:
     """Raises InputError unless every >= 1."""
     if every < 1:
         raise InputError(f"found a record every {every} steps, expected at least 1")
-
-
-def _cores() -> int:
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on this system
-        return os.cpu_count() or 1
 
 
 def _points(starts: Any, system: QuadraticSystem | BirationalMap) -> FloatArray:

@@ -1,0 +1,102 @@
+"""kahanmaps scan."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kahanmaps_cli.options import output_options
+from kahanmaps_cli.outputs import OutputFolder, file_name, will_write
+from kahanmaps_cli.params import Seconds
+from kahanmaps_cli.progress import say
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.scan_run import scan_options, scanned
+from kahanmaps_cli.terminal import tell
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.scan.result import Scan
+
+
+@click.command("scan")
+@scan_options
+@click.option(
+    "--analyze", "analysis", type=Seconds(), metavar="T", help="Analyze a member of each slow class, T seconds each."
+)
+@click.option("--toml", "as_toml", is_flag=True, help="A member of each component as a system file, one after another.")
+@click.option("--write-to", "folder", type=OutputFolder(), metavar="DIR", help="Write these to files in DIR.")
+@output_options
+def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
+    """Which members of a family are integrable: where in parameter space degrees grow more slowly.
+
+    \b
+      kahanmaps scan henon_heiles --over c
+      kahanmaps scan zhukovski_volterra_2 --over b1,b2
+      kahanmaps scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b
+      kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze 5 --write-to out
+
+    The degrees of the first iterates of all members with parameters in GF(p), for several small primes p. Members with
+    smaller degrees than the others form points, lines, curves and surfaces; what is there modulo all primes is written
+    as a condition over Q. It is confirmed at random members by the computation of `degrees`, and a rational member
+    tells the kind of growth. Found modulo primes and confirmed is evidence, and no proof.
+
+    Without --eps: conditions that hold for every eps; with eps among the parameters also those that contain it. With
+    more than three parameters members on random lines of parameter space are tried, which finds hypersurfaces only.
+    What can have been missed is told.
+
+    Exit status: 0 done, whatever was found; 2 wrong use; 3 the time was over.
+    """
+    if as_json and options["as_toml"]:
+        raise click.UsageError("give --toml or --json, not both")
+    found = scanned(system, quiet, options)
+    if options["folder"] is not None:
+        _write(found, options["folder"], quiet)
+    if options["as_toml"]:
+        for one in found.components:
+            if one.values is not None:
+                click.echo(f"# {one.text}\n{found.member(one).to_toml()}")
+    elif as_json:
+        print_json(_record(found, options))
+    else:
+        from kahanmaps.checks.settings import eps_record, eps_words
+
+        at = "" if "eps" in found.over else eps_words(eps_record(found.eps, found.file.map))
+        tell(f"# scan: {found.file.name} over {', '.join(found.over)}{at}")
+        tell(found.text)
+    if found.ended == "complete":
+        return 0
+    if not quiet:
+        say(f"stopped early: the time was over after the members modulo {len(found.sweeps)} of the primes")
+    return 3
+
+
+def _write(found: Scan, folder: str, quiet: bool) -> None:
+    """A system file for every component that has a rational member."""
+    from kahanmaps.whole_files import write_whole
+
+    known = [one for one in found.components if one.values is not None]
+    paths = [Path(folder) / f"{file_name(found.file.name)}-{k}.toml" for k in range(1, len(known) + 1)]
+    for path in paths:
+        will_write(str(path))
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for path, one in zip(paths, known, strict=True):
+        write_whole(str(path), found.member(one).to_toml().encode())
+    if not quiet:
+        say(f"{folder}: {len(known)} system files")
+
+
+def _record(found: Scan, options: dict[str, Any]) -> dict[str, Any]:
+    from kahanmaps.checks.settings import eps_record
+    from kahanmaps.version import __version__
+
+    return {
+        "command": "scan",
+        "version": __version__,
+        "system": found.file.name,
+        **eps_record(found.eps, found.file.map),
+        "arithmetic": "modulo primes",
+        "seconds": options["seconds"],
+        **found.to_json(),
+        "document": dict(found.file.document),
+    }

@@ -1,0 +1,42 @@
+"""kahanmaps plot scan."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from kahanmaps_cli.params import PointText
+from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
+from kahanmaps_cli.progress import say
+from kahanmaps_cli.scan_run import scan_options, scanned
+
+
+@click.command("scan", cls=PictureCommand)
+@scan_options
+@click.option("--window", type=PointText(), metavar="A0,A1,B0,B1", help="The part that is shown.")
+@picture_options
+def command(system: str | None, **options: Any) -> int:
+    """The plane of two parameters: where degrees grow more slowly.
+
+    \b
+      kahanmaps plot scan zhukovski_volterra_2 --over b1,b2
+      kahanmaps plot scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b \\
+        --window=-2,2,-2,2 -o plane.pdf
+
+    A colour for each kind of growth; marks are points, lines are curves.
+
+    Exit status: 0 done, 2 wrong use, 3 the time was over (the picture is
+    written).
+    """
+    from kahanmaps.maps.floats.fast import to_floats
+    from kahanmaps.plots.scan import draw_scan
+    from kahanmaps.plots.windows import require_window
+
+    require_output(options)
+    window = None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), 2)
+    found = scanned(system, options["quiet"], options)
+    deliver(draw_scan(found, style_from(options), window=window), options, found.file)
+    if found.ended != "complete" and not options["quiet"]:
+        say("stopped early: the time was over")
+    return 0 if found.ended == "complete" else 3

@@ -1,0 +1,78 @@
+"""What scan and its picture share: the options, and the scan that they ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from kahanmaps_cli.options import (
+    eps_options,
+    is_inline,
+    load_system,
+    seconds_option,
+    seed_option,
+    stack,
+    system_options,
+    the_eps,
+)
+from kahanmaps_cli.progress import Progress
+
+if TYPE_CHECKING:
+    from kahanmaps.laboratory.scan.result import Scan
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+scan_options: Callable[[F], F] = stack(
+    system_options,
+    click.option(
+        "--over",
+        required=True,
+        metavar="A,B,...",
+        help="The parameters that vary, up to 8, eps perhaps among them; an inline system need not declare them.",
+    ),
+    eps_options,
+    click.option(
+        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: as many as are small, up to 7)."
+    ),
+    click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters)."),
+    seconds_option(120.0, "Stop about then, and say what was seen."),
+    click.option("-j", "--jobs", type=int, metavar="N", help="Threads, with numba (default: all processors)."),
+    seed_option,
+)
+
+
+def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
+    """The scan that a command line asks for."""
+    from kahanmaps.laboratory.scan.scan import scan
+
+    names = [name.strip() for name in options["over"].split(",") if name.strip()]
+    if is_inline(options):
+        given = {"eps", *(name for name, _ in options["parameters"])}
+        options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
+    if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):
+        raise click.UsageError("found eps among the parameters of system files that are asked for: they hold no eps")
+    file = load_system(system, options)
+    with Progress(quiet) as progress:
+        return scan(
+            file,
+            names,
+            eps=the_eps(options["eps"], options["time_step"], required=False),
+            terms=options["terms"],
+            primes=_primes(options["primes"]),
+            analysis=options.get("analysis"),
+            seconds=options["seconds"],
+            seed=options["seed"],
+            jobs=options["jobs"],
+            progress=progress,
+        )
+
+
+def _primes(text: str | None) -> list[int] | None:
+    if text is None:
+        return None
+    pieces = [piece.strip() for piece in text.split(",")]
+    if not all(piece.isascii() and piece.isdigit() and len(piece) < 10 for piece in pieces):
+        raise click.UsageError(f"found --primes {text[:60]!r}, expected primes separated by commas")
+    return [int(piece) for piece in pieces]

@@ -1,0 +1,169 @@
+"""Pieces modulo several small primes that belong to one variety over Q: by Chinese remainders and reconstruction.
+
+What is reconstructed from some primes has to be there modulo the others. Nothing here proves that it is a piece of the
+family over Q: that is tried on members of it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
+from itertools import combinations, product
+from math import isqrt, prod
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import primitive_part, ring
+from kahanmaps.algebra.residues import chinese, rational_reconstruction, rational_vector
+from kahanmaps.laboratory.modular_points import exponents_up_to, null_space, product_of
+from kahanmaps.laboratory.scan.pieces import Rows, pivots
+
+RationalRows = tuple[tuple[fmpq, ...], ...]
+
+_MOST_PAIRS = 100_000  # of flats modulo two primes that are tried
+_MOST_CONJUGATES = 24  # points modulo a prime of which pairs are taken
+_LOW = 12  # heights up to which one prime may be bad
+_AT_LEAST = 3  # primes
+
+
+def height_bound(primes: Sequence[int]) -> int:
+    """The numerators and denominators that two of the primes suffice for."""
+    low = sorted(primes)[:2]
+    return isqrt((prod(low) - 1) // 2)
+
+
+def lifted_flats(
+    found: Mapping[int, Sequence[Rows]],
+    is_there: Callable[[RationalRows, int], bool] = lambda rows, p: residues(rows, p) is not None,
+) -> dict[RationalRows, tuple[int, ...]]:
+    """Affine subspaces over Q whose residues are among those found modulo the primes: reduced rows, and these primes.
+
+    `is_there` says modulo which primes rows have to be found.
+
+    >>> modulo = {p: [((1, 0, -pow(2, -1, p) % p), (0, 1, p - 3))] for p in (31, 37, 41)}
+    >>> lifted_flats(modulo)
+    {((1, 0, -1/2), (0, 1, -3)): (31, 37, 41)}
+    """
+    sets = {p: set(flats) for p, flats in found.items()}
+    done: dict[RationalRows, tuple[int, ...]] = {}
+    spent = 0
+    for p, q in sorted(combinations(sorted(found), 2), key=lambda pair: len(found[pair[0]]) * len(found[pair[1]])):
+        spent += len(found[p]) * len(found[q])
+        if spent > _MOST_PAIRS:
+            break
+        for one, other in product(found[p], found[q]):
+            lifted = _lifted_rows(one, p, other, q)
+            if lifted is None or lifted in done:
+                continue
+            at = tuple(r for r in sorted(sets) if residues(lifted, r) in sets[r])
+            height = max((max(abs(int(x.p)), int(x.q)) for row in lifted for x in row), default=0)
+            missing = sum(r not in at and is_there(lifted, r) for r in sets)
+            if len(at) >= _AT_LEAST and missing <= (height <= _LOW):
+                done[lifted] = at
+    return done
+
+
+def flat_equations(rows: RationalRows, names: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
+    """The equations of an affine subspace, primitive polynomials.
+
+    >>> flat_equations(((fmpq(1), fmpq(0), fmpq(-1, 2)),), ["a", "b"])
+    (2*a - 1,)
+    """
+    context = ring(names)
+    variables = [*context.gens(), context.constant(1)]
+    sums = (sum((c * x for c, x in zip(row, variables, strict=True)), context.constant(0)) for row in rows)
+    return tuple(primitive_part(one)[1] for one in sums)
+
+
+def lifted_conjugates(found: Mapping[int, Sequence[Sequence[int]]], count: int) -> dict[RationalRows, tuple[int, ...]]:
+    """Pairs of points over quadratic fields that are among the points found modulo the primes where the field splits.
+
+    Rows of the line through both, and last (s, q) with t^2 + s t + q = 0 for its free variable.
+
+    >>> roots = {7: [[3], [4]], 17: [[6], [11]], 23: [[5], [18]], 29: []}
+    >>> lifted_conjugates(roots, 1)
+    {((0, -2),): (7, 17, 23)}
+    """
+    pairs: dict[int, list[Rows]] = {p: [] for p in found}
+    for p, points in found.items():
+        if len(points) <= _MOST_CONJUGATES:
+            for x, y in combinations(points, 2):
+                line = null_space([[*x, 1], [*y, 1]], count + 1, p)
+                free = next(k for k in range(count) if k not in pivots(line))
+                pairs[p].append((*map(tuple, line), ((-x[free] - y[free]) % p, x[free] * y[free] % p)))
+
+    def splits(rows: RationalRows, p: int) -> bool:
+        known = residues(rows, p)
+        return known is not None and pow(known[-1][0] ** 2 - 4 * known[-1][1], (p - 1) // 2, p) == 1
+
+    lifted = lifted_flats(pairs, splits)
+    return {rows: at for rows, at in lifted.items() if not _is_square(rows[-1][0] ** 2 - 4 * rows[-1][1])}
+
+
+def _is_square(x: fmpq) -> bool:
+    return x >= 0 and all(isqrt(int(part)) ** 2 == part for part in (x.p, x.q))
+
+
+def _lifted_rows(one: Rows, p: int, other: Rows, q: int) -> RationalRows | None:
+    rows = []
+    for a, b in zip(one, other, strict=True):
+        row = []
+        for entry in chinese(a, p, b, q):
+            value = rational_reconstruction(entry, p * q)
+            if value is None:
+                return None
+            row.append(value)
+        rows.append(tuple(row))
+    return tuple(rows)
+
+
+def residues(rows: Sequence[Sequence[fmpq]], p: int) -> Rows | None:
+    """The rows modulo a prime, None where it divides a denominator."""
+    if any(int(x.q) % p == 0 for row in rows for x in row):
+        return None
+    return tuple(tuple(int(x.p) * pow(int(x.q), -1, p) % p for x in row) for row in rows)
+
+
+def lifted_forms(
+    found: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
+) -> list[tuple[fmpq_mpoly, tuple[int, ...]]]:
+    """The irreducible hypersurfaces over Q behind those of degree 2 and more modulo the primes, and these primes.
+
+    Their product is lifted from all primes but one, where it has to agree, and factored.
+
+    >>> circle = {p: [[p - 1, 0, 0, 1, 0, 1]] for p in (31, 37, 41)}
+    >>> lifted_forms(circle, ["a", "b"])
+    [(a^2 + b^2 - 1, (31, 37, 41))]
+    """
+    products = {p: _product(forms, p, len(names)) for p, forms in found.items() if forms}
+    sizes = Counter(len(form) for form in products.values())
+    if not sizes:
+        return []
+    size = sizes.most_common(1)[0][0]
+    products = {p: form for p, form in products.items() if len(form) == size}
+    lead = [max((k for k, c in enumerate(form) if c), default=0) for form in products.values()]
+    if len(products) < _AT_LEAST or len(set(lead)) > 1:
+        return []
+    scaled = {p: [c * pow(form[lead[0]], -1, p) % p for c in form] for p, form in products.items()}
+    *first, last = sorted(scaled)
+    together, modulus = scaled[first[0]], first[0]
+    for p in first[1:]:
+        together, modulus = chinese(together, modulus, scaled[p], p), modulus * p
+    values = rational_vector(together, modulus)
+    if values is None or residues([values], last) != (tuple(scaled[last]),):
+        return []
+    degree = next(d for d in range(100) if len(exponents_up_to(len(names), d)) == size)
+    terms = {e: c for e, c in zip(exponents_up_to(len(names), degree), values, strict=True) if c != 0}
+    factors = ring(names).from_dict(terms).factor()[1]
+    return [(primitive_part(factor)[1], tuple(sorted(scaled))) for factor, _ in factors]
+
+
+def _product(forms: Sequence[Sequence[int]], p: int, count: int) -> list[int]:
+    """The coefficients of the product of polynomials, up to its degree."""
+
+    def degree_of(form: Sequence[int]) -> int:
+        return next(d for d in range(100) if len(exponents_up_to(count, d)) == len(form))
+
+    top = sum(map(degree_of, forms))
+    return reduce(lambda a, b: product_of(a, b, count, top, p) or [], forms, [1])

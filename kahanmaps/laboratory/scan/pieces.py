@@ -1,0 +1,121 @@
+"""What a set of points of GF(p)^k is made of: affine subspaces, hypersurfaces of them, single points.
+
+The points with one degree sequence are the points of some varieties without those of smaller ones, and may hold points
+by chance besides. So pieces are found from few random points, and count where they hold about as many points as a
+variety of their dimension has, p^d.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from kahanmaps.laboratory.modular_points import Point, echelon, exponents_up_to, monomial_values, null_space
+
+Rows = tuple[tuple[int, ...], ...]
+
+MAX_DEGREE = 6
+_SHARE = 0.5  # of the points of a piece that must be there: special ones are missing
+_SPARE = 1.5  # points for each coefficient of a hypersurface
+_TRIES, _MANY = 80, 3000  # samples; of more than 3 parameters, where all points of one have to be on one piece
+_MOST_POINTS = 400  # that are taken for single ones
+
+
+@dataclass
+class Pieces:
+    """The pieces of a set of points modulo `prime`.
+
+    `flats` has affine subspaces by dimension: reduced rows (c_1, ..., c_k, c_0) of equations c_1 a_1 + ... + c_0 = 0.
+    `forms` has hypersurfaces of degree 2 and more by the affine subspace they are in (no rows: the whole space). Each
+    is the coefficients of the monomials of `exponents_up_to`, in their order, in the variables that are free there.
+    `left` points are in none of them.
+    """
+
+    prime: int
+    flats: dict[int, list[Rows]] = field(default_factory=dict)
+    forms: dict[Rows, list[tuple[int, ...]]] = field(default_factory=dict)
+    left: int = 0
+
+
+def pieces(points: Sequence[Point], prime: int, seen: int, complete: bool, rng: random.Random) -> Pieces:
+    """The pieces of a set of points, of `seen` that were tried; single points where all of GF(p)^k was tried.
+
+    >>> line = [(a, (2 * a + 3) % 31) for a in range(31)]
+    >>> found = pieces([*line, (5, 5)], 31, 31**2, True, random.Random(0))
+    >>> found.flats
+    {1: [((1, 15, 17),)], 0: [((1, 0, 26), (0, 1, 26))]}
+    """
+    import numpy as np
+
+    count = len(points[0])
+    found = Pieces(prime)
+    rest = np.array(points, dtype=np.int64)
+
+    def flats(dimension: int, needed: float) -> Iterator[tuple[Rows, Any]]:
+        """Affine subspaces with so many of the points, and which of these are in them."""
+        for _ in range(_TRIES if count <= 3 else _MANY):
+            if len(rest) < needed:
+                return
+            sample = [[*rest[i].tolist(), 1] for i in rng.sample(range(len(rest)), dimension + 1)]
+            rows = null_space(sample, count + 1, prime)
+            if len(rows) == count - dimension:
+                ones = np.ones((len(rest), 1), dtype=np.int64)
+                inside = ~(np.hstack([rest, ones]) @ np.array(rows).T % prime).any(axis=1)
+                if inside.sum() >= needed:
+                    yield tuple(map(tuple, rows)), inside
+
+    def forms(here: Any, needed: float) -> Iterator[tuple[tuple[int, ...], Any]]:
+        """Hypersurfaces of degree 2 and more with so many of the points `here`, and which of these are in them."""
+        for degree in range(2, MAX_DEGREE + 1):
+            size = len(exponents_up_to(here.shape[1], degree))
+            enough = max(needed, _SPARE * size)
+            for attempt in range(_TRIES):
+                if len(here) < enough:
+                    break
+                table = np.array([monomial_values(tuple(x), degree, prime) for x in here.tolist()])
+                chosen = range(len(here)) if attempt == 0 else rng.sample(range(len(here)), size - 1)
+                basis = null_space([table[i].tolist() for i in chosen], size, prime)
+                inside = table @ np.array(basis[0]) % prime == 0 if len(basis) == 1 else np.zeros(len(here), dtype=bool)
+                if inside.sum() >= enough:
+                    yield tuple(basis[0]), inside
+                    here = here[~inside]
+
+    for dimension in range(count - 1, 0, -1):
+        # Of the dimension that is looked for: affine ones, then others in affine ones of one dimension more.
+        needed = max(_SHARE * seen / prime ** (count - dimension), dimension + 3)
+        for rows, inside in flats(dimension, needed):
+            found.flats.setdefault(dimension, []).append(rows)
+            rest = rest[~inside]
+        if dimension == count - 1:
+            for form, inside in forms(rest, needed):
+                found.forms.setdefault((), []).append(form)
+                rest = rest[~inside]
+            if not complete:
+                break
+            continue
+        for rows, inside in flats(dimension + 1, needed):
+            free = [k for k in range(count) if k not in pivots(rows)]
+            places, kept = np.flatnonzero(inside), np.ones(len(rest), dtype=bool)
+            for form, some in forms(rest[inside][:, free], needed):
+                found.forms.setdefault(rows, []).append(form)
+                kept[places[some]] = False
+                places = places[~some]
+            rest = rest[kept]
+    if complete and len(rest) <= _MOST_POINTS:
+        single = [tuple(map(tuple, echelon(_equations(x), prime))) for x in rest.tolist()]
+        found.flats.setdefault(0, []).extend(single)
+        rest = rest[:0]
+    found.left = len(rest)
+    return found
+
+
+def pivots(rows: Sequence[Sequence[Any]]) -> list[int]:
+    """The variables that reduced equations say by the others."""
+    return [next(k for k, c in enumerate(row) if c) for row in rows]
+
+
+def _equations(x: Sequence[int]) -> list[list[int]]:
+    """The point as the solution of equations."""
+    return [[*(int(i == j) for j in range(len(x))), -value] for i, value in enumerate(x)]

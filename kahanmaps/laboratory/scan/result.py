@@ -1,0 +1,207 @@
+"""What a scan finds: components of parameter space, and what was seen of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.fields import GF, QQ, Field
+from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.displayed import Displayed
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.symbols import member_of
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.conclusion import Conclusion
+from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.scan.lift import height_bound
+from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
+
+STEPS = 40  # for which singularities are followed where the growth at a member is asked
+
+
+@dataclass(frozen=True)
+class Component:
+    """A condition on the parameters: `equations`, polynomials over Q that vanish on it, found modulo `primes`.
+
+    `degrees` are d_1, ..., d_N there. `confirmed` of `tried` random members have them. `values` are those of a rational
+    member, None where none was found; `growth` what its degrees do, `verdict` what its analysis says, None where that
+    was not asked.
+    """
+
+    equations: tuple[fmpq_mpoly, ...]
+    dimension: int
+    degrees: Degrees
+    primes: tuple[int, ...]
+    confirmed: int = 0
+    tried: int = 0
+    values: dict[str, fmpq] | None = None
+    growth: DegreeGrowth | None = None
+    verdict: Conclusion | None = None
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether all members tried have the degrees."""
+        return 0 < self.tried == self.confirmed
+
+    @property
+    def is_rational_point(self) -> bool:
+        """Whether it is one member, with rational parameters."""
+        return self.dimension == 0 and self.values is not None
+
+    @property
+    def member_text(self) -> str:
+        """The values of the rational member, as a point where there are several; empty where none is known."""
+        values = [format_number(value) for value in (self.values or {}).values()]
+        return f"({', '.join(values)})" if len(values) > 1 else "".join(values)
+
+    @property
+    def text(self) -> str:
+        """The condition: values of a point, else equations."""
+        if self.is_rational_point:
+            return self.member_text
+        return ", ".join(f"{format_polynomial(equation)} = 0" for equation in self.equations)
+
+    def contains(self, point: Sequence[Any], prime: int | None = None) -> bool:
+        """Whether the equations hold at a rational point, or at one modulo a prime."""
+        field: Field = QQ if prime is None else GF(prime)
+        values = [field.convert(x) for x in point]
+        return all(field.is_zero(evaluate(equation, field, values)) for equation in self.equations)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; equations as text."""
+        growth = self.growth
+        return {
+            **attributes(self, "equations", "dimension", "primes", "confirmed", "tried", "is_confirmed", "values"),
+            "growth": None if growth is None else str(growth.growth),
+            "growth_text": None if growth is None else growth.growth_text,
+            "verdict": None if self.verdict is None else attributes(self.verdict, "kind", "ground", "sentence"),
+        }
+
+
+def growth_on(some: Sequence[Component]) -> DegreeGrowth | None:
+    """The growth on components with the same degrees: that of the first of them where it is known."""
+    return next((one.growth for one in some if one.growth is not None), None)
+
+
+@dataclass(frozen=True)
+class Scan(Displayed):
+    """What a scan found: components, the ones with the slowest growth first.
+
+    `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
+    the number of slow members on no component modulo each of them: points over number fields, of a height above
+    `height`, or there by chance. `symmetric` are pairs of parameters whose exchange permutes the slow members.
+    `ended` is "complete" or "time".
+    """
+
+    file: SystemFile
+    over: tuple[str, ...]
+    eps: fmpq | None
+    seed: int
+    generic: Degrees
+    components: tuple[Component, ...]
+    sweeps: tuple[Sweep, ...]
+    left: tuple[int, ...]
+    symmetric: tuple[tuple[str, str], ...]
+    ended: str
+
+    @property
+    def height(self) -> int:
+        """Numerators and denominators of single points up to which they are found; 0 where too little was tried."""
+        return height_bound([one.prime for one in self.sweeps]) if len(self.sweeps) > 2 else 0
+
+    @property
+    def complete(self) -> bool:
+        """Whether all members modulo the primes were tried, rather than those on random lines of parameter space."""
+        return all(one.complete for one in self.sweeps)
+
+    @property
+    def classes(self) -> list[tuple[Degrees, list[Component]]]:
+        """The components by degrees, in their order."""
+        found: dict[Degrees, list[Component]] = {}
+        for one in self.components:
+            found.setdefault(one.degrees, []).append(one)
+        return list(found.items())
+
+    @property
+    def coverage(self) -> str:
+        """What was tried, and what can have been missed: a sentence or two."""
+        if not self.height:
+            return f"members modulo three primes are needed, those modulo {len(self.sweeps)} were tried"
+        parts = [f"{one.seen} modulo {one.prime}" for one in self.sweeps]
+        where = f"where one of the first {len(self.generic)} degrees is smaller"
+        if self.complete:
+            return (
+                f"all members with parameters modulo the primes: {', '.join(parts)}; found are single points with "
+                f"numerators and denominators up to {self.height}, and hypersurfaces of a degree up to 6, {where}"
+            )
+        return f"members on random lines of parameter space: {', '.join(parts)}; found are only hypersurfaces, {where}"
+
+    @property
+    def text(self) -> str:
+        """Lines for people, a word and a tab at the front."""
+        if not self.height:
+            return f"tried\t{self.coverage}"
+        names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
+        lines = [("in general", ", ".join(map(str, self.generic)))]
+        for degrees, members in self.classes:
+            growth = growth_on(members)
+            told = ", ".join("none" if d < 0 else str(d) for d in degrees)
+            known = "" if growth is None or growth.recurrence is None else f", {growth.basis.partition(':')[0]}"
+            lines.append(("degrees", told + (f"\t{growth.kind_text}{known}" if growth is not None else "")))
+            for where, sign, here in (
+                ("where", "; ", [one for one in members if not one.is_rational_point]),
+                (f"at {names} =", ", ", [one for one in members if one.is_rational_point]),
+            ):
+                for some, mark in (
+                    ([one.text for one in here if one.is_confirmed], ""),
+                    ([one.text for one in here if not one.is_confirmed], "\tnot confirmed"),
+                ):
+                    lines += [(where, sign.join(some) + mark)] if some else []
+            lines += [
+                ("verdict", f"{names} = {one.member_text}: {one.verdict.sentence}")
+                for one in members
+                if one.verdict is not None
+            ]
+        if not self.components:
+            lines.append(("found", "no condition on the parameters under which degrees are smaller"))
+        if self.components:
+            lines.append(("growth", f"that of one member; singularities were followed for {STEPS} steps"))
+        lines += [("symmetry", f"exchanging {a} and {b} permutes the slow members") for a, b in self.symmetric]
+        lines.append(("tried", self.coverage))
+        if any(self.left):
+            rest = ", ".join(f"{n} modulo {one.prime}" for n, one in zip(self.left, self.sweeps, strict=True))
+            lines.append(("left", f"slow members on no component: {rest}"))
+        else:
+            lines.append(("left", "none: every slow member that was seen is on a component"))
+        return "\n".join(f"{word}\t{rest}" for word, rest in lines)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            **attributes(self, "over", "seed", "generic"),
+            "classes": [
+                {"degrees": list(degrees), "components": [one.to_json() for one in some]}
+                for degrees, some in self.classes
+            ],
+            "symmetric": [list(pair) for pair in self.symmetric],
+            "sweeps": [
+                {
+                    **attributes(one, "prime", "seen", "complete", "accidents"),
+                    "slow": sum(map(len, one.classes.values())),
+                    "left": left,
+                }
+                for one, left in zip(self.sweeps, self.left, strict=True)
+            ],
+            **attributes(self, "height", "coverage", "ended"),
+        }
+
+    def member(self, component: Component) -> SystemFile:
+        """The system of a rational member on a component. Raises InputError where none is known."""
+        if component.values is None:
+            raise InputError(f"no rational member is known where {component.text}")
+        return member_of(self.file, {name: x for name, x in component.values.items() if name != "eps"})

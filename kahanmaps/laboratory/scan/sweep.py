@@ -1,0 +1,137 @@
+"""Degree sequences of the members of a family modulo a small prime, and the members whose degrees are smaller.
+
+The degrees of a special member are at most those of the generic one. So the largest at each step are the generic
+sequence, and a member with another one is *slow*. A line in special position looks the same: slow members are measured
+on further lines until none of them turns out to be generic after all.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.errors import InputError
+from kahanmaps.maps.implicit import BirationalMap
+
+Point = tuple[int, ...]
+Degrees = tuple[int, ...]
+
+_SLICE = 2048
+_LINES = (3, 12)  # of a slow member: at least, at most
+
+
+class TimeOver(Exception):
+    """The sweep was not finished."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The slow members modulo one prime: `classes` has their points by degrees, `seen` members were tried.
+
+    `generic` are the degrees of the others. Where not `complete`, the members were on random lines of parameter space.
+    """
+
+    prime: int
+    generic: Degrees
+    classes: dict[Degrees, list[Point]]
+    seen: int
+    complete: bool
+    accidents: int
+
+    @property
+    def slow(self) -> dict[Point, Degrees]:
+        """The degrees of every slow member."""
+        return {point: degrees for degrees, points in self.classes.items() for point in points}
+
+
+def members_of(prime: int, count: int, lines: int | None, rng: random.Random) -> Iterator[Point]:
+    """All points of GF(p)^count, or those on so many random lines of it."""
+    if lines is None:
+        yield from product(range(prime), repeat=count)
+        return
+    for _ in range(lines):
+        base, way = ([rng.randrange(prime) for _ in range(count)] for _ in range(2))
+        for s in range(prime):
+            yield tuple((b + s * w) % prime for b, w in zip(base, way, strict=True))
+
+
+def sweep(
+    map_: BirationalMap,
+    count: int,
+    prime: int,
+    eps: fmpq | None,
+    terms: int,
+    room: int,
+    *,
+    lines: int | None = None,
+    seed: str = "",
+    jobs: int = 1,
+    deadline: float | None = None,
+    progress: Callable[[int, int], None] = lambda done, of: None,
+) -> Sweep:
+    """The slow members of a family modulo a prime, by the degrees d_1, ..., d_terms.
+
+    Args:
+        map_: a map with symbols, the parameters of the family.
+        count: how many parameters vary: the symbols, and perhaps eps as the last one, which is never 0.
+        prime: below 2^13.
+        eps: an exact number, or None for generic eps, in GF(p^2).
+        terms, room: see `Family.degrees`.
+        lines: None for all members, else so many random lines of parameter space.
+        seed: of everything random.
+        jobs: threads.
+        deadline: a value of time.monotonic().
+        progress: is told how many members are done, of how many.
+
+    Returns:
+        A `Sweep`.
+
+    Raises:
+        InputError: where the map exists nowhere, or the degrees need more room.
+        TimeOver: at the deadline.
+    """
+    import numpy as np
+
+    from kahanmaps.maps.residues.families import TOO_LARGE, Family
+
+    family, rng = Family(map_, prime), random.Random(seed)
+
+    def measure(points: Sequence[Point], told: Callable[[int, int], None] = lambda done, of: None) -> Any:
+        parts = []
+        for low in range(0, len(points), _SLICE):
+            if deadline is not None and time.monotonic() > deadline:
+                raise TimeOver
+            some = np.array(points[low : low + _SLICE], dtype=np.int64)
+            parts.append(family.degrees(some, eps, terms, room, rng, jobs=jobs))
+            told(low + len(some), len(points))
+        return np.concatenate(parts)
+
+    points = list(members_of(prime, count, lines, rng))
+    if count > len(map_.symbols):
+        points = [point for point in points if point[-1]]
+    found = measure(points, progress)
+    if (found == TOO_LARGE).any():
+        raise InputError(f"the degrees of {terms} iterates are too large to be scanned, expected fewer terms")
+    generic = found.max(axis=0)
+    if generic[0] < 0:
+        raise InputError("the map has no value anywhere, whatever the parameters are")
+    slow, accidents = np.flatnonzero((found != generic).any(axis=1)), 0
+    for line in range(1, _LINES[1]):
+        if not len(slow):
+            break
+        before, found[slow] = found[slow], np.maximum(found[slow], measure([points[i] for i in slow]))
+        kept = slow[(found[slow] != generic).any(axis=1)]
+        accidents += len(slow) - len(kept)
+        if line >= _LINES[0] and (before == found[slow]).all():
+            break
+        slow = kept
+    classes: dict[Degrees, list[Point]] = {}
+    for i in slow:
+        classes.setdefault(tuple(int(d) for d in found[i]), []).append(points[i])
+    return Sweep(prime, tuple(int(d) for d in generic), classes, len(points), lines is None, accidents)

@@ -1,0 +1,250 @@
+"""Images of lines under many maps, over GF(p^2): polynomials, their products and gcds in machine numbers.
+
+An element a + b w of GF(p^2), with w^2 = nu no square modulo p, is a pair of doubles that hold integers in [0, p); a
+polynomial is an array (2, length). Sums of products stay below 2^53 by the choice of p and of the largest length, so
+that they are exact, and are reduced by a product with 1/p: floor((x + 1/2)/p) is right where x/p < 2^36, since
+(x + 1/2)/p is at least 1/(2 p) away from an integer.
+
+The functions are ordinary ones until `kernel` puts what numba makes of them in their place, as in numba_kernel.py.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+_LOCK = Lock()
+
+
+@lru_cache(maxsize=1)
+def _compiled() -> Any:
+    import numba
+
+    from kahanmaps.maps.kept_code import compiled
+
+    module, inner = globals(), numba.njit(nogil=True)
+    names = "reduce add_product clear copy stripped subtract inverse_of_last gcd divide entries minors "
+    for name in f"{names} without_common_factor".split():
+        module[f"_{name}"] = inner(module[f"_{name}"])
+    return compiled(walk, nogil=True)
+
+
+def kernel() -> Any:
+    """The compiled `walk`. Raises ImportError without numba."""
+    with _LOCK:
+        return _compiled()
+
+
+def _reduce(x: Any, length: int, p: float) -> None:
+    """Residues, in place."""
+    r = 1.0 / p
+    for part in range(2):
+        row = x[part]
+        for i in range(length):
+            row[i] -= p * np.floor((row[i] + 0.5) * r)
+
+
+def _add_product(total: Any, a: Any, length_a: int, b: Any, length_b: int, sign: float, nu: float) -> None:
+    """total += sign a b, not reduced."""
+    x, y, b0, b1 = total[0], total[1], b[0], b[1]
+    for i in range(length_a):
+        c0, c1 = sign * a[0, i], sign * a[1, i]
+        if c0 != 0 or c1 != 0:
+            d = nu * c1
+            for j in range(length_b):
+                x[i + j] += c0 * b0[j] + d * b1[j]
+                y[i + j] += c0 * b1[j] + c1 * b0[j]
+
+
+def _clear(a: Any, length: int) -> None:
+    """Zeros, as far as the length."""
+    for i in range(length):
+        a[0, i] = a[1, i] = 0.0
+
+
+def _copy(a: Any, b: Any, length: int) -> None:
+    """b becomes a, as far as the length."""
+    for i in range(length):
+        b[0, i], b[1, i] = a[0, i], a[1, i]
+
+
+def _stripped(a: Any, length: int) -> int:
+    """The length without zeros at the end."""
+    while length > 0 and a[0, length - 1] == 0 and a[1, length - 1] == 0:
+        length -= 1
+    return length
+
+
+def _subtract(a: Any, length_a: int, b: Any, length_b: int, inverse: Any, p: float, nu: float) -> Any:
+    """a minus the multiple of b that removes its leading term; the factor. `inverse` is that of the last of b."""
+    u, v = a[0, length_a - 1], a[1, length_a - 1]
+    c0 = (u * inverse[0] + nu * v * inverse[1]) % p
+    c1 = (u * inverse[1] + v * inverse[0]) % p
+    first, d, r = length_a - length_b, nu * c1, 1.0 / p
+    b0, b1, x, y = b[0], b[1], a[0], a[1]
+    for j in range(length_b - 1):
+        s = x[first + j] - c0 * b0[j] - d * b1[j]
+        t = y[first + j] - c0 * b1[j] - c1 * b0[j]
+        x[first + j] = s - p * np.floor((s + 0.5) * r)
+        y[first + j] = t - p * np.floor((t + 0.5) * r)
+    a[0, length_a - 1] = a[1, length_a - 1] = 0.0
+    return c0, c1
+
+
+def _inverse_of_last(b: Any, length: int, p: float, nu: float, inverses: Any) -> Any:
+    """1/c for the last coefficient c."""
+    u, v = b[0, length - 1], b[1, length - 1]
+    norm = inverses[int((u * u - nu * v * v) % p)]
+    return (u * norm) % p, ((p - v) * norm) % p
+
+
+def _gcd(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inverses: Any) -> Any:
+    """A gcd and its length; both arrays are used up."""
+    while length_b > 1:
+        inverse = _inverse_of_last(b, length_b, p, nu, inverses)
+        while length_a >= length_b:
+            _subtract(a, length_a, b, length_b, inverse, p, nu)
+            length_a = _stripped(a, length_a - 1)
+        a, b = b, a
+        length_a, length_b = length_b, length_a
+    return (a, length_a) if length_b == 0 else (b, length_b)
+
+
+def _divide(a: Any, length_a: int, b: Any, length_b: int, p: float, nu: float, inverses: Any, into: Any) -> int:
+    """The quotient of a by b goes to `into`, the rest stays in a; the length of the rest."""
+    inverse = _inverse_of_last(b, length_b, p, nu, inverses)
+    _clear(into, max(length_a, 1))
+    while length_a >= length_b:
+        place = length_a - length_b
+        into[0, place], into[1, place] = _subtract(a, length_a, b, length_b, inverse, p, nu)
+        length_a = _stripped(a, length_a - 1)
+    return length_a
+
+
+def _entries(X: Any, length: int, exponents: Any, terms: Any, values: Any, p: float, nu: float, M: Any) -> int:
+    """The matrix (M | -r) at the curve X, whose polynomials have this length; the length of its entries.
+
+    Each row of `terms` is (i, j, k, place): entry (i, j) has monomial k with the coefficient values[place].
+    """
+    power = exponents[0].sum()
+    top = power * (length - 1) + 1
+    for i in range(M.shape[0]):
+        for j in range(M.shape[1]):
+            _clear(M[i, j], top)
+    product, other = np.empty((2, top)), np.empty((2, top))
+    for k in range(len(exponents)):
+        product[0, 0], product[1, 0], size = 1.0, 0.0, 1
+        for variable in range(exponents.shape[1]):
+            for _ in range(exponents[k, variable]):
+                _clear(other, size + length - 1)
+                _add_product(other, X[variable], length, product, size, 1.0, nu)
+                size += length - 1
+                _reduce(other, size, p)
+                product, other = other, product
+        for t in range(len(terms)):
+            if terms[t, 2] == k:
+                _add_product(M[terms[t, 0], terms[t, 1]], values[:, terms[t, 3] : terms[t, 3] + 1], 1, product, size,
+                             1.0, nu)  # fmt: skip
+    for i in range(M.shape[0]):
+        for j in range(M.shape[1]):
+            _reduce(M[i, j], top, p)
+    return int(top)
+
+
+def _minors(M: Any, length: int, minors: Any, p: float, nu: float) -> int:
+    """Minors of the first rows for all sets of columns; those of all rows have the length that is returned."""
+    n = M.shape[0]
+    for j in range(n + 1):
+        _copy(M[0, j], minors[1 << j], length)
+    size = length
+    for k in range(1, n):
+        for mask in range(1 << (n + 1)):
+            columns = 0
+            for j in range(n + 1):
+                columns += mask >> j & 1
+            if columns != k + 1:
+                continue
+            _clear(minors[mask], size + length - 1)
+            place = 0
+            for j in range(n + 1):
+                if mask >> j & 1:
+                    sign = 1.0 if (k + place) % 2 == 0 else -1.0
+                    _add_product(minors[mask], M[k, j], _stripped(M[k, j], length), minors[mask ^ 1 << j], size, sign,
+                                 nu)  # fmt: skip
+                    place += 1
+            _reduce(minors[mask], size + length - 1, p)
+        size += length - 1
+    return size
+
+
+def _without_common_factor(X: Any, length: int, weights: Any, p: float, nu: float, inverses: Any, work: Any) -> int:
+    """Divides the polynomials of the curve by their gcd, in place; the length that they have then, 0 for none."""
+    a, b, c, common = work[0], work[1], work[2], work[3]
+    count = X.shape[0]
+    _clear(a, length)
+    _clear(b, length)
+    for j in range(count):
+        _add_product(a, weights[0, :, j : j + 1], 1, X[j], length, 1.0, nu)
+        _add_product(b, weights[1, :, j : j + 1], 1, X[j], length, 1.0, nu)
+    _reduce(a, length, p)
+    _reduce(b, length, p)
+    found, size = _gcd(a, _stripped(a, length), b, _stripped(b, length), p, nu, inverses)
+    _copy(found, common, size)
+    if size != 1:  # two mixtures may have a factor that not all have
+        for j in range(count):
+            _copy(X[j], c, length)
+            rest = _stripped(c, length)
+            if size:
+                rest = _divide(c, rest, common, size, p, nu, inverses, a)
+            if rest:
+                found, size = _gcd(common, size, c, rest, p, nu, inverses)
+                _copy(found, common, size)
+    longest = 0
+    for j in range(count):
+        if size > 1:
+            _copy(X[j], c, length)
+            _divide(c, _stripped(c, length), common, size, p, nu, inverses, X[j])
+        longest = max(longest, _stripped(X[j], length))
+    return longest
+
+
+def walk(
+    start: Any, exponents: Any, terms: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float, room: int,
+    degrees: Any,
+) -> None:  # fmt: skip
+    """degrees[m, s] becomes the degree of the image of the line start[m] by s + 1 steps of map m.
+
+    start[m, j] are the two coefficients of coordinate j, values[m] the coefficients of the equation, in GF(p^2);
+    `weights` (steps, 2, 2, n + 1) mix coordinates. A line ends before polynomials longer than `room`, and with degrees
+    -1 where the iterate exists nowhere.
+    """
+    n = start.shape[1] - 1
+    power = exponents[0].sum()
+    X = np.zeros((n + 1, 2, room))
+    M = np.zeros((n, n + 1, 2, room))
+    minors = np.zeros((1 << (n + 1), 2, room))
+    work = np.zeros((4, 2, room))
+    full = (1 << (n + 1)) - 1
+    one = np.zeros((2, 1))
+    one[0, 0] = 1.0
+    for m in range(start.shape[0]):
+        for j in range(n + 1):
+            _copy(start[m, j], X[j], 2)
+        length = 2
+        for step in range(degrees.shape[1]):
+            if n * power * (length - 1) + 1 > room:
+                break
+            size = _entries(X, length, exponents, terms, values[m], p, nu, M)
+            top = _minors(M, size, minors, p, nu)
+            for j in range(n + 1):  # with the sign (-1)^j
+                _clear(X[j], top)
+                _add_product(X[j], one, 1, minors[full ^ 1 << j], top, 1.0 - 2.0 * (j % 2), nu)
+                _reduce(X[j], top, p)
+            length = _without_common_factor(X, top, weights[step], p, nu, inverses, work)
+            degrees[m, step] = length - 1
+            if length == 0:
+                degrees[m, step:] = -1
+                break

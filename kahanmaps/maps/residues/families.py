@@ -1,0 +1,179 @@
+"""Degrees of the iterates of many members of a family of maps: all modulo one small prime p, on lines over GF(p^2).
+
+The parameters of the members are residues modulo p, so that all of them can be tried. A line over GF(p) would meet
+points without a value all the time; over GF(p^2) it does with a probability of about 1/p^2 for each of them. A line
+can only give degrees that are too small: who wants to be certain takes several and the largest.
+"""
+
+from __future__ import annotations
+
+import random
+from concurrent.futures import ThreadPoolExecutor
+from functools import reduce
+from math import prod
+from typing import Any
+
+import numpy as np
+from flint import fmpq, fmpz, fmpz_mod_ctx, fmpz_mod_poly_ctx, fq_default_ctx, fq_default_poly_ctx
+from numpy.typing import NDArray
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.errors import InputError
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.kernels import choose_kernel
+
+MAX_PRIME = 1 << 13  # sums of a few thousand products of residues, and times nu, stay below 2^53
+MAX_DIMENSION = 6
+NOWHERE, TOO_LARGE = -1, -2  # in the place of degrees
+_CHUNK = 128
+LONG = 200  # members from which on compiling pays
+
+Members = NDArray[np.int64]
+
+
+class Family:
+    """A map with symbols modulo an odd prime p < 2^13, every coefficient a table over monomials in symbols and eps.
+
+    Raises InputError for what is out of range, BadPrime where the prime divides a denominator.
+    """
+
+    def __init__(self, map_: BirationalMap, prime: int) -> None:
+        if not 2 < prime < MAX_PRIME or not fmpz(prime).is_prime():
+            raise InputError(f"found the prime {prime}, expected an odd prime below {MAX_PRIME}")
+        if map_.dim > MAX_DIMENSION:
+            raise InputError(f"found a map of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
+        self.prime, self.dim, self.symbols = prime, map_.dim, map_.symbols
+        field, n = GF(prime), map_.dim
+        self._terms: list[tuple[int, int, int, int]] = []
+        self._values: list[list[tuple[tuple[int, ...], int]]] = []  # polynomials in the symbols, then eps
+        places: dict[tuple[int, ...], int] = {}
+        for i, row in enumerate(map_.rows):
+            for j, entry in enumerate(row):
+                found: dict[tuple[int, ...], list[tuple[tuple[int, ...], int]]] = {}
+                for monomial, coefficient in entry.terms():
+                    value = int(field.convert(coefficient))
+                    if value:
+                        exponents = tuple(int(e) for e in monomial)
+                        found.setdefault(exponents[:n], []).append((exponents[n:], value))
+                for exponent, polynomial in found.items():
+                    place = places.setdefault(exponent, len(places))
+                    self._terms.append((i, j, place, len(self._values)))
+                    self._values.append(polynomial)
+        self.degree = max(1, *(sum(exponent) for exponent in places))
+        self._exponents = [(*exponent, self.degree - sum(exponent)) for exponent in places]
+        self._nu = next(c for c in range(2, prime) if pow(c, (prime - 1) // 2, prime) == prime - 1)
+        self._inverses = np.array([0, *(pow(c, -1, prime) for c in range(1, prime))], dtype=float)
+
+    def degrees(
+        self,
+        members: Members,
+        eps: fmpq | None,
+        terms: int,
+        room: int,
+        rng: random.Random,
+        *,
+        kernel: str | None = None,
+        jobs: int = 1,
+    ) -> NDArray[np.int64]:
+        """The degrees d_1, ..., d_terms of each member, one a row, on one random line each.
+
+        Args:
+            members: residues of the symbols, one member a row; with one more column, that of eps.
+            eps: an exact number, or None for a random element of GF(p^2) for each member, where eps is no column.
+            terms: how many steps.
+            room: the largest degree that is worked out before common factors are removed; beyond it the degrees are -2
+                (TOO_LARGE), and -1 (NOWHERE) where the iterate exists nowhere.
+            rng: of the lines.
+            kernel: "numpy" or "numba".
+            jobs: threads.
+        """
+        draw = np.random.default_rng(rng.getrandbits(64))
+        p, count = self.prime, len(members)
+        values = self._coefficients(members, eps, draw)
+        start = draw.integers(0, p, (count, self.dim + 1, 2, 2)).astype(float)
+        start[:, -1] = 0.0
+        start[:, -1, 0, 0] = 1.0
+        weights = draw.integers(0, p, (terms, 2, 2, self.dim + 1)).astype(float)
+        found = np.full((count, terms), TOO_LARGE, dtype=np.int64)
+        walk = _walk(choose_kernel(kernel, long=count >= LONG))
+        exponents = np.array(self._exponents, dtype=np.int64)
+        layout = np.array(self._terms, dtype=np.int64)
+
+        def part(low: int) -> None:
+            here = slice(low, low + _CHUNK)
+            walk(start[here], exponents, layout, values[here], weights, self._inverses, float(p), float(self._nu),
+                 room, found[here])  # fmt: skip
+
+        with ThreadPoolExecutor(jobs) as pool:
+            for _ in pool.map(part, range(0, count, _CHUNK)):
+                pass
+        return found
+
+    def _coefficients(self, members: Members, eps: fmpq | None, draw: np.random.Generator) -> NDArray[np.float64]:
+        """The coefficients of the equation, an array (members, 2, places)."""
+        p, count = self.prime, len(members)
+        if members.shape[1] > len(self.symbols):
+            step = np.stack([members[:, -1], np.zeros(count, dtype=np.int64)])
+        elif eps is None:
+            step = draw.integers(0, p, (2, count))
+            step[0, ~step.any(axis=0)] = 1
+        else:
+            step = np.zeros((2, count), dtype=np.int64)
+            step[0] = int(GF(p).convert(eps))
+        powers = [np.array([[1], [0]]) + 0 * step]
+        found = np.zeros((count, 2, len(self._values)))
+        for place, polynomial in enumerate(self._values):
+            total = np.zeros((2, count), dtype=np.int64)
+            for exponents, coefficient in polynomial:
+                while len(powers) <= exponents[-1]:
+                    a, b = powers[-1], step
+                    powers.append(np.stack([a[0] * b[0] + self._nu * a[1] % p * b[1], a[0] * b[1] + a[1] * b[0]]) % p)
+                term = np.full(count, coefficient)
+                for k, exponent in enumerate(exponents[:-1]):
+                    for _ in range(exponent):
+                        term = term * members[:, k] % p
+                total += term * powers[exponents[-1]] % p
+            found[:, :, place] = (total % p).T
+        return found
+
+
+def _walk(kernel: str) -> Any:
+    if kernel == "numba":
+        from kahanmaps.maps.residues.curve_kernel import kernel as compiled
+
+        return compiled()
+    return _walk_in_flint
+
+
+def _walk_in_flint(
+    start: Any, exponents: Any, layout: Any, values: Any, weights: Any, inverses: Any, p: float, nu: float, room: int,
+    degrees: Any,
+) -> None:  # fmt: skip
+    """What `walk` of curve_kernel.py does, without numba."""
+    modulus = fmpz_mod_poly_ctx(fmpz_mod_ctx(int(p)))([-int(nu), 0, 1])
+    field: Any = fq_default_ctx(modulus=modulus, var="w")
+    context: Any = fq_default_poly_ctx(field)
+
+    def polynomial(pairs: Any) -> Any:
+        return context([field([int(a), int(b)]) for a, b in pairs.T])
+
+    zero, one, power = context([]), context([1]), int(exponents[0].sum())
+    for m in range(len(start)):
+        X = [polynomial(entry) for entry in start[m]]
+        for step in range(degrees.shape[1]):
+            n = len(X) - 1
+            if n * power * max(entry.degree() for entry in X) + 1 > room:
+                break
+            rows: list[list[Any]] = [[None] * (n + 1) for _ in range(n)]
+            monomials = [prod((x**e for x, e in zip(X, row, strict=True)), start=one) for row in exponents.tolist()]
+            for i, j, k, place in layout:
+                term = monomials[k] * polynomial(values[m][:, place : place + 1])
+                rows[i][j] = term if rows[i][j] is None else rows[i][j] + term
+            image = [zero if minor is None else minor for minor in kernel_minors(rows)]
+            common = reduce(lambda a, b: a.gcd(b), image)
+            if common.is_zero():
+                degrees[m, step:] = NOWHERE
+                break
+            X = [entry // common for entry in image]
+            degrees[m, step] = max(entry.degree() for entry in X)

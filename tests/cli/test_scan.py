@@ -1,0 +1,106 @@
+"""kahanmaps scan: blocks of components, files of members, and what stops it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+import tomllib
+
+import pytest
+from cli_helpers import COMMAND
+
+QUICK = "henon_heiles --over c --primes 101,103,107 --terms 4"
+PLANE = """--rhs "x' = x*(x+2*y); y' = -y*((g+1)*x+g*y)" --over g --primes 101,103,107 --terms 4"""
+
+
+def test_blocks_say_degrees_growth_and_where(kahanmaps):
+    outcome = kahanmaps(f"scan {QUICK}")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert outcome.out.splitlines() == [
+        "# scan: henon_heiles over c, every eps (the time step is 2 eps)",
+        "in general\t3, 7, 17, 39",
+        "degrees\t3, 5, 9, 13\tquadratic growth, dynamical degree 1, explained",
+        "at c =\t-1",
+        "growth\tthat of one member; singularities were followed for 40 steps",
+        "tried\tall members with parameters modulo the primes: 101 modulo 101, 103 modulo 103, 107 modulo 107; found "
+        "are single points with numerators and denominators up to 72, and hypersurfaces of a degree up to 6, where one "
+        "of the first 4 degrees is smaller",
+        "left\tnone: every slow member that was seen is on a component",
+    ]
+
+
+def test_the_json_has_what_is_needed_to_run_it_again(kahanmaps):
+    found = kahanmaps(f"scan {QUICK} --seed 3 --json").json
+    assert (found["command"], found["over"], found["seed"], found["eps"]) == ("scan", ["c"], 3, "every")
+    assert found["document"]["name"] == "henon_heiles"
+    ((only,),) = [one["components"] for one in found["classes"]]
+    assert (only["equations"], only["values"], only["growth"]) == (["c + 1"], {"c": "-1"}, "quadratic")
+    assert (only["confirmed"], only["tried"], only["primes"]) == (3, 3, [101, 103, 107])
+    assert [one["seen"] for one in found["sweeps"]] == [101, 103, 107]
+
+
+def test_an_inline_system_need_not_declare_what_varies(kahanmaps, tmp_path):
+    folder = tmp_path / "cases"
+    outcome = kahanmaps(f"scan {PLANE} --write-to {folder}")
+    assert outcome.status == 0
+    assert "at g =\t1" in outcome.out.splitlines()
+    files = sorted(folder.iterdir())
+    values = {tomllib.loads(path.read_text())["parameters"]["g"] for path in files}
+    assert {"-2", "-1", "0", "1", "2"} <= values
+    assert outcome.err == f"{folder}: {len(files)} system files\n"
+    assert kahanmaps(f"degrees {files[0]} --terms 2").status == 0
+
+
+def test_members_are_printed_as_system_files(kahanmaps):
+    found = kahanmaps(f"scan {QUICK} --toml").out
+    assert found.startswith("# -1\n")
+    assert tomllib.loads(found)["parameters"] == {"c": "-1"}
+
+
+def test_verdicts_are_asked_for(kahanmaps):
+    assert "Integrable (proved)" in kahanmaps(f"scan {PLANE} --analyze 4").out
+    assert "verdict" not in kahanmaps(f"scan {PLANE}").out
+
+
+def test_the_time_may_be_over(kahanmaps):
+    outcome = kahanmaps(f"scan {QUICK} --seconds 1e-6")
+    assert outcome.status == 3
+    assert outcome.out.splitlines()[1] == "tried\tmembers modulo three primes are needed, those modulo 0 were tried"
+    assert outcome.err == "stopped early: the time was over after the members modulo 0 of the primes\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("henon_heiles", "Missing option '--over'"),
+        ("henon_heiles --over c,d", "found the symbol 'd', expected eps or a parameter of the system: c"),
+        ("henon_heiles --over ,", "found no parameter to scan over"),
+        ("henon_heiles --over c --primes 5,x", "expected primes separated by commas"),
+        ("henon_heiles --over c --primes 5,7", "expected three different ones or more"),
+        ("henon_heiles --over c --primes 5,7,9973", "expected an odd prime below 8192"),
+        ("henon_heiles --over c --terms 99", "expected 1 to 14"),
+        ("henon_heiles --over c --analyze -1", "expected a number of seconds above 0"),
+        ("henon_heiles --over c,eps --write-to here", "they hold no eps"),
+        ("henon_heiles --over c,eps --toml", "they hold no eps"),
+        ("henon_heiles --over c --toml --json", "not both"),
+        ("lyness --over a,eps", "expected a map that depends on it"),
+        ("henon_heiles --over c --jobs 0", "expected at least 1"),
+        ("paper_m2 --over c", "found the symbol 'c'"),
+    ],
+)
+def test_wrong_use_is_one_line(kahanmaps, options, message):
+    outcome = kahanmaps(f"scan {options}")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert message in outcome.err
+
+
+def test_ctrl_c_ends_it():
+    line = [*COMMAND, "scan", "henon_heiles", "--over", "c", "--primes", "8101,8111,8117", "--terms", "7"]
+    process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ})
+    time.sleep(3)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert "Traceback" not in err

@@ -1,0 +1,234 @@
+"""Scans find the conditions that are known, confirm them, and tell what was tried."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
+from kahanmaps.documents.symbols import map_with_symbols
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.laboratory.scan.growth import _goes_on
+from kahanmaps.laboratory.scan.result import Component
+from kahanmaps.laboratory.scan.scan import _confirmed, scan
+from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
+from kahanmaps.maps.residues import families
+
+THREE_LINES = """variables = ["x", "y"]
+parameters = { g1 = 1, g2 = 1 }
+[system]
+rhs = ["x*(g2*(x + y) + y)", "-y*(g1*(x + y) + x)"]"""
+LOTKA_VOLTERRA = """variables = ["x", "y", "z"]
+parameters = { A = 1, B = 1, C = 1 }
+[system]
+rhs = ["x*(C*y + z)", "y*(x + A*z)", "z*(B*x + y)"]"""
+DRESSING_CHAIN = """variables = ["x1", "x2", "x3"]
+parameters = { p = 0, q = 0, r = 0 }
+[system]
+rhs = ["x3^2 - x2^2 + p", "x1^2 - x3^2 + q", "x2^2 - x1^2 + r"]"""
+
+
+def slow(found, *kinds):
+    """The texts of the components whose growth is of these kinds."""
+    return {
+        one.text
+        for degrees, some in found.classes
+        for one in some
+        if any(o.growth and o.growth.growth in kinds for o in some)
+    }
+
+
+@pytest.fixture(scope="module")
+def three_lines():
+    return scan(parse_system(THREE_LINES), ["g1", "g2"], primes=(43, 47, 53), seed=1)
+
+
+def test_the_classification_of_three_lines_is_found(three_lines):
+    # zander-2021: the exponents (1, 1, 1), (1, 1, 2), (1, 2, 3), up to permutation and a factor
+    assert slow(three_lines, GrowthClass.QUADRATIC) == {
+        "(1, 1)",
+        *("(1, 2)", "(2, 1)", "(1/2, 1/2)"),
+        *("(2, 3)", "(3, 2)", "(1/2, 3/2)", "(3/2, 1/2)", "(1/3, 2/3)", "(2/3, 1/3)"),
+    }
+
+
+def test_linear_cases_and_the_degenerate_line_are_found(three_lines):
+    linear = slow(three_lines, GrowthClass.LINEAR)
+    assert linear == {"(0, 1)", "(1, 0)", "g1 + 1 = 0", "g2 + 1 = 0", "g1 + g2 = 0"}
+    assert "g1 + g2 + 1 = 0" in slow(three_lines, GrowthClass.BOUNDED)
+
+
+def test_special_points_of_a_curve_are_found_on_it(three_lines):
+    line = next(one for one in three_lines.components if one.text == "g1 + 1 = 0")
+    point = next(one for one in three_lines.components if one.text == "(-1, 2)")
+    assert line.contains(list(point.values.values()))
+    assert point.degrees[-1] < line.degrees[-1]
+
+
+def test_everything_is_confirmed_and_nothing_is_left(three_lines):
+    assert all(one.is_confirmed and one.tried == 3 for one in three_lines.components)
+    assert three_lines.left == (0, 0, 0)
+    assert three_lines.symmetric == (("g1", "g2"),)
+    assert three_lines.height == 31
+    assert "up to 31" in three_lines.coverage
+
+
+def test_a_member_of_a_component_is_a_system_of_its_own(three_lines):
+    point = next(one for one in three_lines.components if one.text == "(2, 3)")
+    member = three_lines.member(point)
+    assert (member.parameters["g1"], member.parameters["g2"]) == (2, 3)
+    assert member.name == "system at g1 = 2, g2 = 3"
+    with pytest.raises(InputError, match="no rational member"):
+        three_lines.member(replace(point, values=None))
+
+
+def test_a_wrong_condition_is_not_confirmed():
+    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
+    g1, g2 = ring(["g1", "g2"]).gens()
+    good = Component((g1 + g2 - 1,), 1, (2, 4, 7, 12, 20, 33, 54), (43, 47, 53))
+    wrong = replace(good, equations=(g1 + g2 - 7,))
+    found = [_confirmed(one, ["g1", "g2"], map_, None, [], random.Random(1)) for one in (good, wrong)]
+    assert [(one.confirmed, one.tried, one.is_confirmed) for one in found] == [(3, 3, True), (0, 3, False)]
+
+
+def test_one_member_speaks_for_others_only_as_long_as_their_degrees_agree(three_lines):
+    points = {one.text: one for one in three_lines.components}
+    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
+    known = points["(2, 3)"].growth
+    assert _goes_on(points["(3, 2)"], known, map_, None, 0)
+    # as if the first degrees of two components were the same and the further ones were not
+    assert not _goes_on(points["(1, 2)"], known, map_, None, 0)
+    assert not _goes_on(points["(3, 2)"], None, map_, None, 0)
+
+
+def test_the_conditions_of_lotka_volterra_in_space_are_found():
+    found = scan(parse_system(LOTKA_VOLTERRA), ["A", "B", "C"], primes=(17, 19, 23), terms=3)
+    conditions = {one.text: one for one in found.components}
+    assert conditions["A*B*C + 1 = 0"].degrees == (3, 7, 15)
+    # the curves in it on which the map is integrable
+    for one in ("A*B + 1 = 0, C - 1 = 0", "B*C + 1 = 0, A - 1 = 0", "A*C + 1 = 0, B - 1 = 0"):
+        assert conditions[one].growth.growth is GrowthClass.QUADRATIC
+        assert conditions[one].dimension == 1
+    assert found.left == (0, 0, 0)
+
+
+def test_the_condition_of_the_dressing_chain_is_found():
+    found = scan(parse_system(DRESSING_CHAIN), ["p", "q", "r"], primes=(11, 13, 17), terms=4)
+    assert slow(found, GrowthClass.QUADRATIC) == {"p + q + r = 0"}
+
+
+def test_henon_heiles_keeps_one_case_of_three():
+    found = scan(load("henon_heiles"), ["c"], primes=(101, 103, 107))
+    assert [one.text for one in found.components] == ["-1"]
+    assert found.components[0].growth.growth is GrowthClass.QUADRATIC
+
+
+def test_a_scan_needs_no_numba(monkeypatch):
+    asked = {"primes": (31, 37, 41), "terms": 3}
+    compiled = scan(load("henon_heiles"), ["c"], **asked)
+    monkeypatch.setattr(families, "choose_kernel", lambda kernel, long: "numpy")
+    slow = scan(load("henon_heiles"), ["c"], **asked)
+    assert (slow.text, slow.sweeps) == (compiled.text, compiled.sweeps)
+
+
+def test_one_eps_may_have_more_slow_members_than_every_eps():
+    found = scan(load("henon_heiles"), ["c"], primes=(31, 37, 41), eps=1, terms=3)
+    assert found.generic[1] < 7  # at eps = 1 the fourth iterate is the identity, whatever c is
+
+
+def test_points_over_quadratic_fields_have_their_minimal_polynomial():
+    text = """variables = ["x", "y"]
+    parameters = { a = 1 }
+    [system]
+    rhs = ["x*(x + 2*y)", "-y*(a^2*x + (a^2 - 1)*y)"]"""
+    found = scan(parse_system(text), ["a"], terms=5)
+    quadratic = {one.text: one for one in found.components if one.growth and one.growth.growth is GrowthClass.QUADRATIC}
+    assert set(quadratic) == {"a^2 - 2 = 0", "a^2 - 3 = 0"}  # g = a^2 - 1 is 1 and 2
+    assert all(one.is_confirmed and one.values is None for one in quadratic.values())
+    assert quadratic["a^2 - 2 = 0"].growth.degrees[:8] == (1, 2, 4, 8, 13, 20, 28, 38)
+    assert "where\ta^2 - 2 = 0" in found.text.splitlines()
+    assert any(one.text == "a^2 + 1 = 0" for one in found.components)  # where the primes are 1 modulo 4
+    assert found.left == (0,) * 10
+
+
+REPAIRED = """variables = ["x", "y"]
+parameters = { A = 1 }
+[system]
+rhs = ["2*x*y", "A*y^2 - 4*x^2 - 6*x - 6"]"""
+
+
+def test_a_condition_with_eps_is_found_where_eps_varies_too():
+    found = scan(parse_system(REPAIRED), ["eps", "A"], primes=(43, 47, 53), terms=5)
+    assert found.over == ("A", "eps")
+    # the catalogue's repaired_octahedral
+    one = next(one for one in found.components if one.text == "24*eps^2 + A + 2 = 0")
+    assert one.is_confirmed
+    assert one.growth.growth is GrowthClass.QUADRATIC
+    assert one.values["A"] == -2 - 24 * one.values["eps"] ** 2
+    without = scan(parse_system(REPAIRED), ["A"], primes=(43, 47, 53), terms=5)
+    assert [one.text for one in without.components] == ["-1"]  # the one that holds for every eps
+
+
+def test_more_parameters_than_can_be_tried_give_hypersurfaces():
+    text = LOTKA_VOLTERRA.replace("C = 1", "C = 1, D = 1").replace("x + A*z", "D*x + A*z")
+    found = scan(parse_system(text), ["A", "B", "C", "D"], primes=(61, 67, 71), terms=3)
+    assert not found.complete
+    assert "A*B*C + D = 0" in {one.text for one in found.components if one.is_confirmed}
+    assert "found are only hypersurfaces" in found.coverage
+
+
+def test_a_family_without_special_members_says_so():
+    found = scan(parse_system('variables = ["x"]\nparameters.a = 1\n[system]\nrhs = ["x^2 + a^2 + 1"]'), ["a"])
+    assert found.components == ()
+    assert "found\tno condition" in found.text
+
+
+def test_the_time_may_be_over_before_anything_is_known():
+    found = scan(load("henon_heiles"), ["c"], seconds=1e-6)
+    assert (found.ended, found.components, found.height) == ("time", (), 0)
+    with pytest.raises(TimeOver):
+        sweep(map_with_symbols(load("henon_heiles"), ["c"]), 1, 31, None, 2, 99, deadline=0.0)
+
+
+def test_a_sweep_is_the_same_for_the_same_seed_and_generic_members_are_not_slow():
+    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
+    found = [sweep(map_, 2, 13, None, 5, 99, seed=seed) for seed in ("a", "a", "b")]
+    assert found[0] == found[1]
+    assert found[0].classes == found[2].classes  # lines in special position were replaced
+    assert found[0].accidents > 0  # of which there are some modulo 13
+    assert found[0].generic not in found[0].classes
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"over": []}, "no parameter"),
+        ({"over": ["d"]}, "found the symbol 'd'"),
+        ({"eps": 0}, "found eps = 0"),
+        ({"over": ["c", "eps"], "eps": 1}, "found eps both"),
+        ({"primes": (31, 37)}, "three different ones"),
+        ({"primes": (31, 37, 39)}, "three different ones"),
+        ({"terms": 0}, "expected 1 to 14"),
+        ({"terms": 14}, "too large to be scanned"),
+        ({"jobs": 0}, "expected at least 1"),
+    ],
+)
+def test_what_cannot_be_scanned_is_refused(change, message):
+    options = {"over": ["c"], **change}
+    with pytest.raises(InputError, match=message):
+        scan(load("henon_heiles"), options.pop("over"), **options)
+
+
+def test_an_analysis_of_members_gives_verdicts():
+    text = THREE_LINES.replace("g2 = 1", "g2 = 2")
+    found = scan(parse_system(text), ["g1"], primes=(101, 103, 107), terms=4, analysis=4)
+    verdicts = {one.values["g1"]: one.verdict for one in found.components}
+    assert verdicts[fmpq(1)].kind == verdicts[fmpq(3)].kind == "integrable"
+    assert verdicts[fmpq(1)].ground == "proved"
+    assert "g1 = 1: Integrable (proved)" in found.text

@@ -1,0 +1,142 @@
+"""Points modulo primes become affine subspaces, hypersurfaces and single points, and these conditions over Q."""
+
+from __future__ import annotations
+
+import random
+from itertools import product
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.laboratory.scan.lift import height_bound, lifted_conjugates, lifted_flats, lifted_forms
+from kahanmaps.laboratory.scan.members import point_on
+from kahanmaps.laboratory.scan.pieces import pieces
+
+PRIMES = (31, 37, 41)
+
+
+def points_where(condition, p, count):
+    return [x for x in product(range(p), repeat=count) if condition(*x) % p == 0]
+
+
+def found_in(points, p, count, seed=0):
+    return pieces(points, p, p**count, True, random.Random(seed))
+
+
+def test_two_lines_and_points_beside_them_are_told_apart():
+    points = points_where(lambda a, b: (a - 3 * b) * (a + b - 1), 31, 2)
+    found = found_in([*points, (5, 0), (7, 1)], 31, 2)
+    assert set(found.flats[1]) == {((1, 28, 0),), ((1, 1, 30),)}
+    assert set(found.flats[0]) == {((1, 0, 26), (0, 1, 0)), ((1, 0, 24), (0, 1, 30))}
+    assert not found.forms
+
+
+def test_a_curve_is_found_among_points_by_chance():
+    rng = random.Random(1)
+    noise = [(rng.randrange(31), rng.randrange(31)) for _ in range(4)]
+    points = points_where(lambda a, b: a * a + b * b - 1, 31, 2)
+    found = found_in([*points, *noise], 31, 2)
+    assert len(found.forms[()]) == 1
+    assert len(found.flats[0]) == len(set(noise) - set(points))
+
+
+def test_points_by_chance_are_no_curve():
+    rng = random.Random(2)
+    points = list({(rng.randrange(31), rng.randrange(31)) for _ in range(40)})
+    found = found_in(points, 31, 2)
+    assert not found.forms
+    assert not found.flats.get(1)
+    assert len(found.flats[0]) == len(points)
+
+
+def test_a_curve_in_a_plane_of_space_is_found():
+    points = [x for x in product(range(31), repeat=3) if x[0] == 1 and (x[1] * x[2] + 1) % 31 == 0]
+    found = found_in(points, 31, 3)
+    assert list(found.forms) == [((1, 0, 0, 30),)]
+    assert not found.flats.get(0)
+
+
+def test_a_surface_and_a_line_of_space_are_found():
+    points = {*points_where(lambda a, b, c: a * b * c + 1, 19, 3), *((t, 2, 3) for t in range(19))}
+    found = found_in(sorted(points), 19, 3)
+    assert len(found.forms[()]) == 1
+    assert found.flats[1] == [((0, 1, 0, 17), (0, 0, 1, 16))]
+
+
+def test_three_hyperplanes_of_a_space_of_dimension_6_are_told_apart():
+    rng = random.Random(3)
+    points = [tuple(0 if i == k else rng.randrange(1, 79) for i in range(6)) for k in range(3) for _ in range(150)]
+    found = pieces(points, 79, 79 * 150, False, random.Random(0))
+    assert sorted(found.flats[5]) == [(tuple(int(i == k) for i in range(7)),) for k in (2, 1, 0)]
+
+
+def test_single_points_are_not_looked_for_where_not_all_members_were_tried():
+    found = pieces([(1, 2, 3, 4)], 31, 31 * 40, False, random.Random(0))
+    assert (found.flats, found.left) == ({}, 1)
+
+
+def test_what_is_not_there_modulo_the_third_prime_is_not_lifted():
+    point = {p: [((1, p - 2),)] for p in PRIMES}
+    assert list(lifted_flats(point)) == [((fmpq(1), fmpq(-2)),)]
+    assert lifted_flats({**point, 41: [((1, 41 - 3),)]}) == {}
+
+
+def test_a_point_of_low_height_may_be_missing_modulo_one_of_four_primes():
+    low = {p: [((1, p - 2),)] for p in PRIMES}
+    assert lifted_flats({**low, 43: [((1, 5),)]}) == {((fmpq(1), fmpq(-2)),): PRIMES}
+    high = {p: [((1, p - 15),)] for p in PRIMES}
+    assert lifted_flats({**high, 43: [((1, 5),)]}) == {}
+
+
+def roots(p, c):
+    return [[t] for t in range(p) if (t * t - c) % p == 0]
+
+
+@pytest.mark.parametrize(("c", "expected"), [(5, {((0, -5),)}), (4, {}), (-1, {((0, 1),)})])
+def test_conjugate_points_are_told_from_rational_ones(c, expected):
+    primes = (11, 13, 17, 19, 29, 31, 37, 41)
+    assert set(lifted_conjugates({p: roots(p, c) for p in primes}, 1)) == set(expected)
+
+
+def test_conjugate_points_have_to_be_there_modulo_all_primes_that_split():
+    found = {p: roots(p, 5) for p in (11, 13, 17, 19, 29, 31, 37, 41)}
+    assert lifted_conjugates({**found, 29: [[7], [9]], 31: []}, 1) == {}  # one is let off
+    assert lifted_conjugates({**found, 13: [[7], [9]]}, 1) != {}  # 5 is no square modulo 13
+
+
+def test_conjugate_points_of_a_plane_are_on_a_rational_line():
+    found = {p: [[t, (2 * t + 1) % p] for (t,) in roots(p, 5)] for p in (11, 19, 29, 31, 41)}
+    assert lifted_conjugates(found, 2) == {((fmpq(1), fmpq(-1, 2), fmpq(1, 2)), (-2, -19)): (11, 19, 29, 31, 41)}
+
+
+def test_the_height_bound_is_that_of_two_primes():
+    assert height_bound((53, 59, 61)) == 39
+    assert 2 * 39**2 < 53 * 59 <= 2 * 40**2
+
+
+@pytest.mark.parametrize("spoilt", [False, True])
+def test_a_product_is_factored_and_has_to_agree_modulo_the_last_prime(spoilt):
+    expected = {"a^2 + 2*b^2 - 3", "a*b - 2"}
+    forms = {}
+    for p in PRIMES:
+        both = [[-3 % p, 0, 0, 1, 0, 2], [-2 % p, 0, 0, 0, 1, 0]]
+        forms[p] = [[-4 % p, 0, 0, 1, 0, 2], both[1]] if spoilt and p == 41 else both
+    found = {str(form) for form, _ in lifted_forms(forms, ["a", "b"])}
+    assert found == (set() if spoilt else expected)
+
+
+@pytest.mark.parametrize("field", [QQ, GF(2**61 - 1)])
+def test_members_on_a_component_are_on_it(field):
+    a, b, c = ring(["a", "b", "c"]).gens()
+    one = ring(["a", "b", "c"]).constant(1)
+    x = point_on([b * c + one, a - 2 * b + one], 3, field, random.Random(1))
+    assert x[1] * x[2] + field.one == field.zero
+    assert x[0] - x[1] - x[1] + field.one == field.zero
+    assert len({point_on([a * b * c + one], 3, field, random.Random(k)) for k in range(5)}) == 5
+
+
+def test_a_curve_without_rational_points_has_no_rational_member():
+    a, b = ring(["a", "b"]).gens()
+    assert point_on([a**2 + b**2 - 3], 2, QQ, random.Random(1)) is None

@@ -1,0 +1,125 @@
+"""Degrees of many members of a family modulo a small prime: compiled, by FLINT, and by the lines of `degrees`."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
+from kahanmaps.documents.symbols import map_with_symbols
+from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.laboratory.growth.curves import Line
+from kahanmaps.maps.residues.families import NOWHERE, TOO_LARGE, Family
+
+THREE_LINES = """variables = ["x", "y"]
+parameters = { g1 = 1, g2 = 1 }
+[system]
+rhs = ["x*(g2*(x + y) + y)", "-y*(g1*(x + y) + x)"]"""
+LOTKA_VOLTERRA = """variables = ["x", "y", "z"]
+parameters = { A = 1, B = 1, C = 1 }
+[system]
+rhs = ["x*(C*y + z)", "y*(x + A*z)", "z*(B*x + y)"]"""
+LYNESS = """variables = ["x", "y"]
+parameters = { a = 1, b = 1 }
+[map]
+image = ["y", "(a + b*y^2 + y)/x"]"""
+CASES = [
+    (THREE_LINES, ["g1", "g2"], 6, 67),
+    (LOTKA_VOLTERRA, ["A", "B", "C"], 3, 23),
+    (LYNESS, ["a", "b"], 5, 31),  # an equation of degree 2 in the point
+]
+
+
+def family(text: str, names: list[str], prime: int) -> Family:
+    return Family(map_with_symbols(parse_system(text), names), prime)
+
+
+def members(count: int, prime: int, size: int = 40) -> np.ndarray:
+    return np.array([[random.Random(k).randrange(prime) for k in range(i, i + count)] for i in range(size)])
+
+
+@pytest.mark.parametrize(("text", "names", "terms", "prime"), CASES)
+def test_the_compiled_loop_and_flint_give_the_same_degrees_on_the_same_lines(text, names, terms, prime):
+    pytest.importorskip("numba")
+    one = family(text, names, prime)
+    points = members(len(names), prime)
+    found = [one.degrees(points, None, terms, 400, random.Random(3), kernel=kernel) for kernel in ("numba", "numpy")]
+    assert (found[0] == found[1]).all()
+    assert len({tuple(row) for row in found[0].tolist()}) > 1  # members are told from each other
+
+
+@pytest.mark.parametrize(("text", "names", "terms", "prime"), CASES)
+def test_the_largest_of_several_lines_is_what_lines_over_a_large_field_give(text, names, terms, prime):
+    map_, values = map_with_symbols(parse_system(text), names), [2, 3, 5][: len(names)]
+    one = Family(map_, 1009)
+    found = np.max([one.degrees(np.array([values]), None, terms, 400, random.Random(k)) for k in range(3)], axis=0)
+    field = GF(2**61 - 1)
+    rng = random.Random(1)
+    line = Line(map_.at(field.random(rng), field, [field.convert(n) for n in values]), rng, math.inf, 10**6)
+    expected = []
+    for _ in range(terms):
+        line.step(1000)
+        expected.append(line.degree)
+    assert found.tolist() == [expected]
+
+
+def test_special_members_have_smaller_degrees():
+    points = np.array([[1, 1], [1, 2], [2, 3], [5, 6], [3, 12]])
+    found = np.max(
+        [family(THREE_LINES, ["g1", "g2"], 8179).degrees(points, None, 7, 300, random.Random(k)) for k in (1, 2)],
+        axis=0,
+    )
+    assert found.tolist() == [
+        [2, 4, 8, 13, 20, 28, 38],  # zander-2021
+        [2, 4, 7, 12, 18, 25, 34],
+        [2, 4, 7, 11, 16, 23, 31],
+        [2, 4, 7, 12, 20, 33, 54],
+        [2, 4, 8, 16, 32, 64, 128],
+    ]
+
+
+def test_threads_change_nothing():
+    one = family(THREE_LINES, ["g1", "g2"], 53)
+    points = members(2, 53, 300)
+    assert (
+        one.degrees(points, None, 4, 99, random.Random(1), jobs=3) == one.degrees(points, None, 4, 99, random.Random(1))
+    ).all()
+
+
+@pytest.mark.parametrize("kernel", ["numba", "numpy"])
+def test_a_line_ends_where_there_is_no_room(kernel):
+    if kernel == "numba":
+        pytest.importorskip("numba")
+    found = family(THREE_LINES, ["g1", "g2"], 101).degrees(
+        np.array([[3, 12]]), None, 5, 17, random.Random(1), kernel=kernel
+    )
+    assert found.tolist() == [[2, 4, 8, 16, TOO_LARGE]]  # the fifth needs 33 coefficients, the fourth 17
+
+
+@pytest.mark.parametrize("kernel", ["numba", "numpy"])
+def test_an_iterate_that_exists_nowhere_is_told(kernel):
+    if kernel == "numba":
+        pytest.importorskip("numba")
+    vanishing = 'variables = ["x"]\nparameters.a = 1\n[bilinear]\nequations = ["a*(X - x) = eps*a*x*X"]'
+    found = family(vanishing, ["a"], 13).degrees(np.array([[2], [0]]), None, 2, 99, random.Random(1), kernel=kernel)
+    assert found.tolist() == [[1, 1], [NOWHERE, NOWHERE]]
+
+
+def test_eps_may_be_a_number():
+    hh = Family(map_with_symbols(load("henon_heiles"), ["c"]), 101)
+    found = hh.degrees(np.array([[4]]), 1, 4, 99, random.Random(1))
+    assert found.tolist()[0][3] == 1  # at eps = 1 the fourth iterate is the identity
+
+
+def test_what_is_out_of_range_is_refused():
+    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
+    for prime in (2, 15, 8191 * 3, 8209):
+        with pytest.raises(InputError, match="expected an odd prime below 8192"):
+            Family(map_, prime)
+    with pytest.raises(BadPrime):
+        Family(map_with_symbols(parse_system(THREE_LINES.replace("+ x)", "+ x/7)")), ["g1"]), 7)

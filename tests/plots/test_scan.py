@@ -1,0 +1,54 @@
+"""The plane of two parameters: curves and points of a scan, a colour for each block."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.scan.scan import scan
+from kahanmaps.plots.scan import draw_scan
+
+PLANE = """variables = ["x", "y"]
+parameters = { a = 1, b = 1 }
+[system]
+rhs = ["x*(a*x + y)", "y*(x + b*y)"]"""
+
+
+@pytest.fixture(scope="module")
+def found():
+    return scan(parse_system(PLANE), ["a", "b"], terms=4, primes=[23, 29, 31])
+
+
+def of_growth(found, kind):
+    """The components of the blocks with this growth."""
+    return [one for _, some in found.classes for one in some if any(o.growth and o.growth.growth == kind for o in some)]
+
+
+def test_marks_are_the_points_of_each_kind_of_growth(found):
+    figure = draw_scan(found)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts[:3] == ["bounded growth", "linear growth", "quadratic growth"]
+    for text, line in zip(texts, figure.axes[0].lines, strict=True):
+        points = [one for one in of_growth(found, text.split()[0]) if one.dimension == 0]
+        assert sorted(line.get_xdata()) == sorted(int(one.values["a"].p) / int(one.values["a"].q) for one in points)
+
+
+def test_curves_are_the_zeros_of_the_conditions(found):
+    [axes] = draw_scan(found, window=((-2.0, 2.0), (-2.0, 2.0))).axes
+    a, b = np.concatenate(axes.collections[1].get_segments()).T  # those of linear growth
+    assert len(a) > 50
+    assert np.abs(2 * a * b - a - b).max() < 1e-9
+    assert (axes.get_xlim(), axes.get_xlabel()) == ((-2.0, 2.0), "$a$")
+
+
+def test_a_plane_is_drawn_and_nothing_else():
+    with pytest.raises(InputError, match="expected two parameters"):
+        draw_scan(scan(load("henon_heiles"), ["c"], terms=2, primes=[5, 7, 11]))
+
+
+def test_a_scan_without_conditions_is_an_empty_plane():
+    none = scan(parse_system(PLANE), ["a", "b"], terms=1, primes=[5, 7, 11], seconds=1e-6)
+    assert draw_scan(none).legends == []
