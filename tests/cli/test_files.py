@@ -79,6 +79,7 @@ READS = {
             "stored": "plot portrait --from IN --format svg",
         },
     ),
+    "plot scan": (".svg", {"system": "plot scan IN --over w,eps --primes 11,13,17 --terms 1"}),
     "plot batch": (".svg", {"database": "plot batch IN", "db": "plot batch --db IN"}),
 }
 # Made before each test: what is in the file, by the name of what takes it.

@@ -126,7 +126,7 @@ def test_a_density_of_the_flow(kahanmaps):
         ("euler_top --toml --latex", "give one of --toml, --latex and --json"),
         ("--vars x,y --rhs x/a --rhs x -p a=1 --symbolic a", "a division by something with variables in it"),
         ("", "missing SYSTEM"),
-        ("lyness --flow", "found an explicit map, expected a quadratic vector field"),
+        ("lyness --flow", "found an explicit map, expected a polynomial vector field"),
         ("lotka_volterra --flow --toml", "--flow goes without --toml"),
     ],
 )

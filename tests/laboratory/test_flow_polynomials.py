@@ -156,7 +156,7 @@ def test_a_constant_cofactor_gives_an_integral_that_depends_on_time():
     assert ("proved", "Darboux polynomials of the flow, apart from affine ones: x^2 - 20*z") in beside.lines()
     assert ("proved", "T1 = exp(20*t)*(x^2 - 20*z) is an integral of the flow that depends on time") in beside.lines()
     [told] = [text for _, text in beside.lines() if text.startswith("no other Darboux")]
-    assert told == "no other Darboux polynomial of the flow shows up to degree 3"
+    assert told == "no other Darboux polynomial of the flow shows up to degree 3 but those of integrals"
 
 
 def test_symbols_stay_in_them():

@@ -144,9 +144,9 @@ class FlowAndMap:
             text = f"{timed.name} = {timed.text} is an integral of the flow that depends on time"
             found.append((str(timed.integral.verdict), text))
         if self.polynomials_degree > 1:
-            which = "no other Darboux polynomial of the flow"
-            which = which if self.polynomials else "no Darboux polynomial of the flow but affine ones"
-            found.append(("measured", f"{which} shows up to degree {self.polynomials_degree}"))
+            which, but = ("other ", "") if self.polynomials else ("", "affine ones and ")
+            shown = f"no {which}Darboux polynomial of the flow shows up to degree {self.polynomials_degree}"
+            found.append(("measured", f"{shown} but {but}those of integrals"))
         return found
 
     def to_json(self) -> dict[str, Any]:
