@@ -1,15 +1,16 @@
-"""The curves P = c Q on which a planar map with the integral P/Q moves: their genus and what points they share.
+"""The curves P = c Q on which a planar map with the integral P/Q moves: their genus, and the points that all have.
 
-All is modulo a prime, where eps is a residue, and in random projective coordinates. A member of the pencil through a
-random point has one component there, a curve C; that it is irreducible over GF(p) and has the point as a smooth one
-makes it so over the closure. Where curves fall into several components these are a pencil as well (lueroth-stein), and
-are taken instead. Two such curves C, C' of degree d meet in the base points only, and outside of these C is smooth
-(bertini). The resultant gives each with its number of intersections; where this may be more than 1 = m^2, m the
-multiplicity, the point is blown up again and again until the curves meet no more. Then
+All is computed modulo a prime, where a residue stands for eps, in random projective coordinates. A curve C is the
+component through a random point of the curve of the pencil there: it is irreducible over GF(p), and the point is
+smooth on it, so that it is irreducible over the closure. Where curves of the pencil have several components these are
+a pencil as well, and are taken instead. Two such curves of degree d meet in the base points only, and outside of them
+both are smooth, by Bertini's theorem (hartshorne-1977, III.10). The resultant tells how often they meet in each. Where
+that may be more than the square of the multiplicity m the point is blown up, and so are those infinitely near to it,
+until the curves are apart. Then (hartshorne-1977, V.3)
 
     sum m_i^2 = d^2,        genus = (d - 1)(d - 2)/2 - sum m_i (m_i - 1)/2.
 
-Nothing is said where the first of these fails, or where two primes disagree.
+Nothing is said where the first of these fails, or where primes disagree.
 """
 
 from __future__ import annotations
@@ -36,6 +37,8 @@ from kahanmaps.laboratory.singular.jets import modulo
 MAX_DEGREE = 12
 _TRIES = 3
 _BITS = 31  # of primes: FLINT's Python cannot sort several factors with larger coefficients
+# Of the degrees of a planar map of infinite order that keeps all curves of a pencil, by genus: diller-favre-2001.
+GROWTH_ON = {0: GrowthClass.LINEAR, 1: GrowthClass.QUADRATIC}
 _Local = dict[tuple[int, int], Any]  # a power series in x, y at a point, its coefficients by exponents
 
 
@@ -73,29 +76,31 @@ class Pencil:
 
     @property
     def text(self) -> str:
-        """The whole in one sentence."""
-        several = "" if self.components == 1 else f" have {self.components} components, which"
+        """All of it in a line."""
+        kind = "is" if self.components == 1 else f"has {self.components} components"
         points = ", ".join(points.text for points in self.base_points)
         return (
-            f"the curves {self.integral} = c{several} are of degree {self.degree} and genus {self.genus}, "
-            f"with base points: {points}"
+            f"the generic curve {self.integral} = c {kind} of degree {self.degree} and genus {self.genus}; "
+            f"base points: {points}"
         )
 
     def motion(self, growth: GrowthClass) -> str:
-        """What the map is on these curves, for that growth of its degrees; empty where that does not follow."""
+        """What the map is on these curves, given how its degrees grow; empty where nothing follows.
+
+        An automorphism of a curve of genus 1 is a translation or has finite order.
+        """
         if self.genus > 1:
-            return "the map has finite order, as it has on each curve of such a genus"
+            return "the map has finite order, for on such a curve there are finitely many automorphisms"
         if self.genus == 1 and growth is GrowthClass.QUADRATIC:
-            who = "the map" if self.components == 1 else "an iterate of the map"
-            return f"{who} is a translation on each of these curves: all else has finite order there"
+            who = "on it the map" if self.components == 1 else "on each of them an iterate of the map"
+            return f"{who} is a translation, for the degrees grow"
         return ""
 
     def against(self, growth: GrowthClass) -> str:
-        """Why that growth of the degrees is impossible here; empty where it is not."""
-        possible = {0: GrowthClass.LINEAR, 1: GrowthClass.QUADRATIC}.get(self.genus)
-        if growth in (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL) and growth is not possible:
-            return f"on curves of genus {self.genus} the degrees cannot grow as they seem to"
-        return ""
+        """Why the degrees cannot grow so; empty where they can."""
+        grows = growth in (GrowthClass.LINEAR, GrowthClass.QUADRATIC, GrowthClass.POLYNOMIAL)
+        possible = not grows or growth is GROWTH_ON.get(self.genus)
+        return "" if possible else f"{growth} growth is impossible where the generic curve has genus {self.genus}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -122,24 +127,23 @@ def pencil_of(
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> found = pencil_of("I", parse_rational_function("y^2 - x^3 - x", ["x", "y", "eps"]), None)
     >>> found.text
-    'the curves I = c are of degree 3 and genus 1, with base points: 9 of multiplicity 1 (8 infinitely near)'
+    'the generic curve I = c is of degree 3 and genus 1; base points: 9 of multiplicity 1 (8 infinitely near)'
     """
     if max(degree_in(part, 2) for part in (integral.numerator, integral.denominator)) > MAX_DEGREE:
         return None
     rng = random.Random(f"pencil {seed_for(seed, integral, eps)}")
     deadline = time.monotonic() + seconds
     found: list[Pencil] = []
-    for _ in range(_TRIES):
+    while len(found) < _TRIES and time.monotonic() < deadline:
         try:
             field = GF(random_prime(rng, _BITS))
             residue = field.random(rng) if eps is None else field.convert(eps)
-            found.append(_Reduced(field, rng, deadline).pencil(name, integral, int(residue)))
-        except BadPrime:
+            pencil = _Reduced(field, rng, deadline).pencil(name, integral, int(residue))
+        except (BadPrime, _Unclear):
             continue
-        except _Unclear:
-            return None
-        if len(found) == 2:
-            return found[0] if found[0] == found[1] else None
+        if pencil in found:
+            return pencil
+        found.append(pencil)
     return None
 
 
@@ -156,9 +160,8 @@ class _Reduced:
     """The plane modulo a prime, in random coordinates; `points` counts base points by (multiplicity, whether near)."""
 
     def __init__(self, field: PrimeField, rng: random.Random, deadline: float) -> None:
-        self.field, self.prime, self.deadline = field, field.prime, deadline
+        self.field, self.prime, self._rng, self._deadline = field, field.prime, rng, deadline
         self.ring = nmod_mpoly_ctx.get(("x", "y"), modulus=self.prime, ordering=Ordering.degrevlex)
-        self.random = lambda: rng.randrange(1, self.prime)
         self.points: Counter[tuple[int, bool]] = Counter()
 
     def pencil(self, name: str, integral: RationalFunction, eps: int) -> Pencil:
@@ -174,8 +177,13 @@ class _Reduced:
         _require(sum(count * m * m for (m, _), count in self.points.items()) == d * d)
         loss = sum(count * m * (m - 1) // 2 for (m, _), count in self.points.items())
         multiplicities = sorted({m for m, _ in self.points}, reverse=True)
-        points = (BasePoints(m, self.points[m, False] + self.points[m, True], self.points[m, True]) for m in multiplicities)
+        points = (
+            BasePoints(m, self.points[m, False] + self.points[m, True], self.points[m, True]) for m in multiplicities
+        )
         return Pencil(name, components, d, (d - 1) * (d - 2) // 2 - loss, tuple(points))
+
+    def _random(self) -> int:
+        return self._rng.randrange(1, self.prime)
 
     def _in_random_coordinates(self, forms: Sequence[Any], eps: int) -> list[nmod_mpoly]:
         """Polynomials in (x, y, eps) made homogeneous, all of the same degree, and affine forms put for x, y and z."""
@@ -183,14 +191,15 @@ class _Reduced:
         flat = [modulo(f, self.field).compose(x, y, self.ring.constant(eps), ctx=self.ring) for f in forms]
         d = int(max(f.total_degree() for f in flat))
         X, Y, Z = (
-            [line**k for k in range(d + 1)] for line in (x * self.random() + y * self.random() + self.random() for _ in "xyz")
+            [line**k for k in range(d + 1)]
+            for line in (x * self._random() + y * self._random() + self._random() for _ in "xyz")
         )
         zero = self.ring.constant(0)
         return [sum((X[i] * Y[j] * Z[d - i - j] * int(c) for (i, j), c in f.terms()), zero) for f in flat]
 
     def _component(self, P: nmod_mpoly, Q: nmod_mpoly) -> nmod_mpoly:
         """That of the member through a random point on which the point is: irreducible over the closure of GF(p)."""
-        at = [self.random(), self.random()]
+        at = [self._random(), self._random()]
         member = P * int(Q(*at)) - Q * int(P(*at))
         _require(not member.is_zero())
         through = [(C, e) for C, e in member.factor()[1] if not int(C(*at))]
@@ -215,7 +224,7 @@ class _Reduced:
             k = int(common.degree())
             _require(k > 0)
             b = -common[k - 1] / K(k)
-            _require(common == fq_default_poly_ctx(K)([-b, 1]) ** k)  # in random coordinates one point to each a
+            _require(common == _polynomial(K, [-b, 1]) ** k)  # in random coordinates one point to each a
             local = [_moved({(i, j): K(int(c)) for (i, j), c in F.terms()}, a, b, int(number)) for F in (C, D)]
             self._resolve(K, local[0], local[1], int(number), exact=True, near=False)
 
@@ -223,12 +232,12 @@ class _Reduced:
         self.points[1, near] += conjugates
         self.points[1, True] += conjugates * (chain - 1)
 
-    def _resolve(self, K: fq_default_ctx, f: _Local, g: _Local, most: int, *, exact: bool, near: bool) -> None:
+    def _resolve(self, K: Any, f: _Local, g: _Local, most: int, *, exact: bool, near: bool) -> None:
         """Count a point over K that two curves may share, and those infinitely near to it.
 
         The curves meet there at most `most` times, or `exact`ly so often: terms of a higher degree make no difference.
         """
-        _require(time.monotonic() < self.deadline)
+        _require(time.monotonic() < self._deadline)
         m = min(map(sum, f), default=most + 1)
         _require(m == min(map(sum, g), default=most + 1) and m * m <= most)
         if m == 0:
@@ -239,10 +248,9 @@ class _Reduced:
         self.points[m, near] += K.degree()
         if m * m == most:
             return
-        shear = K(self.random())  # so that x = 0 touches neither curve
+        shear = K(self._random())  # so that x = 0 touches neither curve
         f, g = (_sheared(F, shear) for F in (f, g))
-        ring = fq_default_poly_ctx(K)
-        cones = [ring([F.get((m - j, j), K(0)) for j in range(m + 1)]) for F in (f, g)]
+        cones = [_polynomial(K, [F.get((m - j, j), K(0)) for j in range(m + 1)]) for F in (f, g)]
         _require(all(cone.degree() == m for cone in cones))
         directions = cones[0].gcd(cones[1]).factor()[1]
         for direction, _ in directions:
@@ -255,11 +263,15 @@ class _Reduced:
             self._resolve(L, blown[0], blown[1], left, exact=exact and len(directions) == 1, near=True)
 
 
-def _root(K: fq_default_ctx, coefficients: Sequence[Any]) -> Any:
-    return fq_default_poly_ctx(K)(list(coefficients)).roots()[0][0]
+def _polynomial(K: Any, coefficients: list[Any]) -> Any:
+    return fq_default_poly_ctx(K)(coefficients)  # type: ignore[arg-type]  # the stub forgets lists
 
 
-def _embedding(K: fq_default_ctx, L: fq_default_ctx) -> Any:
+def _root(K: Any, coefficients: list[Any]) -> Any:
+    return _polynomial(K, coefficients).roots()[0][0]
+
+
+def _embedding(K: Any, L: Any) -> Any:
     """A way to take elements of K into L, which contains it."""
     if K.degree() == L.degree():
         return lambda c: c
@@ -268,12 +280,12 @@ def _embedding(K: fq_default_ctx, L: fq_default_ctx) -> Any:
     return lambda c: sum((power * L(int(part)) for part, power in zip(c.to_list(), powers, strict=False)), L(0))
 
 
-def _on_line(K: fq_default_ctx, F: nmod_mpoly, a: Any) -> Any:
+def _on_line(K: Any, F: nmod_mpoly, a: Any) -> Any:
     """F(a, y) as a polynomial over K."""
     coefficients = [K(0)] * (int(F.total_degree()) + 1)
     for (i, j), c in F.terms():
         coefficients[j] += a**i * K(int(c))
-    return fq_default_poly_ctx(K)(coefficients)
+    return _polynomial(K, coefficients)
 
 
 def _moved(F: _Local, a: Any, b: Any, most: int) -> _Local:
