@@ -175,7 +175,7 @@ def analyze(
             bare, symbols=symbols, eps=found.eps, seconds=share(0.45), seed=seed, progress=told("integrals")
         )
         proved = [one for one in found.integrals.integrals if one.verdict is Verdict.PROVED]
-        if dim == 2 and len(proved) == 1 and not symbols:
+        if dim == 2 and len(proved) == 1 and not found.symbols:
             found.pencil = pencil_of(proved[0].name, proved[0].function, found.eps, seed=seed, seconds=share(0.1))
         profile = found.integrals.profile
         if profile.first_degree is not None and profile.period is None:
