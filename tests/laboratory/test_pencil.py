@@ -58,6 +58,22 @@ def test_curves_that_are_known(text, known):
     assert summary(curves(text)) == known
 
 
+@pytest.mark.parametrize("a", [-5, -3, -2, -1, 1, 2, 3, 5])
+def test_points_over_an_extension_count_as_often_as_they_have_conjugates(a):
+    # Two double points at infinity, as those of bicircular quartics; then a double point with two tangents that all
+    # curves have, on each of which they meet once more.
+    at_infinity = curves(f"((x^2 + {a}*y^2)^2 + 2*x + 7*y^2 + 3)/((x^2 + {a}*y^2)*x + 7*x^2 + 1)")
+    assert summary(at_infinity) == (1, 4, 1, {2: (2, 0), 1: (8, 0)})
+    assert summary(curves(f"(y^2 + {a}*x^2 + x^3)/(x^4 + y^4)")) == (1, 4, 2, {2: (1, 0), 1: (12, 4)})
+
+
+@pytest.mark.parametrize("a", [-3, -2, -1, 2, 3, 5])
+def test_points_near_to_points_over_an_extension_may_need_a_larger_one(a):
+    # Of the curves of genus 2 above, in (q, y), the double cover with q = x^2 - 5: branched in the four points with
+    # q = -5 and the four at infinity, 2 g - 2 = 2 (2*2 - 2) + 8.
+    assert curves(f"(y^2 + {a}*(x^2 - 5)^2 + (x^2 - 5)^3)/((x^2 - 5)^4 + y^4)").genus == 7
+
+
 @pytest.mark.parametrize(
     ("outer", "components"), [("({})^2", 2), ("({0})^3 + ({0})", 3), ("(({0})^2 + 1)/({0})", 2), ("1/({})", 1)]
 )

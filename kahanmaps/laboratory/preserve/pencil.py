@@ -134,8 +134,9 @@ def pencil_of(
     rng = random.Random(f"pencil {seed_for(seed, integral, eps)}")
     deadline = time.monotonic() + seconds
     found: list[Pencil] = []
-    while len(found) < _TRIES and time.monotonic() < deadline:
+    for _ in range(_TRIES):
         try:
+            _require(time.monotonic() < deadline)
             field = GF(random_prime(rng, _BITS))
             residue = field.random(rng) if eps is None else field.convert(eps)
             pencil = _Reduced(field, rng, deadline).pencil(name, integral, int(residue))
