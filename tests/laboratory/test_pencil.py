@@ -69,9 +69,9 @@ def test_points_over_an_extension_count_as_often_as_they_have_conjugates(a):
 
 @pytest.mark.parametrize("a", [-3, -2, -1, 2, 3, 5])
 def test_points_near_to_points_over_an_extension_may_need_a_larger_one(a):
-    # Of the curves of genus 2 above, in (q, y), the double cover with q = x^2 - 5: branched in the four points with
-    # q = -5 and the four at infinity, 2 g - 2 = 2 (2*2 - 2) + 8.
-    assert curves(f"(y^2 + {a}*(x^2 - 5)^2 + (x^2 - 5)^3)/((x^2 - 5)^4 + y^4)").genus == 7
+    # Of the curves of genus 2 above, in (q, y), the triple cover with q = x^3 - 5: branched in the four points with
+    # q = -5 and the four at infinity, 2 g - 2 = 3 (2*2 - 2) + 2*8.
+    assert curves(f"(y^2 + {a}*(x^3 - 5)^2 + (x^3 - 5)^3)/((x^3 - 5)^4 + y^4)").genus == 12
 
 
 @pytest.mark.parametrize(
