@@ -149,6 +149,7 @@ SOURCES: dict[str, str] = {
     "diller-favre-2001": (
         "J. Diller, C. Favre. Dynamics of bimeromorphic maps of surfaces. Amer. J. Math. 123 (2001), 1135-1169"
     ),
+    "hartshorne-1977": "R. Hartshorne. Algebraic geometry. Graduate Texts in Mathematics 52, Springer, 1977",
     "fatou-1906": "P. Fatou. Series trigonometriques et series de Taylor. Acta Math. 30 (1906), 335-400",
     "massey-1969": (
         "J. L. Massey. Shift-register synthesis and BCH decoding. IEEE Trans. Inform. Theory 15 (1969), 122-127"

@@ -15,6 +15,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.plain import attributes
+from kahanmaps.checks.claims import Verdict
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError
@@ -23,12 +24,14 @@ from kahanmaps.laboratory.conclusion import Conclusion, conclude
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.degrees import degree_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
+from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.densities import find_densities
 from kahanmaps.laboratory.preserve.hamiltonian_structure import MAX_DIMENSION as MAX_HAMILTONIAN_DIMENSION
 from kahanmaps.laboratory.preserve.hamiltonian_structure import constant_structures
 from kahanmaps.laboratory.preserve.integrals import find_integrals
 from kahanmaps.laboratory.preserve.limits import flow_and_map
+from kahanmaps.laboratory.preserve.pencil import pencil_of
 from kahanmaps.laboratory.preserve.poisson_tensors import find_poisson
 from kahanmaps.laboratory.preserve.sparse_relations import sparse_relations
 from kahanmaps.laboratory.report import Statement, sections
@@ -90,6 +93,7 @@ class Analysis(Findings, Displayed):
                 for line in lines
             ],
             **attributes(self, "integrals"),
+            "invariant_curves": self._invariant_curves(),
             "hirota_kimura": [relation.text for relation in self.relations],
             **attributes(self, "densities", "flow", "poisson", "degrees", "heights"),
             "singularities": runs,
@@ -99,6 +103,13 @@ class Analysis(Findings, Displayed):
             "skipped": self.skipped,
             "document": dict(self.file.document),
         }
+
+    def _invariant_curves(self) -> dict[str, Any] | None:
+        """The curves of a planar integral, and what the map is on them; None where the degrees contradict them."""
+        growth = self.degrees.growth if self.degrees is not None else GrowthClass.UNKNOWN
+        if self.pencil is None or self.pencil.against(growth):
+            return None
+        return {**self.pencil.to_json(), "motion": self.pencil.motion(growth)}
 
     def _member(self) -> dict[str, Any] | None:
         """What a member of the family is one by, and what follows: x = centre + T y, J = T [[0, I], [-I, 0]] T^T."""
@@ -163,6 +174,9 @@ def analyze(
         found.integrals = find_integrals(
             bare, symbols=symbols, eps=found.eps, seconds=share(0.45), seed=seed, progress=told("integrals")
         )
+        proved = [one for one in found.integrals.integrals if one.verdict is Verdict.PROVED]
+        if dim == 2 and len(proved) == 1 and not found.symbols:
+            found.pencil = pencil_of(proved[0].name, proved[0].function, found.eps, seed=seed, seconds=share(0.1))
         profile = found.integrals.profile
         if profile.first_degree is not None and profile.period is None:
             maps = Laboratory(bare, (), found.eps, seed).maps

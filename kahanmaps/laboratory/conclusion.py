@@ -10,11 +10,11 @@ from kahanmaps.family.structure import Structure
 from kahanmaps.laboratory.consistency import contradictions, orbits_lie_on_curves
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.laboratory.preserve.pencil import GROWTH_ON
 from kahanmaps.laboratory.singular.fates import CONFINED
 
 PROVED, EXPLAINED, MEASURED, ESTIMATED = "proved", "explained", "measured", "estimated"
-# Of a map of the plane that keeps each curve of a pencil: diller-favre-2001.
-_CURVES = {GrowthClass.LINEAR: "rational curves", GrowthClass.QUADRATIC: "elliptic curves, of genus 1"}
+_CURVES = {0: "rational curves", 1: "elliptic curves, of genus 1"}
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,8 @@ def conclude(found: Findings) -> Conclusion:
         )
     if _orbits_on_curves_proved(found):
         sense = "superintegrable" if found.dim > 2 else "integrable"
-        curves = _CURVES.get(growth, "curves") if found.dim == 2 else "curves"
-        sentence = f"{sense.capitalize()} (proved): {integrals}, so that orbits lie on {curves}; {phrase}{known}."
+        where = f"so that orbits lie on {_curves(found, growth)}"
+        sentence = f"{sense.capitalize()} (proved): {integrals}, {where}; {phrase}{known}."
         return verdict("integrable", sentence, sense, PROVED)
     if growth is GrowthClass.UNKNOWN and (liouville or orbits_lie_on_curves(found)):
         curves = ", so that orbits lie on curves" if orbits_lie_on_curves(found) else ""
@@ -132,6 +132,14 @@ def _orbits_on_curves_proved(found: Findings) -> bool:
         return False
     proved = sum(one.verdict is Verdict.PROVED for one in search.integrals)
     return max(proved, 0 if search.symbols else search.by_theorems) >= found.dim - 1
+
+
+def _curves(found: Findings, growth: GrowthClass) -> str:
+    """The curves of integrals: in the plane with their genus, which the growth tells where it was not computed."""
+    genus = found.pencil.genus if found.pencil is not None else None
+    if genus is None and found.dim == 2:
+        genus = next((g for g, kind in GROWTH_ON.items() if kind is growth), None)
+    return "curves" if genus is None else _CURVES.get(genus, f"curves of genus {genus}")
 
 
 def _liouville(found: Findings) -> str:

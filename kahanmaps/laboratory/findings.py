@@ -14,6 +14,7 @@ from kahanmaps.laboratory.preserve.densities import DensitySearch
 from kahanmaps.laboratory.preserve.hamiltonian_structure import ConstantStructures
 from kahanmaps.laboratory.preserve.integrals import IntegralSearch
 from kahanmaps.laboratory.preserve.limits import FlowAndMap
+from kahanmaps.laboratory.preserve.pencil import Pencil
 from kahanmaps.laboratory.preserve.poisson_tensors import PoissonSearch
 from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
 from kahanmaps.laboratory.singular.singularities import SingularityRun
@@ -31,6 +32,7 @@ class Findings:
     seed: int
     symbols: tuple[str, ...] = ()
     integrals: IntegralSearch | None = None
+    pencil: Pencil | None = None  # in the plane
     relations: tuple[SparseRelation, ...] = ()
     densities: DensitySearch | None = None
     flow: FlowAndMap | None = None

@@ -35,7 +35,7 @@ class Statement:
 def sections(found: Findings) -> list[tuple[str, list[Statement]]]:
     """Titles with their statements, which may be none."""
     return [
-        ("integrals", _integral_lines(found)),
+        ("integrals", [*_integral_lines(found), *_curve_lines(found)]),
         ("measure", _measure_lines(found)),
         ("the flow", [] if found.flow is None else [Statement(*line) for line in found.flow.lines()]),
         ("Poisson tensors", _poisson_lines(found)),
@@ -93,6 +93,16 @@ def _integral_lines(found: Findings) -> list[Statement]:
     if search.reason and profile.nullities:
         lines.append(Statement(NOTE, search.reason))
     return lines + family
+
+
+def _curve_lines(found: Findings) -> list[Statement]:
+    if found.pencil is None:
+        return []
+    growth = found.degrees.growth if found.degrees is not None else GrowthClass.UNKNOWN
+    against = found.pencil.against(growth)
+    follows = f"but {against}" if against else found.pencil.motion(growth)
+    text = "; ".join(filter(None, [found.pencil.text, follows]))
+    return [Statement(UNDECIDED if against else MEASURED, text)]
 
 
 def _measure_lines(found: Findings) -> list[Statement]:

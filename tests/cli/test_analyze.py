@@ -90,6 +90,7 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
             "curves; quadratic growth, dynamical degree 1 (explained). The integrals and densities are for every a2, "
             "all else is for the given values. It is Liouville integrable, with the Poisson tensor P1 (proved).",
         },
+        "invariant_curves": None,
         "hirota_kimura": ["x1^2 + c1*x3^2 + c2 = 0", "x2^2 + c3*x3^2 + c4 = 0"],
         "family": None,
         "member": None,

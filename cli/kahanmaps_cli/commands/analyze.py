@@ -44,9 +44,10 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
 
     SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md).
     Integrals and densities in closed form with their proofs, which integrals of the flow it keeps, deforms and loses,
-    Hirota-Kimura relations, degrees of the iterates and their recurrence, heights, symmetries, commuting systems,
-    singularity confinement, and whether the system belongs to the commuting family, in these or other affine
-    coordinates. Claims in the file are not read. Without --eps everything is for every eps.
+    genus and base points of the curves of a planar integral, Hirota-Kimura relations, degrees of the iterates and their
+    recurrence, heights, symmetries, commuting systems, singularity confinement, and whether the system belongs to the
+    commuting family, in these or other affine coordinates. Claims in the file are not read. Without --eps everything is
+    for every eps.
 
     proved, supported: formulas, as identities in x and eps. measured: modulo primes and along orbits, which is
     evidence. The number of integrals and the growth are separate findings.

@@ -1,0 +1,194 @@
+"""The curves of a planar integral: their genus and base points, known from elsewhere, and what must not be said."""
+
+from __future__ import annotations
+
+import random
+import time
+from dataclasses import replace
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.text import parse_rational_function
+from kahanmaps.documents.catalog import load
+from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.laboratory.consistency import contradictions
+from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.laboratory.preserve import pencil as module
+from kahanmaps.laboratory.preserve.pencil import Pencil, pencil_of
+
+SECONDS = 60.0  # never used up
+
+
+def integral(text: str) -> RationalFunction:
+    return parse_rational_function(text, ["x", "y", "eps"])
+
+
+def curves(text: str, eps: fmpq | None = None) -> Pencil:
+    found = pencil_of("I", integral(text), eps, seconds=SECONDS)
+    assert found is not None
+    return found
+
+
+def summary(found: Pencil) -> tuple[int, int, int, dict[int, tuple[int, int]]]:
+    """Components, degree, genus, and by multiplicity how many base points, and how many of them infinitely near."""
+    points = {one.multiplicity: (one.count, one.infinitely_near) for one in found.base_points}
+    return found.components, found.degree, found.genus, points
+
+
+KNOWN = [  # by hand
+    ("x", (1, 1, 0, {1: (1, 0)})),  # lines through a point at infinity
+    ("x*y", (1, 2, 0, {1: (4, 2)})),  # two asymptotes, each a tangent at infinity
+    ("x^2 + y^2", (1, 2, 0, {1: (4, 2)})),  # the circular points, conjugate
+    ("x^3 - y", (1, 3, 0, {2: (1, 0), 1: (5, 5)})),  # cusps at infinity
+    ("y^2 - x^3 - x", (1, 3, 1, {1: (9, 8)})),  # Weierstrass form: all at the flex at infinity
+    ("x^4 + y^4 + x", (1, 4, 3, {1: (16, 12)})),  # smooth, four points at infinity, four times each
+    ("(x^4 + y^4 + x)/(x^3*y + y^2 + 1)", (1, 4, 3, {1: (16, 0)})),  # as two generic quartics
+    ("(x^2*y^2 + 2*x + 5*y^2 + 3)/(x^2*y^2 + 3*x*y^2 + 7*x^2 + 1)", (1, 4, 1, {2: (2, 0), 1: (8, 0)})),  # QRT
+    ("x*y*(x + y - 1)", (1, 3, 1, {1: (9, 6)})),  # three lines with the exponents 1, 1, 1
+    ("x^2*y*(x + y - 1)", (1, 4, 1, {2: (2, 1), 1: (8, 6)})),  # 2, 1, 1
+    ("x^3*y^2*(x + y - 1)", (1, 6, 1, {3: (2, 1), 2: (3, 2), 1: (6, 5)})),  # 3, 2, 1
+]
+
+
+@pytest.mark.parametrize(("text", "known"), KNOWN)
+def test_curves_that_are_known(text, known):
+    assert summary(curves(text)) == known
+
+
+@pytest.mark.parametrize("a", [-5, -3, -2, -1, 1, 2, 3, 5])
+def test_points_over_an_extension_count_as_often_as_they_have_conjugates(a):
+    # Two double points at infinity, as those of bicircular quartics; then a double point with two tangents that all
+    # curves have, on each of which they meet once more.
+    at_infinity = curves(f"((x^2 + {a}*y^2)^2 + 2*x + 7*y^2 + 3)/((x^2 + {a}*y^2)*x + 7*x^2 + 1)")
+    assert summary(at_infinity) == (1, 4, 1, {2: (2, 0), 1: (8, 0)})
+    assert summary(curves(f"(y^2 + {a}*x^2 + x^3)/(x^4 + y^4)")) == (1, 4, 2, {2: (1, 0), 1: (12, 4)})
+
+
+@pytest.mark.parametrize("a", [-3, -2, -1, 2, 3, 5])
+def test_points_near_to_points_over_an_extension_may_need_a_larger_one(a):
+    # Of the curves of genus 2 above, in (q, y), the triple cover with q = x^3 - 5: branched in the four points with
+    # q = -5 and the four at infinity, 2 g - 2 = 3 (2*2 - 2) + 2*8.
+    assert curves(f"(y^2 + {a}*(x^3 - 5)^2 + (x^3 - 5)^3)/((x^3 - 5)^4 + y^4)").genus == 12
+
+
+@pytest.mark.parametrize(
+    ("outer", "components"), [("({})^2", 2), ("({0})^3 + ({0})", 3), ("(({0})^2 + 1)/({0})", 2), ("1/({})", 1)]
+)
+@pytest.mark.parametrize("text", ["x^2 + y^2", "x^3 + x - y^2", "(x^2*y + y^2 + 1)/(x*y + 2)"])
+def test_of_curves_with_several_components_one_is_taken(text, outer, components):
+    alone, composed = summary(curves(text)), summary(curves(outer.format(text)))
+    assert composed == (components, *alone[1:])
+
+
+def test_a_common_factor_is_no_part_of_the_curves():
+    x, y, _ = ring(["x", "y", "eps"]).gens()
+    P, Q, common = y**2 - x**3 - x, x * y + 1, x**2 + y - 3
+    plain, padded = RationalFunction(P, Q), RationalFunction(P * common, Q * common)
+    found = [pencil_of("I", function, None, seconds=SECONDS) for function in (plain, padded)]
+    assert found[0] is not None
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_genus_is_the_number_of_lattice_points_within_the_newton_polygon(seed):
+    # Of generic coefficients; the polygon has the origin as a corner, for c is one of them.
+    rng = random.Random(seed)
+    a, b = rng.randint(2, 7), rng.randint(2, 7)
+    corners = [(0, 0), (a, 0), (rng.randint(1, 5), rng.randint(1, 5)), (0, b)]
+    inside = [(i, j) for i in range(1, 8) for j in range(1, 8) if _is_inside(i, j, corners)]
+    terms = [f"{rng.randint(2, 10**6)}*x^{i}*y^{j}" for i, j in corners[1:] + inside + [(1, 0), (0, 1)]]
+    assert curves(" + ".join(terms)).genus == len(inside)
+
+
+def _is_inside(i: int, j: int, points: list[tuple[int, int]]) -> bool:
+    """Whether a point is within the convex hull, and not on its edge."""
+    for p in points:
+        for q in points:
+            sides = [(q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]) for x, y in [*points, (i, j)]]
+            if p != q and min(sides[:-1]) >= 0 and sides[-1] <= 0:
+                return False
+    return True
+
+
+@pytest.mark.parametrize("text", ["y^2 - x^3 - x", "x*y", "y^2 - x^5 - x", "(x^2*y + y^2 + 1)/(x*y + 2)"])
+def test_the_genus_stays_under_birational_maps(text):
+    before = curves(text).genus
+    for x, y in [("(x + y^2)", "y"), ("(2*x - y)", "(x + 3)"), ("x", "(1/(x*y))")]:
+        assert curves(text.replace("x", "X").replace("y", y).replace("X", x)).genus == before
+
+
+def test_special_eps_have_curves_of_their_own():
+    text = "y^2 - x^3 - (eps - 1)*x^2*y^2"
+    assert curves(text).degree == 4
+    assert curves(text, fmpq(1)).degree == 3
+
+
+def test_nothing_is_said_beyond_the_degree_or_the_time():
+    assert pencil_of("I", integral("x^12*y + 1"), None, seconds=SECONDS) is None
+    assert pencil_of("I", integral("x*y"), None, seconds=1e-9) is None
+
+
+def test_a_point_that_is_double_on_one_curve_only_is_refused():
+    # Two members of a pencil have the same multiplicities. The curves below meet four times in the origin.
+    reduced = module._Reduced(GF(2**31 - 1), random.Random(0), time.monotonic() + SECONDS)
+    x, y = reduced.ring.gens()
+    x, y = x + 2 * y, 5 * x + 7 * y
+    node, other_node, touching = y**2 - x**2 + x**3 + y**4, x * y + x**4, 2 * (y - x) + x**2 + x**4
+    reduced._find_points(node, other_node, 4)
+    assert reduced.points == {(2, False): 1, (1, False): 12, (1, True): 0}
+    with pytest.raises(module._Unclear):
+        reduced._find_points(node, touching, 4)
+
+
+def test_nothing_is_said_where_a_base_point_is_missed(monkeypatch):
+    monkeypatch.setattr(module._Reduced, "_add_simple", lambda *_, **__: None)
+    assert pencil_of("I", integral("x*y"), None, seconds=0.3) is None
+
+
+@pytest.mark.parametrize(
+    "name", ["nahm_tetrahedral", "nahm_octahedral", "nahm_icosahedral", "qrt_symmetric", "somos_5"]
+)
+def test_the_genus_of_maps_of_the_catalogue_goes_with_their_growth(name):
+    found = analyze(load(name), seconds=30)
+    assert found.pencil is not None
+    assert (found.pencil.genus, found.degrees.growth) == (1, GrowthClass.QUADRATIC)
+    assert "the map is a translation" in found.to_json()["invariant_curves"]["motion"]
+    assert not contradictions(found)
+
+
+@pytest.mark.parametrize(
+    ("genus", "growth", "agree"),
+    [
+        (0, GrowthClass.BOUNDED, True),
+        (0, GrowthClass.LINEAR, True),
+        (0, GrowthClass.QUADRATIC, False),
+        (1, GrowthClass.LINEAR, False),
+        (1, GrowthClass.QUADRATIC, True),
+        (2, GrowthClass.BOUNDED, True),
+        (2, GrowthClass.LINEAR, False),
+        (2, GrowthClass.QUADRATIC, False),
+        (2, GrowthClass.UNKNOWN, True),
+    ],
+)
+def test_the_genus_allows_one_kind_of_growth(genus, growth, agree):
+    assert (replace(curves("x*y"), genus=genus).against(growth) == "") is agree
+
+
+def test_a_genus_that_the_degrees_exclude_is_no_finding():
+    found = analyze(load("weierstrass"), seconds=30)
+    wrong = replace(found, pencil=replace(found.pencil, genus=0))
+    assert wrong.conclusion.kind == "undecided"
+    assert "quadratic growth is impossible where the generic curve has genus 0" in wrong.conclusion.sentence
+    assert [line.status for _, lines in wrong.sections for line in lines if "has genus 0" in line.text] == ["undecided"]
+    assert wrong.to_json()["invariant_curves"] is None
+
+
+def test_what_the_map_does_on_the_curves_is_said_where_it_follows():
+    elliptic, rational, other = (curves(text) for text in ("y^2 - x^3 - x", "x*y", "y^2 - x^5 - x"))
+    assert elliptic.motion(GrowthClass.QUADRATIC) == "on it the map is a translation, for the degrees grow"
+    assert elliptic.motion(GrowthClass.BOUNDED) == rational.motion(GrowthClass.LINEAR) == ""
+    assert "finite order" in other.motion(GrowthClass.UNKNOWN)
+    assert "an iterate" in replace(elliptic, components=2).motion(GrowthClass.QUADRATIC)
