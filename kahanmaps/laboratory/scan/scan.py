@@ -122,8 +122,8 @@ def scan(
     if jobs is not None and jobs < 1:
         raise InputError(f"found {jobs} jobs, expected at least 1")
     if primes is not None and (len(set(primes)) < 3 or any(p < 5 or not fmpz(p).is_prime() for p in primes)):
-        told = ", ".join(map(str, primes))
-        raise InputError(f"found the primes {told}, expected at least three different ones, from 5 on")
+        given = ", ".join(map(str, primes))
+        raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
     rng = random.Random(f"scan {seed_for(seed, names, map_.subject, exact)}")
     began = time.monotonic()
     terms, room, cost = _terms(map_, len(names), exact, terms, rng)
