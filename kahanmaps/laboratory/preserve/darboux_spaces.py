@@ -207,8 +207,25 @@ def _blocks(solutions: list[nmod_mat], coordinates: Vectors, prime: int) -> list
     if n < 2:
         return []
     forms = _some_combinations(_restricted(solutions, coordinates, prime), prime)
+    algebra = _intertwining(forms, n, prime)
+    rng = random.Random(prime)
+    E = combination_of([rng.randrange(prime) for _ in algebra], algebra)
+    found = []
+    for factor, _ in E.charpoly().factor()[1]:
+        if factor.degree() != 1:
+            continue  # spaces that are conjugate over an extension of the field
+        root = -int(factor[0]) * pow(int(factor[1]), -1, prime) % prime
+        shifted = [[(int(E[i, j]) - (root if i == j else 0)) % prime for j in range(n)] for i in range(n)]
+        eigen = null_space(shifted, n, prime)
+        if len(eigen) > 1:
+            found.append(echelon(combine(eigen, coordinates, prime), prime))
+    return found
+
+
+def _intertwining(forms: list[nmod_mat], n: int, prime: int) -> list[nmod_mat]:
+    """A basis of the n x n matrices E with E A = A E^T for all of these antisymmetric A."""
     rows = []
-    for A in forms:
+    for A in forms[:2]:  # few E are left to which the others apply
         for i in range(n):
             for j in range(i, n):
                 row = [0] * (n * n)
@@ -216,19 +233,11 @@ def _blocks(solutions: list[nmod_mat], coordinates: Vectors, prime: int) -> list
                     row[i * n + m] = (row[i * n + m] + int(A[m, j])) % prime
                     row[j * n + m] = (row[j * n + m] - int(A[i, m])) % prime
                 rows.append(row)
-    algebra = null_space(rows, n * n, prime)
-    rng = random.Random(prime)
-    entries = combine([[rng.randrange(prime) for _ in algebra]], algebra, prime)[0]
-    E = nmod_mat(n, n, entries, prime)
-    found = []
-    for factor, _ in E.charpoly().factor()[1]:
-        if factor.degree() != 1:
-            continue  # spaces that are conjugate over an extension of the field
-        root = -int(factor[0]) * pow(int(factor[1]), -1, prime) % prime
-        shifted = [[(entries[i * n + j] - (root if i == j else 0)) % prime for j in range(n)] for i in range(n)]
-        eigen = null_space(shifted, n, prime)
-        if len(eigen) > 1:
-            found.append(echelon(combine(eigen, coordinates, prime), prime))
+    found = [nmod_mat(n, n, entries, prime) for entries in null_space(rows, n * n, prime)]
+    for A in forms[2:]:
+        differences = [(E * A - A * E.transpose()).entries() for E in found]
+        weights = null_space([list(map(int, row)) for row in zip(*differences, strict=True)], len(found), prime)
+        found = [combination_of(each, found) for each in weights]
     return found
 
 
