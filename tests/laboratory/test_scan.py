@@ -232,3 +232,17 @@ def test_an_analysis_of_members_gives_verdicts():
     assert verdicts[fmpq(1)].kind == verdicts[fmpq(3)].kind == "integrable"
     assert verdicts[fmpq(1)].ground == "proved"
     assert "g1 = 1: Integrable (proved)" in found.text
+
+
+@pytest.mark.parametrize(
+    ("rhs", "symmetric"),
+    [
+        ('["y", "x^2 + (a*b - 1)*y"]', (("a", "b"),)),
+        ('["y", "x^2 + (2*a*b - b)*y"]', ()),
+        ('["a", "b"]', ()),  # no member is slower than others
+        ('["y", "x^2 + (a^2 - 2*b^2)*y"]', ()),  # (0, 0) alone is seen where 2 is no square, and is not moved
+    ],
+)
+def test_an_exchange_of_parameters_is_told_where_it_moves_slow_members(rhs, symmetric):
+    file = parse_system(f'variables = ["x", "y"]\nparameters = {{ a = 1, b = 1 }}\n[system]\nrhs = {rhs}')
+    assert scan(file, ["a", "b"]).symmetric == symmetric

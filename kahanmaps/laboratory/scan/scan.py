@@ -286,13 +286,16 @@ def _left(one: Sweep, components: Sequence[Component]) -> int:
 
 
 def _is_symmetric(sweeps: Sequence[Sweep], i: int, j: int) -> bool:
-    """Whether exchanging two parameters leaves the degrees of all members that were tried as they are."""
+    """Whether exchanging two parameters moves slow members, and to members with the same degrees, modulo each prime."""
 
     def exchanged(point: tuple[int, ...]) -> tuple[int, ...]:
         values = list(point)
         values[i], values[j] = values[j], values[i]
         return tuple(values)
 
-    return all(
-        one.complete and all(one.slow.get(exchanged(x)) == degrees for x, degrees in one.slow.items()) for one in sweeps
+    return bool(sweeps) and all(
+        one.complete
+        and any(exchanged(x) != x for x in one.slow)
+        and all(one.slow.get(exchanged(x)) == degrees for x, degrees in one.slow.items())
+        for one in sweeps
     )
