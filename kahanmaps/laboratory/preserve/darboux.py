@@ -170,7 +170,7 @@ def _of_flow(laboratory: Laboratory, found: DarbouxSearch, seconds: float) -> Da
         assert K is not None  # or it would not have been listed
         found.spaces.append(DarbouxPolynomials(format_polynomial(K), (P,), Verdict.PROVED))
     if known.degree < found.degree:
-        found.reason = f"degrees above {known.degree} are not settled: too little time, or too many monomials"
+        found.reason = f"degrees above {known.degree} are not settled: {known.reason}"
     return found
 
 

@@ -3,20 +3,21 @@
 They are sought with no cofactor K given. On P = 0 the Taylor coefficients of a solution, in all monomials up to a
 degree, are orthogonal to the coefficients of P: the matrix of these, an order a row, has a smaller rank there than at
 random points, and P divides its minors, the extactic determinants (pereira-2001). These are interpolated on a random
-line modulo a prime. Where P vanishes on the line they all do; and at each such point the polynomials that vanish along
-its solution are one null space, which contains P. Where integrals I have that degree, multiples of some I - c are in it
-at every point: enough points of P = 0 have P in common, but no such multiples. So have points of two conjugate
-hypersurfaces the product of these. P is lifted to Q; whether it divides f . grad P is then decided exactly.
+line modulo a prime. A P of degree d has there d zeros in all, conjugate ones in one irreducible factor, and is one of
+the polynomials that vanish along the solutions from all of them. So it is in the space of one of the choices of factors
+whose degrees add up to d: those of a line, or what those of several lines have in common. Where these spaces are 0
+there is no P; where one is a line, P is lifted to Q, and whether it divides f . grad P is decided exactly.
 """
 
 from __future__ import annotations
 
 import random
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache, reduce
 from math import comb, inf
+from operator import mul
 
 from flint import fmpq_mpoly, nmod_mat, nmod_poly
 
@@ -34,8 +35,9 @@ _MOST_MONOMIALS = 21  # of the degree that is gone to unasked, within a second
 _MOST_EVER = 56  # with which a line takes a minute
 _SPARE = 8  # orders of a series beyond the number of monomials
 _LARGEST = 10**6  # coefficient: in a random fraction modulo primes of 61 bits it is as small once in 2^20 times
-_MOST_SPACES = 24  # of which all choices of some are looked at
+_MOST_CHOICES = 400  # of zeros on a line, and of pairs of choices
 _PRIMES = 12  # of which the first mostly suffices
+_LINES = 4  # modulo one of them
 
 Vectors = list[list[int]]
 
@@ -45,13 +47,13 @@ class FlowPolynomials:
     """Darboux polynomials of a field, irreducible over Q, that are no integrals, each exact, short ones first.
 
     Members P - c Q for an integral P/Q of the same degree are left out unless they are factors of right-hand sides.
-    There are no others of at most `degree` that are irreducible over the complex numbers, or have two conjugate factors
-    there: measured on lines modulo primes. Symbols count for the degree. Coefficients are
-    at most 10^6.
+    There are no others of at most `degree` with coefficients of at most 10^6: measured on lines modulo primes. Symbols
+    count for the degree. `reason` says why higher degrees that were asked for are not settled.
     """
 
     functions: tuple[fmpq_mpoly, ...]
     degree: int
+    reason: str = ""
 
 
 @lru_cache(maxsize=16)
@@ -81,9 +83,9 @@ def flow_polynomials(
         return replace(known, functions=tuple(P for P in known.functions if degree_in(P, field.dim)))
     n = field.dim
     if max_degree is not None:
-        max_degree = max((d for d in range(max_degree + 1) if comb(n + d, d) <= _MOST_EVER), default=0)
+        top = max((d for d in range(max_degree + 1) if comb(n + d, d) <= _MOST_EVER), default=0)
     else:
-        max_degree = max((d for d in (1, 2, 3, 4) if comb(n + d, d) <= _MOST_MONOMIALS), default=0)
+        top = max((d for d in (1, 2, 3, 4) if comb(n + d, d) <= _MOST_MONOMIALS), default=0)
     deadline = time.monotonic() + seconds
     rng = random.Random(f"flow polynomials {seed_for(seed, field.rhs)}")
     found: dict[str, fmpq_mpoly] = {}
@@ -92,55 +94,45 @@ def flow_polynomials(
     for P in [primitive_part(P)[1] for f in field.rhs if not f.is_zero() for P, _ in f.factor()[1]]:
         if darboux_cofactor(field, P) is not None:
             found.setdefault(str(P), P)
-    done, lowest = 0, 0  # the lowest degree of integrals
-    for degree in range(1, max_degree + 1):
-        for _ in range(_PRIMES):
-            if time.monotonic() > deadline:
-                break
-            try:
-                flow = ModularFlow(field, random_prime(rng), (), rng.getrandbits(64))
-            except BadPrime:
-                continue
-            if not lowest and _rank(flow, degree) < comb(n + degree, degree):
-                lowest = degree
-            # Products of integrals less a number at all points are no more common to one point more.
-            if _has_all(flow, field, degree, degree // lowest + 1 if lowest else 1, found):
-                done = degree
-                break
-        if done < degree:
+    done, reason = 0, "too many monomials" if max_degree is not None and top < max_degree else ""
+    while done < top:
+        unsettled = _unsettled(field, done + 1, rng, deadline, found)
+        if unsettled:
+            reason = unsettled
             break
+        done += 1
     listed = [P for P in found.values() if not field.derivative(P).is_zero()]
     by_size = sorted(listed, key=lambda P: (degree_in(P, n), len(P), [[-int(e) for e in m] for m in P.monoms()]))
-    return FlowPolynomials(tuple(by_size), done)
+    return FlowPolynomials(tuple(by_size), done, reason)
 
 
-def _has_all(flow: ModularFlow, field: PolynomialField, degree: int, points: int, found: dict[str, fmpq_mpoly]) -> bool:
-    """Adds the polynomials that so many lines show, and tells whether these show that there are no others.
-
-    They do if what is left on them, without what was found, has no irreducible factor of a degree from 2 on that
-    another polynomial could have there: then at least `points` points of it were seen.
-    """
-    lines = [_Line(flow, degree, found.values()) for _ in range(points)]
-    spaces = [space for line in lines for space in line.spaces()]
-    for vector in _in_common(spaces, points + 1, flow.prime):
-        P = _lifted(vector, degree, flow.prime, field)
-        if P is not None and darboux_cofactor(field, P) is not None:
-            found.setdefault(str(P), P)
-    return len(spaces) <= _MOST_SPACES and all(line.is_explained_by(found.values()) for line in lines)
-
-
-def _in_common(spaces: Sequence[Vectors], most: int, prime: int) -> Iterator[list[int]]:
-    """What up to so many of the spaces have in common, where that is one vector."""
-
-    def further(common: Vectors, start: int, left: int) -> Iterator[list[int]]:
-        if len(common) == 1:
-            yield common[0]
-        elif common and left:
-            for k in range(start, len(spaces)):
-                yield from further(_intersection(common, spaces[k], prime), k + 1, left - 1)
-
-    for k, space in enumerate(spaces[:_MOST_SPACES]):
-        yield from further(space, k + 1, max(1, most - 1))
+def _unsettled(
+    field: PolynomialField, degree: int, rng: random.Random, deadline: float, found: dict[str, fmpq_mpoly]
+) -> str:
+    """Adds the polynomials of a degree, given those of lower ones; why there may be others, "" where there are none."""
+    for _ in range(_PRIMES):
+        try:
+            flow = ModularFlow(field, random_prime(rng), (), rng.getrandbits(64))
+        except BadPrime:
+            continue
+        common: list[Vectors] = []
+        for k in range(_LINES):
+            if time.monotonic() > deadline:
+                return "the time was over"
+            here = _Line(flow, degree, found.values()).spaces()
+            if here is None or (k and len(common) * len(here) > _MOST_CHOICES):
+                break
+            if k:
+                pairs = (_intersection(A, B, flow.prime) for A in common for B in here)
+                here = [list(map(list, key)) for key in {tuple(map(tuple, space)) for space in pairs if space}]
+            common = here
+            for vector in [space[0] for space in common if len(space) == 1]:
+                P = _lifted(vector, degree, flow.prime, field)
+                if P is not None and darboux_cofactor(field, P) is not None:
+                    found.setdefault(str(P), P)
+            if all(len(space) == 1 for space in common):
+                return ""
+    return "lines modulo primes leave others possible"
 
 
 def _rank(flow: ModularFlow, degree: int) -> int:
@@ -166,35 +158,63 @@ class _Line:
         """The point of a parameter."""
         return tuple((a + t * b) % self.flow.prime for a, b in zip(self.start, self.slope, strict=True))
 
-    def spaces(self) -> list[Vectors]:
-        """What vanishes along the solution from each point of the line where that is more than at others."""
-        p, found = self.flow.prime, []
-        for root, _ in self.left.roots():
-            space = null_space(self._rows(self.at(int(root))), self.count, p)
-            if len(space) > self.count - self.rank:
-                found.append(space)
+    def spaces(self) -> list[Vectors] | None:
+        """What vanishes along the solutions from as many zeros as the degree is, for each choice; None if too many.
+
+        Only where that is more than from as many random points: there products of integrals less a number do.
+        """
+        p = self.flow.prime
+        usual = cache(lambda k: len(null_space([row for _ in range(k) for row in self._rows(None)], self.count, p)))
+        points = []
+        for factor, _ in self.left.factor()[1] if self.left.degree() > 0 else ():
+            if factor.degree() <= self.degree:
+                space = null_space(self._conjugates(factor), self.count, p)
+                if len(space) > usual(factor.degree()):
+                    points.append((factor.degree(), space))
+        found: list[Vectors] = []
+        waiting: list[tuple[int, int, Vectors]] = [(0, 0, [])]
+        tried = 0
+        while waiting:
+            start, size, common = waiting.pop()
+            for k in range(start, len(points)):
+                degree, space = points[k]
+                if size + degree > self.degree:
+                    continue
+                tried += 1
+                both = _intersection(common, space, p) if size else space
+                if size and len(both) <= usual(size + degree):
+                    continue
+                if size + degree == self.degree:
+                    found.append(both)
+                else:
+                    waiting.append((k + 1, size + degree, both))
+            if tried > _MOST_CHOICES:
+                return None
         return found
 
-    def is_explained_by(self, known: Iterable[fmpq_mpoly]) -> bool:
-        """Whether no irreducible factor of a degree from 2 to that of the polynomials is left over."""
-        p, rest = self.flow.prime, self._without(self.left, known)
-        t = nmod_poly([0, 1], p)
-        power = t
-        for degree in range(1, self.degree + 1):
-            if rest.degree() < degree:
-                break
-            power = power.pow_mod(p, rest)  # t^(p^degree): gcds with it minus t are products of factors of that degree
-            factors = rest.gcd(power - t)
-            if degree > 1 and factors.degree() > 0:
-                return False
-            while factors.degree() > 0:
-                rest = rest // factors
-                factors = rest.gcd(factors)
-            power = power % rest if rest.degree() > 0 else power
-        return True
+    def _rows(self, x: Point | None) -> Vectors:
+        """The Taylor coefficients along the solution from a point, or a random one."""
+        return self.flow.series(x or self.flow.random_point(), self.degree, self.count + _SPARE)
 
-    def _rows(self, x: Point) -> Vectors:
-        return self.flow.series(x, self.degree, self.count + _SPARE)
+    def _conjugates(self, factor: nmod_poly) -> Vectors:
+        """The Taylor coefficients from a zero of an irreducible polynomial in t, in the powers of the zero.
+
+        They are polynomials in t: with their values at nodes j, the sum of value * L_j(t) modulo the polynomial, where
+        L_j is 1 at its own node and 0 at the others.
+        """
+        p, flow, orders = self.flow.prime, self.flow, self.count + _SPARE
+        if factor.degree() == 1:
+            return self._rows(self.at(int(-factor[0] / factor[1])))
+        nodes = range(self.degree + (orders - 1) * max(0, flow.degree - 1) + 1)
+        values = [[c for row in self._rows(self.at(t)) for c in row] for t in nodes]
+        whole = reduce(mul, (nmod_poly([-t, 1], p) for t in nodes))
+        basis = []
+        for t in nodes:
+            others = whole // nmod_poly([-t, 1], p)
+            L = others * ~others(t) % factor
+            basis.append([int(L[k]) for k in range(factor.degree())])
+        mixed = combine(list(zip(*basis, strict=True)), values, p)
+        return [row[k : k + self.count] for row in mixed for k in range(0, len(row), self.count)]
 
     def _extactic(self) -> nmod_poly:
         """The factors on the line of the minors of the Taylor coefficients that are 0 along solutions.
