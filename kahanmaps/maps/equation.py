@@ -9,15 +9,17 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly
+from flint import Ordering, fmpq, fmpq_mpoly, fmpq_mpoly_ctx, nmod_mpoly_ctx
 
-from kahanmaps.algebra.fields import QQ, Field
-from kahanmaps.algebra.minors import Product
+from kahanmaps.algebra.fields import QQ, Field, PrimeField
+from kahanmaps.algebra.minors import Product, kernel_minors
 from kahanmaps.algebra.polynomials import evaluate, names_of, ring
 from kahanmaps.errors import InputError
+
+_MOST_TERMS = 400  # of forms that are quicker than minors
 
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, Any], ...]
@@ -68,6 +70,63 @@ class Equation:
              for entry in row]
             for row in self.terms
         ]  # fmt: skip
+
+    def image(self, X: Sequence[Any], zero: Any, times: Product = operator.mul) -> list[Any]:
+        """The image of (X_1 : ... : X_n : Z), elements of any ring, perhaps with a factor in common: the kernel of L.
+
+        By the forms of a map where they are explicit, else by the minors of L.
+        """
+        if self.explicit is None:
+            return kernel_minors(self.rows(self.monomials(X, times), zero), times)
+        (image,) = self.explicit.rows(self.explicit.monomials(X, times), zero)
+        return image
+
+    @property
+    def image_degree(self) -> int:
+        """The degree of the forms that `image` evaluates."""
+        return self.dim * self.degree if self.explicit is None else self.explicit.degree
+
+    @cached_property
+    def explicit(self) -> Equation | None:
+        """Where the i-th row is Q_i x~_i = P_i: the forms of the map without common factor, as one row.
+
+        None elsewhere, where they are long, and over other fields than QQ and GF(p). Exact.
+        """
+        if any(entry for i, row in enumerate(self.terms) for j, entry in enumerate(row[:-1]) if j != i):
+            return None
+        if self.over is not QQ and not isinstance(self.over, PrimeField):
+            return None
+        rows = self.polynomials()
+        if any(row[i].is_zero() for i, row in enumerate(rows)):
+            return None
+        below = reduce(lambda P, Q: P * (Q / P.gcd(Q)), (row[i] for i, row in enumerate(rows)))
+        forms = [-row[-1] * (below / row[i]) for i, row in enumerate(rows)] + [below]
+        common = reduce(lambda P, Q: P.gcd(Q), forms)
+        forms = [form / common for form in forms]
+        degree = forms[-1].total_degree()
+        if degree > 1:
+            exponents = sorted({tuple(map(int, m)) for form in forms for m in form.monoms()})
+        else:
+            exponents = [tuple(int(i == k) for i in range(self.dim + 1)) for k in range(self.dim + 1)]
+        if degree < 1 or sum(map(len, forms)) > _MOST_TERMS:
+            return None
+        place = {exponent: k for k, exponent in enumerate(exponents)}
+        terms = (tuple((place[tuple(map(int, m))], self.over.convert(c)) for m, c in form.terms()) for form in forms)
+        return Equation(self.over, tuple(exponents), (tuple(terms),))
+
+    def polynomials(self) -> list[list[Any]]:
+        """L over QQ or GF(p) with p < 2^63 as a matrix of polynomials in x1, ..., xn, z."""
+        names = (*(f"x{k}" for k in range(1, len(self.exponents[0]))), "z")
+        context: Any
+        if isinstance(self.over, PrimeField):
+            context = nmod_mpoly_ctx.get(names, modulus=self.over.prime, ordering=Ordering.degrevlex)
+        else:
+            context = fmpq_mpoly_ctx.get(names, Ordering.degrevlex)
+        scalar = int if isinstance(self.over, PrimeField) else fmpq
+        return [
+            [context.from_dict({self.exponents[k]: scalar(value) for k, value in entry}) for entry in row]
+            for row in self.terms
+        ]
 
     def transposed(self) -> Equation:
         """The equation with x and x~ exchanged (and another sign), that of the inverse map; in degree 1 only."""

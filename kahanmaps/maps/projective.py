@@ -7,12 +7,9 @@ other. Source: petrera-suris-2016, eq. (eq: Phi gen).
 
 from __future__ import annotations
 
-from math import comb
+from math import comb, prod
 from typing import Any, NamedTuple
 
-from flint import Ordering, fmpq, fmpq_mpoly_ctx, nmod_mpoly_ctx
-
-from kahanmaps.algebra.fields import PrimeField
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import MapOver
@@ -23,7 +20,7 @@ _MOST_TERMS = 3_000  # of a form of several factors, before a common one is divi
 
 class HomogeneousMap(NamedTuple):
     """The `forms` without common factor that give a map on projective space, and the `factor` that was divided out
-    of its minors, of several factors of their minors put into each other.
+    of what `Equation.image` gives, of several factors put into each other.
 
     `denominator` is up to its sign that of the map, det M(x) made homogeneous: of several factors the product of
     theirs. A last form that is zero says that the map is singular everywhere.
@@ -58,25 +55,18 @@ def homogeneous_map(map_over: MapOver) -> HomogeneousMap:
             raise TooLarge(f"the composition of {len(others) + 1} maps is too large for forms on projective space")
         moved, common = _without_common_factor([form.compose(*found.forms) for form in next_one.forms])
         factor, denominator = (part.compose(*found.forms) for part in (next_one.factor, next_one.denominator))
-        below = found.factor ** (equation.dim * equation.degree)
+        below = found.factor**equation.image_degree
         found = HomogeneousMap(moved, below * factor * common, found.denominator * denominator)
     return found
 
 
 def _of_equation(equation: Equation) -> HomogeneousMap:
-    names = (*(f"x{k + 1}" for k in range(equation.dim)), "z")
-    context: Any
-    if isinstance(equation.over, PrimeField):
-        context = nmod_mpoly_ctx.get(names, modulus=equation.over.prime, ordering=Ordering.degrevlex)
-    else:
-        context = fmpq_mpoly_ctx.get(names, Ordering.degrevlex)
-    scalar = int if isinstance(equation.over, PrimeField) else fmpq
-    rows = [
-        [context.from_dict({equation.exponents[k]: scalar(value) for k, value in entry}) for entry in row]
-        for row in equation.terms
-    ]
-    minors = kernel_minors(rows)
-    return HomogeneousMap(*_without_common_factor(minors), minors[-1])
+    rows = equation.polynomials()
+    if equation.explicit is None:
+        minors = kernel_minors(rows)
+        return HomogeneousMap(*_without_common_factor(minors), minors[-1])
+    (forms,) = equation.explicit.polynomials()
+    return HomogeneousMap(forms, forms[0] * 0 + 1, prod(-row[i] for i, row in enumerate(rows)))
 
 
 def _without_common_factor(forms: list[Any]) -> tuple[list[Any], Any]:

@@ -22,6 +22,7 @@ from search_helpers import system as file_from
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.polynomials import ring
 from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.analysis import Analysis, analyze
@@ -210,6 +211,31 @@ def test_random_points_have_the_patterns_of_polynomials(name, monkeypatch):
     written = patterns(system, None)
     monkeypatch.setattr("kahanmaps.laboratory.singular.singularities.WRITTEN_DIMENSION", 1)
     assert patterns(system, None) == written
+
+
+@pytest.mark.parametrize("name", ["mcmillan", "lyness", "todd", "hietarinta_viallet"])
+def test_random_points_have_the_degrees_of_polynomials_for_explicit_maps(name, monkeypatch):
+    """Of equations that are not linear in the old point, nor is that of the inverse."""
+    map_ = load(name).map
+    written = patterns(map_, None)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.singularities.WRITTEN_DIMENSION", 1)
+    assert patterns(map_, None).series == written.series != ()
+
+
+@pytest.mark.parametrize(
+    ("last", "growth", "degrees"),
+    [
+        ("(x2*x5 + x3*x4)/x1", GrowthClass.QUADRATIC, (1, 2, 3, 4, 6, 9, 11, 14, 18, 22)),  # Somos-5
+        ("x1 + x3^3 - x4*x2", GrowthClass.EXPONENTIAL, (1, 3, 3, 4, 9, 9, 12, 27, 27, 36)),  # x3^3 every third step
+        ("(x2*x5 + x3^2 + 7)/x1", GrowthClass.UNKNOWN, (1, 2, 3, 4, 6, 9, 13, 18, 26, 38)),
+    ],
+)
+def test_explicit_maps_of_dimension_five_are_explained_or_say_how_far_they_were_followed(last, growth, degrees):
+    image = ", ".join(f'"{text}"' for text in ("x2", "x3", "x4", "x5", last))
+    file = parse_system(f'variables = ["x1", "x2", "x3", "x4", "x5"]\n[map]\nimage = [{image}]')
+    found = degree_growth(file.map, max_degree=2000)
+    assert (found.growth, found.degrees[:10]) == (growth, degrees)
+    assert bool(found.patterns.series) == (not found.patterns.running) == (growth is not GrowthClass.UNKNOWN)
 
 
 def test_two_eps_that_differ_leave_the_patterns_open():

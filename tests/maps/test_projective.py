@@ -16,7 +16,10 @@ from flint import fmpq, fmpq_mat
 from helpers import fraction
 
 from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.maps.projective import homogeneous_map
 from kahanmaps.maps.residues.projective import (
@@ -91,13 +94,46 @@ def test_the_matrix_of_linear_forms_sends_the_image_to_zero(n, seed):
 
 
 def test_what_the_forms_have_in_common_is_divided_out():
-    """x' = x, y' = 2 y at eps = 1/4: (5 x/3 : 3 y : 1), a linear map, where the minors have degree 2."""
-    forms, factor, _ = homogeneous_map(KahanMap(QuadraticSystem.from_text(["x", "y"], ["x", "2*y"]), "1/4", QQ))
+    """x' = x, y' = x + 2 y at eps = 1/4: (5 x/3 : ... : 1), a linear map, where the minors have degree 2."""
+    forms, factor, _ = homogeneous_map(KahanMap(QuadraticSystem.from_text(["x", "y"], ["x", "x + 2*y"]), "1/4", QQ))
     x, y, z = forms[0].context().gens()
     assert int(factor.total_degree()) == 1
     assert forms[2] == forms[2].leading_coefficient() * z
     assert forms[0] * 3 == forms[2].leading_coefficient() * 5 * x
-    assert forms[1] == forms[2].leading_coefficient() * 3 * y
+    assert forms[1] * 3 == forms[2].leading_coefficient() * (4 * x + 9 * y)
+
+
+@pytest.mark.parametrize(
+    ("image", "degree"),
+    [
+        (["y", "(y + 2)/x"], 2),
+        (["y", "-x + 3*y/(y^2 - 1)"], 3),
+        (["y/x", "(x*z + 1)/(x*y)", "x/(y + 1)"], 3),
+        (["x + 1", "x + 2*y"], 1),
+        (["1/x", "x*y", "z + y"], 3),
+    ],
+)
+@pytest.mark.parametrize("over", [QQ, GF(1000003)])
+def test_the_forms_of_an_explicit_map_are_its_minors_without_common_factor(image, degree, over):
+    names = NAMES[: len(image)]
+    functions = [parse_rational_function(text, [*names, "eps"]) for text in image]
+    equation = explicit_map(names, functions).at(1, over).equation
+    assert equation.image_degree == degree
+    rng = random.Random(degree)
+    for last in (1, 1, 0):
+        X = [over.convert(k) for k in (*(rng.randint(1, 9) for _ in names), last)]
+        found = equation.image(X, over.zero)
+        minors = kernel_minors(equation.rows(equation.monomials(X), over.zero))
+        assert any(found) or not last
+        assert all(a * d == b * c for (a, b), (c, d) in itertools.pairwise(zip(found, minors, strict=True)))
+
+
+def test_a_map_whose_matrix_is_not_diagonal_has_its_minors():
+    assert KahanMap(dense(2, 2), "2/7", QQ).equation.explicit is None
+    for power, is_short in ((3, True), (16, False)):  # 30 terms or so, and 459
+        text = f"(x + y + 1)^{power}/(x - 2*y - 2)^{power}"
+        image = [parse_rational_function(one, ["x", "y", "eps"]) for one in (text, f"x*{text}")]
+        assert (explicit_map(["x", "y"], image).at(1).equation.explicit is not None) is is_short
 
 
 SYSTEMS = {
@@ -165,9 +201,10 @@ def test_points_beyond_the_first_portion_have_their_own_images():
 def test_the_common_factor_is_looked_for_up_to_dimension_six():
     def chart(n):
         names = [f"x{k}" for k in range(n)]
-        return ProjectiveMap(QuadraticSystem.from_text(names, names), "1/3", 7)
+        rhs = ["x0", *(f"x0 + x{k}" for k in range(1, n))]
+        return ProjectiveMap(QuadraticSystem.from_text(names, rhs), "1/3", 7)
 
-    # x~ = x (1 + eps)/(1 - eps): n minors of degree n in common but for one factor.
+    # A linear map: n minors of degree n in common but for one factor.
     assert (chart(6).degree, chart(6).factor.count("z")) == (1, 1)
     assert (chart(7).degree, chart(7).factor) == (7, None)
 

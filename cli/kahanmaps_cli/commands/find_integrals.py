@@ -139,6 +139,8 @@ def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, A
                 tell(f"\t{space.verdict}\t{formula(text)}")
         if found.reason:
             tell(f"note\t{found.reason}")
+        elif not found.spaces:
+            tell(f"none of degree up to {found.degree}")
     return 3 if found.reason else 0
 
 

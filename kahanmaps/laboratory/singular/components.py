@@ -14,7 +14,6 @@ from typing import Any
 from flint import Ordering, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.laboratory.singular.jets import modulo
 from kahanmaps.maps.equation import Equation
 
@@ -59,7 +58,7 @@ def components(
         ring.from_dict({(k, 0): int(c) for k, c in enumerate(entry.coeffs())}) + ring.gen(1) * w
         for entry, w in zip(curve, direction, strict=True)
     ]
-    image = kernel_minors(equation.rows(equation.monomials(X), ring.constant(0)))
+    image = equation.image(X, ring.constant(0))
     common = reduce(nmod_mpoly.gcd, image)
     image = [entry / common for entry in image]
     found: dict[str, tuple[nmod_mpoly, list[int]]] = {}

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from typing import Any
 
-from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly_ctx, nmod_poly
+from flint import fmpq, fmpq_mat, nmod_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.minors import kernel_minors
@@ -322,18 +322,12 @@ def _hypersurface(key: tuple[Any, ...], degree: int, primes: tuple[int, ...], or
 
 
 def _forms(equation: Equation, inverse: Equation, digits: int) -> _Forms:
-    names = [f"x{k + 1}" for k in range(equation.dim)]
-    context = fmpq_mpoly_ctx.get((*names, "z"), Ordering.degrevlex)
 
     def factors(one: Equation) -> tuple[Any, ...]:
-        rows = [
-            [context.from_dict({one.exponents[k]: fmpq(value) for k, value in entry}) for entry in row[:-1]] + [None]
-            for row in one.terms
-        ]
-        form = kernel_minors(rows)[-1]
+        form = kernel_minors([[*row[:-1], None] for row in one.polynomials()])[-1]
         return (form,) if digits > _MOST_DIGITS else tuple(factor for factor, _ in form.factor()[1])
 
-    infinity = context.gens()[-1]
+    infinity = equation.polynomials()[0][0].context().gens()[-1]
     poles = tuple(form for form in factors(equation) if form != infinity)
     return _Forms(poles, factors(inverse), infinity)
 
@@ -346,7 +340,7 @@ def _on_line(
     equation, p = map_.equation, map_.field.characteristic
     a, b, across = (tuple(rng.randrange(p) for _ in range(equation.dim + 1)) for _ in range(3))
     line = [nmod_poly([x, v], p) for x, v in zip(a, b, strict=True)]
-    image = kernel_minors(equation.rows(equation.monomials(line), nmod_poly([], p)))
+    image = equation.image(line, nmod_poly([], p))
     common = reduce(nmod_poly.gcd, image)
     image = [entry // common for entry in image]
     degree = max(int(entry.degree()) for entry in image)

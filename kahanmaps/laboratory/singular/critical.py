@@ -54,7 +54,7 @@ def critical_points(
     def E(X: Sequence[Any], zero: Any) -> Any:
         total = None
         for equation, inverse in zip(equations, inverses, strict=True):
-            X = kernel_minors(equation.rows(equation.monomials(X), zero))
+            X = equation.image(X, zero)
             found = _denominator(inverse, X, zero)
             total = found if total is None else total * found
         return total
@@ -74,7 +74,7 @@ def pole_points(equations: Sequence[Equation], rng: random.Random) -> tuple[list
     def determinants(X: Sequence[Any], zero: Any) -> Any:
         total = _denominator(equations[0], X, zero)
         for before, equation in pairwise(equations):
-            X = kernel_minors(before.rows(before.monomials(X), zero))
+            X = before.image(X, zero)
             total = total * _denominator(equation, X, zero)
         return total
 
@@ -89,7 +89,7 @@ def _random_line(equation: Equation, rng: random.Random) -> tuple[list[int], lis
 
 def _image(equation: Equation, curve: Sequence[nmod_poly]) -> tuple[list[nmod_poly], nmod_poly]:
     """The image of a curve without common factor, and the factor that was divided out."""
-    image = kernel_minors(equation.rows(equation.monomials(curve), curve[-1] * 0))
+    image = equation.image(curve, curve[-1] * 0)
     common = reduce(nmod_poly.gcd, image)
     return ([entry // common for entry in image] if common.degree() > 0 else image), common
 

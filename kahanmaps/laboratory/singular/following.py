@@ -15,9 +15,9 @@ from kahanmaps.laboratory.singular.orders import AlongCurves, Orders, Tracked
 from kahanmaps.maps.equation import Equation
 
 _MAX_PRECISION = 4096
-_MOST_ALONG = 2048  # where series are followed far
+_MOST_ALONG = 16384  # where series are followed far
 _CONSTANT = 8  # so often at least is the same order repeated that goes on
-_CHECKED = 3  # so many times as many orders as their recurrence is long have to follow it
+_CHECKED = 4  # further orders have to follow a recurrence than tell it
 _FREE_STEPS = 100  # for which a hypersurface is followed that is one again
 
 
@@ -103,7 +103,7 @@ def orders_at(
             if hit is None:
                 return Orders(rows[:last], (), reached, True)
         found = [find_recurrence(column) for column in zip(*rows, strict=True)]
-        repeats = all(one is not None and len(rows) >= max(_CONSTANT, _CHECKED * one.order) for one in found)
+        repeats = all(one is not None and len(rows) >= max(_CONSTANT, 2 * one.order + _CHECKED) for one in found)
         is_cut = not is_whole and not limits.is_over  # by the precision
         if rows and repeats and (len(run) >= min(reach, limits.along) or is_cut):
             laws = tuple(one.characteristic for one in found if one is not None)

@@ -13,7 +13,6 @@ from typing import Any
 from flint import Ordering, nmod, nmod_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
 
 from kahanmaps.algebra.fields import PrimeField
-from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.maps.equation import Equation
 
 # The order in t at the point with these coordinates, known below t^precision; None where it is not seen there.
@@ -121,12 +120,11 @@ def walk(
         divided, denominators = 0, list[int | None]()
         for equation in equations:
             nothing = Jet(zero, [zero] * len(tangents), X[0].precision)
-            minors = kernel_minors(equation.rows(equation.monomials(X), None))
-            image = [nothing if jet is None else jet for jet in minors]
+            image = [nothing if jet is None else jet for jet in equation.image(X, None)]
             known = min(jet.precision for jet in image)
             common, denominator = _divided([jet.value for jet in image], known)
             X = [jet.over_power(common) for jet in image]
-            divided = divided * equation.dim * equation.degree + common
+            divided = divided * equation.image_degree + common
             denominators.append(denominator)
         pole = None if denominator is None else denominator - common
         limit = tuple(int(jet.value[0]) for jet in X)
@@ -154,11 +152,11 @@ def walk_along(
             def times(left: nmod_poly, right: nmod_poly, known: int = precision) -> nmod_poly:
                 return left.mul_low(right, known)
 
-            image = kernel_minors(equation.rows(equation.monomials(X, times), zero), times)
+            image = equation.image(X, zero, times)
             common, denominator = _divided(image, precision)
             precision -= common
             X = [entry.right_shift(common).truncate(precision) for entry in image]
-            divided = divided * equation.dim * equation.degree + common
+            divided = divided * equation.image_degree + common
             denominators.append(denominator)
         pole = None if denominator is None else denominator - common
         orders = [function(X, precision) for function in functions]
@@ -215,10 +213,16 @@ def form_order(form: Any, field: PrimeField) -> Function:
 
 
 def image_of(equations: Sequence[Equation], point: Sequence[int]) -> list[int] | None:
-    """The image of a point of projective space modulo p; None where all minors vanish: there only curves have one."""
+    """The image of a point of projective space modulo p; None where all forms vanish: there only curves have one."""
     prime, X = equations[0].over.characteristic, list(point)
     for equation in equations:
-        rows = equation.rows(equation.monomials([nmod(x, prime) for x in X]), nmod(0, prime))
+        values = [nmod(x, prime) for x in X]
+        if equation.explicit is not None:
+            X = [int(x) for x in equation.image(values, nmod(0, prime))]
+            if not any(X):
+                return None
+            continue
+        rows = equation.rows(equation.monomials(values), nmod(0, prime))
         kernel, nullity = nmod_mat(rows, prime).nullspace()
         if nullity != 1:
             return None

@@ -60,7 +60,7 @@ _FEW_DIGITS = 50
 _REACH = {1: 1000, 2: 1000, 3: 500, 4: 250}  # steps by dimension, above it the least
 _LEAST_REACH = 100
 _ALONG = {1: 400, 2: 400, 3: 150, 4: 60}  # the same along series
-_LEAST_ALONG = 18
+_LEAST_ALONG = 40
 _MOST_SHOWN = 200
 _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
@@ -370,8 +370,6 @@ def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, sec
     limits = _range(map_.dim, steps, time.monotonic() + seconds)
     if not _is_dominant(map_, eps):
         return _refused(eps, False, False) or _unknown("")
-    if not map_.at(eps).is_bilinear:
-        return _unknown(f"the singularities of {map_.kind} are followed in dimension {WRITTEN_DIMENSION} at most")
     rng = random.Random(f"patterns {seed_for(seed, map_.subject, eps)}")
     if len(map_.at(eps).factors) > 1:
         found = fates_at_random(map_, eps, rng, limits)

@@ -66,7 +66,9 @@ class ProjectiveMap:
         self.is_undefined = False
         if map_.dim <= MAX_FACTORED:
             forms = [homogeneous_map(one) for one in over.factors]
-            self._factors = [(one, _reduced(form)) for one, form in zip(over.equations, forms, strict=True)]
+            self._factors = [
+                (one, _reduced(form, one.explicit is None)) for one, form in zip(over.equations, forms, strict=True)
+            ]
             with suppress(TooLarge):
                 found = homogeneous_map(over) if len(forms) > 1 else forms[0]
                 self.factor, self.degree = str(found.factor), found.degree
@@ -179,9 +181,11 @@ class ProjectiveMap:
         return found
 
 
-def _reduced(one: HomogeneousMap) -> ReducedForms | None:
-    """The terms of the forms without what they have in common; None where that is nothing."""
-    return None if one.factor.is_constant() else [[(tuple(m), int(c)) for m, c in form.terms()] for form in one.forms]
+def _reduced(one: HomogeneousMap, by_minors: bool) -> ReducedForms | None:
+    """The terms of the forms without what they have in common; None where they are the minors."""
+    if by_minors and one.factor.is_constant():
+        return None
+    return [[(tuple(m), int(c)) for m, c in form.terms()] for form in one.forms]
 
 
 @dataclass(frozen=True, eq=False)
