@@ -282,6 +282,8 @@ def _fate_at(
         run = list(whole(walked(equations, point, direction, tangents, orders.settled_at + 2, limits.end)))
         status, down, up = _told([step.rank for step in run], full)
     settled = max(up or 0, orders.settled_at) if orders.is_settled else None
+    if len(equations) > 1 and not tracked.functions:  # det M stands for the critical hypersurfaces of one map only
+        orders = replace(NO_ORDERS, followed=orders.followed)
     return _Fate(status, down, up, tuple(run), orders.followed, settled, orders)
 
 

@@ -221,10 +221,14 @@ def singularities(
     return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
 
 
+class TooLong(InputError):
+    """Why the singularities of a composition are not followed."""
+
+
 def _without_forms(map_: BirationalMap, eps: fmpq, seed: int, limits: Range) -> SingularityRun:
     """The same for a composition whose forms are too large: hypersurfaces are told by random points."""
     if not map_.at(eps).is_bilinear:
-        raise InputError(
+        raise TooLong(
             "found a composition whose forms on projective space are too large, expected a shorter one, or one of maps "
             "with equations that are linear in both points: of these the singularities are known by random points"
         )
@@ -359,7 +363,10 @@ def patterns(
         values = default_eps(map_, seed + again) if eps is None else (eps,)
         part = max(0.0, end - time.monotonic()) / len(values)
         if map_.dim <= WRITTEN_DIMENSION and all(can_be_written(map_, value, part) for value in values):
-            runs = [singularities(map_, value, steps=steps, seed=seed, seconds=part) for value in values]
+            try:
+                runs = [singularities(map_, value, steps=steps, seed=seed, seconds=part) for value in values]
+            except TooLong:
+                return _unknown("the composition is too long for its singularities to be followed")
             found = patterns_of(runs, map_.has_eps)
         else:
             found = _one_of([_at_random(map_, value, steps, seed, part) for value in values])
