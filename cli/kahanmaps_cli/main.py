@@ -18,7 +18,7 @@ import click
 from kahanmaps.errors import InputError, KahanmapsError, bounded, is_of_the_machine, is_out_of_memory
 from kahanmaps_cli.colour_option import colour_option, with_colour_option
 from kahanmaps_cli.groups import SuggestingGroup, in_our_words
-from kahanmaps_cli.params import with_short_integers
+from kahanmaps_cli.params import with_our_rules
 from kahanmaps_cli.progress import as_typed, say
 from kahanmaps_cli.streams import have_standard_streams, leave_nothing_to_flush
 
@@ -115,7 +115,7 @@ class LazyGroup(SuggestingGroup):
             return None
         module = import_module(f"kahanmaps_cli.commands.{COMMANDS[cmd_name][0]}")
         command: click.Command = module.command
-        return with_colour_option(with_short_integers(command))
+        return with_colour_option(with_our_rules(command))
 
     def hint(self, written: str, known: list[str]) -> str:
         from kahanmaps.documents.catalog import names

@@ -1,6 +1,6 @@
-"""The formats of an orbit: text for people, jsonl and csv streamed line by line, npz whole at the end.
+"""The formats of an orbit: text for people, json, jsonl and csv streamed line by line, npz whole at the end.
 
-All but npz are valid after every record, so that whatever ends an orbit leaves a file that can be read.
+All but json and npz are valid after every record, so that whatever ends an orbit leaves a file that can be read.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import IO, Any
 
-from kahanmaps_cli.render import ending
+from kahanmaps_cli.render import ending, envelope
 from kahanmaps_cli.terminal import tell
 
 # An npz file of text holds every number padded to the longest one; beyond this size jsonl is the format to use.
@@ -66,14 +66,32 @@ class JsonLines(Writer):
         self._line(json.dumps({"record": "header", **header}))
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
-        record: dict[str, Any] = {"record": "point", "step": step, "x": list(x)}
-        if self.integrals:
-            record["integrals"] = dict(zip(self.integrals, values, strict=True))
-        self._line(json.dumps(record))
+        self._line(json.dumps({"record": "point", **_record(step, x, self.integrals, values)}))
 
     def end(self, end: dict[str, Any]) -> None:
         self._line(json.dumps({"record": "end", **end}))
         self.stream.flush()
+
+
+class Json(Writer):
+    """One JSON object with the header, all points and the end."""
+
+    def header(self, header: dict[str, Any]) -> None:
+        self._line(json.dumps({**envelope("orbit"), **header})[:-1] + ', "points": [')
+        self._separator = ""
+
+    def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
+        self._line(self._separator + json.dumps(_record(step, x, self.integrals, values)))
+        self._separator = ","
+
+    def end(self, end: dict[str, Any]) -> None:
+        self._line(f'], "end": {json.dumps(end)}}}')
+        self.stream.flush()
+
+
+def _record(step: int, x: Sequence[str], integrals: Sequence[str], values: Sequence[str | None]) -> dict[str, Any]:
+    record: dict[str, Any] = {"step": step, "x": list(x)}
+    return {**record, "integrals": dict(zip(integrals, values, strict=True))} if integrals else record
 
 
 class Csv(Writer):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from functools import cache
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +17,7 @@ else:
     OptionType = click.ParamType
 
 
+_WITH_EXPONENT = re.compile(r"([+-]?[0-9]+)(?:\.([0-9]+))?[eE]\+?([0-9]{1,3})")
 _MOST_STEP_DIGITS, _MOST_DIGITS = 40, 100  # of a step number, of any other integer: floats go further
 
 
@@ -60,6 +63,7 @@ class Whole(OptionType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         text = str(value).strip()
+        text = _spelt_out(text)
         digits = text.removeprefix("-").removeprefix("+")
         # Longer ones are refused before they meet Python's own limit on digits.
         if not (digits.isascii() and digits.isdigit() and len(digits) <= 400 and int(text) >= self.least):
@@ -75,17 +79,49 @@ class ShortInteger(OptionType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if isinstance(value, str) and len(value.strip()) > _MOST_DIGITS:
             self.fail(f"found {quoted(value)}, expected an integer of at most {_MOST_DIGITS} digits", param, ctx)
+        if isinstance(value, str):
+            value = _spelt_out(value.strip())
         return click.INT.convert(value, param, ctx)
 
 
-def with_short_integers(command: click.Command) -> click.Command:
-    """The command, and those below it, with integers of bounded length wherever they say `type=int`."""
+def _spelt_out(text: str) -> str:
+    """1e6 and 2.5e3 as integers without an exponent; any other text as it is.
+
+    >>> _spelt_out("2.5e3"), _spelt_out("1e-1"), _spelt_out("2.5e0")
+    ('2500', '1e-1', '2.5e0')
+    """
+    match = _WITH_EXPONENT.fullmatch(text)
+    if match is None:
+        return text
+    whole, part, exponent = match[1], match[2] or "", int(match[3])
+    return whole + part.ljust(exponent, "0") if len(part) <= exponent else text
+
+
+def _require_once(command: click.Command, ctx: click.Context, args: list[str]) -> list[str]:
+    """The arguments, of which an option with one value may not be given twice: the first one would be lost."""
+    _, _, order = command.make_parser(ctx).parse_args(args=list(args))
+    for option in order:
+        takes_one = isinstance(option, click.Option) and not (option.multiple or option.count or option.is_flag)
+        if takes_one and not ctx.resilient_parsing and order.count(option) > 1:
+            raise click.UsageError(f"{option.opts[-1]} is given {order.count(option)} times, expected once", ctx)
+    return args
+
+
+@cache  # a command is given its rules once
+def with_our_rules(command: click.Command) -> click.Command:
+    """The command, and those below it, with integers of bounded length for `type=int`, and no option lost.
+
+    That is to say: none that takes one value is given more than once.
+    """
+    parse_args = command.parse_args
+    # click offers no other place for it
+    command.parse_args = lambda ctx, args: parse_args(ctx, _require_once(command, ctx, args))  # type: ignore[method-assign]
     for parameter in command.params:
         if parameter.type is click.INT:
             parameter.type = ShortInteger()
     if isinstance(command, click.Group):
         for below in command.commands.values():
-            with_short_integers(below)
+            with_our_rules(below)
     return command
 
 

@@ -61,14 +61,19 @@ class Progress:
         else:
             _write(text + "\n")
 
+    def clear(self) -> None:
+        """Take the line away from a terminal, until the next sentence."""
+        if self._shown:
+            _write("\r" + " " * self._shown + "\r")
+            self._shown = 0
+
     def __enter__(self) -> Progress:
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._shown:
-            _write("\r" + " " * self._shown + "\r")
+        self.clear()
 
 
 def _width() -> int:

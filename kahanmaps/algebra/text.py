@@ -13,6 +13,7 @@ What is printed parses back to the same value wherever that value lies within th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import prod
 
 from flint import fmpq, fmpq_mpoly, fmpq_poly
 
@@ -26,8 +27,11 @@ from kahanmaps.algebra.numerals import (
     require_text,
     wrong_kind,
 )
-from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
+from kahanmaps.algebra.polynomials import RationalFunction, names_of, primitive_part, ring
 from kahanmaps.errors import ExpressionError
+
+_MOST_FACTORED = 2000  # terms of a polynomial that is printed in factors
+_ONE = fmpq(1)
 
 
 def parse_number(text: str, *, limits: Limits = LIMITS) -> fmpq:
@@ -216,6 +220,72 @@ def format_rational_function(function: RationalFunction) -> str:
     if any(sign in below for sign in "*+- "):
         below = f"({below})"
     return f"{above}/{below}"
+
+
+def format_factored(function: RationalFunction) -> str:
+    """The quotient, above and below in irreducible factors over Q where that is shorter.
+
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> format_factored(RationalFunction(2*x**3*y - 2*x*y, (x - y)**2)), format_factored(RationalFunction(x + 1, 2*y))
+    ('2*x*y*(x^2 - 1)/(x - y)^2', '(x/2 + 1/2)/y')
+    """
+    found = shorter_factors(function)
+    return format_rational_function(function) if found is None else format_product(*found)
+
+
+def shorter_factors(function: RationalFunction) -> tuple[list[tuple[fmpq_mpoly, int]], fmpq] | None:
+    """Polynomials of coprime integers with exponents, and a number, that multiply to a function; None if not shorter.
+
+    Numerator and denominator are each in irreducible factors over Q, or one polynomial times variables.
+    """
+    factors, constant, is_shorter = list[tuple[fmpq_mpoly, int]](), fmpq(1), False
+    for sign, polynomial in ((1, function.numerator), (-1, function.denominator)):
+        if len(polynomial) == 0 or len(polynomial) > _MOST_FACTORED:
+            return None
+        content, whole = primitive_part(polynomial)
+        constant *= content**sign
+        powers = [(primitive_part(g)[1], int(k)) for g, k in whole.factor()[1]]
+        variables = [one for one in powers if len(one[0]) == 1]
+        rest = whole / prod(g**k for g, k in variables) if variables else whole
+        choices = [powers, [*variables, *([(rest, 1)] if len(rest) > 1 else [])]]
+        chosen = min(choices, key=lambda powers: len(format_product(powers)))
+        is_shorter |= len(chosen) > 1 or any(k > 1 for _, k in chosen)
+        factors += [(g, sign * k) for g, k in chosen]
+    return (factors, constant) if is_shorter else None
+
+
+def format_product(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq = _ONE) -> str:
+    """A number times powers of polynomials, short ones first, those with negative exponents below a line.
+
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> format_product([(x + y, 2), (y, -1), (x - 1, -3)], fmpq(-2, 3)), format_product([(x + y, 1)])
+    ('-2*(x + y)^2/(3*y*(x - 1)^3)', 'x + y')
+    """
+    parts = []
+    for number, powers in sides(factors, constant):
+        bases = [(f"({format_polynomial(g)})" if len(g) > 1 else format_polynomial(g), k) for g, k in powers]
+        told = [base + (f"^{k}" if k > 1 else "") for base, k in bases]
+        parts.append(([str(number)] if number > 1 else []) + told)
+    above, below = ("*".join(part) for part in parts)
+    if len(factors) == 1 and factors[0][1] == 1 and constant == 1:
+        return format_polynomial(factors[0][0])
+    sign = "-" if constant < 0 else ""
+    if not below:
+        return f"{sign}{above or 1}"
+    return f"{sign}{above or 1}/({below})" if len(parts[1]) > 1 else f"{sign}{above or 1}/{below}"
+
+
+def sides(factors: Sequence[tuple[fmpq_mpoly, int]], constant: fmpq) -> list[tuple[int, list[tuple[fmpq_mpoly, int]]]]:
+    """The positive number and the powers, short ones first, of a product that stand above a line, and below it."""
+    return [
+        (number, sorted(((g, sign * k) for g, k in factors if sign * k > 0), key=_size))
+        for sign, number in ((1, abs(int(constant.p))), (-1, int(constant.q)))
+    ]
+
+
+def _size(power: tuple[fmpq_mpoly, int]) -> tuple[int, list[int]]:
+    """The number of terms, and then the order of the ring."""
+    return len(power[0]), [-int(e) for e in power[0].monoms()[0]]
 
 
 def _term(coefficient: fmpq, monomial: Sequence[int], names: Sequence[str]) -> str:

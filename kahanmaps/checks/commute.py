@@ -96,7 +96,7 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
             g, ratio, is_same_step = Kahan(g.system.scaled(ratio)), SAME_STEP, ratio == 1
         else:
             note = f"the map of g is taken at eps2 = {format_number(eps2)}"
-        notes.append(f"{note}; the evidence names eps only")
+        notes.append(f"{note}; the evidence below is stated for eps")
     proof = None
     if is_same_step and as_they_are and file.member is not None and other.member is not None:
         proof = theorems.commuting_by_involution_of_members(file.member, other.member)

@@ -15,6 +15,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
 from kahanmaps.algebra.reading import factors_of, first_terms, reading_order
+from kahanmaps.algebra.text import shorter_factors, sides
 from kahanmaps.displayed import latex_form
 from kahanmaps.errors import InputError, counted
 
@@ -88,14 +89,30 @@ def latex_polynomial(polynomial: fmpq_mpoly) -> str:
 
 @latex_form.register
 def latex_rational_function(function: RationalFunction) -> str:
-    r"""A quotient of polynomials over Q as LaTeX, exact, without fractions inside the fraction.
+    r"""A quotient of polynomials over Q as LaTeX, exact, without fractions inside the fraction, in factors where they
+    are shorter.
 
-    The denominator starts with a positive term. Common factors stay, as they do in `RationalFunction`.
+    Otherwise the denominator starts with a positive term, and common factors stay, as they do in `RationalFunction`.
 
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> print(latex_rational_function(parse_rational_function("(x/2 + 1)/(1 - eps^2*x)", ["x", "eps"])))
     \frac{x + 2}{2 - 2 \varepsilon^2 x}
+    >>> print(latex_rational_function(parse_rational_function("-2*(x + 1)^2*y/3", ["x", "y"])))
+    -\frac{2 y \left(x + 1\right)^2}{3}
     """
+    found = shorter_factors(function)
+    if found is not None and _is_product(found[0]):
+        # The first term is read first, and is to be positive.
+        negative = [(g, k) for g, k in found[0] if reading_order(g)[0][1] < 0]
+        factors = [(-g if (g, k) in negative else g, k) for g, k in found[0]]
+        constant = -found[1] if sum(k for _, k in negative) % 2 else found[1]
+        above, below = (
+            latex_polynomial(powers[0][0])
+            if number == 1 and [k for _, k in powers] == [1]
+            else " ".join([str(number)] * (number > 1 or not powers) + [_latex_power(g, k) for g, k in powers])
+            for number, powers in sides(factors, constant)
+        )
+        return ("-" if constant < 0 else "") + (above if below == "1" else rf"\frac{{{above}}}{{{below}}}")
     above, below = map(latex_polynomial, above_and_below(function))
     return above if function.is_polynomial else rf"\frac{{{above}}}{{{below}}}"
 
@@ -137,6 +154,19 @@ def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:
         rows.append(rf"&\ \vdots\ \text{{({len(equations)} equations)}}")
     inside = r" \\ ".join(rows)
     return rf"$\displaystyle \begin{{aligned}} {inside} \end{{aligned}}$"
+
+
+def _is_product(factors: Sequence[tuple[fmpq_mpoly, int]]) -> bool:
+    """Whether there are several sums above or below the line, or powers of sums."""
+    powers = [k for g, k in factors if len(g) > 1]
+    return sum(k for k in powers if k > 0) > 1 or sum(k for k in powers if k < 0) < -1
+
+
+def _latex_power(polynomial: fmpq_mpoly, exponent: int) -> str:
+    if len(polynomial) == 1:
+        return latex_polynomial(polynomial**exponent)
+    power = "" if exponent == 1 else f"^{_braced(str(exponent))}"
+    return rf"\left({latex_polynomial(polynomial)}\right){power}"
 
 
 def _power(name: str, exponent: int) -> str:

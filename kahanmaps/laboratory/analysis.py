@@ -63,7 +63,12 @@ class Analysis(Findings, Displayed):
     @property
     def sections(self) -> list[tuple[str, list[Statement]]]:
         """The report: titles and their statements."""
-        return [(title, lines) for title, lines in sections(self) if lines]
+        return sections(self)
+
+    @property
+    def final_sections(self) -> list[tuple[str, list[Statement]]]:
+        """The first of them, up to the one that is not complete yet."""
+        return sections(self, until_pending=True)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: the verdict, the statements, and all results."""
@@ -128,6 +133,7 @@ def analyze(
     seconds: float | None = None,
     seed: int = 0,
     progress: Callable[[str], None] = lambda _: None,
+    reached: Callable[[Analysis], None] = lambda _: None,
 ) -> Analysis:
     """What a map preserves and how it grows, within a time budget.
 
@@ -138,6 +144,7 @@ def analyze(
         seconds: time for everything, about; by default 16 for planar systems, up to 150 from dimension 6 on.
         seed: of everything random.
         progress: is told what is being done.
+        reached: gets what is known, at the beginning and after each part.
 
     Returns:
         An `Analysis`. Parts that there was no time for are named in `skipped`.
@@ -271,21 +278,25 @@ def analyze(
         ("densities", densities),
         ("the flow", flow),
         ("Poisson tensors", poisson),
+        ("heights", heights),
         ("symmetries", symmetries),
         ("commuting systems", commuting),
-        ("heights", heights),
     ]
     # Where degrees make use of them singularities come first; in more dimensions they are slow, and come last.
     parts.insert(2 if dim <= WRITTEN_DIMENSION else len(parts), ("singularities", confinement))
+    found.pending = [name for name, _ in parts]
+    reached(found)
     for name, part in parts:
         if left() <= 0:
             found.skipped.append(f"{name}: the time was over")
-            continue
-        progress(name)
-        try:
-            part()
-        except KahanmapsError as error:
-            found.skipped.append(f"{name}: {error}")
+        else:
+            progress(name)
+            try:
+                part()
+            except KahanmapsError as error:
+                found.skipped.append(f"{name}: {error}")
+        found.pending.remove(name)
+        reached(found)
     if system is None:
         found.skipped.append(
             "Hamiltonian structure, the commuting family, symmetries, commuting systems: for fields only"

@@ -46,7 +46,13 @@ class Findings:
     structure: Structure | NoStructure | None = None  # in coordinates with the centre as origin
     centre: tuple[fmpq, ...] | None = None
     skipped: list[str] = field(default_factory=list)
+    pending: list[str] = field(default_factory=list)  # the parts that were not gone through yet
     elapsed: float = 0.0
+
+    def stop(self, reason: str) -> None:
+        """No pending part is gone through any more."""
+        self.skipped += [f"{part}: {reason}" for part in self.pending]
+        self.pending.clear()
 
     @property
     def dim(self) -> int:

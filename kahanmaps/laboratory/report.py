@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 from flint import fmpq_mat
 
 from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import counted
 from kahanmaps.family.skew_hamiltonian import factors_of_chi
 from kahanmaps.family.structure import Structure
+from kahanmaps.invariants.heights import Growth
 from kahanmaps.laboratory.consistency import doubt_of_heights
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
+from kahanmaps.laboratory.preserve.hirota_kimura import Profile
 from kahanmaps.laboratory.symmetry.commuting import CommutingField
 
 PROVED, SUPPORTED, EXPLAINED, MEASURED = "proved", "supported", "explained", "measured"
 UNDECIDED, NOTE = "undecided", "note"
 _SHOWN_DEGREES = 12
+_NAMES = 6  # that are listed one by one
 
 
 @dataclass(frozen=True)
@@ -32,19 +38,33 @@ class Statement:
     text: str
 
 
-def sections(found: Findings) -> list[tuple[str, list[Statement]]]:
-    """Titles with their statements, which may be none."""
+def sections(found: Findings, until_pending: bool = False) -> list[tuple[str, list[Statement]]]:
+    """Titles with their statements, those that have some; perhaps only those before the first one that is not final."""
+    ready = takewhile(lambda section: not (until_pending and section[1].intersection(found.pending)), _sections())
+    return [(title, lines) for title, _, tell in ready if (lines := tell(found))]
+
+
+def _sections() -> list[tuple[str, set[str], Callable[[Findings], list[Statement]]]]:
+    """Titles, the parts of the analysis that their statements come from, and what makes these."""
     return [
-        ("integrals", [*_integral_lines(found), *_curve_lines(found)]),
-        ("measure", _measure_lines(found)),
-        ("the flow", [] if found.flow is None else [Statement(*line) for line in found.flow.lines()]),
-        ("Poisson tensors", _poisson_lines(found)),
-        ("growth", _growth_lines(found)),
-        ("singularities", _singularity_lines(found)),
-        ("symmetry", _symmetry_lines(found)),
-        ("structure", _structure_lines(found)),
-        ("commuting systems", _commuting_lines(found)),
-        ("not done", [Statement(NOTE, text) for text in found.skipped]),
+        (
+            "integrals",
+            {"the commuting family", "degrees", "integrals"},
+            lambda found: [*_integral_lines(found), *_curve_lines(found)],
+        ),
+        ("measure", {"densities"}, _measure_lines),
+        (
+            "the flow",
+            {"the flow"},
+            lambda found: [Statement(*line) for line in found.flow.lines()] if found.flow else [],
+        ),
+        ("Poisson tensors", {"Poisson tensors"}, _poisson_lines),
+        ("growth", {"degrees", "heights"}, _growth_lines),
+        ("singularities", {"singularities"}, _singularity_lines),
+        ("symmetry", {"symmetries"}, _symmetry_lines),
+        ("structure", {"hamiltonian structure", "the commuting family"}, _structure_lines),
+        ("commuting systems", {"commuting systems"}, _commuting_lines),
+        ("not done", set(), lambda found: [Statement(NOTE, text) for text in found.skipped if not found.pending]),
     ]
 
 
@@ -72,27 +92,45 @@ def _integral_lines(found: Findings) -> list[Statement]:
     elif profile.period is not None:
         lines.append(Statement(MEASURED, f"all orbits tried close after {counted(profile.period, 'step')}"))
     else:
-        nullities = ", ".join(map(str, profile.nullities))
-        relations = f"relations along an orbit, of degree at most 1, 2, ...: spaces of dimension {nullities}"
         if search.codimension:
             seen = "" if search.is_exact else "at least "
-            text = f"generic orbits lie on varieties of codimension {seen}{search.codimension}; {relations}"
+            number = f"{seen}{counted(search.codimension, 'independent integral')}"
+            text = f"generic orbits lie on varieties of codimension {seen}{search.codimension}, which means {number}"
         else:
-            text = f"orbits show no integral up to degree {profile.degree}; {relations}"
-        lines.append(Statement(MEASURED, text))
+            text = "orbits show no integral"
+        lines.append(Statement(MEASURED, f"{text}; relations along an orbit: {_relations(profile)}"))
         if not profile.agree:
             lines.append(Statement(NOTE, "the orbits that were compared do not agree"))
     lines += [Statement(MEASURED, f"along orbits {relation.text}") for relation in found.relations]
     integrals = [name for relation in found.relations for name in relation.integrals]
     if integrals:
-        letter = integrals[0].rstrip("0123456789")
-        lines.append(Statement(NOTE, f"the {letter} are integrals: numbers that depend on the orbit only"))
+        if len(integrals) == 1:
+            text = "is constant on each orbit and differs between orbits, so it is an integral"
+        else:
+            text = "are constant on each orbit and differ between orbits, so they are integrals"
+        lines.append(Statement(NOTE, f"{_listed(integrals)} {text}"))
     functions = [name for relation in found.relations for name in relation.functions_of_eps]
     if functions:
-        lines.append(Statement(NOTE, f"the {functions[0].rstrip('0123456789')} are numbers that depend on eps only"))
+        depend = "depends" if len(functions) == 1 else "depend"
+        lines.append(Statement(NOTE, f"{_listed(functions)} {depend} on eps only"))
     if search.reason and profile.nullities:
         lines.append(Statement(NOTE, search.reason))
     return lines + family
+
+
+def _relations(profile: Profile) -> str:
+    """How many independent ones there are of each degree from the first that has some."""
+    degrees = list(enumerate(profile.nullities, 1))
+    some = [f"a {k}-dimensional space up to degree {degree}" for degree, k in degrees if k]
+    none = max((degree for degree, k in degrees if not k), default=0)
+    before = [f"none up to degree {none}" if none > 1 else "none of degree 1"] if none else []
+    return ", ".join(before + some)
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The names without repetition, only the first and the last one of many."""
+    names = list(dict.fromkeys(names))
+    return ", ".join(names) if len(names) <= _NAMES else f"{names[0]}, ..., {names[-1]}"
 
 
 def _curve_lines(found: Findings) -> list[Statement]:
@@ -109,13 +147,23 @@ def _measure_lines(found: Findings) -> list[Statement]:
     search = found.densities
     if search is None:
         return []
-    lines = [Statement(str(one.verdict), f"dx/phi is invariant, phi = {one.text}") for one in search.densities]
-    if not search.densities:
+    lines = []
+    if search.densities:
+        shortest = min(search.densities, key=lambda one: (one.verdict is not Verdict.PROVED, len(one.text)))
+        lines.append(Statement(str(shortest.verdict), f"dx/phi is invariant, phi = {shortest.text}"))
+        if len(search.densities) > 1:
+            number = counted(len(search.densities) - 1, "further polynomial")
+            lines.append(Statement(NOTE, f"{number} phi, this one times integrals: find-density writes them out"))
+    else:
         lines.append(Statement(MEASURED if "no polynomial" in search.reason else UNDECIDED, search.reason))
     if search.turning is not None:
         text = f"|dx/phi| is invariant, and dx/phi changes its sign, phi = {search.turning.text}"
         lines.append(Statement(str(search.turning.verdict), text))
     return lines
+
+
+def _flow_lines(found: Findings) -> list[Statement]:
+    return [] if found.flow is None else [Statement(*line) for line in found.flow.lines()]
 
 
 def _poisson_lines(found: Findings) -> list[Statement]:
@@ -148,8 +196,8 @@ def _growth_lines(found: Findings) -> list[Statement]:
             lines.append(Statement(PROVED, found.degrees.enclosure.text))
     if found.heights is not None:
         doubt = doubt_of_heights(found)
-        status = UNDECIDED if doubt or found.heights.text.startswith("undecided") else MEASURED
-        text = f"heights of exact orbits: {found.heights.text}"
+        status = UNDECIDED if doubt or found.heights.kind is Growth.UNDECIDED else MEASURED
+        text = found.heights.text
         lines.append(Statement(status, f"{text}, but {doubt}" if doubt else text))
     return lines
 
@@ -197,8 +245,10 @@ def _structure_lines(found: Findings) -> list[Statement]:
         lines.append(Statement(PROVED, f"not Hamiltonian with a constant J: {structures.reason}"))
     darboux = affine_darboux(found.file.system) if found.file.is_quadratic else None
     if darboux is not None and darboux.functions:
-        planes = ", ".join(format_polynomial(one.function) for one in darboux.functions)
-        lines.append(Statement(PROVED, f"invariant hyperplanes of flow and map: {planes} = 0"))
+        planes = [f"{format_polynomial(one.function)} = 0" for one in darboux.functions]
+        kind = {1: "point", 2: "line", 3: "plane"}.get(found.dim, "hyperplane")
+        are = f"the {kind} {planes[0]} is" if len(planes) == 1 else f"the {kind}s {_enumerated(planes)} are"
+        lines.append(Statement(PROVED, f"{are} invariant, for flow and map"))
     if found.structure is not None and found.structure.text:
         text = f"belongs to the commuting family: {found.structure.text}{_coordinates(found, found.structure.T)}"
         lines.append(Statement(PROVED, text))
@@ -212,6 +262,10 @@ def _structure_lines(found: Findings) -> list[Statement]:
             )
         )
     return lines
+
+
+def _enumerated(texts: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(texts[:-1]), texts[-1]]))
 
 
 def _coordinates(found: Findings, T: fmpq_mat | None) -> str:
@@ -248,5 +302,7 @@ def _commuting_lines(found: Findings) -> list[Statement]:
     lines += [Statement(NOTE, text) for text in search.irrational]
     lines += [Statement(UNDECIDED, text) for text in search.undecided]
     if not (told or search.every_g_commutes or search.families or search.irrational or search.undecided):
-        lines.append(Statement(PROVED, "no g = B f with a constant rational matrix B other than 0, f and -f commutes"))
+        lines.append(
+            Statement(PROVED, "of the fields g = B f, B a constant rational matrix, only 0, f and -f commute with f")
+        )
     return lines

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pty
 import signal
 import subprocess
 import time
+from importlib import import_module
 
 import pytest
 from cli_helpers import COMMAND
@@ -30,6 +32,9 @@ def test_the_report_as_text(kahanmaps):
     outcome = kahanmaps(TOP)
     title, lines, verdict = report(outcome.out)
     assert (outcome.status, outcome.err) == (0, "")
+    equations = outcome.out.splitlines()[1:5]
+    assert equations[:3] == ["x1' = x2*x3", "x2' = -2*x1*x3", "x3' = x1*x2"]
+    assert equations[3].startswith("proved: an identity of rational functions, or a theorem; supported: ")
     assert title == "analyze: euler_top, dimension 3, a1 = 1, a2 = -2, a3 = 1, every eps (the time step is 2 eps)"
     assert {status for _, status, _ in lines} <= STATUSES
     assert (
@@ -183,16 +188,55 @@ def test_wrong_use_gives_2(kahanmaps, command, words):
 # Time, progress and interrupts
 
 
-def test_an_interrupt_in_any_part_ends_it(kahanmaps, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
+def interrupted(*_, **__):
+    raise KeyboardInterrupt
 
-    for part in ("degree_growth", "linear_symmetries", "height_survey"):
-        with monkeypatch.context() as patch:
-            patch.setattr(f"kahanmaps.laboratory.analysis.{part}", interrupted)
-            outcome = kahanmaps(FOUR)
-        assert (outcome.status, outcome.out) == (130, "")
-        assert "interrupted" in outcome.err
+
+@pytest.mark.parametrize(
+    ("part", "sections"),
+    [
+        ("constant_structures", ["not done"]),
+        ("find_integrals", ["growth", "singularities", "structure", "not done"]),
+        ("linear_symmetries", ["integrals", "measure", "the flow", "growth", "singularities", "structure", "not done"]),
+    ],
+)
+def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, part, sections):
+    monkeypatch.setattr(f"kahanmaps.laboratory.analysis.{part}", interrupted)
+    outcome = kahanmaps("analyze weierstrass")
+    _, lines, verdict = report(outcome.out)
+    assert outcome.status == 130
+    assert "interrupted: the verdict rests on what was found so far" in outcome.err
+    assert list(dict.fromkeys(section for section, _, _ in lines)) == sections
+    skipped = [text for section, _, text in lines if section == "not done"]
+    assert skipped[-1] == "commuting systems: interrupted"
+    assert (verdict[0] == "undecided") is (part == "constant_structures")
+    as_json = kahanmaps("analyze weierstrass --json")
+    assert (as_json.status, as_json.json["skipped"]) == (130, skipped)
+
+
+def test_an_interrupt_before_anything_was_begun_prints_nothing(kahanmaps, monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.analysis.Laboratory", interrupted)
+    outcome = kahanmaps(FOUR)
+    assert (outcome.status, outcome.out) == (130, "")
+
+
+def test_sections_are_told_as_soon_as_they_are_final(kahanmaps, monkeypatch):
+    told = []
+    monkeypatch.setattr("kahanmaps_cli.commands.analyze.tell", lambda text, **_: told.append(text.strip()))
+    seen = {}
+    for part in ("find_densities", "height_survey", "linear_symmetries"):
+        whole = getattr(import_module("kahanmaps.laboratory.analysis"), part)
+
+        def looked_at(*args, part=part, whole=whole, **options):
+            seen[part] = list(told)
+            return whole(*args, **options)
+
+        monkeypatch.setattr(f"kahanmaps.laboratory.analysis.{part}", looked_at)
+    kahanmaps("analyze weierstrass")
+    assert ("integrals" in seen["find_densities"], "measure" in seen["find_densities"]) == (True, False)
+    assert ("the flow" in seen["height_survey"], "growth" in seen["height_survey"]) == (True, False)
+    assert ("singularities" in seen["linear_symmetries"], "symmetry" in seen["linear_symmetries"]) == (True, False)
+    assert [text for text in ("integrals", "growth", "verdict") if told.count(text) != 1] == []
 
 
 @pytest.mark.slow
@@ -209,5 +253,6 @@ def test_an_interrupt_gives_130_and_is_prompt():
     while b"interrupted" not in said:
         said += os.read(ours, 4096)
     os.close(ours)
-    assert (process.returncode, out) == (130, b"")
+    assert process.returncode == 130
+    assert json.loads(out)["skipped"][-1].endswith(": interrupted")
     assert b"Traceback" not in said

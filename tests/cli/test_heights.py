@@ -16,13 +16,16 @@ OSCILLATOR = "--vars q,p --rhs p --rhs '2*q^2-q'"  # q'' = -q + 2 q^2; the fourt
 
 
 @pytest.mark.parametrize(
-    ("name", "kind"), [("weierstrass", "quadratic"), ("lorenz", "exponential"), ("harmonic", "linear")]
+    ("name", "kind"), [("weierstrass", "quadratically"), ("lorenz", "exponentially"), ("harmonic", "linearly")]
 )
 def test_the_kinds_of_growth(kahanmaps, name, kind):
     outcome = kahanmaps(f"heights {name} --starts 2 --steps 40 --max-digits 3000")
     assert (outcome.status, outcome.err) == (0, "")
     assert len(outcome.rows) == 5
-    assert outcome.rows[-1] == ["heights", f"{kind}: 4 orbits, 2 values of eps"]
+    assert outcome.rows[-1] == [
+        "heights",
+        f"bit lengths grow {kind} on all 4 exact orbits tried, at 2 values of eps",
+    ]
     assert outcome.out.startswith(f"# {name}, eps = 1/10 (time step 2 eps = 1/5), 3/11 (time step 2 eps = 6/11), exact")
 
 
@@ -31,7 +34,7 @@ def test_the_json_has_what_is_needed_to_run_it_again(kahanmaps):
     assert (found["version"], found["eps"], found["time_step"]) == (__version__, ["1/10"], ["1/5"])
     assert [orbit["start"] for orbit in found["orbits"]] == [["1", "1/2"], ["1/3", "2"]]
     assert (found["kind"], found["kinds"], found["whole"]) == ("quadratic", ["quadratic"], True)
-    assert found["text"] == "quadratic: 2 orbits, 1 value of eps"
+    assert found["text"] == "bit lengths grow quadratically on all 2 exact orbits tried, at 1 value of eps"
     assert found["document"]["name"] == "weierstrass"
 
 
@@ -39,13 +42,18 @@ def test_starts_that_disagree_are_told(kahanmaps):
     # the axis y = 0 is invariant, and on it Lotka-Volterra is linear
     outcome = kahanmaps("heights lotka_volterra --start 1,2 --start 3,0 --steps 40 --max-digits 3000")
     assert outcome.status == 3
-    assert outcome.rows[-1][1] == "undecided: the starts disagree (2 exponential, 2 linear)"
+    assert outcome.rows[-1][1] == "heights of exact orbits are undecided: the starts disagree (2 exponential, 2 linear)"
 
 
 def test_a_special_eps_is_seen_as_such(kahanmaps):
     outcome = kahanmaps(f"heights {OSCILLATOR} --eps 1 --steps 40")
-    assert (outcome.status, outcome.rows[-1][1]) == (0, "periodic: 3 orbits, 1 value of eps")
-    assert kahanmaps(f"heights {OSCILLATOR} --steps 40").rows[-1][1] == "quadratic: 6 orbits, 2 values of eps"
+    assert (outcome.status, outcome.rows[-1][1]) == (
+        0,
+        "points come back on all 3 exact orbits tried, at 1 value of eps",
+    )
+    assert kahanmaps(f"heights {OSCILLATOR} --steps 40").rows[-1][1] == (
+        "bit lengths grow quadratically on all 6 exact orbits tried, at 2 values of eps"
+    )
 
 
 def test_eps_that_disagree_are_told(monkeypatch):
@@ -54,12 +62,12 @@ def test_eps_that_disagree_are_told(monkeypatch):
 
     found = height_survey(QuadraticSystem.from_text(["q", "p"], ["p", "2*q^2 - q"]), starts=2, steps=40)
     assert (found.kind, found.kinds) == (Growth.UNDECIDED, (Growth.PERIODIC, Growth.QUADRATIC))
-    assert found.text == "undecided: the eps disagree (2 periodic, 2 quadratic)"
+    assert found.text == "heights of exact orbits are undecided: the eps disagree (2 periodic, 2 quadratic)"
 
 
 def test_too_few_steps_decide_nothing(kahanmaps):
     outcome = kahanmaps("heights weierstrass --steps 4 --starts 1")
-    assert (outcome.status, outcome.rows[-1][1]) == (3, "undecided: 0 of 2 orbits decided")
+    assert (outcome.status, outcome.rows[-1][1]) == (3, "heights of exact orbits are undecided: 0 of 2 orbits decided")
 
 
 def test_the_time_ends_it(kahanmaps):

@@ -152,7 +152,7 @@ F_1 = \frac{1 - \varepsilon^2 x_2^2}{1 + 2 \varepsilon^2 x_3^2}
 F_2 = \frac{1 + 2 \varepsilon^2 x_3^2}{1 + 2 \varepsilon^2 x_1^2}
 \]
 \[
-\phi = 1 + 4 \varepsilon^2 x_3^2 + 4 \varepsilon^4 x_3^4
+\phi = \left(1 + 2 \varepsilon^2 x_3^2\right)^2
 \]
 """
 

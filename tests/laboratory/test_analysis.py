@@ -31,9 +31,9 @@ PARTS = (
     "densities",
     "the flow",
     "Poisson tensors",
+    "heights",
     "symmetries",
     "commuting systems",
-    "heights",
     "singularities",
 )
 
@@ -305,9 +305,9 @@ def test_relations_of_several_degrees_do_not_share_names():
         "x2^2 + c2*x2*x3 + c2*x3^2 + c3*x3 - 1/eps^2 = 0",
     ]
     lines = text_of(found)
-    assert "the c are integrals: numbers that depend on the orbit only" in lines
-    assert "the e are" not in lines
-    assert "the e are numbers that depend on eps only" in text_of(analyze(load("planar_cubic_hamiltonian")))
+    assert "c1, c2, c3 are constant on each orbit and differ between orbits, so they are integrals" in lines
+    assert "on eps only" not in lines
+    assert "depend on eps only" in text_of(analyze(load("planar_cubic_hamiltonian")))
 
 
 def test_symbols_enter_formulas_and_the_json_says_which():
@@ -361,18 +361,19 @@ def test_wrong_use(options, words):
         analyze(load("euler_top"), **options)
 
 
-ALONG = "relations along an orbit, of degree at most 1, 2, ...: spaces of dimension 0, 2"
+LIE = "generic orbits lie on varieties of codimension "
+ALONG = "relations along an orbit: none of degree 1, a 2-dimensional space up to degree 2"
 
 
 @pytest.mark.parametrize(
     ("profile", "others", "expected"),
     [
-        ({}, {}, [("measured", f"generic orbits lie on varieties of codimension 2; {ALONG}")]),
+        ({}, {}, [("measured", f"{LIE}2, which means 2 independent integrals; {ALONG}")]),
         (
             {"codimensions": (0, 1)},
             {"reason": "no closed form"},
             [
-                ("measured", f"generic orbits lie on varieties of codimension at least 1; {ALONG}"),
+                ("measured", f"{LIE}at least 1, which means at least 1 independent integral; {ALONG}"),
                 ("note", "no closed form"),
             ],
         ),
@@ -380,7 +381,7 @@ ALONG = "relations along an orbit, of degree at most 1, 2, ...: spaces of dimens
             {"codimensions": (0, 0), "agree": False},
             {},
             [
-                ("measured", f"orbits show no integral up to degree 2; {ALONG}"),
+                ("measured", f"orbits show no integral; {ALONG}"),
                 ("note", "the orbits that were compared do not agree"),
             ],
         ),
@@ -429,13 +430,25 @@ def test_what_is_said_of_integrals(profile, others, expected):
     ("integrals", "functions", "notes"),
     [
         (((), ()), ((), ()), []),
-        ((("c1",), ("c2",)), ((), ()), ["the c are integrals: numbers that depend on the orbit only"]),
+        (
+            (("c1",), ("c2",)),
+            ((), ()),
+            ["c1, c2 are constant on each orbit and differ between orbits, so they are integrals"],
+        ),
+        (
+            (tuple(f"c{k}" for k in range(1, 8)), ("c2",)),
+            (("e1", "e2"), ()),
+            [
+                "c1, ..., c7 are constant on each orbit and differ between orbits, so they are integrals",
+                "e1, e2 depend on eps only",
+            ],
+        ),
         (
             ((), ("k12",)),
             (("d3",), ()),
             [
-                "the k are integrals: numbers that depend on the orbit only",
-                "the d are numbers that depend on eps only",
+                "k12 is constant on each orbit and differs between orbits, so it is an integral",
+                "d3 depends on eps only",
             ],
         ),
     ],

@@ -330,7 +330,7 @@ def test_heights_of_orbits_shorter_than_the_last_pattern_are_no_finding():
     for degrees, words in (((20,) * 30, "are bounded"), (tuple(2**n for n in range(12)), "grow exponentially")):
         other = replace(found, degrees=replace(found.degrees, degrees=degrees, patterns=None))
         assert words in doubt_of_heights(other)
-        (line,) = [line for line in dict(other.sections)["growth"] if line.text.startswith("heights")]
+        (line,) = [line for line in dict(other.sections)["growth"] if line.text.startswith("bit lengths")]
         assert line.status == "undecided"
 
 

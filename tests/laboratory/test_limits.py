@@ -88,7 +88,7 @@ def test_the_combination_has_the_series_that_is_told(name):
 
 
 def test_a_flow_integral_that_no_integral_tends_to_is_lost_and_that_is_measured():
-    for file, formula in ((THREE_LINES, "x^4*y^3 + 6*x^3*y^4 + 12*x^2*y^5 + 8*x*y^6"), (load("zander_120"), "x*y^2")):
+    for file, formula in ((THREE_LINES, "x*y^3*(x + 2*y)^3"), (load("zander_120"), "x*y^2")):
         found = flow_and_map(find_integrals(file))
         assert [one.text for one in found.others] == [formula]
         assert found.lost == 1
@@ -186,7 +186,7 @@ def test_symbols_stay_in_the_limits():
 
 
 def test_the_density_of_the_map_tends_to_one_of_the_flow():
-    for name, phi in (("zander_120", "x^2*y + 2*x*y^2"), ("euler_top", "1"), ("lotka_volterra", "x*y")):
+    for name, phi in (("zander_120", "x*y*(x + 2*y)"), ("euler_top", "1"), ("lotka_volterra", "x*y")):
         search, densities = find_integrals(load(name)), find_densities(load(name))
         assert flow_and_map(search, densities).density.text == phi
         assert find_densities(load(name), flow=True).densities[0].text == phi
@@ -235,7 +235,7 @@ def test_a_polarised_map_deforms_the_energy_of_a_cubic_field():
 def test_a_polarised_map_may_lose_an_integral():
     """x y^2 (x + y)^3/(x - y + 1), a product of lines that the field keeps zero."""
     found = flow_and_map(find_integrals(polarised(*FOUR_LINES)))
-    assert [one.text for one in found.others] == ["(x^4*y^2 + 3*x^3*y^3 + 3*x^2*y^4 + x*y^5)/(x - y + 1)"]
+    assert [one.text for one in found.others] == ["x*y^2*(x + y)^3/(x - y + 1)"]
     assert (found.limits, found.lost) == ((), 1)
     assert is_kept_by_flow(Laboratory(polarised(*FOUR_LINES), flow=True).field, found.others[0].function)
     assert not is_kept_by_flow(Laboratory(polarised(*DUFFING), flow=True).field, found.others[0].function)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,13 +17,20 @@ from kahanmaps_cli.options import (
     symbolic_option,
     system_options,
 )
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.search import formula, symbols_and_eps
 from kahanmaps_cli.terminal import echo, on_terminal, tell
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis
+    from kahanmaps.laboratory.report import Statement
+
+INTERRUPTED = 130
+_WORDS = (
+    "proved: an identity of rational functions, or a theorem; supported: true at random points; explained: follows "
+    "from singularities that were measured; measured: modulo primes or along orbits, which is evidence"
+)
 
 
 @click.command("analyze")
@@ -60,16 +69,36 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
         raise click.UsageError("give --markdown or --json, one of the two")
     symbols, eps = symbols_and_eps(options)
     file = load_system(system, options)
+    report = _Report(as_json or markdown)
+    is_interrupted = False
     with Progress(quiet) as progress:
-        found = analyze(
-            file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress
-        )
+        report.progress = progress
+        try:
+            analyze(
+                file,
+                symbols=symbols,
+                eps=eps,
+                seconds=options["seconds"],
+                seed=options["seed"],
+                progress=progress,
+                reached=report,
+            )
+        except KeyboardInterrupt:
+            if report.found is None:
+                raise
+            is_interrupted = True
+            report.found.stop("interrupted")
+    found = report.found
+    assert found is not None
     if as_json:
         print_json(found.to_json())
     elif markdown:
         _print_markdown(found)
     else:
-        _print(found)
+        report.end()
+    if is_interrupted:
+        say("interrupted: the verdict rests on what was found so far")
+        return INTERRUPTED
     return 3 if found.conclusion.kind == "undecided" else 0
 
 
@@ -82,15 +111,42 @@ def _title(found: Analysis) -> str:
     return f"{found.file.name}, dimension {found.dim}{values}{step}{formulas}"
 
 
-def _print(found: Analysis) -> None:
-    tell(f"analyze: {_title(found)}")
-    for name, lines in found.sections:
-        tell(f"\n{name}", style="bold")
-        for line in lines:
-            tell(f"{line.status}\t{formula(line.text)}")
-    final = found.conclusion
-    tell("\nverdict", style="bold")
-    tell(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
+class _Report:
+    """The report as text, each section as soon as it is final; `is_silent` keeps it back for another form."""
+
+    def __init__(self, is_silent: bool) -> None:
+        self.found: Analysis | None = None
+        self.progress: Progress | None = None
+        self._is_silent, self._told = is_silent, 0
+
+    def __call__(self, found: Analysis) -> None:
+        begins, self.found = self.found is None, found
+        if self._is_silent:
+            return
+        if begins:
+            tell(f"analyze: {_title(found)}")
+            for line in str(found.file.map).split("\n"):
+                tell(line)
+            tell(_WORDS)
+        self._tell(found.final_sections)
+
+    def end(self) -> None:
+        """What is left of it, and the verdict."""
+        assert self.found is not None
+        self._tell(self.found.sections)
+        final = self.found.conclusion
+        tell("\nverdict", style="bold")
+        tell(final.sentence if on_terminal() else f"{final.kind}\t{final.sentence}", style="bold")
+
+    def _tell(self, sections: Sequence[tuple[str, Sequence[Statement]]]) -> None:
+        if self.progress is not None and len(sections) > self._told:
+            self.progress.clear()
+        for name, lines in sections[self._told :]:
+            tell(f"\n{name}", style="bold")
+            for line in lines:
+                tell(f"{line.status}\t{formula(line.text)}")
+        self._told = max(self._told, len(sections))
+        sys.stdout.flush()
 
 
 def _print_markdown(found: Analysis) -> None:

@@ -22,7 +22,7 @@ from kahanmaps_cli.options import (
     quiet_option,
     system_options,
 )
-from kahanmaps_cli.orbit_formats import Csv, JsonLines, Npz, OutputFull, Text, Writer
+from kahanmaps_cli.orbit_formats import Csv, Json, JsonLines, Npz, OutputFull, Text, Writer
 from kahanmaps_cli.orbit_run import OrbitRun
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic, PointText, Steps
@@ -34,7 +34,8 @@ from kahanmaps_cli.streams import is_read
 if TYPE_CHECKING:
     from kahanmaps.maps.orbits import OrbitEnd
 
-_FORMATS = ("text", "jsonl", "csv", "npz", "npy")
+_FORMATS = ("text", "json", "jsonl", "csv", "npz", "npy")
+_TEXT = ("", ".txt", ".tsv", ".out", ".dat", ".log")  # endings of files of text
 _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 
 
@@ -67,11 +68,18 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 )
 @click.option("--max-digits", type=int, metavar="N", help="Digit budget (exact arithmetic; default 200000).")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="Default text, or what the name of FILE says.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE.")
 @click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
 @quiet_option
 def command(
-    system: str | None, form: str | None, output: str | None, verbose: bool, quiet: bool, **options: Any
+    system: str | None,
+    form: str | None,
+    as_json: bool,
+    output: str | None,
+    verbose: bool,
+    quiet: bool,
+    **options: Any,
 ) -> int:
     """Iterate the map of SYSTEM from a start; a vector field stands for its Kahan map.
 
@@ -120,7 +128,9 @@ def command(
         raise click.UsageError("--kernel is for --arithmetic float")
     options["accuracy"] = options["accuracy"] or 15
     output = None if output == "-" else output
-    form = form or _form_from_name(output)
+    if as_json and form not in (None, "json"):
+        raise click.UsageError(f"give --json or --format {form}, not both")
+    form = "json" if as_json else form or _form_from_name(output)
     if form == "npy":
         _require_npy(options, output)
     hidden = quiet or (output is None and sys.stdout.isatty())  # the points themselves show the progress
@@ -206,6 +216,8 @@ def _writer(form: str, stream: IO[Any], run: OrbitRun, to_file: bool) -> Writer:
     columns, integrals = run.file.variables, [name for name, _ in run.columns]
     if form == "jsonl":
         return JsonLines(stream, columns, integrals)
+    if form == "json":
+        return Json(stream, columns, integrals)
     if form == "csv":
         return Csv(stream, columns, integrals)
     if form == "npz":
@@ -215,8 +227,13 @@ def _writer(form: str, stream: IO[Any], run: OrbitRun, to_file: bool) -> Writer:
 
 
 def _form_from_name(output: str | None) -> str:
-    suffix = Path(output).suffix[1:] if output is not None else ""
-    return suffix if suffix in _FORMATS else "text"
+    suffix = "" if output is None else Path(output).suffix
+    if suffix in _TEXT:
+        return "text"
+    if suffix[1:] not in _FORMATS:
+        endings = ", ".join(f".{form}" for form in _FORMATS[1:])
+        raise click.UsageError(f"found the ending {suffix} of {output}, expected .txt, {endings}, or --format")
+    return suffix[1:]
 
 
 @contextmanager

@@ -35,6 +35,14 @@ DEFAULT_SECONDS = 30.0
 _NUMERATORS = (13, 17, 19, 23, 29, 31, 37, 41, 43, 47)
 _DENOMINATORS = (7, 8, 9, 16, 25, 27)
 _MOST_STARTS = 1000
+_GROWN = {
+    Growth.PERIODIC: "points come back",
+    Growth.BOUNDED: "bit lengths stay bounded",
+    Growth.LOGARITHMIC: "bit lengths grow logarithmically",
+    Growth.LINEAR: "bit lengths grow linearly",
+    Growth.QUADRATIC: "bit lengths grow quadratically",
+    Growth.EXPONENTIAL: "bit lengths grow exponentially",
+}
 _DRAWS = 20  # starts tried in place of one whose orbit meets a singular point
 
 
@@ -81,13 +89,15 @@ class HeightSurvey(Displayed):
         total = len(self.orbits)
         if len(self.kinds) > 1:
             counts = (f"{sum(o.growth.kind is kind for o in self.orbits)} {kind}" for kind in self.kinds)
-            return f"undecided: {'the eps' if self._eps_differ else 'the starts'} disagree ({', '.join(counts)})"
+            which = "the eps" if self._eps_differ else "the starts"
+            return f"heights of exact orbits are undecided: {which} disagree ({', '.join(counts)})"
         decided = sum(orbit.growth.kind is not Growth.UNDECIDED for orbit in self.orbits)
         if self.kind is Growth.UNDECIDED:
-            return f"undecided: {decided} of {counted(total, 'orbit')} decided"
+            return f"heights of exact orbits are undecided: {decided} of {counted(total, 'orbit')} decided"
         eps = {orbit.eps for orbit in self.orbits}
-        many = f"{decided} of {counted(total, 'orbit')}" if decided < total else counted(total, "orbit")
-        return f"{self.kind}: {many}" + (f", {counted(len(eps), 'value')} of eps" if self.has_eps else "")
+        many = f"{decided} of {total}" if decided < total else f"all {total}" if total > 1 else "the"
+        at = f", at {counted(len(eps), 'value')} of eps" if self.has_eps else ""
+        return f"{_GROWN[self.kind]} on {many} exact {'orbit' if total == 1 else 'orbits'} tried{at}"
 
     @property
     def _eps_differ(self) -> bool:
@@ -126,7 +136,7 @@ def height_survey(
     >>> from kahanmaps.documents.catalog import load
     >>> found = height_survey(load("weierstrass").system, starts=2, steps=40)
     >>> found.kind, found.text
-    (<Growth.QUADRATIC: 'quadratic'>, 'quadratic: 4 orbits, 2 values of eps')
+    (<Growth.QUADRATIC: 'quadratic'>, 'bit lengths grow quadratically on all 4 exact orbits tried, at 2 values of eps')
     """
     if isinstance(starts, int) and not 1 <= starts <= _MOST_STARTS:
         raise InputError(f"found {starts} starts, expected 1 to {_MOST_STARTS}")

@@ -193,7 +193,7 @@ class Recurrence:
         """The recurrence as an equation, with what speaks for it."""
         if self.measured is not None:
             return f"{self.equation}, explained by the singularities; {self.terms} measured terms agree"
-        return f"{self.equation}, from {self.terms} terms of which {self.checked} were not needed to find it"
+        return f"{self.equation}, found from {self.terms - self.checked} terms, confirmed by {self.checked} more"
 
     @property
     def equation(self) -> str:

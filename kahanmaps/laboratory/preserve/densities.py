@@ -18,7 +18,7 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part
-from kahanmaps.algebra.text import format_rational_function
+from kahanmaps.algebra.text import format_factored
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
@@ -60,7 +60,7 @@ class FoundDensity:
     @property
     def text(self) -> str:
         """The formula of phi."""
-        return self.product or format_rational_function(self.function)
+        return self.product or format_factored(self.function)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

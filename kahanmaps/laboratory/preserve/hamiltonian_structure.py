@@ -23,7 +23,7 @@ from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_inte
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.displayed import Displayed
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.preserve.affine_functions import QuotientForms, affine_integrals, quotient_by
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -93,7 +93,8 @@ def constant_structures(system: QuadraticSystem, *, seed: int = 0) -> ConstantSt
     if not integrals:
         reason += " and there is no affine integral"
     elif (n - len(integrals)) % 2:
-        reason += f", and the kernel of J can not be all of the {len(integrals)} affine integrals, by parity"
+        reason += f", and the {counted(len(integrals), 'affine integral')} would give J a kernel of dimension "
+        reason += f"{len(integrals)}, impossible for a skew {n} x {n} matrix"
         # For one integral the kernel is this or zero; of more integrals there are subspaces that were not tried.
         proved = proved and len(integrals) == 1
     else:

@@ -21,7 +21,7 @@ from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate, ring
-from kahanmaps.algebra.text import format_polynomial, format_rational_function
+from kahanmaps.algebra.text import format_factored, format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
@@ -58,7 +58,7 @@ class FoundIntegral:
     @property
     def text(self) -> str:
         """The formula."""
-        return self.product or format_rational_function(self.function)
+        return self.product or format_factored(self.function)
 
     @property
     def short_text(self) -> str:

@@ -22,7 +22,7 @@ from kahanmaps.algebra.functions import BudgetExceeded, Function, FunctionField
 from kahanmaps.algebra.matrices import nullspace
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, evaluate, primitive_part, ring
-from kahanmaps.algebra.text import format_polynomial, format_rational_function
+from kahanmaps.algebra.text import format_factored, format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import KahanmapsError, counted
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -73,9 +73,9 @@ class Limit:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        second = None if self.second is None else format_rational_function(self.second)
+        second = None if self.second is None else format_factored(self.second)
         known = attributes(self, "name", "combination", "order", "kept")
-        return {**known, "leading": format_rational_function(self.leading), "second": second}
+        return {**known, "leading": format_factored(self.leading), "second": second}
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class FlowAndMap:
 def _short(function: RationalFunction, most: int) -> str:
     """The formula, or its size where it is longer."""
     sizes = len(function.numerator), len(function.denominator)
-    return format_rational_function(function) if sum(sizes) <= most else f"P/Q with {sizes[0]} and {sizes[1]} terms"
+    return format_factored(function) if sum(sizes) <= most else f"P/Q with {sizes[0]} and {sizes[1]} terms"
 
 
 def flow_and_map(

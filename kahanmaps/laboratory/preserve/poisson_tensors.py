@@ -24,7 +24,7 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.fields import GF, Field
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, degree_in, ring
-from kahanmaps.algebra.text import format_rational_function
+from kahanmaps.algebra.text import format_factored, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.decide import Identity, Sides
 from kahanmaps.checks.expand import MAX_DIMENSION
@@ -124,9 +124,7 @@ class FoundTensor:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        brackets = [
-            {"of": list(pair), "is": format_rational_function(entry)} for pair, entry in self.tensor.brackets.items()
-        ]
+        brackets = [{"of": list(pair), "is": format_factored(entry)} for pair, entry in self.tensor.brackets.items()]
         return {
             **attributes(self, "name"),
             "brackets": brackets,

@@ -36,7 +36,7 @@ from kahanmaps.algebra.polynomials import (
     primitive_part,
     ring,
 )
-from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.algebra.text import format_product
 from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.invariants.measures import jacobian_determinant_sides
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -66,17 +66,7 @@ class Product:
     @property
     def text(self) -> str:
         """The product as a formula in factors."""
-        parts = []
-        for sign in (1, -1):
-            powers = [(format_polynomial(g), len(g) > 1, sign * k) for g, k in self.factors if sign * k > 0]
-            bases = [(f"({g})" if is_sum else g, k) for g, is_sum, k in powers]
-            parts.append([base + (f"^{k}" if k > 1 else "") for base, k in bases])
-        if len(self.factors) == 1 and self.factors[0][1] == 1:
-            return format_polynomial(self.factors[0][0])
-        above, below = ("*".join(part) for part in parts)
-        if not below:
-            return above or "1"
-        return f"{above or 1}/({below})" if len(parts[1]) > 1 else f"{above or 1}/{below}"
+        return format_product(self.factors)
 
     @property
     def function(self) -> RationalFunction | None:

@@ -15,7 +15,7 @@ from kahanmaps.laboratory.singular.orders import AlongCurves, Orders, Tracked
 from kahanmaps.maps.equation import Equation
 
 _MAX_PRECISION = 4096
-_MOST_ALONG = 16384  # where series are followed far
+_MOST_ALONG = 2048  # where series are followed far
 _CONSTANT = 8  # so often at least is the same order repeated that goes on
 _CHECKED = 4  # further orders have to follow a recurrence than tell it
 _FREE_STEPS = 100  # for which a hypersurface is followed that is one again
