@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from threading import Event
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -17,7 +18,8 @@ from kahanmaps_cli.options import (
     system_options,
     the_eps,
 )
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.scan.result import Scan
@@ -54,7 +56,8 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
     if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):
         raise click.UsageError("found eps among the parameters of system files that are asked for: they hold no eps")
     file = load_system(system, options)
-    with Progress(quiet) as progress:
+    interrupted = Event()
+    with Progress(quiet) as progress, interruptible(interrupted.set):
         return scan(
             file,
             names,
@@ -66,7 +69,18 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
             seed=options["seed"],
             jobs=options["jobs"],
             progress=progress,
+            stop=interrupted.is_set,
         )
+
+
+def ending(found: Scan, quiet: bool) -> int:
+    """The exit status, and a word where it is not 0."""
+    if found.ended == "complete":
+        return 0
+    if not quiet:
+        why = "the time was over" if found.ended == "time" else "interrupted"
+        say(f"stopped early: {why} before {', '.join(found.omitted)}")
+    return 3 if found.ended == "time" else 130
 
 
 def _primes(text: str | None) -> list[int] | None:

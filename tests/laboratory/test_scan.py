@@ -73,7 +73,7 @@ def test_special_points_of_a_curve_are_found_on_it(three_lines):
 
 def test_everything_is_confirmed_and_nothing_is_left(three_lines):
     assert all(one.is_confirmed and one.tried == 3 for one in three_lines.components)
-    assert three_lines.left == (0, 0, 0)
+    assert not any(three_lines.left)
     assert three_lines.symmetric == (("g1", "g2"),)
     assert three_lines.height == 31
     assert "up to 31" in three_lines.coverage
@@ -115,7 +115,7 @@ def test_the_conditions_of_lotka_volterra_in_space_are_found():
     for one in ("A*B + 1 = 0, C - 1 = 0", "B*C + 1 = 0, A - 1 = 0", "A*C + 1 = 0, B - 1 = 0"):
         assert conditions[one].growth.growth is GrowthClass.QUADRATIC
         assert conditions[one].dimension == 1
-    assert found.left == (0, 0, 0)
+    assert not any(found.left)
 
 
 def test_the_condition_of_the_dressing_chain_is_found():
@@ -178,9 +178,11 @@ def test_a_condition_with_eps_is_found_where_eps_varies_too():
 def test_more_parameters_than_can_be_tried_give_hypersurfaces():
     text = LOTKA_VOLTERRA.replace("C = 1", "C = 1, D = 1").replace("x + A*z", "D*x + A*z")
     found = scan(parse_system(text), ["A", "B", "C", "D"], primes=(61, 67, 71), terms=3)
-    assert not found.complete
     assert "A*B*C + D = 0" in {one.text for one in found.components if one.is_confirmed}
-    assert "found are only hypersurfaces" in found.coverage
+    assert found.coverage.startswith(
+        "members on 150 random lines of parameter space modulo 61, 67, 71; found are hyper"
+    )
+    assert found.degree == 4
 
 
 def test_a_family_without_special_members_says_so():
@@ -192,8 +194,50 @@ def test_a_family_without_special_members_says_so():
 def test_the_time_may_be_over_before_anything_is_known():
     found = scan(load("henon_heiles"), ["c"], seconds=1e-6)
     assert (found.ended, found.components, found.height) == ("time", (), 0)
+
+    def over():
+        raise TimeOver
+
     with pytest.raises(TimeOver):
-        sweep(map_with_symbols(load("henon_heiles"), ["c"]), 1, 31, None, 2, 99, deadline=0.0)
+        sweep(map_with_symbols(load("henon_heiles"), ["c"]), 1, 31, None, 2, 99, check=over)
+
+
+@pytest.mark.parametrize("condition", ["a^2 - 2", "a^2 - 2*b^2", "a^2 + 2", "a^2 - 3*b^2 + 2*b + 1"])
+def test_curves_that_split_over_a_quadratic_field_are_found_as_one_and_others(condition):
+    text = f"""variables = ["x", "y"]
+    parameters = {{ a = 1, b = 1 }}
+    [system]
+    rhs = ["y", "x^2 + b*x + ({condition})*y"]"""
+    found = scan(parse_system(text), ["a", "b"], terms=6)
+    assert [one.text for one in found.components] == [f"{condition} = 0"]
+    assert found.components[0].is_confirmed
+    assert found.components[0].growth.growth is GrowthClass.QUADRATIC
+    assert not any(found.left)
+
+
+def test_a_curve_that_is_missed_is_said_to_be_one():
+    # over a cubic field: modulo 1/3 of the primes all three lines are there, modulo 1/2 one of them
+    text = """variables = ["x", "y"]
+    parameters = { a = 1, b = 1 }
+    [system]
+    rhs = ["y", "x^2 + b*x + (a^3 - 2)*y"]"""
+    found = scan(parse_system(text), ["a", "b"], terms=6)
+    assert found.components == ()
+    assert "that many are no single points: a curve of them was missed" in found.text
+
+
+def test_what_was_left_out_is_named_stage_by_stage():
+    asked = []
+
+    def stop():
+        asked.append(1)
+        return len(asked) > 60
+
+    found = scan(parse_system(THREE_LINES), ["g1", "g2"], primes=(31, 37, 41), terms=5, stop=stop)
+    assert found.ended == "interrupted"
+    assert found.omitted
+    assert f"no time for {found.omitted[0]}" in found.text
+    assert found.to_json()["omitted"] == list(found.omitted)
 
 
 def test_a_sweep_is_the_same_for_the_same_seed_and_generic_members_are_not_slow():

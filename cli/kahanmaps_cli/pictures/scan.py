@@ -8,8 +8,7 @@ import click
 
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
-from kahanmaps_cli.progress import say
-from kahanmaps_cli.scan_run import scan_options, scanned
+from kahanmaps_cli.scan_run import ending, scan_options, scanned
 
 
 @click.command("scan", cls=PictureCommand)
@@ -26,8 +25,8 @@ def command(system: str | None, **options: Any) -> int:
 
     A colour for each kind of growth; marks are points, lines are curves.
 
-    Exit status: 0 done, 2 wrong use, 3 the time was over (the picture is
-    written).
+    Exit status: 0 done, 2 wrong use, 3 the time was over, 130 interrupted
+    (the picture is written).
     """
     from kahanmaps.maps.floats.fast import to_floats
     from kahanmaps.plots.scan import draw_scan
@@ -37,6 +36,4 @@ def command(system: str | None, **options: Any) -> int:
     window = None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), 2)
     found = scanned(system, options["quiet"], options)
     deliver(draw_scan(found, style_from(options), window=window), options, found.file)
-    if found.ended != "complete" and not options["quiet"]:
-        say("stopped early: the time was over")
-    return 0 if found.ended == "complete" else 3
+    return ending(found, options["quiet"])

@@ -19,6 +19,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.conclusion import Conclusion
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.scan.lift import height_bound
+from kahanmaps.laboratory.scan.pieces import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
 
 STEPS = 40  # for which singularities are followed where the growth at a member is asked
@@ -95,7 +96,7 @@ class Scan(Displayed):
     `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
     the number of slow members on no component modulo each of them: points over number fields, of a height above
     `height`, or there by chance. `symmetric` are pairs of parameters whose exchange permutes the slow members.
-    `ended` is "complete" or "time".
+    `ended` is "complete", "time" or "interrupted"; `omitted` says what was left out.
     """
 
     file: SystemFile
@@ -108,16 +109,29 @@ class Scan(Displayed):
     left: tuple[int, ...]
     symmetric: tuple[tuple[str, str], ...]
     ended: str
+    omitted: tuple[str, ...] = ()
 
     @property
     def height(self) -> int:
-        """Numerators and denominators of single points up to which they are found; 0 where too little was tried."""
-        return height_bound([one.prime for one in self.sweeps]) if len(self.sweeps) > 2 else 0
+        """Numerators and denominators up to which conditions are found; 0 where too little was tried."""
+        bounds = [height_bound([one.prime for one in some]) for some in self._kinds if len(some) > 2]
+        return min(bounds, default=0)
 
     @property
-    def complete(self) -> bool:
-        """Whether all members modulo the primes were tried, rather than those on random lines of parameter space."""
-        return all(one.complete for one in self.sweeps)
+    def _kinds(self) -> tuple[list[Sweep], list[Sweep]]:
+        """The sweeps over all members, and those over members on random lines of parameter space."""
+        return [one for one in self.sweeps if one.complete], [one for one in self.sweeps if not one.complete]
+
+    @property
+    def degree(self) -> int:
+        """Of the hypersurfaces with the same degrees, all together, up to which they are found."""
+        count = len(self.over)
+        enough = [
+            degree_reached(0.75 * min(one.seen / one.prime for one in some), count)
+            for some in self._kinds
+            if len(some) > 2
+        ]
+        return max(enough, default=0)
 
     @property
     def classes(self) -> list[tuple[Degrees, list[Component]]]:
@@ -132,20 +146,26 @@ class Scan(Displayed):
         """What was tried, and what can have been missed: a sentence or two."""
         if not self.height:
             return f"members modulo three primes are needed, those modulo {len(self.sweeps)} were tried"
-        parts = [f"{one.seen} modulo {one.prime}" for one in self.sweeps]
+        whole, lines = ((", ".join(str(one.prime) for one in some)) for some in self._kinds)
+        parts = [f"all members with parameters modulo {whole}"] if whole else []
+        if lines:
+            count = round(min(one.seen / one.prime for one in self._kinds[1]))
+            parts.append(f"{'those' if parts else 'members'} on {count} random lines of parameter space modulo {lines}")
+        small = "single points" if len(self.over) == 1 else "single points, affine spaces, hypersurfaces of these"
+        kinds = [small] if whole else []
+        if len(self.over) > 1:
+            kinds.append(f"hypersurfaces of a total degree up to {self.degree} for each sequence of degrees")
         where = f"where one of the first {len(self.generic)} degrees is smaller"
-        if self.complete:
-            return (
-                f"all members with parameters modulo the primes: {', '.join(parts)}; found are single points with "
-                f"numerators and denominators up to {self.height}, and hypersurfaces of a degree up to 6, {where}"
-            )
-        return f"members on random lines of parameter space: {', '.join(parts)}; found are only hypersurfaces, {where}"
+        return (
+            f"{', and '.join(parts)}; found are {', and '.join(kinds)}, {where}, over Q with numerators and "
+            f"denominators up to {self.height}, or over a quadratic field that splits modulo three of the primes"
+        )
 
     @property
     def text(self) -> str:
         """Lines for people, a word and a tab at the front."""
         if not self.height:
-            return f"tried\t{self.coverage}"
+            return "\n".join(f"{word}\t{rest}" for word, rest in [*self._seen, ("tried", self.coverage), *self._open])
         names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
         lines = [("in general", ", ".join(map(str, self.generic)))]
         for degrees, members in self.classes:
@@ -175,10 +195,35 @@ class Scan(Displayed):
         lines.append(("tried", self.coverage))
         if any(self.left):
             rest = ", ".join(f"{n} modulo {one.prime}" for n, one in zip(self.left, self.sweeps, strict=True))
-            lines.append(("left", f"slow members on no component: {rest}"))
-        else:
+            lines.append(("left", f"slow members on no component: {rest}{self._left_words}"))
+        elif not self.omitted:
             lines.append(("left", "none: every slow member that was seen is on a component"))
-        return "\n".join(f"{word}\t{rest}" for word, rest in lines)
+        return "\n".join(f"{word}\t{rest}" for word, rest in [*lines, *self._open])
+
+    @property
+    def _left_words(self) -> str:
+        """What so many members must be."""
+        most = 0
+        for n, one in zip(self.left, self.sweeps, strict=True):
+            dimension = len(self.over) - 1
+            while dimension > most and n < 0.5 * one.seen / one.prime ** (len(self.over) - dimension):
+                dimension -= 1
+            most = dimension
+        words = "a curve of them was" if most == 1 else f"a variety of dimension {most} was"
+        return f"; that many are no single points: {words} missed" if most else ""
+
+    @property
+    def _open(self) -> list[tuple[str, str]]:
+        return [("open", f"there was no time for {', '.join(self.omitted)}")] if self.omitted else []
+
+    @property
+    def _seen(self) -> list[tuple[str, str]]:
+        """The numbers of slow members by degrees, where nothing was lifted."""
+        return [
+            ("slow", f"{', '.join(map(str, degrees))}\t{len(points)} members modulo {one.prime}")
+            for one in self.sweeps
+            for degrees, points in sorted(one.classes.items())
+        ]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -197,7 +242,7 @@ class Scan(Displayed):
                 }
                 for one, left in zip(self.sweeps, self.left, strict=True)
             ],
-            **attributes(self, "height", "coverage", "ended"),
+            **attributes(self, "height", "coverage", "ended", "omitted"),
         }
 
     def member(self, component: Component) -> SystemFile:
