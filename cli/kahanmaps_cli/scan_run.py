@@ -36,7 +36,14 @@ scan_options: Callable[[F], F] = stack(
     ),
     eps_options,
     click.option(
-        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: as many as are small, up to 7)."
+        "--by",
+        type=click.Choice(["degrees", "integrals", "density"]),
+        default="degrees",
+        show_default=True,
+        help="Look for smaller degrees of iterates, relations along orbits, or densities.",
+    ),
+    click.option(
+        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N, or relations and densities up to degree N."
     ),
     click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters)."),
     seconds_option(120.0, "Stop about then, and say what was seen."),
@@ -62,6 +69,7 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
             file,
             names,
             eps=the_eps(options["eps"], options["time_step"], required=False),
+            by=options["by"],
             terms=options["terms"],
             primes=_primes(options["primes"]),
             analysis=options.get("analysis"),

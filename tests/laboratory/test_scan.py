@@ -261,6 +261,8 @@ def test_a_sweep_is_the_same_for_the_same_seed_and_generic_members_are_not_slow(
         ({"terms": 0}, "expected 1 to 14"),
         ({"terms": 14}, "too large to be scanned"),
         ({"jobs": 0}, "expected at least 1"),
+        ({"by": "luck"}, "expected one by degrees, integrals, density"),
+        ({"by": "density", "terms": 9}, "expected fewer than 130 monomials"),
     ],
 )
 def test_what_cannot_be_scanned_is_refused(change, message):
@@ -290,3 +292,36 @@ def test_an_analysis_of_members_gives_verdicts():
 def test_an_exchange_of_parameters_is_told_where_it_moves_slow_members(rhs, symmetric):
     file = parse_system(f'variables = ["x", "y"]\nparameters = {{ a = 1, b = 1 }}\n[system]\nrhs = {rhs}')
     assert scan(file, ["a", "b"]).symmetric == symmetric
+
+
+def test_a_scan_by_densities_finds_the_members_with_more_of_them():
+    found = scan(load("zhukovski_volterra_2"), ["b1"], by="density", terms=4, primes=(101, 103, 107))
+    (one,) = found.components
+    assert (one.text, one.degrees, found.generic, one.is_confirmed) == ("0", (0, 0, 0, 4), (0, 0, 0, 1), True)
+    assert "densities\t0, 0, 0, 4\tquadratic growth" in found.text
+
+
+def test_a_scan_by_integrals_finds_those_of_each_degree():
+    found = scan(parse_system(THREE_LINES), ["g1"], by="integrals", terms=3, primes=(101, 103, 107), seed=2)
+    points = {one.text: (one.degrees, str(one.growth.growth)) for one in found.components}
+    assert points["1"] == ((0, 0, 1), "quadratic")  # a pencil of cubics
+    assert points["0"] == ((0, 1, 3), "linear")
+    assert all(one.is_confirmed for one in found.components)
+    assert found.generic == (0, 0, 0)
+
+
+def test_blocks_of_relations_have_one_kind_of_growth_each():
+    found = scan(parse_system(THREE_LINES), ["g1"], by="integrals", terms=3, primes=(101, 103, 107), seed=2)
+    kinds = [{str(one.growth.growth) for one in some} for _, some in found.classes]
+    assert all(len(some) == 1 for some in kinds)
+    assert len({degrees for degrees, _ in found.classes}) < len(kinds)
+
+
+@pytest.mark.parametrize(("by", "degrees"), [("integrals", (3, 6, 10)), ("density", (3, 6, 9))])
+def test_a_wrong_condition_has_neither_relations_nor_densities(by, degrees):
+    map_ = map_with_symbols(parse_system(THREE_LINES), ["g1", "g2"])
+    g1, g2 = ring(["g1", "g2"]).gens()
+    wrong = Component((g1 - g2,), 1, tuple(d - 1 for d in degrees), (43, 47, 53))
+    found = _confirmed(wrong, ["g1", "g2"], map_, None, [], random.Random(1), by)
+    assert (found.confirmed, found.tried) == (0, 3)
+    assert _confirmed(replace(wrong, degrees=degrees), ["g1", "g2"], map_, None, [], random.Random(1), by).is_confirmed

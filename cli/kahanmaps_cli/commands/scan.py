@@ -38,11 +38,15 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps scan zhukovski_volterra_2 --over b1,b2
       kahanmaps scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b
       kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze 5 --write-to out
+      kahanmaps scan zhukovski_volterra_2 --over b1 --by density
 
     The degrees of the first iterates of all members with parameters in GF(p), for several small primes p. Members with
     smaller degrees than the others form points, lines, curves and surfaces; what is there modulo all primes is written
     as a condition over Q. It is confirmed at random members by the computation of `degrees`, and a rational member
     tells the kind of growth. Found modulo primes and confirmed is evidence, and no proof.
+
+    --by integrals counts polynomials that vanish along an orbit instead, degree by degree, and --by density those phi
+    for which the measure dx/phi is invariant.
 
     With two or three parameters members on random lines of parameter space are tried besides, modulo primes at which
     quadratic fields split: so a^2 - 2 = 0 is found as one curve. The time is for everything together; what there was

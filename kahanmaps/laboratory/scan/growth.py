@@ -37,6 +37,7 @@ def with_growth(
     check: Callable[[], None],
     seed: int,
     progress: Progress,
+    by: str,
 ) -> tuple[list[Component], int]:
     """The components with the growth at a rational member, those with the slowest first; for how many it is missing.
 
@@ -51,11 +52,12 @@ def with_growth(
         progress(f"scan: growth on component {k + 1} of {len(components)}")
         try:
             check()
-            if _goes_on(one, enough.get(one.degrees), map_, eps, seed):
+            if by == "degrees" and _goes_on(one, enough.get(one.degrees), map_, eps, seed):
                 continue
             left = max(0.1, deadline - time.monotonic())
             known = None if one.values is None else _growth(one.values, file, eps, left, seed)
-            if known is None or not _agree(known.degrees, (1, *one.degrees)):  # there may be a special member only
+            # there may be a special member only
+            if known is None or (by == "degrees" and not _agree(known.degrees, (1, *one.degrees))):
                 known = _beyond(one, map_, eps, seed)
         except TimeOver:
             missed += 1

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import comb
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly
@@ -22,6 +23,12 @@ from kahanmaps.laboratory.scan.lift import height_bound
 from kahanmaps.laboratory.scan.pieces import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
 
+# By what is scanned: a word for the numbers, and where members are found.
+WORDS = {
+    "degrees": ("degrees", "where one of the first {} degrees is smaller"),
+    "integrals": ("relations", "where more polynomials of degree up to {} vanish along an orbit"),
+    "density": ("densities", "where dx/phi is invariant for more polynomials phi of degree up to {}"),
+}
 STEPS = 40  # for which singularities are followed where the growth at a member is asked
 
 
@@ -96,6 +103,8 @@ class Scan(Displayed):
     `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
     the number of slow members on no component modulo each of them: points over number fields, of a height above
     `height`, or there by chance. `symmetric` are pairs of parameters whose exchange permutes the slow members.
+    `by` says what is meant by degrees: those of iterates, or how many polynomials of degree 1, 2, ... there are that
+    vanish along an orbit ("integrals"), or phi with an invariant measure dx/phi ("density").
     `ended` is "complete", "time" or "interrupted"; `omitted` says what was left out.
     """
 
@@ -110,6 +119,7 @@ class Scan(Displayed):
     symmetric: tuple[tuple[str, str], ...]
     ended: str
     omitted: tuple[str, ...] = ()
+    by: str = "degrees"
 
     @property
     def height(self) -> int:
@@ -135,11 +145,12 @@ class Scan(Displayed):
 
     @property
     def classes(self) -> list[tuple[Degrees, list[Component]]]:
-        """The components by degrees, in their order."""
-        found: dict[Degrees, list[Component]] = {}
+        """The components by degrees, in their order; where these are no degrees of iterates, also by their growth."""
+        found: dict[Any, list[Component]] = {}
         for one in self.components:
-            found.setdefault(one.degrees, []).append(one)
-        return list(found.items())
+            other = None if self.by == "degrees" or one.growth is None else one.growth.growth
+            found.setdefault((one.degrees, other), []).append(one)
+        return [(degrees, some) for (degrees, _), some in found.items()]
 
     @property
     def coverage(self) -> str:
@@ -154,8 +165,10 @@ class Scan(Displayed):
         small = "single points" if len(self.over) == 1 else "single points, affine spaces, hypersurfaces of these"
         kinds = [small] if whole else []
         if len(self.over) > 1:
-            kinds.append(f"hypersurfaces of a total degree up to {self.degree} for each sequence of degrees")
-        where = f"where one of the first {len(self.generic)} degrees is smaller"
+            kinds.append(
+                f"hypersurfaces of a total degree up to {self.degree} for each sequence of {WORDS[self.by][0]}"
+            )
+        where = WORDS[self.by][1].format(len(self.generic))
         return (
             f"{', and '.join(parts)}; found are {', and '.join(kinds)}, {where}, over Q with numerators and "
             f"denominators up to {self.height}, or over a quadratic field that splits modulo three of the primes"
@@ -172,7 +185,7 @@ class Scan(Displayed):
             growth = growth_on(members)
             told = ", ".join("none" if d < 0 else str(d) for d in degrees)
             known = "" if growth is None or growth.recurrence is None else f", {growth.basis.partition(':')[0]}"
-            lines.append(("degrees", told + (f"\t{growth.kind_text}{known}" if growth is not None else "")))
+            lines.append((WORDS[self.by][0], told + (f"\t{growth.kind_text}{known}" if growth is not None else "")))
             for where, sign, here in (
                 ("where", "; ", [one for one in members if not one.is_rational_point]),
                 (f"at {names} =", ", ", [one for one in members if one.is_rational_point]),
@@ -188,7 +201,7 @@ class Scan(Displayed):
                 if one.verdict is not None
             ]
         if not self.components:
-            lines.append(("found", "no condition on the parameters under which degrees are smaller"))
+            lines.append(("found", f"no condition on the parameters {WORDS[self.by][1].format(len(self.generic))}"))
         if self.components:
             lines.append(("growth", f"that of one member; singularities were followed for {STEPS} steps"))
         lines += [("symmetry", f"exchanging {a} and {b} permutes the slow members") for a, b in self.symmetric]
@@ -228,7 +241,7 @@ class Scan(Displayed):
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            **attributes(self, "over", "seed", "generic"),
+            **attributes(self, "over", "seed", "by", "generic"),
             "classes": [
                 {"degrees": list(degrees), "components": [one.to_json() for one in some]}
                 for degrees, some in self.classes
@@ -244,6 +257,19 @@ class Scan(Displayed):
             ],
             **attributes(self, "height", "coverage", "ended", "omitted"),
         }
+
+    def with_dimensions(self, dim: int) -> Scan:
+        """The scan of maps of this dimension with numbers of polynomials in the place of ranks."""
+
+        def counted(ranks: Degrees) -> Degrees:
+            return tuple(comb(dim + d, d) - rank for d, rank in enumerate(ranks, 1))
+
+        sweeps = (
+            replace(one, generic=counted(one.generic), classes={counted(d): x for d, x in one.classes.items()})
+            for one in self.sweeps
+        )
+        components = tuple(replace(one, degrees=counted(one.degrees)) for one in self.components)
+        return replace(self, generic=counted(self.generic), components=components, sweeps=tuple(sweeps))
 
     def member(self, component: Component) -> SystemFile:
         """The system of a rational member on a component. Raises InputError where none is known."""

@@ -13,7 +13,9 @@ import random
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations, product, repeat
+from math import comb
 from typing import Any
 
 from flint import fmpq, fmpz
@@ -22,11 +24,11 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
-from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.errors import BadPrime, InputError, quoted
 from kahanmaps.laboratory.scan.conditions import beside, conditions
 from kahanmaps.laboratory.scan.growth import Progress, with_growth, with_verdicts
-from kahanmaps.laboratory.scan.members import degrees_on, point_on
-from kahanmaps.laboratory.scan.result import Component, Scan
+from kahanmaps.laboratory.scan.members import degrees_on, point_on, ranks_on
+from kahanmaps.laboratory.scan.result import WORDS, Component, Scan
 from kahanmaps.laboratory.scan.sweep import Sweep, TimeOver, sweep
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kernels import processors
@@ -52,6 +54,8 @@ _ROOM, _ROOM_OF_MANY = 260, 220  # for degrees before common factors are removed
 _MOST_ROOM = 4096
 _TRIAL_PRIME = 8179  # modulo which hardly a member is special
 _MOST_TERMS = 7
+_MONOMIALS, _FEW_MONOMIALS = {"integrals": 21, "density": 36}, 15  # up to 2 parameters; orbits modulo 19 are short
+_MOST_MONOMIALS, _MOST_TOP = 130, 12
 _MEMBERS = 3  # that confirm a component
 _TRIES = 20  # for a rational member
 
@@ -61,6 +65,7 @@ def scan(
     over: Sequence[str],
     *,
     eps: Any = None,
+    by: str = "degrees",
     terms: int | None = None,
     primes: Sequence[int] | None = None,
     seconds: float = DEFAULT_SECONDS,
@@ -76,7 +81,10 @@ def scan(
         file: the family; its claims are not looked at.
         over: names of its parameters that vary, the others have the values of the file; eps may be one of them.
         eps: an exact number, or None for generic eps: conditions that hold for every eps.
-        terms: how many iterates are measured, by default as many as have small degrees, at most 7.
+        by: what makes members special: smaller "degrees" of iterates; "integrals", more polynomials of some degree that
+            vanish along an orbit; "density", more polynomials phi for which the measure dx/phi is invariant.
+        terms: how many iterates are measured, by default as many as have small degrees, at most 7; else the degree of
+            the polynomials, by default such that there are few.
         primes: at least three primes, by default such that the members are some ten thousand.
         seconds: time for everything, about; what was left out then is said.
         seed: of everything random.
@@ -116,6 +124,8 @@ def scan(
         raise InputError("found eps as a parameter to scan over, expected a map that depends on it")
     if exact == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+    if by not in WORDS:
+        raise InputError(f"found a scan by {quoted(by)}, expected one by {', '.join(WORDS)}")
     if jobs is not None and jobs < 1:
         raise InputError(f"found {jobs} jobs, expected at least 1")
     if primes is not None and (len(set(primes)) < 3 or any(p < 5 or not fmpz(p).is_prime() for p in primes)):
@@ -123,7 +133,7 @@ def scan(
         raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
     rng = random.Random(f"scan {seed_for(seed, names, map_.subject, exact)}")
     began = time.monotonic()
-    terms, room, cost = _terms(map_, len(names), exact, terms, rng)
+    terms, room, cost = (_terms if by == "degrees" else partial(_top, by))(map_, len(names), exact, terms, rng)
     jobs = jobs or processors()
     most = _PART * seconds * jobs / cost
     plan = _plan(len(names), primes, most)
@@ -143,7 +153,7 @@ def scan(
         left = (time.monotonic() - began) * max(0, total - done) / done
         progress(f"scan: {done} of {total} members, {left:.0f} s left")
 
-    limits: dict[str, Any] = {"jobs": jobs, "check": until(_UNTIL[0]), "progress": told}
+    limits: dict[str, Any] = {"jobs": jobs, "by": by, "check": until(_UNTIL[0]), "progress": told}
 
     def take(plan: list[tuple[int, int | None]]) -> None:
         for k, (p, lines) in enumerate(plan):
@@ -171,12 +181,12 @@ def scan(
     for k, one in enumerate(known):
         progress(f"scan: confirms component {k + 1} of {len(known)}")
         try:
-            known[k] = _confirmed(one, names, map_, exact, known, rng, until(_UNTIL[2]))
+            known[k] = _confirmed(one, names, map_, exact, known, rng, by, until(_UNTIL[2]))
         except TimeOver:
             omitted.append(f"the confirmation of {len(known) - k} components")
             break
     check = until(1 if analysis is None else _UNTIL[3])
-    known, missed = with_growth(known, file, map_, exact, began + seconds, check, seed, progress)
+    known, missed = with_growth(known, file, map_, exact, began + seconds, check, seed, progress, by)
     omitted += [f"the growth on {missed} components"] if missed else []
     if analysis is not None:
         known, missed = with_verdicts(known, file, exact, analysis, began + seconds, until(1), seed, progress)
@@ -187,7 +197,10 @@ def scan(
     )
     ended = "interrupted" if stop() else "time" if omitted else "complete"
     generic = sweeps[0].generic if sweeps else ()
-    return Scan(file, names, exact, seed, generic, tuple(known), tuple(sweeps), left, symmetric, ended, tuple(omitted))
+    found = Scan(
+        file, names, exact, seed, generic, tuple(known), tuple(sweeps), left, symmetric, ended, tuple(omitted), by
+    )
+    return found if by == "degrees" else found.with_dimensions(map_.dim)
 
 
 def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[tuple[int, int | None]]:
@@ -239,6 +252,28 @@ def _terms(
     return measured, room, (time.monotonic() - began) / LONG
 
 
+def _top(
+    by: str, map_: BirationalMap, count: int, eps: fmpq | None, top: int | None, rng: random.Random
+) -> tuple[int, int, float]:
+    """The degree of polynomials, 0, and the seconds for a member, as `_terms` has them for degrees of iterates."""
+    import numpy as np
+
+    from kahanmaps.maps.residues.families import LONG, Family
+    from kahanmaps.maps.residues.relations import ranks
+
+    sizes = [comb(map_.dim + degree, degree) for degree in range(1, _MOST_TOP + 1)]
+    if top is not None and not (1 <= top <= _MOST_TOP and sizes[top - 1] <= _MOST_MONOMIALS):
+        raise InputError(f"found {top} for the degree of polynomials, expected fewer than {_MOST_MONOMIALS} monomials")
+    few = _MONOMIALS[by] if count < 3 or by == "density" else _FEW_MONOMIALS
+    top = top or max(1, sum(size <= few for size in sizes))
+    tried = np.array([[rng.randrange(1, _TRIAL_PRIME) for _ in range(count)] for _ in range(LONG)])
+    began = time.monotonic()
+    found = ranks(Family(map_, _TRIAL_PRIME), tried, eps, top, rng, by)
+    if not found.any():
+        raise InputError("the map has no value anywhere, whatever the parameters are")
+    return top, 0, (time.monotonic() - began) / LONG
+
+
 def _confirmed(
     one: Component,
     names: Sequence[str],
@@ -246,13 +281,17 @@ def _confirmed(
     eps: fmpq | None,
     others: Sequence[Component],
     rng: random.Random,
+    by: str = "degrees",
     check: Callable[[], None] = lambda: None,
 ) -> Component:
     """The component with what random members on it say, and a rational one that is on no smaller component."""
     measured = []
     for _ in range(_MEMBERS):
         check()
-        measured.append(degrees_on(map_, one.equations, len(names), eps, one.degrees, rng))
+        if by == "degrees":
+            measured.append(degrees_on(map_, one.equations, len(names), eps, one.degrees, rng))
+        else:
+            measured.append(ranks_on(map_, one.equations, len(names), eps, len(one.degrees), rng, by))
     known = [degrees for degrees in measured if degrees is not None]
     values = None
     for _ in range(_TRIES):

@@ -71,10 +71,11 @@ def sweep(
     lines: int | None = None,
     seed: str = "",
     jobs: int = 1,
+    by: str = "degrees",
     check: Callable[[], None] = lambda: None,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Sweep:
-    """The slow members of a family modulo a prime, by the degrees d_1, ..., d_terms.
+    """The slow members of a family modulo a prime, by the degrees d_1, ..., d_terms, or by ranks up to that degree.
 
     Args:
         map_: a map with symbols, the parameters of the family.
@@ -82,6 +83,7 @@ def sweep(
         prime: below 2^13.
         eps: an exact number, or None for generic eps, in GF(p^2).
         terms, room: see `Family.degrees`.
+        by: what is measured: "degrees", or "integrals" or "density" for what `ranks` counts.
         lines: None for all members, else so many random lines of parameter space.
         seed: of everything random.
         jobs: threads.
@@ -98,6 +100,7 @@ def sweep(
     import numpy as np
 
     from kahanmaps.maps.residues.families import TOO_LARGE, Family
+    from kahanmaps.maps.residues.relations import ranks
 
     family, rng = Family(map_, prime), random.Random(seed)
 
@@ -106,7 +109,10 @@ def sweep(
         for low in range(0, len(points), _SLICE):
             check()
             some = np.array(points[low : low + _SLICE], dtype=np.int64)
-            parts.append(family.degrees(some, eps, terms, room, rng, jobs=jobs))
+            if by == "degrees":
+                parts.append(family.degrees(some, eps, terms, room, rng, jobs=jobs))
+            else:
+                parts.append(ranks(family, some, eps, terms, rng, by))
             told(low + len(some), len(points))
         return np.concatenate(parts)
 
