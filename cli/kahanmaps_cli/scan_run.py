@@ -76,6 +76,8 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
             seconds=options["seconds"],
             seed=options["seed"],
             jobs=options["jobs"],
+            keep=options.get("keep"),
+            shard=options.get("shard"),
             progress=progress,
             stop=interrupted.is_set,
         )
@@ -83,7 +85,7 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
 
 def ending(found: Scan, quiet: bool) -> int:
     """The exit status, and a word where it is not 0."""
-    if found.ended == "complete":
+    if found.ended in ("complete", "part"):
         return 0
     if not quiet:
         why = "the time was over" if found.ended == "time" else "interrupted"

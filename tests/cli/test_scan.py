@@ -116,6 +116,7 @@ def test_the_time_is_shared_by_everything_and_what_is_left_out_is_said(kahanmaps
         ("henon_heiles --over c,eps --write-to here", "they hold no eps"),
         ("henon_heiles --over c,eps --toml", "they hold no eps"),
         ("henon_heiles --over c --toml --json", "not both"),
+        ("henon_heiles --over c --shard 1/2", "goes with --keep"),
         ("lyness --over a,eps", "expected a map that depends on it"),
         ("henon_heiles --over c --jobs 0", "expected at least 1"),
         ("paper_m2 --over c", "found the symbol 'c'"),
@@ -138,3 +139,46 @@ def test_ctrl_c_ends_it_with_what_was_seen():
     assert "slow\t" in out
     assert "interrupted" in err
     assert "Traceback" not in err
+
+
+def test_a_scan_that_was_killed_goes_on_where_it_was(kahanmaps, tmp_path):
+    kept = tmp_path / "kept.jsonl"
+    line = [*COMMAND, "scan", *QUICK.split(), "--primes", "101,103,107,109,113,127", "--keep", str(kept)]
+    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**os.environ})
+    while not kept.exists() or kept.read_bytes().count(b"\n") < 2:
+        time.sleep(0.01)
+        assert process.poll() is None
+    process.kill()
+    process.wait()
+    before = kept.read_bytes()
+    kept.write_bytes(before + b'{"prime": 10')  # as if it had been writing
+    command = f"scan {QUICK} --primes 101,103,107,109,113,127"
+    again = kahanmaps(f"{command} --keep {kept}")
+    assert again.status == 0
+    assert kept.read_bytes().startswith(before)
+    assert again.out == kahanmaps(command).out
+    written = kept.read_bytes()
+    assert kahanmaps(f"{command} --keep {kept}").out == again.out
+    assert kept.read_bytes() == written
+
+
+def test_parts_are_put_together(kahanmaps, tmp_path):
+    parts = []
+    for k in (1, 2):
+        outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/{k} --shard {k}/2")
+        assert outcome.status == 0
+        assert "open\tnot asked for were the other parts and conditions" in outcome.out
+        parts.append((tmp_path / str(k)).read_bytes())
+    (tmp_path / "all").write_bytes(b"".join(parts))
+    assert kahanmaps(f"scan {QUICK} --keep {tmp_path}/all").out == kahanmaps(f"scan {QUICK}").out
+    assert (tmp_path / "all").read_bytes() == b"".join(parts)  # nothing was measured again
+
+
+def test_what_another_scan_has_kept_is_refused(kahanmaps, tmp_path):
+    assert kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept").status == 0
+    outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept --seed 1")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "of a scan with another value of seed" in outcome.err
+    (tmp_path / "other").write_text("name = 1\n")
+    assert "expected a file that a scan has kept" in kahanmaps(f"scan {QUICK} --keep {tmp_path}/other").err
+    assert (tmp_path / "other").read_text() == "name = 1\n"

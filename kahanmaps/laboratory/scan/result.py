@@ -105,7 +105,7 @@ class Scan(Displayed):
     `height`, or there by chance. `symmetric` are pairs of parameters whose exchange permutes the slow members.
     `by` says what is meant by degrees: those of iterates, or how many polynomials of degree 1, 2, ... there are that
     vanish along an orbit ("integrals"), or phi with an invariant measure dx/phi ("density").
-    `ended` is "complete", "time" or "interrupted"; `omitted` says what was left out.
+    `ended` is "complete", "time", "interrupted" or, for a shard, "part"; `omitted` says what was left out.
     """
 
     file: SystemFile
@@ -177,7 +177,7 @@ class Scan(Displayed):
     @property
     def text(self) -> str:
         """Lines for people, a word and a tab at the front."""
-        if not self.height:
+        if not self.height or self.ended == "part":
             return "\n".join(f"{word}\t{rest}" for word, rest in [*self._seen, ("tried", self.coverage), *self._open])
         names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
         lines = [("in general", ", ".join(map(str, self.generic)))]
@@ -227,7 +227,8 @@ class Scan(Displayed):
 
     @property
     def _open(self) -> list[tuple[str, str]]:
-        return [("open", f"there was no time for {', '.join(self.omitted)}")] if self.omitted else []
+        why = "not asked for were" if self.ended == "part" else "there was no time for"
+        return [("open", f"{why} {', '.join(self.omitted)}")] if self.omitted else []
 
     @property
     def _seen(self) -> list[tuple[str, str]]:

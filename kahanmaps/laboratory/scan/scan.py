@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations, product, repeat
-from math import comb
+from math import comb, inf
 from typing import Any
 
 from flint import fmpq, fmpz
@@ -27,6 +27,7 @@ from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError, quoted
 from kahanmaps.laboratory.scan.conditions import beside, conditions
 from kahanmaps.laboratory.scan.growth import Progress, with_growth, with_verdicts
+from kahanmaps.laboratory.scan.kept import Kept
 from kahanmaps.laboratory.scan.members import degrees_on, point_on, ranks_on
 from kahanmaps.laboratory.scan.result import WORDS, Component, Scan
 from kahanmaps.laboratory.scan.sweep import Sweep, TimeOver, sweep
@@ -72,6 +73,8 @@ def scan(
     seed: int = 0,
     jobs: int | None = None,
     analysis: float | None = None,
+    keep: str | None = None,
+    shard: tuple[int, int] | None = None,
     progress: Progress = lambda _: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Scan:
@@ -91,6 +94,8 @@ def scan(
         jobs: threads, by default as many as processors; they need numba.
         analysis: seconds for an analysis of a member on each component whose degrees do not grow exponentially; of
             points with the same degrees one is enough. None for none.
+        keep: a file for what is measured modulo each prime, as soon as it is known; what is there is not done again.
+        shard: (i, n): keep only the i-th of n parts of this, and look for no conditions.
         progress: is told what is being done.
         stop: is asked now and then whether to end with what is known.
 
@@ -98,7 +103,7 @@ def scan(
         A `Scan`. Found modulo primes and confirmed at members, which is evidence and no proof.
 
     Raises:
-        InputError: for unknown parameters, wrong primes, a map that exists nowhere.
+        InputError: for a file of another scan, unknown parameters, wrong primes, a map that exists nowhere.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lines = parse_system('''variables = ["x", "y"]
@@ -126,17 +131,30 @@ def scan(
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     if by not in WORDS:
         raise InputError(f"found a scan by {quoted(by)}, expected one by {', '.join(WORDS)}")
+    if shard is not None and (keep is None or not 1 <= shard[0] <= shard[1]):
+        raise InputError(f"found the part {shard[0]} of {shard[1]}, expected 1 to {shard[1]}, and a file to keep it in")
     if jobs is not None and jobs < 1:
         raise InputError(f"found {jobs} jobs, expected at least 1")
     if primes is not None and (len(set(primes)) < 3 or any(p < 5 or not fmpz(p).is_prime() for p in primes)):
         given = ", ".join(map(str, primes))
         raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
-    rng = random.Random(f"scan {seed_for(seed, names, map_.subject, exact)}")
+    rng = random.Random(start := f"scan {seed_for(seed, names, map_.subject, exact)}")
     began = time.monotonic()
     terms, room, cost = (_terms if by == "degrees" else partial(_top, by))(map_, len(names), exact, terms, rng)
     jobs = jobs or processors()
     most = _PART * seconds * jobs / cost
+    if keep is not None:
+        most = inf  # the same on every machine, and not all in one go
     plan = _plan(len(names), primes, most)
+    settings = {
+        "document": dict(file.document),
+        "over": names,
+        "eps": str(exact),
+        "by": by,
+        "terms": terms,
+        "seed": seed,
+    }
+    kept = Kept(keep, settings)
     total = sum(_size(len(names), *one) for one in plan)
     sweeps: list[Sweep] = []
     omitted: list[str] = []
@@ -158,8 +176,12 @@ def scan(
     def take(plan: list[tuple[int, int | None]]) -> None:
         for k, (p, lines) in enumerate(plan):
             try:
-                name = f"{rng.getrandbits(64)} {p}"
-                sweeps.append(sweep(map_, len(names), p, exact, terms, room, lines=lines, seed=name, **limits))
+                one = kept.get(p, lines)
+                if one is None:
+                    name = f"{start} {p} {lines}"
+                    one = sweep(map_, len(names), p, exact, terms, room, lines=lines, seed=name, **limits)
+                    kept.add(one, lines)
+                sweeps.append(one)
             except BadPrime:
                 continue
             except TimeOver:
@@ -168,6 +190,12 @@ def scan(
         generic = max((one.generic for one in sweeps), default=())
         sweeps[:] = [one for one in sweeps if one.generic == generic]
 
+    if shard is not None:
+        take(plan[shard[0] - 1 :: shard[1]])
+        ended = "interrupted" if stop() else "time" if omitted else "part"
+        omitted.append("the other parts and conditions")
+        generic = sweeps[0].generic if sweeps else ()
+        return Scan(file, names, exact, seed, generic, (), tuple(sweeps), (), (), ended, tuple(omitted), by)
     take(plan)
     known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
     again = [(one.prime, _MORE * round(one.seen / one.prime)) for one in sweeps if not one.complete]
