@@ -54,7 +54,9 @@ scan_options: Callable[[F], F] = stack(
 
 def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
     """The scan that a command line asks for."""
+    from kahanmaps.laboratory.scan.kept import Kept
     from kahanmaps.laboratory.scan.scan import scan
+    from kahanmaps.laboratory.scan.sweep import TimeOver
 
     names = [name.strip() for name in options["over"].split(",") if name.strip()]
     if is_inline(options):
@@ -64,6 +66,12 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
         raise click.UsageError("found eps among the parameters of system files that are asked for: they hold no eps")
     file = load_system(system, options)
     interrupted = Event()
+
+    def told(sentence: str) -> None:
+        if interrupted.is_set():
+            raise TimeOver
+        progress(sentence)
+
     with Progress(quiet) as progress, interruptible(interrupted.set):
         return scan(
             file,
@@ -76,10 +84,8 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
             seconds=options["seconds"],
             seed=options["seed"],
             jobs=options["jobs"],
-            keep=options.get("keep"),
-            shard=options.get("shard"),
-            progress=progress,
-            stop=interrupted.is_set,
+            kept=None if options.get("keep") is None else Kept(options["keep"], *(options["shard"] or ())),
+            progress=told,
         )
 
 

@@ -229,11 +229,12 @@ def test_a_curve_that_is_missed_is_said_to_be_one():
 def test_what_was_left_out_is_named_stage_by_stage():
     asked = []
 
-    def stop():
-        asked.append(1)
-        return len(asked) > 60
+    def stop(sentence):
+        asked.append(sentence)
+        if len(asked) > 60:
+            raise TimeOver
 
-    found = scan(parse_system(THREE_LINES), ["g1", "g2"], primes=(31, 37, 41), terms=5, stop=stop)
+    found = scan(parse_system(THREE_LINES), ["g1", "g2"], primes=(31, 37, 41), terms=5, progress=stop)
     assert found.ended == "interrupted"
     assert found.omitted
     assert f"no time for {found.omitted[0]}" in found.text

@@ -14,6 +14,7 @@ from kahanmaps_cli.scan_run import ending, scan_options, scanned
 @click.command("scan", cls=PictureCommand)
 @scan_options
 @click.option("--window", type=PointText(), metavar="A0,A1,B0,B1", help="The part that is shown.")
+@click.option("--modulo", type=int, metavar="P", help="The slow members modulo P, one of the primes, instead.")
 @picture_options
 def command(system: str | None, **options: Any) -> int:
     """The plane of two parameters: where degrees grow more slowly.
@@ -22,8 +23,11 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps plot scan zhukovski_volterra_2 --over b1,b2
       kahanmaps plot scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b \\
         --window=-2,2,-2,2 -o plane.pdf
+      kahanmaps plot scan zhukovski_volterra_2 --over b1,b2 --modulo 53
 
-    A colour for each kind of growth; marks are points, lines are curves.
+    A colour for each kind of growth; marks are points, lines are curves, and
+    the conditions of the first ones are written beside them. With --modulo P
+    the plane over GF(P): all slow members that were seen.
 
     Exit status: 0 done, 2 wrong use, 3 the time was over, 130 interrupted
     (the picture is written).
@@ -34,6 +38,8 @@ def command(system: str | None, **options: Any) -> int:
 
     require_output(options)
     window = None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), 2)
+    if window is not None and options["modulo"] is not None:
+        raise click.UsageError("give --window or --modulo, not both: modulo a prime the whole plane is shown")
     found = scanned(system, options["quiet"], options)
-    deliver(draw_scan(found, style_from(options), window=window), options, found.file)
+    deliver(draw_scan(found, style_from(options), window=window, modulo=options["modulo"]), options, found.file)
     return ending(found, options["quiet"])

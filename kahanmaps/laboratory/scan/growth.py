@@ -49,8 +49,8 @@ def with_growth(
     for k, one in enumerate(found):
         if one.degrees[-1] < 0:
             continue
-        progress(f"scan: growth on component {k + 1} of {len(components)}")
         try:
+            progress(f"scan: growth on component {k + 1} of {len(components)}")
             check()
             if by == "degrees" and _goes_on(one, enough.get(one.degrees), map_, eps, seed):
                 continue
@@ -133,9 +133,9 @@ def with_verdicts(
     for one in components:
         asked = one.values is not None and one.growth is not None and one.growth.growth is not GrowthClass.EXPONENTIAL
         if asked and one.values is not None and one.degrees not in points:
-            progress(f"scan: analyzes a member where {one.text}")
             member, step = _member(file, one.values, eps)
             try:
+                progress(f"scan: analyzes a member where {one.text}")
                 check()
                 left = max(0.1, deadline - time.monotonic())
                 one = replace(one, verdict=analyze(member, eps=step, seconds=min(seconds, left), seed=seed).conclusion)

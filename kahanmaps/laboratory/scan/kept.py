@@ -17,18 +17,22 @@ _SETTINGS = "settings"
 
 
 class Kept:
-    """The sweeps of a scan with these settings (plain data) in a file, which is made if need be; without a path none.
+    """The sweeps of a scan in a file, which is made if need be; `part` of `parts`, if others do the rest.
 
-    Raises InputError where the file is that of another scan, or no such file.
+    Raises InputError for a part that is none.
     """
 
-    def __init__(self, path: str | None, settings: dict[str, Any]) -> None:
+    def __init__(self, path: str, part: int = 1, parts: int = 1) -> None:
+        if not 1 <= part <= parts:
+            raise InputError(f"found the part {part} of {parts}, expected 1 to {parts}")
+        self.part, self.parts = part, parts
         self._path = path
         self._sweeps: dict[tuple[int, int | None], Sweep] = {}
-        if path is None:
-            return
+
+    def open(self, settings: dict[str, Any]) -> None:
+        """Read what is there of the scan with these settings. Raises InputError for a file of anything else."""
         settings = json.loads(json.dumps(settings, default=str))
-        with open(path, "ab+") as stream:
+        with open(self._path, "ab+") as stream:
             stream.seek(0)
             content = stream.read()
             whole = content[: content.rfind(b"\n") + 1]
@@ -36,14 +40,13 @@ class Kept:
                 records = [json.loads(line) for line in whole.splitlines()]
                 others = [one[_SETTINGS] for one in records if _SETTINGS in one]
                 found = [_sweep(one) for one in records if _SETTINGS not in one]
-            except (ValueError, KeyError, TypeError, AttributeError) as error:
-                raise InputError(f"found {path}, expected a file that a scan has kept") from error
-            for other in others:
-                wrong = [key for key in settings if other.get(key) != settings[key]]
-                if wrong:
-                    raise InputError(f"found {path} of a scan with another value of {wrong[0]}, expected the same scan")
+                wrong = [key for key in settings for other in others if other[key] != settings[key]]
+            except (ValueError, KeyError, TypeError) as error:
+                raise InputError(f"found {self._path}, expected a file that a scan has kept") from error
             if content and not others:
-                raise InputError(f"found {path}, expected a file that a scan has kept")
+                raise InputError(f"found {self._path}, expected a file that a scan has kept")
+            if wrong:
+                raise InputError(f"found {self._path} of a scan with another value of {wrong[0]}, expected this one")
             stream.truncate(len(whole))
             self._sweeps.update(found)
             if not others:
@@ -55,13 +58,8 @@ class Kept:
 
     def add(self, one: Sweep, lines: int | None) -> None:
         """Write a finished sweep."""
-        if self._path is not None:
-            record = {"lines": lines, **vars(one), "classes": [*one.classes.items()]}
-            file = os.open(self._path, os.O_WRONLY | os.O_APPEND)
-            try:
-                _write(file, record)
-            finally:
-                os.close(file)
+        with open(self._path, "ab") as stream:
+            _write(stream.fileno(), {"lines": lines, **vars(one), "classes": [*one.classes.items()]})
 
 
 def _write(file: int, record: dict[str, Any]) -> None:

@@ -73,10 +73,8 @@ def scan(
     seed: int = 0,
     jobs: int | None = None,
     analysis: float | None = None,
-    keep: str | None = None,
-    shard: tuple[int, int] | None = None,
+    kept: Kept | None = None,
     progress: Progress = lambda _: None,
-    stop: Callable[[], bool] = lambda: False,
 ) -> Scan:
     """The conditions on parameters under which the degrees of the iterates are smaller than in general.
 
@@ -94,10 +92,8 @@ def scan(
         jobs: threads, by default as many as processors; they need numba.
         analysis: seconds for an analysis of a member on each component whose degrees do not grow exponentially; of
             points with the same degrees one is enough. None for none.
-        keep: a file for what is measured modulo each prime, as soon as it is known; what is there is not done again.
-        shard: (i, n): keep only the i-th of n parts of this, and look for no conditions.
-        progress: is told what is being done.
-        stop: is asked now and then whether to end with what is known.
+        kept: a file for what is measured modulo each prime, as soon as it is known; what is there is not done again.
+        progress: is told what is being done, again and again; TimeOver from it ends the scan with what is known.
 
     Returns:
         A `Scan`. Found modulo primes and confirmed at members, which is evidence and no proof.
@@ -131,8 +127,6 @@ def scan(
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
     if by not in WORDS:
         raise InputError(f"found a scan by {quoted(by)}, expected one by {', '.join(WORDS)}")
-    if shard is not None and (keep is None or not 1 <= shard[0] <= shard[1]):
-        raise InputError(f"found the part {shard[0]} of {shard[1]}, expected 1 to {shard[1]}, and a file to keep it in")
     if jobs is not None and jobs < 1:
         raise InputError(f"found {jobs} jobs, expected at least 1")
     if primes is not None and (len(set(primes)) < 3 or any(p < 5 or not fmpz(p).is_prime() for p in primes)):
@@ -143,25 +137,31 @@ def scan(
     terms, room, cost = (_terms if by == "degrees" else partial(_top, by))(map_, len(names), exact, terms, rng)
     jobs = jobs or processors()
     most = _PART * seconds * jobs / cost
-    if keep is not None:
+    if kept is not None:
         most = inf  # the same on every machine, and not all in one go
     plan = _plan(len(names), primes, most)
-    settings = {
-        "document": dict(file.document),
-        "over": names,
-        "eps": str(exact),
-        "by": by,
-        "terms": terms,
-        "seed": seed,
-    }
-    kept = Kept(keep, settings)
+    if kept is not None:
+        document = dict(file.document)
+        kept.open({"document": document, "over": names, "eps": str(exact), "by": by, "terms": terms, "seed": seed})
     total = sum(_size(len(names), *one) for one in plan)
     sweeps: list[Sweep] = []
     omitted: list[str] = []
 
+    doing, interrupted = "scan", False
+
+    def tell(sentence: str) -> None:
+        nonlocal doing, interrupted
+        doing = sentence
+        try:
+            progress(sentence)
+        except TimeOver:
+            interrupted = True
+            raise
+
     def until(part: float) -> Callable[[], None]:
         def check() -> None:
-            if stop() or time.monotonic() > began + part * seconds:
+            tell(doing)
+            if time.monotonic() > began + part * seconds:
                 raise TimeOver
 
         return check
@@ -169,18 +169,19 @@ def scan(
     def told(done: int, _: int) -> None:
         done += sum(one.seen for one in sweeps)
         left = (time.monotonic() - began) * max(0, total - done) / done
-        progress(f"scan: {done} of {total} members, {left:.0f} s left")
+        tell(f"scan: {done} of {total} members, {left:.0f} s left")
 
     limits: dict[str, Any] = {"jobs": jobs, "by": by, "check": until(_UNTIL[0]), "progress": told}
 
     def take(plan: list[tuple[int, int | None]]) -> None:
         for k, (p, lines) in enumerate(plan):
             try:
-                one = kept.get(p, lines)
+                one = None if kept is None else kept.get(p, lines)
                 if one is None:
                     name = f"{start} {p} {lines}"
                     one = sweep(map_, len(names), p, exact, terms, room, lines=lines, seed=name, **limits)
-                    kept.add(one, lines)
+                    if kept is not None:
+                        kept.add(one, lines)
                 sweeps.append(one)
             except BadPrime:
                 continue
@@ -190,9 +191,9 @@ def scan(
         generic = max((one.generic for one in sweeps), default=())
         sweeps[:] = [one for one in sweeps if one.generic == generic]
 
-    if shard is not None:
-        take(plan[shard[0] - 1 :: shard[1]])
-        ended = "interrupted" if stop() else "time" if omitted else "part"
+    if kept is not None and kept.parts > 1:
+        take(plan[kept.part - 1 :: kept.parts])
+        ended = "interrupted" if interrupted else "time" if omitted else "part"
         omitted.append("the other parts and conditions")
         generic = sweeps[0].generic if sweeps else ()
         return Scan(file, names, exact, seed, generic, (), tuple(sweeps), (), (), ended, tuple(omitted), by)
@@ -207,23 +208,23 @@ def scan(
         known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
     omitted += [f"all conditions for {missed} sequences of degrees"] if missed else []
     for k, one in enumerate(known):
-        progress(f"scan: confirms component {k + 1} of {len(known)}")
         try:
+            tell(f"scan: confirms component {k + 1} of {len(known)}")
             known[k] = _confirmed(one, names, map_, exact, known, rng, by, until(_UNTIL[2]))
         except TimeOver:
             omitted.append(f"the confirmation of {len(known) - k} components")
             break
     check = until(1 if analysis is None else _UNTIL[3])
-    known, missed = with_growth(known, file, map_, exact, began + seconds, check, seed, progress, by)
+    known, missed = with_growth(known, file, map_, exact, began + seconds, check, seed, tell, by)
     omitted += [f"the growth on {missed} components"] if missed else []
     if analysis is not None:
-        known, missed = with_verdicts(known, file, exact, analysis, began + seconds, until(1), seed, progress)
+        known, missed = with_verdicts(known, file, exact, analysis, began + seconds, until(1), seed, tell)
         omitted += [f"{missed} verdicts"] if missed else []
     left = tuple(_left(one, known) for one in sweeps)
     symmetric = tuple(
         (names[i], names[j]) for i, j in combinations(range(len(names)), 2) if _is_symmetric(sweeps, i, j)
     )
-    ended = "interrupted" if stop() else "time" if omitted else "complete"
+    ended = "interrupted" if interrupted else "time" if omitted else "complete"
     generic = sweeps[0].generic if sweeps else ()
     found = Scan(
         file, names, exact, seed, generic, tuple(known), tuple(sweeps), left, symmetric, ended, tuple(omitted), by
