@@ -74,7 +74,7 @@ def test_special_points_of_a_curve_are_found_on_it(three_lines):
 def test_everything_is_confirmed_and_nothing_is_left(three_lines):
     assert all(one.is_confirmed and one.tried == 3 for one in three_lines.components)
     assert not any(three_lines.left)
-    assert three_lines.symmetric == (("g1", "g2"),)
+    assert three_lines.symmetric == (("g2", "g1"),)
     assert three_lines.height == 31
     assert "up to 31" in three_lines.coverage
 
@@ -284,13 +284,15 @@ def test_an_analysis_of_members_gives_verdicts():
 @pytest.mark.parametrize(
     ("rhs", "symmetric"),
     [
-        ('["y", "x^2 + (a*b - 1)*y"]', (("a", "b"),)),
+        ('["y", "x^2 + (a*b - 1)*y"]', (("b", "a"), ("-a", "-b"))),
+        ('["y", "x^2 + (a^2 + b - 1)*y"]', (("-a", "b"),)),
+        ('["y", "x^2 + a*y + b*(b - 1)"]', ()),  # a = 0 alone, and affine
         ('["y", "x^2 + (2*a*b - b)*y"]', ()),
         ('["a", "b"]', ()),  # no member is slower than others
-        ('["y", "x^2 + (a^2 - 2*b^2)*y"]', ()),  # (0, 0) alone is seen where 2 is no square, and is not moved
+        ('["y", "x^2 + (a^2 - 2*b^2)*y"]', (("a", "-b"), ("-a", "b"))),  # (0, 0) alone is seen in the whole plane
     ],
 )
-def test_an_exchange_of_parameters_is_told_where_it_moves_slow_members(rhs, symmetric):
+def test_changes_of_parameters_are_told_where_they_permute_slow_members(rhs, symmetric):
     file = parse_system(f'variables = ["x", "y"]\nparameters = {{ a = 1, b = 1 }}\n[system]\nrhs = {rhs}')
     assert scan(file, ["a", "b"]).symmetric == symmetric
 
@@ -326,3 +328,17 @@ def test_a_wrong_condition_has_neither_relations_nor_densities(by, degrees):
     found = _confirmed(wrong, ["g1", "g2"], map_, None, [], random.Random(1), by)
     assert (found.confirmed, found.tried) == (0, 3)
     assert _confirmed(replace(wrong, degrees=degrees), ["g1", "g2"], map_, None, [], random.Random(1), by).is_confirmed
+
+
+def test_a_cycle_of_three_parameters_is_found_and_no_exchange():
+    found = scan(parse_system(LOTKA_VOLTERRA), ["A", "B", "C"], primes=(17, 19, 23), terms=3)
+    assert ("C", "A", "B") in found.symmetric or ("B", "C", "A") in found.symmetric
+    assert ("A", "C", "B") not in found.symmetric
+
+
+def test_a_reflection_that_moves_points_is_found():
+    text = """variables = ["x", "y"]
+    parameters = { a = 1 }
+    [system]
+    rhs = ["y", "x^2 + (a - 1)*(a - 4)*y"]"""
+    assert scan(parse_system(text), ["a"], terms=6, primes=(101, 103, 107)).symmetric == (("-a + 5",),)

@@ -138,7 +138,7 @@ def degree_reached(points: float, count: int) -> int:
     """Up to which degree, at most `MAX_DEGREE`, so many points are enough for a hypersurface.
 
     >>> degree_reached(53, 2), degree_reached(11, 2)
-    (6, 1)
+    (6, 2)
     """
     sizes = (len(exponents_up_to(count, degree)) for degree in range(1, MAX_DEGREE + 1))
     return sum(_SPARE * size + 2 <= points for size in sizes)

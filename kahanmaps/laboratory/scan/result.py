@@ -102,9 +102,9 @@ class Scan(Displayed):
 
     `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
     the number of slow members on no component modulo each of them: points over number fields, of a height above
-    `height`, or there by chance. `symmetric` are pairs of parameters whose exchange permutes the slow members.
-    `by` says what is meant by degrees: those of iterates, or how many polynomials of degree 1, 2, ... there are that
-    vanish along an orbit ("integrals"), or phi with an invariant measure dx/phi ("density").
+    `height`, or there by chance. `symmetric` are changes of parameters that permute the slow members, by their
+    images. `by` says what is meant by degrees: those of iterates, or how many polynomials of degree 1, 2, ... there
+    are that vanish along an orbit ("integrals"), or phi with an invariant measure dx/phi ("density").
     `ended` is "complete", "time", "interrupted" or, for a shard, "part"; `omitted` says what was left out.
     """
 
@@ -116,7 +116,7 @@ class Scan(Displayed):
     components: tuple[Component, ...]
     sweeps: tuple[Sweep, ...]
     left: tuple[int, ...]
-    symmetric: tuple[tuple[str, str], ...]
+    symmetric: tuple[tuple[str, ...], ...]
     ended: str
     omitted: tuple[str, ...] = ()
     by: str = "degrees"
@@ -204,7 +204,9 @@ class Scan(Displayed):
             lines.append(("found", f"no condition on the parameters {WORDS[self.by][1].format(len(self.generic))}"))
         if self.components:
             lines.append(("growth", f"that of one member; singularities were followed for {STEPS} steps"))
-        lines += [("symmetry", f"exchanging {a} and {b} permutes the slow members") for a, b in self.symmetric]
+        for images in self.symmetric:
+            image = f"({', '.join(images)})" if len(images) > 1 else images[0]
+            lines.append(("symmetry", f"{names} -> {image} permutes the slow members"))
         lines.append(("tried", self.coverage))
         if any(self.left):
             rest = ", ".join(f"{n} modulo {one.prime}" for n, one in zip(self.left, self.sweeps, strict=True))
@@ -247,7 +249,7 @@ class Scan(Displayed):
                 {"degrees": list(degrees), "components": [one.to_json() for one in some]}
                 for degrees, some in self.classes
             ],
-            "symmetric": [list(pair) for pair in self.symmetric],
+            "symmetric": [list(images) for images in self.symmetric],
             "sweeps": [
                 {
                     **attributes(one, "prime", "seen", "complete", "accidents"),

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import combinations, product, repeat
+from itertools import product, repeat
 from math import comb, inf
 from typing import Any
 
@@ -22,6 +22,7 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError, quoted
@@ -31,6 +32,7 @@ from kahanmaps.laboratory.scan.kept import Kept
 from kahanmaps.laboratory.scan.members import degrees_on, point_on, ranks_on
 from kahanmaps.laboratory.scan.result import WORDS, Component, Scan
 from kahanmaps.laboratory.scan.sweep import Sweep, TimeOver, sweep
+from kahanmaps.laboratory.scan.symmetric import symmetries
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kernels import processors
 
@@ -82,17 +84,17 @@ def scan(
         file: the family; its claims are not looked at.
         over: names of its parameters that vary, the others have the values of the file; eps may be one of them.
         eps: an exact number, or None for generic eps: conditions that hold for every eps.
-        by: what makes members special: smaller "degrees" of iterates; "integrals", more polynomials of some degree that
-            vanish along an orbit; "density", more polynomials phi for which the measure dx/phi is invariant.
-        terms: how many iterates are measured, by default as many as have small degrees, at most 7; else the degree of
-            the polynomials, by default such that there are few.
+        by: what makes members special: smaller "degrees" of iterates; "integrals", more polynomials of some degree
+            that vanish along an orbit; "density", more polynomials phi for which the measure dx/phi is invariant.
+        terms: how many iterates are measured, by default as many as have small degrees, at most 7; or else the degree
+            of the polynomials, by default such that there are few.
         primes: at least three primes, by default such that the members are some ten thousand.
         seconds: time for everything, about; what was left out then is said.
         seed: of everything random.
         jobs: threads, by default as many as processors; they need numba.
         analysis: seconds for an analysis of a member on each component whose degrees do not grow exponentially; of
             points with the same degrees one is enough. None for none.
-        kept: a file for what is measured modulo each prime, as soon as it is known; what is there is not done again.
+        kept: a file for what is measured modulo each prime, as soon as it is known; that is not done again.
         progress: is told what is being done, again and again; TimeOver from it ends the scan with what is known.
 
     Returns:
@@ -221,9 +223,7 @@ def scan(
         known, missed = with_verdicts(known, file, exact, analysis, began + seconds, until(1), seed, tell)
         omitted += [f"{missed} verdicts"] if missed else []
     left = tuple(_left(one, known) for one in sweeps)
-    symmetric = tuple(
-        (names[i], names[j]) for i, j in combinations(range(len(names)), 2) if _is_symmetric(sweeps, i, j)
-    )
+    symmetric = tuple(tuple(map(format_polynomial, images)) for images in symmetries(sweeps, known, names))
     ended = "interrupted" if interrupted else "time" if omitted else "complete"
     generic = sweeps[0].generic if sweeps else ()
     found = Scan(
@@ -346,19 +346,3 @@ def _left(one: Sweep, components: Sequence[Component]) -> int:
 def _lacks_hypersurface(one: Sweep, components: Sequence[Component]) -> bool:
     """Whether members on random lines are left, as many as a hypersurface has."""
     return not one.complete and _left(one, components) >= 0.5 * one.seen / one.prime
-
-
-def _is_symmetric(sweeps: Sequence[Sweep], i: int, j: int) -> bool:
-    """Whether exchanging two parameters moves slow members, and to members with the same degrees, modulo each prime."""
-
-    def exchanged(point: tuple[int, ...]) -> tuple[int, ...]:
-        values = list(point)
-        values[i], values[j] = values[j], values[i]
-        return tuple(values)
-
-    sweeps = [one for one in sweeps if one.complete]
-    return bool(sweeps) and all(
-        any(exchanged(x) != x for x in one.slow)
-        and all(one.slow.get(exchanged(x)) == degrees for x, degrees in one.slow.items())
-        for one in sweeps
-    )
