@@ -182,6 +182,7 @@ def test_more_parameters_than_can_be_tried_give_hypersurfaces():
     assert found.coverage.startswith(
         "members on 150 random lines of parameter space modulo 61, 67, 71; found are hyper"
     )
+    assert "nothing of smaller dimension" in found.coverage
     assert found.degree == 4
 
 

@@ -169,6 +169,8 @@ class Scan(Displayed):
                 f"hypersurfaces of a total degree up to {self.degree} for each sequence of {WORDS[self.by][0]}"
             )
         where = WORDS[self.by][1].format(len(self.generic))
+        if not whole:
+            kinds.append("nothing of smaller dimension, for which all members would have to be tried")
         return (
             f"{', and '.join(parts)}; found are {', and '.join(kinds)}, {where}, over Q with numerators and "
             f"denominators up to {self.height}, or over a quadratic field that splits modulo three of the primes"
