@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import permutations, product
 from typing import Any
 
@@ -11,7 +11,7 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.polynomials import primitive_part, ring
 from kahanmaps.laboratory.scan.lift import residues
 from kahanmaps.laboratory.scan.result import Component
-from kahanmaps.laboratory.scan.sweep import Sweep
+from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 
 Change = tuple[tuple[int, int, fmpq], ...]  # a_k becomes sign * a_place + shift: place, sign and shift for each k
 
@@ -32,17 +32,15 @@ def symmetries(
     >>> symmetries([Sweep(7, (2,), {(1,): points}, 49, True, 0)], lines, ["a", "b"])
     [(b, a), (a, -b)]
     """
-    complete = [one for one in sweeps if one.complete]
+    complete = [(one.prime, one.slow) for one in sweeps if one.complete]
     if not complete or not components:
         return []
     found: list[Change] = []
     known = {_identity(len(names))}
     for change in _changes(len(names), components):
-        if (
-            change not in known
-            and _matters(change, components, names)
-            and all(_permutes(change, one) for one in complete)
-        ):
+        if change in known or not all(_permutes(change, p, slow) for p, slow in complete):
+            continue
+        if _matters(change, components, names):
             found.append(change)
             known = _generated(found, len(names))
     return [_images(change, names) for change in found]
@@ -91,9 +89,8 @@ def _matters(change: Change, components: Sequence[Component], names: Sequence[st
     return matters
 
 
-def _permutes(change: Change, one: Sweep) -> bool:
+def _permutes(change: Change, p: int, slow: Mapping[Point, Degrees]) -> bool:
     """Whether all slow members modulo a prime go to such with the same degrees."""
-    p, slow = one.prime, one.slow
     shifts = residues([[shift for _, _, shift in change]], p)
     if shifts is None:
         return True
