@@ -219,15 +219,15 @@ class Scan(Displayed):
 
     @property
     def _left_words(self) -> str:
-        """What so many members must be."""
+        """What so many members may be."""
         most = 0
         for n, one in zip(self.left, self.sweeps, strict=True):
             dimension = len(self.over) - 1
             while dimension > most and n < 0.5 * one.seen / one.prime ** (len(self.over) - dimension):
                 dimension -= 1
             most = dimension
-        words = "a curve of them was" if most == 1 else f"a variety of dimension {most} was"
-        return f"; that many are no single points: {words} missed" if most else ""
+        what = "a curve" if most == 1 else f"a variety of dimension {most}"
+        return f"; as many as {what} has, so one may have been missed" if most else ""
 
     @property
     def _open(self) -> list[tuple[str, str]]:
