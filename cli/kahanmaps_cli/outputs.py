@@ -80,9 +80,12 @@ class OutputFolder(click.Path):
         super().__init__(file_okay=False)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        path = super().convert(value, param, ctx)
         if ctx is not None:
             _files(ctx)  # notes from now on what is read
-        return super().convert(value, param, ctx)
+            if not ctx.resilient_parsing:
+                _require_folder(Path(os.fsdecode(path)))
+        return path
 
 
 def file_name(name: str) -> str:
@@ -128,6 +131,19 @@ def _identity(path: Any) -> Identity | None:
     except (OSError, ValueError):
         return None
     return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None
+
+
+def _require_folder(path: Path) -> None:
+    """Raise OSError where files cannot be written to the folder, before anything is computed: by making it."""
+    missing = [folder for folder in (path, *path.parents) if not folder.exists()]
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        if not os.access(path, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+    finally:
+        for folder in missing:
+            if folder.is_dir():
+                folder.rmdir()
 
 
 def _require_place(path: str, grows: bool) -> None:

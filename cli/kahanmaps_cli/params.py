@@ -195,3 +195,18 @@ class Steps(OptionType):
                 )
             steps.append(int(piece))
         return sorted(set(steps))
+
+
+class Shard(OptionType):
+    """I/N: the I-th of N parts."""
+
+    name = "i/n"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value
+        part, slash, parts = value.partition("/")
+        numbers = [int(text) if text.isascii() and text.isdigit() and len(text) < 10 else 0 for text in (part, parts)]
+        if not slash or not 1 <= numbers[0] <= numbers[1]:
+            self.fail(f"found {value[:40]!r}, expected I/N with 1 <= I <= N, e.g. 3/16", param, ctx)
+        return tuple(numbers)

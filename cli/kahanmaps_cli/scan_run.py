@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from threading import Event
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -17,7 +18,8 @@ from kahanmaps_cli.options import (
     system_options,
     the_eps,
 )
-from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.signals import interruptible
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.scan.result import Scan
@@ -34,7 +36,14 @@ scan_options: Callable[[F], F] = stack(
     ),
     eps_options,
     click.option(
-        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N (default: as many as are small, up to 7)."
+        "--by",
+        type=click.Choice(["degrees", "integrals", "density"]),
+        default="degrees",
+        show_default=True,
+        help="Look for smaller degrees of iterates, relations along orbits, or densities.",
+    ),
+    click.option(
+        "--terms", type=int, metavar="N", help="Measure d_1, ..., d_N, or relations and densities up to degree N."
     ),
     click.option("--primes", metavar="P,Q,...", help="Three primes or more (default: by the number of parameters)."),
     seconds_option(120.0, "Stop about then, and say what was seen."),
@@ -45,7 +54,9 @@ scan_options: Callable[[F], F] = stack(
 
 def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
     """The scan that a command line asks for."""
+    from kahanmaps.laboratory.scan.kept import Kept
     from kahanmaps.laboratory.scan.scan import scan
+    from kahanmaps.laboratory.scan.sweep import TimeOver
 
     names = [name.strip() for name in options["over"].split(",") if name.strip()]
     if is_inline(options):
@@ -54,19 +65,38 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
     if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):
         raise click.UsageError("found eps among the parameters of system files that are asked for: they hold no eps")
     file = load_system(system, options)
-    with Progress(quiet) as progress:
+    interrupted = Event()
+
+    def told(sentence: str) -> None:
+        if interrupted.is_set():
+            raise TimeOver
+        progress(sentence)
+
+    with Progress(quiet) as progress, interruptible(interrupted.set):
         return scan(
             file,
             names,
             eps=the_eps(options["eps"], options["time_step"], required=False),
+            by=options["by"],
             terms=options["terms"],
             primes=_primes(options["primes"]),
             analysis=options.get("analysis"),
             seconds=options["seconds"],
             seed=options["seed"],
             jobs=options["jobs"],
-            progress=progress,
+            kept=None if options.get("keep") is None else Kept(options["keep"], *(options["shard"] or ())),
+            progress=told,
         )
+
+
+def ending(found: Scan, quiet: bool) -> int:
+    """The exit status, and a word where it is not 0."""
+    if found.ended in ("complete", "part"):
+        return 0
+    if not quiet:
+        why = "the time was over" if found.ended == "time" else "interrupted"
+        say(f"stopped early: {why} before {', '.join(found.omitted)}")
+    return 3 if found.ended == "time" else 130
 
 
 def _primes(text: str | None) -> list[int] | None:

@@ -1,17 +1,57 @@
-"""Parameters with ranges of values: -p a=-2..2 or -p a=-2..2:1/4, all combinations of them."""
+"""Parameters with ranges of values: -p a=-2..2 or -p a=-2..2:1/4, all combinations of them, and tables over these."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from kahanmaps_cli.options import load_system
+from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.render import print_json
+from kahanmaps_cli.terminal import tell
+
+if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
 
 _MOST = 10_000
 
 Row = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What was found for one combination of values: in a line, as JSON, and whether it was decided."""
+
+    line: str
+    record: Callable[[], dict[str, Any]]
+    is_done: bool
+
+
+def table(
+    system: str | None, options: dict[str, Any], quiet: bool, found: Callable[[SystemFile, Progress], Cell]
+) -> int | None:
+    """A line for each combination of values, in JSON a record each, and the exit status; None without a range."""
+    rows = rows_of(options["parameters"], system)
+    if rows is None:
+        return None
+    files = [load_system(system, {**options, "parameters": row}) for row in rows]
+    done = 0
+    for row, file in zip(rows, files, strict=True):
+        with Progress(quiet) as progress:
+            cell = found(file, progress)
+        if options["as_json"]:
+            print_json(cell.record())
+        else:
+            tell(f"{', '.join(f'{name} = {value}' for name, value in row)}\t{cell.line}")
+        done += cell.is_done
+    if done < len(rows) and not quiet:
+        say(f"undecided, or stopped early: {len(rows) - done} of {len(rows)}")
+    return 0 if done == len(rows) else 3
 
 
 def rows_of(parameters: Sequence[tuple[str, str]], system: str | None) -> list[Row] | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +11,10 @@ import numpy as np
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
+from kahanmaps.laboratory.scan.conditions import beside
 from kahanmaps.laboratory.scan.result import Component, Scan, growth_on
+from kahanmaps.laboratory.scan.sweep import Sweep
+from kahanmaps.plots.figures import beside as write
 from kahanmaps.plots.figures import drawing, label_of, legend_above, legend_height, new_figure
 from kahanmaps.plots.level_sets import level_curves
 from kahanmaps.plots.point_functions import PointFunction
@@ -20,14 +25,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASPECT = 0.8
+_MANY = f"{GrowthClass.EXPONENTIAL} growth"  # of the points with it none is named
+_WIDE, _HIGH = 0.14, 0.035  # of the picture, the room of a condition
 _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
 
-def draw_scan(found: Scan, style: Style | None = None, *, window: Window | None = None) -> Figure:
-    """Curves and points of the plane of two parameters, a colour for each kind of growth.
+def draw_scan(
+    found: Scan, style: Style | None = None, *, window: Window | None = None, modulo: int | None = None
+) -> Figure:
+    """Curves and points of the plane of two parameters, a colour for each kind of growth, with their conditions.
 
-    `window` is (low, high) of each parameter; by default it holds most of the points with rational parameters. Raises
-    InputError for a scan over another number of parameters.
+    `window` is (low, high) of each parameter; by default it holds most of the points with rational parameters. With
+    `modulo`, one of the primes modulo which all members were tried, the slow ones among these, those on no component
+    as well. Raises InputError for a scan over another number of parameters, and another prime.
 
     >>> from kahanmaps.documents.catalog import load
     >>> from kahanmaps.laboratory.scan.scan import scan
@@ -35,29 +45,98 @@ def draw_scan(found: Scan, style: Style | None = None, *, window: Window | None 
     >>> [text.get_text() for text in figure.legends[0].get_texts()]
     ['quadratic growth']
     """
-    from matplotlib.collections import LineCollection
-
     if len(found.over) != 2:
         raise InputError(f"found a scan over {', '.join(found.over)}, expected two parameters: a plane is drawn")
     style = style or Style()
     kinds = _kinds(found)
+    if modulo is not None:
+        known = {one.prime: one for one in found.sweeps if one.complete}
+        if modulo not in known:
+            tried = ", ".join(map(str, known)) or "none were tried"
+            raise InputError(f"found the prime {modulo}, expected one modulo which all members were tried: {tried}")
+        return _draw(found, style, _modulo(known[modulo], kinds), ((-1, modulo), (-1, modulo)), f" modulo {modulo}")
     points = {kind: [_place(one) for one in some if one.is_rational_point] for kind, some in kinds.items()}
     if window is None:
         every = [place for some in points.values() for place in some]
         window = window_of(np.array(every)) if len(every) > 1 else _USUAL
+    drawn = [
+        _Kind(
+            kind,
+            points[kind],
+            [piece for one in some if one.dimension == 1 for piece in _curve(one, window)],
+            [(one.text, _place(one)) for one in some if one.is_rational_point and kind != _MANY]
+            + [(one.text, _middle(pieces)) for one in some if one.dimension == 1 and (pieces := _curve(one, window))],
+        )
+        for kind, some in kinds.items()
+    ]
+    return _draw(found, style, drawn, window, "")
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """What has one colour: points, pieces of curves, and conditions at the places where they are written."""
+
+    name: str
+    points: Sequence[tuple[float, ...]]
+    curves: Sequence[np.ndarray]
+    labels: Sequence[tuple[str, tuple[float, ...]]]
+
+
+def _modulo(sweep: Sweep, kinds: dict[str, list[Component]]) -> list[_Kind]:
+    """The slow members modulo a prime, each with the growth of a component that it is on and has the degrees of."""
+    rest = {degrees: list(points) for degrees, points in sweep.classes.items()}
+    drawn = []
+    for kind, some in kinds.items():
+        points, labels = [], []
+        for one in some:
+            before = rest.get(one.degrees, [])
+            rest[one.degrees] = beside(before, [one], sweep.prime) if before else []
+            on = sorted(set(before) - set(rest[one.degrees]))
+            points += on
+            labels += [(one.text, on[len(on) // 2])] if on and (one.dimension or kind != _MANY) else []
+        drawn.append(_Kind(kind, points, [], labels))
+    left = [point for points in rest.values() for point in points]
+    return [*drawn, _Kind("on no component", left, [], [])] if left else drawn
+
+
+def _draw(found: Scan, style: Style, kinds: list[_Kind], window: Window, beside_name: str) -> Figure:
+    from matplotlib.collections import LineCollection
+
+    names = [kind.name for kind in kinds]
     with drawing(style):
-        figure = new_figure(style, _ASPECT + legend_height(list(kinds), style))
+        figure = new_figure(style, _ASPECT + legend_height(names, style))
         axes = figure.subplots()
         handles = []
-        for k, (kind, some) in enumerate(kinds.items()):
-            pieces = [piece for one in some if one.dimension == 1 for piece in _curve(one, window)]
-            axes.add_collection(LineCollection(pieces, colors=COLOURS[k], linestyles=[LINES[k]]), autolim=False)
-            columns = np.array(points[kind]).reshape(-1, 2).T
-            handles += axes.plot(*columns, MARKS[k], color=COLOURS[k], markersize=style.font_size / 2, zorder=10 - k)
-        axes.set(xlim=window[0], ylim=window[1], xlabel=label_of(found.over[0]), ylabel=label_of(found.over[1]))
+        for k, kind in enumerate(kinds):
+            colour, mark = COLOURS[k % len(COLOURS)], MARKS[k % len(MARKS)]
+            axes.add_collection(
+                LineCollection(kind.curves, colors=colour, linestyles=[LINES[k % len(LINES)]]), autolim=False
+            )
+            columns = np.array(kind.points, dtype=float).reshape(-1, 2).T
+            size = style.font_size / (4 if beside_name else 2)
+            handles += axes.plot(*columns, mark, color=colour, markersize=size, zorder=10 - k)
+        labels = [(*one, COLOURS[k % len(COLOURS)]) for k, kind in enumerate(kinds) for one in kind.labels]
+        taken: list[tuple[float, float]] = []
+        for text, place, colour in labels:  # those of the slowest growth before others
+            x, y = ((c - low) / (high - low) for c, (low, high) in zip(place, window, strict=True))
+            if not (0 <= x <= 1 and 0 <= y <= 1) or any(abs(x - u) < _WIDE and abs(y - v) < _HIGH for u, v in taken):
+                continue
+            taken.append((x, y))
+            offset = (3.0, 3.0) if x < 1 - _WIDE else (-3.0, 3.0)
+            side = "left" if x < 1 - _WIDE else "right"
+            write(axes, text, place, offset, halo=1.5, size="x-small", color=colour, ha=side, clip_on=True, zorder=20)
+        axes.set(xlim=window[0], ylim=window[1])
+        axes.set(xlabel=label_of(found.over[0]) + beside_name, ylabel=label_of(found.over[1]) + beside_name)
         if handles:
-            legend_above(figure, handles, list(kinds), style)
+            legend_above(figure, handles, names, style)
     return figure
+
+
+def _middle(pieces: list[np.ndarray]) -> tuple[float, float]:
+    """A place on the longest piece of a curve."""
+    longest = max(pieces, key=len)
+    x, y = longest[len(longest) // 2]
+    return float(x), float(y)
 
 
 def _kinds(found: Scan) -> dict[str, list[Component]]:

@@ -59,7 +59,7 @@ def test_an_option_has_the_same_metavar_everywhere():
         name: {option.metavar or option.type.name for words, option in options if own(words) and not option.is_flag}
         for name, options in by_name().items()
     }
-    exceptions = {"-o", "--output", "--integral", "--experiment", "-e"}
+    exceptions = {"-o", "--output", "--integral", "--experiment", "-e", "--by"}
     assert {name: several for name, several in found.items() if len(several) > 1 and name not in exceptions} == {}
 
 

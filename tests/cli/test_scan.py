@@ -24,9 +24,9 @@ def test_blocks_say_degrees_growth_and_where(kahanmaps):
         "degrees\t3, 5, 9, 13\tquadratic growth, dynamical degree 1, explained",
         "at c =\t-1",
         "growth\tthat of one member; singularities were followed for 40 steps",
-        "tried\tall members with parameters modulo the primes: 101 modulo 101, 103 modulo 103, 107 modulo 107; found "
-        "are single points with numerators and denominators up to 72, and hypersurfaces of a degree up to 6, where one "
-        "of the first 4 degrees is smaller",
+        "tried\tall members with parameters modulo 101, 103, 107; found are single points, where one of the first 4 "
+        "degrees is smaller, over Q with numerators and denominators up to 72, or over a quadratic field that splits "
+        "modulo three of the primes",
         "left\tnone: every slow member that was seen is on a component",
     ]
 
@@ -64,11 +64,42 @@ def test_verdicts_are_asked_for(kahanmaps):
     assert "verdict" not in kahanmaps(f"scan {PLANE}").out
 
 
+def test_a_folder_that_cannot_be_made_is_refused_before_the_scan(kahanmaps, tmp_path):
+    (tmp_path / "file").write_text("")
+    began = time.monotonic()
+    outcome = kahanmaps(f"scan {QUICK} --primes 8101,8111,8117 --write-to {tmp_path}/file/cases")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "file/cases" in outcome.err
+    assert time.monotonic() - began < 1
+    assert kahanmaps(f"scan {QUICK} --terms 99 --write-to {tmp_path}/a/b").status == 2
+    assert not (tmp_path / "a").exists()
+
+
+def test_files_of_an_earlier_scan_are_replaced(kahanmaps, tmp_path):
+    for name in ("henon_heiles-1.toml", "henon_heiles-2.toml", "henon_heiles-x.toml"):
+        (tmp_path / name).write_text("old")
+    assert kahanmaps(f"scan {QUICK} --write-to {tmp_path}").status == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["henon_heiles-1.toml", "henon_heiles-x.toml"]
+    assert tomllib.loads((tmp_path / "henon_heiles-1.toml").read_text())["parameters"] == {"c": "-1"}
+
+
 def test_the_time_may_be_over(kahanmaps):
     outcome = kahanmaps(f"scan {QUICK} --seconds 1e-6")
     assert outcome.status == 3
-    assert outcome.out.splitlines()[1] == "tried\tmembers modulo three primes are needed, those modulo 0 were tried"
-    assert outcome.err == "stopped early: the time was over after the members modulo 0 of the primes\n"
+    assert outcome.out.splitlines()[1:] == [
+        "tried\tmembers modulo three primes are needed, those modulo 0 were tried",
+        "open\tthere was no time for members modulo 101, 103, 107",
+    ]
+    assert outcome.err == "stopped early: the time was over before members modulo 101, 103, 107\n"
+
+
+def test_the_time_is_shared_by_everything_and_what_is_left_out_is_said(kahanmaps):
+    began = time.monotonic()
+    outcome = kahanmaps("""scan --rhs "x' = x*(1+a*x+y); y' = y*(b+x+y)" --over a,b,eps --seconds 6""")
+    assert time.monotonic() - began < 15
+    assert outcome.status == 3
+    assert "open\tthere was no time for " in outcome.out
+    assert "stopped early" in outcome.err
 
 
 @pytest.mark.parametrize(
@@ -85,6 +116,7 @@ def test_the_time_may_be_over(kahanmaps):
         ("henon_heiles --over c,eps --write-to here", "they hold no eps"),
         ("henon_heiles --over c,eps --toml", "they hold no eps"),
         ("henon_heiles --over c --toml --json", "not both"),
+        ("henon_heiles --over c --shard 1/2", "goes with --keep"),
         ("lyness --over a,eps", "expected a map that depends on it"),
         ("henon_heiles --over c --jobs 0", "expected at least 1"),
         ("paper_m2 --over c", "found the symbol 'c'"),
@@ -96,11 +128,57 @@ def test_wrong_use_is_one_line(kahanmaps, options, message):
     assert message in outcome.err
 
 
-def test_ctrl_c_ends_it():
-    line = [*COMMAND, "scan", "henon_heiles", "--over", "c", "--primes", "8101,8111,8117", "--terms", "7"]
+def test_ctrl_c_ends_it_with_what_was_seen():
+    line = [*COMMAND, "scan", "henon_heiles", "--over", "c", "--primes", "7,8101,8111,8117", "--terms", "7"]
     process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ})
-    time.sleep(3)
+    time.sleep(6)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, "")
+    assert process.returncode == 130
+    assert "no time for members modulo 8101, 8111, 8117" in out
+    assert "slow\t" in out
+    assert "interrupted" in err
     assert "Traceback" not in err
+
+
+def test_a_scan_that_was_killed_goes_on_where_it_was(kahanmaps, tmp_path):
+    kept = tmp_path / "kept.jsonl"
+    line = [*COMMAND, "scan", *QUICK.split(), "--primes", "101,103,107,109,113,127", "--keep", str(kept)]
+    process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**os.environ})
+    while not kept.exists() or kept.read_bytes().count(b"\n") < 2:
+        time.sleep(0.01)
+        assert process.poll() is None
+    process.kill()
+    process.wait()
+    before = kept.read_bytes()
+    kept.write_bytes(before + b'{"prime": 10')  # as if it had been writing
+    command = f"scan {QUICK} --primes 101,103,107,109,113,127"
+    again = kahanmaps(f"{command} --keep {kept}")
+    assert again.status == 0
+    assert kept.read_bytes().startswith(before)
+    assert again.out == kahanmaps(command).out
+    written = kept.read_bytes()
+    assert kahanmaps(f"{command} --keep {kept}").out == again.out
+    assert kept.read_bytes() == written
+
+
+def test_parts_are_put_together(kahanmaps, tmp_path):
+    parts = []
+    for k in (1, 2):
+        outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/{k} --shard {k}/2")
+        assert outcome.status == 0
+        assert "open\tnot asked for were the other parts and conditions" in outcome.out
+        parts.append((tmp_path / str(k)).read_bytes())
+    (tmp_path / "all").write_bytes(b"".join(parts))
+    assert kahanmaps(f"scan {QUICK} --keep {tmp_path}/all").out == kahanmaps(f"scan {QUICK}").out
+    assert (tmp_path / "all").read_bytes() == b"".join(parts)  # nothing was measured again
+
+
+def test_what_another_scan_has_kept_is_refused(kahanmaps, tmp_path):
+    assert kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept").status == 0
+    outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept --seed 1")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "of a scan with another value of seed, expected this one" in outcome.err
+    (tmp_path / "other").write_text("name = 1\n")
+    assert "expected a file that a scan has kept" in kahanmaps(f"scan {QUICK} --keep {tmp_path}/other").err
+    assert (tmp_path / "other").read_text() == "name = 1\n"

@@ -52,3 +52,22 @@ def test_a_plane_is_drawn_and_nothing_else():
 def test_a_scan_without_conditions_is_an_empty_plane():
     none = scan(parse_system(PLANE), ["a", "b"], terms=1, primes=[5, 7, 11], seconds=1e-6)
     assert draw_scan(none).legends == []
+
+
+def test_conditions_are_written_beside_what_they_describe(found):
+    [axes] = draw_scan(found, window=((-2.0, 2.0), (-2.0, 2.0))).axes
+    at = {text.get_text(): text.xy for text in axes.texts}
+    a, b = at["2*a*b - a - b = 0"]
+    assert abs(2 * a * b - a - b) < 1e-9
+    assert at["(1, 1)"] == (1, 1)
+
+
+def test_the_plane_modulo_a_prime_has_every_slow_member(found):
+    [axes] = draw_scan(found, modulo=29).axes
+    sweep = next(one for one in found.sweeps if one.prime == 29)
+    drawn = [tuple(point) for line in axes.lines for point in line.get_xydata().tolist()]
+    assert sorted(drawn) == sorted(sweep.slow)
+    a, b = {text.get_text(): text.xy for text in axes.texts}["2*a*b - a - b = 0"]
+    assert (2 * a * b - a - b) % 29 == 0
+    with pytest.raises(InputError, match="expected one modulo which all members were tried: 23, 29, 31"):
+        draw_scan(found, modulo=37)

@@ -13,7 +13,7 @@ from kahanmaps_cli.complete import complete_toml
 from kahanmaps_cli.groups import SuggestingGroup
 from kahanmaps_cli.options import json_option, output_options
 from kahanmaps_cli.outputs import OutputFile
-from kahanmaps_cli.params import OptionType
+from kahanmaps_cli.params import Shard
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import echo
@@ -37,21 +37,6 @@ def _database(required: bool = True) -> Callable[[F], F]:
         metavar="FILE",
         help="The database of results (or set KAHANMAPS_DB).",
     )
-
-
-class Shard(OptionType):
-    """I/N: the I-th of N parts."""
-
-    name = "i/n"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if not isinstance(value, str):
-            return value
-        part, slash, parts = value.partition("/")
-        numbers = [int(text) if text.isascii() and text.isdigit() and len(text) < 10 else 0 for text in (part, parts)]
-        if not slash or not 1 <= numbers[0] <= numbers[1]:
-            self.fail(f"found {value[:40]!r}, expected I/N with 1 <= I <= N, e.g. 3/16", param, ctx)
-        return tuple(numbers)
 
 
 @click.group("batch", cls=SuggestingGroup)

@@ -17,6 +17,7 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.value_rows import Cell, table
 
 if TYPE_CHECKING:
     from flint import fmpq_mat
@@ -46,6 +47,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps cycles euler_top -p a1=2 --prime 31 --prime 47
       kahanmaps cycles lotka_volterra --prime 997 --eps 1/10 --eps 1/7
       kahanmaps cycles weierstrass --prime 10007 --samples 200 --json
+      kahanmaps cycles henon_heiles -p c=-2..0 --prime 11
       kahanmaps cycles --vars x,y --rhs 'x*y' --rhs '-x^2' --prime 31
 
     All points of P^n over GF(P), or random ones where they are more than two million (from dimension 7 on, half as many
@@ -56,6 +58,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     are held against the largest number of points of a curve of genus 1 (the fibres of integrable maps of the plane;
     a longer cycle must have a length that reducible fibres allow), against the law of random reversible maps and
     against random permutations; "compatible" is no proof of anything.
+
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
+    combination of values; with --json a record a line.
 
     Exit status: 0 done, 2 wrong use, 3 samples stopped by the clock.
     """
@@ -68,15 +73,15 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     options["primes"] = (*options["primes"], *map(_prime, (text for name, text in options["parameters"] if not name)))
     if not options["primes"]:
         raise click.UsageError("missing --prime P, or -p P")
-    parameters = [pair for pair in options["parameters"] if pair[0]]
-    file = load_system(system, {**options, "parameters": parameters})
-    reversor = None
-    if options["reversor"] is not None:
-        reversor = _matrix(options["reversor"])
-    elif file.is_quadratic:
-        reversor = find_reversor(file.system)
-    runs: list[tuple[Census, Comparison]] = []
-    with Progress(quiet) as progress:
+    options["parameters"] = [pair for pair in options["parameters"] if pair[0]]
+
+    def censuses(file: SystemFile, progress: Progress) -> tuple[fmpq_mat | None, list[tuple[Census, Comparison]]]:
+        reversor = None
+        if options["reversor"] is not None:
+            reversor = _matrix(options["reversor"])
+        elif file.is_quadratic:
+            reversor = find_reversor(file.system)
+        runs = []
         for prime in dict.fromkeys(options["primes"]):
             values = [*options["eps"], *(step / 2 for step in options["time_step"])] or default_eps(prime)
             for eps in values if file.map.has_eps else [1]:
@@ -92,7 +97,23 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
                     progress=progress,
                 )
                 runs.append((census, compare(census, options["seed"])))
-    common = [law for law in runs[0][1].compatible if all(law in found.compatible for _, found in runs)]
+        return reversor, runs
+
+    def cell(file: SystemFile, progress: Progress) -> Cell:
+        reversor, runs = censuses(file, progress)
+        common = _common(runs)
+        longest = ", ".join(f"{census.longest} modulo {census.prime}" for census, _ in runs)
+        line = f"longest cycle {longest}\tcompatible with {', '.join(common) or 'none of the laws'}"
+        stopped = any(census.stopped for census, _ in runs)
+        return Cell(line, lambda: _record(file, options, reversor, runs, common), not stopped)
+
+    status = table(system, {**options, "as_json": as_json}, quiet, cell)
+    if status is not None:
+        return status
+    file = load_system(system, options)
+    with Progress(quiet) as progress:
+        reversor, runs = censuses(file, progress)
+    common = _common(runs)
     if as_json:
         print_json(_record(file, options, reversor, runs, common))
     else:
@@ -101,6 +122,11 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if stopped and not quiet:
         say("stopped by the clock: give more --seconds, fewer --samples or a smaller prime")
     return 3 if stopped else 0
+
+
+def _common(runs: list[tuple[Census, Comparison]]) -> list[str]:
+    """The laws that all runs are compatible with."""
+    return [law for law in runs[0][1].compatible if all(law in found.compatible for _, found in runs)]
 
 
 def _prime(text: str) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -19,7 +18,7 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import tell
-from kahanmaps_cli.value_rows import Row, rows_of
+from kahanmaps_cli.value_rows import Cell, table
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
@@ -71,9 +70,16 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     vary; 2 wrong use; 3 undecided, or stopped early.
     """
     eps = the_eps(options["eps"], options["time_step"], required=False)
-    rows = rows_of(options["parameters"], system)
-    if rows is not None:
-        return _table(system, eps, rows, options, as_json, quiet)
+
+    def cell(file: SystemFile, progress: Progress) -> Cell:
+        found = _measured(file, eps, options, progress)
+        more = ", ..." if len(found.degrees) > _SHOWN else ""
+        line = f"{', '.join(map(str, found.degrees[:_SHOWN]))}{more}\t{found.kind_text}"
+        return Cell(line, lambda: _record(file, options, found), _is_done(found, options["terms"]))
+
+    status = table(system, {**options, "as_json": as_json}, quiet, cell)
+    if status is not None:
+        return status
     file = load_system(system, options)
     with Progress(quiet) as progress:
         found = _measured(file, eps, options, progress)
@@ -107,27 +113,6 @@ def _measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Pro
         steps=options["steps"],
         progress=progress,
     )
-
-
-def _table(
-    system: str | None, eps: Any, rows: Sequence[Row], options: dict[str, Any], as_json: bool, quiet: bool
-) -> int:
-    """A line for each combination of values: these, the degrees and their growth; in JSON a record each."""
-    files = [load_system(system, {**options, "parameters": row}) for row in rows]
-    done = 0
-    for row, file in zip(rows, files, strict=True):
-        at = ", ".join(f"{name} = {value}" for name, value in row)
-        with Progress(quiet) as progress:
-            found = _measured(file, eps, options, progress)
-        if as_json:
-            print_json(_record(file, options, found))
-        else:
-            more = ", ..." if len(found.degrees) > _SHOWN else ""
-            tell(f"{at}\t{', '.join(map(str, found.degrees[:_SHOWN]))}{more}\t{found.kind_text}")
-        done += _is_done(found, options["terms"])
-    if done < len(rows) and not quiet:
-        say(f"undecided, or stopped early: {len(rows) - done} of {len(rows)}")
-    return 0 if done == len(rows) else 3
 
 
 def _is_done(found: DegreeGrowth, terms: int | None) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,6 +20,10 @@ from kahanmaps_cli.search import (
     symbols_and_eps,
 )
 from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.value_rows import Cell, table
+
+if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
 
 
 @click.command("find-integrals")
@@ -49,12 +53,16 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals lagrange_top --monomials 'm1^2+m2^2,p3^2,p3,1'
       kahanmaps find-integrals volterra_periodic_4 --darboux 2
       kahanmaps find-integrals henon_heiles --flow
+      kahanmaps find-integrals henon_heiles -p c=-2..0
       kahanmaps find-integrals lorenz --parameter b=20 --flow --darboux 3
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
     Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals there are is known
     from theorems, and from orbits, measured modulo primes; every formula is verified as an identity. --flow adds
     which integrals of the differential equation those of the map tend to as eps -> 0, and which are lost.
+
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
+    combination of values; with --json a record a line.
 
     Exit status: 0 every integral that theorems give or orbits show has a formula, 2 wrong use, 3 some have none,
     orbits were not measured, or the time was too short.
@@ -63,6 +71,21 @@ def command(system: str | None, **options: Any) -> int:
     from kahanmaps.laboratory.preserve.limits import flow_and_map
 
     require_one_form(options)
+
+    def cell(file: SystemFile, progress: Progress) -> Cell:
+        if any(options[name] for name in ("sets", "darboux", "flow", "as_toml", "as_latex")):
+            raise click.UsageError("a range of values goes without --monomials, --darboux, --flow, --toml and --latex")
+        symbols, eps = symbols_and_eps(options)
+        limits = {name: options[name] for name in ("max_degree", "seconds", "seed")}
+        found = find_integrals(file, symbols=symbols, eps=eps, progress=progress, **limits)
+        formulas = "; ".join(f"{one.text} ({one.verdict})" for one in found.integrals)
+        line = f"{_count(found).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
+        document = {"document": dict(file.document)}
+        return Cell(line, lambda: {**heading("find-integrals", found), **found.to_json(), **document}, not found.reason)
+
+    ending = table(system, options, options["quiet"], cell)
+    if ending is not None:
+        return ending
     with Progress(options["quiet"]) as progress:
         file = load_system(system, options)
         symbols, eps = symbols_and_eps(options)

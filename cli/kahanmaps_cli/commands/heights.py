@@ -20,6 +20,7 @@ from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.value_rows import Cell, table
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
@@ -60,11 +61,15 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps heights weierstrass
       kahanmaps heights henon_heiles --eps 1/10 --random 5
       kahanmaps heights euler_top --start 1,2,3 --start 1/2,1,-1 --steps 100
+      kahanmaps heights henon_heiles -p c=-2..0:1/2
       kahanmaps heights --vars x,y --rhs 'x*(1-y)' --rhs 'y*(x-1)' --json
 
     The height is the bit length of the largest integer that a point needs. Quadratic growth goes with integrable
     maps, exponential growth with others; bounded and linear growth are seen on special curves, too. Without --eps the
     values 1/10 and 3/11 are taken and compared: one eps may be special. This is evidence, and no proof.
+
+    A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
+    combination of values; with --json a record a line.
 
     Exit status: 0 all orbits that were decided agree, 2 wrong use, 3 undecided, or the orbits disagree, or the time was
     over.
@@ -78,9 +83,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     if options["max_digits"] < 1:
         raise InputError(f"found --max-digits {options['max_digits']}, expected at least 1")
     eps = the_eps(options["eps"], options["time_step"], required=False)
-    file = load_system(system, options)
-    with Progress(quiet) as progress:
-        found = height_survey(
+
+    def survey(file: SystemFile, progress: Progress) -> HeightSurvey:
+        return height_survey(
             file.map,
             eps,
             starts=options["given"] or (DEFAULT_STARTS if options["count"] is None else options["count"]),
@@ -91,13 +96,27 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
             seed=options["seed"],
             progress=progress,
         )
+
+    def is_done(found: HeightSurvey) -> bool:
+        return found.is_whole and found.kind is not Growth.UNDECIDED
+
+    def cell(file: SystemFile, progress: Progress) -> Cell:
+        found = survey(file, progress)
+        return Cell(found.text, lambda: _record(file, options, found), is_done(found))
+
+    status = table(system, {**options, "as_json": as_json}, quiet, cell)
+    if status is not None:
+        return status
+    file = load_system(system, options)
+    with Progress(quiet) as progress:
+        found = survey(file, progress)
     if as_json:
         print_json(_record(file, options, found))
     else:
         _print(file, found)
     if not found.is_whole and not quiet:
         say("stopped early: the time was over before all orbits were finished")
-    return 0 if found.is_whole and found.kind is not Growth.UNDECIDED else 3
+    return 0 if is_done(found) else 3
 
 
 def _print(file: SystemFile, found: HeightSurvey) -> None:

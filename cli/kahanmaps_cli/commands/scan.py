@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,10 +10,10 @@ import click
 
 from kahanmaps_cli.options import output_options
 from kahanmaps_cli.outputs import OutputFolder, file_name, will_write
-from kahanmaps_cli.params import Seconds
+from kahanmaps_cli.params import Seconds, Shard
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import print_json
-from kahanmaps_cli.scan_run import scan_options, scanned
+from kahanmaps_cli.scan_run import ending, scan_options, scanned
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
@@ -24,8 +25,17 @@ if TYPE_CHECKING:
 @click.option(
     "--analyze", "analysis", type=Seconds(), metavar="T", help="Analyze a member of each slow class, T seconds each."
 )
+@click.option(
+    "--keep",
+    type=click.Path(dir_okay=False),
+    metavar="FILE",
+    help="Keep there what is measured modulo each prime, and go on from what is there.",
+)
+@click.option("--shard", type=Shard(), metavar="I/N", help="Only the I-th of N parts, into the file of --keep.")
 @click.option("--toml", "as_toml", is_flag=True, help="A member of each component as a system file, one after another.")
-@click.option("--write-to", "folder", type=OutputFolder(), metavar="DIR", help="Write these to files in DIR.")
+@click.option(
+    "--write-to", "folder", type=OutputFolder(), metavar="DIR", help="Write these to DIR, in the place of earlier ones."
+)
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Which members of a family are integrable: where in parameter space degrees grow more slowly.
@@ -35,18 +45,34 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
       kahanmaps scan zhukovski_volterra_2 --over b1,b2
       kahanmaps scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b
       kahanmaps scan zhukovski_volterra_2 --over a1,a2 --analyze 5 --write-to out
+      kahanmaps scan zhukovski_volterra_2 --over b1 --by density
+      kahanmaps scan lorenz --over s,b,r --keep lorenz.jsonl --seconds 600
 
     The degrees of the first iterates of all members with parameters in GF(p), for several small primes p. Members with
     smaller degrees than the others form points, lines, curves and surfaces; what is there modulo all primes is written
     as a condition over Q. It is confirmed at random members by the computation of `degrees`, and a rational member
     tells the kind of growth. Found modulo primes and confirmed is evidence, and no proof.
 
+    --by integrals counts polynomials that vanish along an orbit instead, degree by degree, and --by density those phi
+    for which the measure dx/phi is invariant.
+
+    With two or three parameters members on random lines of parameter space are tried besides, modulo primes at which
+    quadratic fields split: so a^2 - 2 = 0 is found as one curve. The time is for everything together; what there was
+    no time for is told.
+
     Without --eps: conditions that hold for every eps; with eps among the parameters also those that contain it. With
     more than three parameters members on random lines of parameter space are tried, which finds hypersurfaces only.
     What can have been missed is told.
 
-    Exit status: 0 done, whatever was found; 2 wrong use; 3 the time was over.
+    --keep FILE writes what is measured modulo each prime as soon as it is known: a scan that was stopped or killed goes
+    on from there, when the same command is given again. Parts (--shard) that several machines have kept are put
+    together by `cat part1 part2 > all`; the scan with `--keep all` does the rest.
+
+    Exit status: 0 done, whatever was found; 2 wrong use; 3 the time was over: what was left out is told; 130
+    interrupted, with what was found up to then.
     """
+    if options["shard"] is not None and options["keep"] is None:
+        raise click.UsageError("--shard goes with --keep FILE, where its part is kept")
     if as_json and options["as_toml"]:
         raise click.UsageError("give --toml or --json, not both")
     found = scanned(system, quiet, options)
@@ -64,22 +90,22 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         at = "" if "eps" in found.over else eps_words(eps_record(found.eps, found.file.map))
         tell(f"# scan: {found.file.name} over {', '.join(found.over)}{at}")
         tell(found.text)
-    if found.ended == "complete":
-        return 0
-    if not quiet:
-        say(f"stopped early: the time was over after the members modulo {len(found.sweeps)} of the primes")
-    return 3
+    return ending(found, quiet)
 
 
 def _write(found: Scan, folder: str, quiet: bool) -> None:
-    """A system file for every component that has a rational member."""
+    """A system file for every component that has a rational member, in the place of those of an earlier scan."""
     from kahanmaps.whole_files import write_whole
 
     known = [one for one in found.components if one.values is not None]
-    paths = [Path(folder) / f"{file_name(found.file.name)}-{k}.toml" for k in range(1, len(known) + 1)]
-    for path in paths:
-        will_write(str(path))
+    name = file_name(found.file.name)
+    paths = [Path(folder) / f"{name}-{k}.toml" for k in range(1, len(known) + 1)]
     Path(folder).mkdir(parents=True, exist_ok=True)
+    earlier = {path for path in Path(folder).iterdir() if re.fullmatch(rf"{re.escape(name)}-\d+\.toml", path.name)}
+    for path in earlier.union(paths):
+        will_write(str(path))
+    for path in earlier.difference(paths):
+        path.unlink()
     for path, one in zip(paths, known, strict=True):
         write_whole(str(path), found.member(one).to_toml().encode())
     if not quiet:

@@ -8,13 +8,13 @@ import click
 
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
-from kahanmaps_cli.progress import say
-from kahanmaps_cli.scan_run import scan_options, scanned
+from kahanmaps_cli.scan_run import ending, scan_options, scanned
 
 
 @click.command("scan", cls=PictureCommand)
 @scan_options
 @click.option("--window", type=PointText(), metavar="A0,A1,B0,B1", help="The part that is shown.")
+@click.option("--modulo", type=int, metavar="P", help="The slow members modulo P, one of the primes, instead.")
 @picture_options
 def command(system: str | None, **options: Any) -> int:
     """The plane of two parameters: where degrees grow more slowly.
@@ -23,11 +23,14 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps plot scan zhukovski_volterra_2 --over b1,b2
       kahanmaps plot scan --rhs "x' = x*(a*x+y); y' = y*(x+b*y)" --over a,b \\
         --window=-2,2,-2,2 -o plane.pdf
+      kahanmaps plot scan zhukovski_volterra_2 --over b1,b2 --modulo 53
 
-    A colour for each kind of growth; marks are points, lines are curves.
+    A colour for each kind of growth; marks are points, lines are curves, and
+    the conditions of the first ones are written beside them. With --modulo P
+    the plane over GF(P): all slow members that were seen.
 
-    Exit status: 0 done, 2 wrong use, 3 the time was over (the picture is
-    written).
+    Exit status: 0 done, 2 wrong use, 3 the time was over, 130 interrupted
+    (the picture is written).
     """
     from kahanmaps.maps.floats.fast import to_floats
     from kahanmaps.plots.scan import draw_scan
@@ -35,8 +38,8 @@ def command(system: str | None, **options: Any) -> int:
 
     require_output(options)
     window = None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), 2)
+    if window is not None and options["modulo"] is not None:
+        raise click.UsageError("give --window or --modulo, not both: modulo a prime the whole plane is shown")
     found = scanned(system, options["quiet"], options)
-    deliver(draw_scan(found, style_from(options), window=window), options, found.file)
-    if found.ended != "complete" and not options["quiet"]:
-        say("stopped early: the time was over")
-    return 0 if found.ended == "complete" else 3
+    deliver(draw_scan(found, style_from(options), window=window, modulo=options["modulo"]), options, found.file)
+    return ending(found, options["quiet"])

@@ -16,7 +16,7 @@ from kahanmaps.laboratory.growth.degrees import DegreeGrowth, degree_growth
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.scan.members import degrees_on
 from kahanmaps.laboratory.scan.result import STEPS, Component
-from kahanmaps.laboratory.scan.sweep import Degrees
+from kahanmaps.laboratory.scan.sweep import Degrees, TimeOver
 from kahanmaps.maps.implicit import BirationalMap
 
 Progress = Callable[[str], None]
@@ -34,30 +34,43 @@ def with_growth(
     map_: BirationalMap,
     eps: fmpq | None,
     deadline: float,
+    check: Callable[[], None],
     seed: int,
     progress: Progress,
-) -> list[Component]:
-    """The components with the growth at a rational member, as long as there is time; those with the slowest first.
+    by: str,
+) -> tuple[list[Component], int]:
+    """The components with the growth at a rational member, those with the slowest first; for how many it is missing.
 
     Where it is bounded or exponential one member of each class is enough, if further degrees of the others are its own.
     """
-    found: list[Component] = []
+    found = sorted(components, key=lambda one: one.degrees[::-1])
     enough: dict[Degrees, DegreeGrowth] = {}
-    for k, one in enumerate(sorted(components, key=lambda one: one.degrees[::-1])):
-        progress(f"scan: growth on component {k + 1} of {len(components)}")
-        left = deadline - time.monotonic()
-        if left > 0 and one.degrees[-1] >= 0 and not _goes_on(one, enough.get(one.degrees), map_, eps, seed):
-            known = _beyond(one, map_, eps, seed) if one.values is None else _growth(one.values, file, eps, left, seed)
-            one = replace(one, growth=known)
-            if known is not None and known.growth not in _MEASURED_EACH:
-                enough[one.degrees] = known
-        found.append(one)
+    missed = 0
+    for k, one in enumerate(found):
+        if one.degrees[-1] < 0:
+            continue
+        try:
+            progress(f"scan: growth on component {k + 1} of {len(components)}")
+            check()
+            if by == "degrees" and _goes_on(one, enough.get(one.degrees), map_, eps, seed):
+                continue
+            left = max(0.1, deadline - time.monotonic())
+            known = None if one.values is None else _growth(one.values, file, eps, left, seed)
+            # there may be a special member only
+            if known is None or (by == "degrees" and not _agree(known.degrees, (1, *one.degrees))):
+                known = _beyond(one, map_, eps, seed)
+        except TimeOver:
+            missed += 1
+            continue
+        found[k] = replace(one, growth=known)
+        if known is not None and known.growth not in _MEASURED_EACH:
+            enough[one.degrees] = known
     kinds = {one.degrees: one.growth.growth for one in reversed(found) if one.growth is not None}
 
-    def order(one: Component) -> tuple[int, Degrees]:
-        return _ORDER.index(kinds.get(one.degrees, GrowthClass.UNKNOWN)), one.degrees[::-1]
+    def order(one: Component) -> tuple[int, Degrees, str]:
+        return _ORDER.index(kinds.get(one.degrees, GrowthClass.UNKNOWN)), one.degrees[::-1], one.text
 
-    return sorted(found, key=order)
+    return sorted(found, key=order), missed
 
 
 def _growth(values: dict[str, fmpq], file: SystemFile, eps: fmpq | None, left: float, seed: int) -> DegreeGrowth:
@@ -88,7 +101,11 @@ def _goes_on(one: Component, known: DegreeGrowth | None, map_: BirationalMap, ep
     if known is None:
         return False
     found = _beyond(one, map_, eps, seed, max(_SOME, 2 * one.degrees[-1]))
-    return found is not None and all(a == b for a, b in zip(found.degrees, known.degrees, strict=False))
+    return found is not None and _agree(found.degrees, known.degrees)
+
+
+def _agree(some: Degrees, others: Degrees) -> bool:
+    return all(a == b for a, b in zip(some, others, strict=False))
 
 
 def _member(file: SystemFile, values: dict[str, fmpq], eps: fmpq | None) -> tuple[SystemFile, fmpq | None]:
@@ -97,19 +114,34 @@ def _member(file: SystemFile, values: dict[str, fmpq], eps: fmpq | None) -> tupl
 
 
 def with_verdicts(
-    components: list[Component], file: SystemFile, eps: fmpq | None, seconds: float, seed: int, progress: Progress
-) -> list[Component]:
-    """The components with what an analysis says of a member, where degrees do not grow exponentially."""
+    components: list[Component],
+    file: SystemFile,
+    eps: fmpq | None,
+    seconds: float,
+    deadline: float,
+    check: Callable[[], None],
+    seed: int,
+    progress: Progress,
+) -> tuple[list[Component], int]:
+    """The components with what an analysis says of a member, where degrees do not grow exponentially; how many lack it.
+
+    Each has so many seconds, as long as there is time.
+    """
     found: list[Component] = []
     points: set[Degrees] = set()
+    missed = 0
     for one in components:
         asked = one.values is not None and one.growth is not None and one.growth.growth is not GrowthClass.EXPONENTIAL
         if asked and one.values is not None and one.degrees not in points:
-            progress(f"scan: analyzes a member where {one.text}")
             member, step = _member(file, one.values, eps)
-            verdict = analyze(member, eps=step, seconds=seconds, seed=seed).conclusion
-            one = replace(one, verdict=verdict)
+            try:
+                progress(f"scan: analyzes a member where {one.text}")
+                check()
+                left = max(0.1, deadline - time.monotonic())
+                one = replace(one, verdict=analyze(member, eps=step, seconds=min(seconds, left), seed=seed).conclusion)
+            except TimeOver:
+                missed += 1
             if one.dimension == 0:
                 points.add(one.degrees)
         found.append(one)
-    return found
+    return found, missed

@@ -128,42 +128,73 @@ def residues(rows: Sequence[Sequence[fmpq]], p: int) -> Rows | None:
 def lifted_forms(
     found: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
 ) -> list[tuple[fmpq_mpoly, tuple[int, ...]]]:
-    """The irreducible hypersurfaces over Q behind those of degree 2 and more modulo the primes, and these primes.
+    """The irreducible hypersurfaces over Q behind those modulo the primes, and these primes.
 
-    Their product is lifted from all primes but one, where it has to agree, and factored.
+    Tried are each of them, then the products of two, which may be conjugate over a quadratic field, and the product of
+    all that are left, which is lifted from all primes but one, where it has to agree.
 
-    >>> circle = {p: [[p - 1, 0, 0, 1, 0, 1]] for p in (31, 37, 41)}
+    >>> circle = {p: [[1, 0, 0, p - 1, 0, p - 1]] for p in (31, 37, 41)}
     >>> lifted_forms(circle, ["a", "b"])
     [(a^2 + b^2 - 1, (31, 37, 41))]
+    >>> lines = {p: [[0, 1, r], [0, 1, p - r]] for p, r in ((7, 3), (17, 6), (23, 5))}
+    >>> lifted_forms(lines, ["a", "b"])
+    [(a^2 - 2*b^2, (7, 17, 23))]
     """
+    known: list[tuple[fmpq_mpoly, tuple[int, ...]]] = []
+    rest = {p: [tuple(form) for form in forms] for p, forms in found.items()}
+    for together in (1, 2):
+        parts: dict[int, dict[int, dict[Rows, tuple[tuple[int, ...], ...]]]] = {}
+        for p, forms in rest.items():
+            some = list(combinations(forms, together)) if len(forms) <= _MOST_CONJUGATES or together == 1 else []
+            for group in some:
+                row = tuple(_product(group, p, len(names)))
+                parts.setdefault(len(row), {}).setdefault(p, {})[(row,)] = group
+        used: dict[int, set[tuple[int, ...]]] = {p: set() for p in rest}
+        for by_prime in parts.values():
+            for rows, at in lifted_flats({p: list(some) for p, some in by_prime.items()}, lambda *_: False).items():
+                known += [(factor, at) for factor in _factors(rows[0], names)]
+                for p in at:
+                    used[p].update(by_prime[p][residues(rows, p) or ()])
+        rest = {p: [form for form in forms if form not in used[p]] for p, forms in rest.items()}
+    factors, at = _lifted_product(rest, names)
+    return known + [(factor, at) for factor in factors]
+
+
+def _lifted_product(
+    found: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
+) -> tuple[list[fmpq_mpoly], tuple[int, ...]]:
+    """The factors of what the products of all polynomials are lifted to, and the primes."""
     products = {p: _product(forms, p, len(names)) for p, forms in found.items() if forms}
-    sizes = Counter(len(form) for form in products.values())
-    if not sizes:
-        return []
-    size = sizes.most_common(1)[0][0]
-    products = {p: form for p, form in products.items() if len(form) == size}
-    lead = [max((k for k, c in enumerate(form) if c), default=0) for form in products.values()]
-    if len(products) < _AT_LEAST or len(set(lead)) > 1:
-        return []
-    scaled = {p: [c * pow(form[lead[0]], -1, p) % p for c in form] for p, form in products.items()}
+    if not products:
+        return [], ()
+    size = Counter(map(len, products.values())).most_common(1)[0][0]
+    scaled = {p: form for p, form in products.items() if len(form) == size}
+    if len(scaled) < _AT_LEAST or len({next(k for k, c in enumerate(form) if c) for form in scaled.values()}) > 1:
+        return [], ()
     *first, last = sorted(scaled)
     together, modulus = scaled[first[0]], first[0]
     for p in first[1:]:
         together, modulus = chinese(together, modulus, scaled[p], p), modulus * p
     values = rational_vector(together, modulus)
     if values is None or residues([values], last) != (tuple(scaled[last]),):
-        return []
-    degree = next(d for d in range(100) if len(exponents_up_to(len(names), d)) == size)
+        return [], ()
+    return _factors(values, names), tuple(sorted(scaled))
+
+
+def _factors(values: Sequence[fmpq], names: Sequence[str]) -> list[fmpq_mpoly]:
+    """The irreducible factors over Q, primitive, of a polynomial by its coefficients."""
+    degree = next(d for d in range(100) if len(exponents_up_to(len(names), d)) == len(values))
     terms = {e: c for e, c in zip(exponents_up_to(len(names), degree), values, strict=True) if c != 0}
-    factors = ring(names).from_dict(terms).factor()[1]
-    return [(primitive_part(factor)[1], tuple(sorted(scaled))) for factor, _ in factors]
+    return [primitive_part(factor)[1] for factor, _ in ring(names).from_dict(terms).factor()[1]]
 
 
 def _product(forms: Sequence[Sequence[int]], p: int, count: int) -> list[int]:
-    """The coefficients of the product of polynomials, up to its degree."""
+    """The coefficients of the product of polynomials, up to its degree, the first that is not 0 being 1."""
 
     def degree_of(form: Sequence[int]) -> int:
         return next(d for d in range(100) if len(exponents_up_to(count, d)) == len(form))
 
     top = sum(map(degree_of, forms))
-    return reduce(lambda a, b: product_of(a, b, count, top, p) or [], forms, [1])
+    row = reduce(lambda a, b: product_of(a, b, count, top, p) or [], forms, [1])
+    scale = pow(next(c for c in row if c), -1, p)
+    return [c * scale % p for c in row]

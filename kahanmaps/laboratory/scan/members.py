@@ -13,10 +13,12 @@ from kahanmaps.algebra.chance import random_prime_field
 from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.growth.curves import Line, Stopped
+from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, exponents_up_to, rank
 from kahanmaps.maps.implicit import BirationalMap
 
 _TRIES = 200
 _PRIMES = 40
+_SPARE = 4  # points more than monomials
 _HEIGHTS = (12, 120)  # of values at random, for roots of higher degree and others
 
 
@@ -80,19 +82,11 @@ def degrees_on(
     Of `count` parameters eps is the last one where that are more than symbols. On one line; -1 where the iterate exists
     nowhere. `expected` says how many, and about how large; they end before one above `most`.
     """
-    for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
-        field = random_prime_field(rng)
-        try:
-            values = point_on(equations, count, field, rng)
-            if values is None:
-                continue
-            *parameters, step = values if count > len(map_.symbols) else (*values, eps)
-            over = map_.at(field.random(rng) if step is None else field.convert(step), field, parameters)
-            break
-        except BadPrime:
-            continue
-    else:
+    member = _random_member(map_, equations, count, eps, rng)
+    if member is None:
         return None
+    field, step, parameters = member
+    over = map_.at(step, field, parameters)
     line = Line(over, rng, math.inf, most)
     found: list[int] = []
     try:
@@ -104,3 +98,53 @@ def degrees_on(
     except ZeroDivisionError:
         found += [-1] * (len(expected) - len(found))
     return tuple(found)
+
+
+def ranks_on(
+    map_: BirationalMap,
+    equations: Sequence[fmpq_mpoly],
+    count: int,
+    eps: fmpq | None,
+    top: int,
+    rng: random.Random,
+    by: str,
+) -> tuple[int, ...] | None:
+    """What `kahanmaps.maps.residues.relations.ranks` counts, up to a degree, on a random member as for `degrees_on`."""
+    found = _random_member(map_, equations, count, eps, rng)
+    if found is None:
+        return None
+    field, step, parameters = found
+    p = field.characteristic
+    over = ModularMap(map_, p, int(step), [int(x) for x in parameters], rng.getrandbits(60))
+    sizes = [len(exponents_up_to(map_.dim, degree)) for degree in range(1, top + 1)]
+    try:
+        if by == "integrals":
+            rows, _, _ = over.along_orbit(top, sizes[-1] + _SPARE)
+        else:
+            rows = []
+            for x, image in over.pairs(sizes[-1] + _SPARE):
+                above, below = over.determinant(x, image)
+                here, there = over.moved(x, image, top)
+                rows.append([(below * b - above * a) % p for a, b in zip(here, there, strict=True)])
+    except NoPoint:
+        return None
+    return tuple(rank([row[:size] for row in rows], p) for size in sizes)
+
+
+def _random_member(
+    map_: BirationalMap, equations: Sequence[fmpq_mpoly], count: int, eps: fmpq | None, rng: random.Random
+) -> tuple[Any, Any, list[Any]] | None:
+    """A field GF(p), eps and the symbols of a random member on a component."""
+    for _ in range(_PRIMES):  # a point over a number field has residues modulo some of them only
+        field = random_prime_field(rng)
+        try:
+            values = point_on(equations, count, field, rng)
+            if values is None:
+                continue
+            *parameters, step = values if count > len(map_.symbols) else (*values, eps)
+            step = field.random(rng) if step is None else field.convert(step)
+            map_.at(step, field, parameters)
+        except BadPrime:
+            continue
+        return field, step, parameters
+    return None

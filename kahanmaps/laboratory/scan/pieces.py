@@ -8,18 +8,24 @@ variety of their dimension has, p^d.
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from kahanmaps.laboratory.modular_points import Point, echelon, exponents_up_to, monomial_values, null_space
+from flint import Ordering, nmod_mpoly_ctx
+
+from kahanmaps.laboratory.modular_points import Point, echelon, exponents_up_to, monomial_tables, null_space
 
 Rows = tuple[tuple[int, ...], ...]
 
-MAX_DEGREE = 6
+Form = tuple[int, ...]
+
+MAX_DEGREE = 6  # of hypersurfaces with the same degrees, all together
 _SHARE = 0.5  # of the points of a piece that must be there: special ones are missing
-_SPARE = 1.5  # points for each coefficient of a hypersurface
+_SPARE = 1.2  # points for each coefficient of a hypersurface
 _TRIES, _MANY = 80, 3000  # samples; of more than 3 parameters, where all points of one have to be on one piece
+_FEW = 12  # of those for hypersurfaces of degree 3 and more, of which one with points on two is the more useless
+_MOST_DEGREE = 12  # of a product
 _MOST_POINTS = 400  # that are taken for single ones
 
 
@@ -28,19 +34,28 @@ class Pieces:
     """The pieces of a set of points modulo `prime`.
 
     `flats` has affine subspaces by dimension: reduced rows (c_1, ..., c_k, c_0) of equations c_1 a_1 + ... + c_0 = 0.
-    `forms` has hypersurfaces of degree 2 and more by the affine subspace they are in (no rows: the whole space). Each
+    `forms` has irreducible hypersurfaces by the affine subspace they are in (no rows: the whole space). Each
     is the coefficients of the monomials of `exponents_up_to`, in their order, in the variables that are free there.
     `left` points are in none of them.
     """
 
     prime: int
     flats: dict[int, list[Rows]] = field(default_factory=dict)
-    forms: dict[Rows, list[tuple[int, ...]]] = field(default_factory=dict)
+    forms: dict[Rows, list[Form]] = field(default_factory=dict)
     left: int = 0
 
 
-def pieces(points: Sequence[Point], prime: int, seen: int, complete: bool, rng: random.Random) -> Pieces:
+def pieces(
+    points: Sequence[Point],
+    prime: int,
+    seen: int,
+    complete: bool,
+    rng: random.Random,
+    check: Callable[[], None] = lambda: None,
+) -> Pieces:
     """The pieces of a set of points, of `seen` that were tried; single points where all of GF(p)^k was tried.
+
+    `check` is called now and then, and may raise.
 
     >>> line = [(a, (2 * a + 3) % 31) for a in range(31)]
     >>> found = pieces([*line, (5, 5)], 31, 31**2, True, random.Random(0))
@@ -56,6 +71,7 @@ def pieces(points: Sequence[Point], prime: int, seen: int, complete: bool, rng: 
     def flats(dimension: int, needed: float) -> Iterator[tuple[Rows, Any]]:
         """Affine subspaces with so many of the points, and which of these are in them."""
         for _ in range(_TRIES if count <= 3 else _MANY):
+            check()
             if len(rest) < needed:
                 return
             sample = [[*rest[i].tolist(), 1] for i in rng.sample(range(len(rest)), dimension + 1)]
@@ -66,21 +82,28 @@ def pieces(points: Sequence[Point], prime: int, seen: int, complete: bool, rng: 
                 if inside.sum() >= needed:
                     yield tuple(map(tuple, rows)), inside
 
-    def forms(here: Any, needed: float) -> Iterator[tuple[tuple[int, ...], Any]]:
-        """Hypersurfaces of degree 2 and more with so many of the points `here`, and which of these are in them."""
-        for degree in range(2, MAX_DEGREE + 1):
+    def forms(here: Any, needed: float) -> Iterator[tuple[Form, Any]]:
+        """Irreducible hypersurfaces with so many of the points `here`, and which of these are in them.
+
+        What a few more points than coefficients are on is the product of all, what fewer are on perhaps one of them.
+        """
+        for degree in range(2, _MOST_DEGREE + 1):
             size = len(exponents_up_to(here.shape[1], degree))
-            enough = max(needed, _SPARE * size)
-            for attempt in range(_TRIES):
-                if len(here) < enough:
+            enough = int(_SPARE * size) + 2
+            table = _monomials(here, degree, prime)
+            for attempt in range(_TRIES if degree == 2 else _FEW if degree <= MAX_DEGREE else 1):
+                check()
+                if len(here) < max(enough, needed):
                     break
-                table = np.array([monomial_values(tuple(x), degree, prime) for x in here.tolist()])
-                chosen = range(len(here)) if attempt == 0 else rng.sample(range(len(here)), size - 1)
-                basis = null_space([table[i].tolist() for i in chosen], size, prime)
-                inside = table @ np.array(basis[0]) % prime == 0 if len(basis) == 1 else np.zeros(len(here), dtype=bool)
-                if inside.sum() >= enough:
-                    yield tuple(basis[0]), inside
-                    here = here[~inside]
+                chosen = rng.sample(range(len(here)), size - 1 if attempt else enough)
+                basis = null_space(table[chosen].tolist(), size, prime)
+                if len(basis) > 1 or not basis or (table @ basis[0] % prime == 0).sum() < max(enough, needed):
+                    continue
+                for factor, power in _factors(basis[0], degree, here.shape[1], prime):
+                    inside = _monomials(here, power, prime) @ factor % prime == 0
+                    if inside.sum() >= needed:
+                        yield factor, inside
+                        here, table = here[~inside], table[~inside]
 
     for dimension in range(count - 1, 0, -1):
         # Of the dimension that is looked for: affine ones, then others in affine ones of one dimension more.
@@ -108,6 +131,42 @@ def pieces(points: Sequence[Point], prime: int, seen: int, complete: bool, rng: 
         found.flats.setdefault(0, []).extend(single)
         rest = rest[:0]
     found.left = len(rest)
+    return found
+
+
+def degree_reached(points: float, count: int) -> int:
+    """Up to which degree, at most `MAX_DEGREE`, so many points are enough for a hypersurface.
+
+    >>> degree_reached(53, 2), degree_reached(11, 2)
+    (6, 2)
+    """
+    sizes = (len(exponents_up_to(count, degree)) for degree in range(1, MAX_DEGREE + 1))
+    return sum(_SPARE * size + 2 <= points for size in sizes)
+
+
+def _monomials(points: Any, degree: int, prime: int) -> Any:
+    """The values of all monomials up to a degree at points, one a row."""
+    import numpy as np
+
+    slopes = monomial_tables(points.shape[1], degree)
+    table = np.ones((len(points), len(slopes)), dtype=np.int64)
+    for k, some in enumerate(slopes[1:], 1):
+        variable, _, place = some[-1]
+        table[:, k] = table[:, place] * points[:, variable] % prime
+    return table
+
+
+def _factors(form: Sequence[int], degree: int, count: int, prime: int) -> list[tuple[Form, int]]:
+    """The irreducible factors of a polynomial and their degrees; of coefficients the first is 1 that is not 0."""
+    context = nmod_mpoly_ctx.get([f"a{k}" for k in range(count)], modulus=prime, ordering=Ordering.degrevlex)
+    terms = {e: c for e, c in zip(exponents_up_to(count, degree), form, strict=True) if c}
+    found = []
+    for factor, _ in context.from_dict(terms).factor()[1]:
+        values = {tuple(map(int, e)): int(c) for e, c in factor.to_dict().items()}
+        power = max(map(sum, values))
+        row = [values.get(e, 0) for e in exponents_up_to(count, power)]
+        scale = pow(next(c for c in row if c), -1, prime)
+        found.append((tuple(c * scale % prime for c in row), power))
     return found
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import comb
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly
@@ -19,8 +20,15 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.conclusion import Conclusion
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.scan.lift import height_bound
+from kahanmaps.laboratory.scan.pieces import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
 
+# By what is scanned: a word for the numbers, and where members are found.
+WORDS = {
+    "degrees": ("degrees", "where one of the first {} degrees is smaller"),
+    "integrals": ("relations", "where more polynomials of degree up to {} vanish along an orbit"),
+    "density": ("densities", "where dx/phi is invariant for more polynomials phi of degree up to {}"),
+}
 STEPS = 40  # for which singularities are followed where the growth at a member is asked
 
 
@@ -94,8 +102,10 @@ class Scan(Displayed):
 
     `generic` are the degrees d_1, ..., d_N of the other members, `sweeps` what was seen modulo each prime. `left` is
     the number of slow members on no component modulo each of them: points over number fields, of a height above
-    `height`, or there by chance. `symmetric` are pairs of parameters whose exchange permutes the slow members.
-    `ended` is "complete" or "time".
+    `height`, or there by chance. `symmetric` are changes of parameters that permute the slow members, by their
+    images. `by` says what is meant by degrees: those of iterates, or how many polynomials of degree 1, 2, ... there
+    are that vanish along an orbit ("integrals"), or phi with an invariant measure dx/phi ("density").
+    `ended` is "complete", "time", "interrupted" or, for a shard, "part"; `omitted` says what was left out.
     """
 
     file: SystemFile
@@ -106,53 +116,78 @@ class Scan(Displayed):
     components: tuple[Component, ...]
     sweeps: tuple[Sweep, ...]
     left: tuple[int, ...]
-    symmetric: tuple[tuple[str, str], ...]
+    symmetric: tuple[tuple[str, ...], ...]
     ended: str
+    omitted: tuple[str, ...] = ()
+    by: str = "degrees"
 
     @property
     def height(self) -> int:
-        """Numerators and denominators of single points up to which they are found; 0 where too little was tried."""
-        return height_bound([one.prime for one in self.sweeps]) if len(self.sweeps) > 2 else 0
+        """Numerators and denominators up to which conditions are found; 0 where too little was tried."""
+        bounds = [height_bound([one.prime for one in some]) for some in self._kinds if len(some) > 2]
+        return min(bounds, default=0)
 
     @property
-    def complete(self) -> bool:
-        """Whether all members modulo the primes were tried, rather than those on random lines of parameter space."""
-        return all(one.complete for one in self.sweeps)
+    def _kinds(self) -> tuple[list[Sweep], list[Sweep]]:
+        """The sweeps over all members, and those over members on random lines of parameter space."""
+        return [one for one in self.sweeps if one.complete], [one for one in self.sweeps if not one.complete]
+
+    @property
+    def degree(self) -> int:
+        """Of the hypersurfaces with the same degrees, all together, up to which they are found."""
+        count = len(self.over)
+        enough = [
+            degree_reached(0.75 * min(one.seen / one.prime for one in some), count)
+            for some in self._kinds
+            if len(some) > 2
+        ]
+        return max(enough, default=0)
 
     @property
     def classes(self) -> list[tuple[Degrees, list[Component]]]:
-        """The components by degrees, in their order."""
-        found: dict[Degrees, list[Component]] = {}
+        """The components by degrees, in their order; where these are no degrees of iterates, also by their growth."""
+        found: dict[Any, list[Component]] = {}
         for one in self.components:
-            found.setdefault(one.degrees, []).append(one)
-        return list(found.items())
+            other = None if self.by == "degrees" or one.growth is None else one.growth.growth
+            found.setdefault((one.degrees, other), []).append(one)
+        return [(degrees, some) for (degrees, _), some in found.items()]
 
     @property
     def coverage(self) -> str:
         """What was tried, and what can have been missed: a sentence or two."""
         if not self.height:
             return f"members modulo three primes are needed, those modulo {len(self.sweeps)} were tried"
-        parts = [f"{one.seen} modulo {one.prime}" for one in self.sweeps]
-        where = f"where one of the first {len(self.generic)} degrees is smaller"
-        if self.complete:
-            return (
-                f"all members with parameters modulo the primes: {', '.join(parts)}; found are single points with "
-                f"numerators and denominators up to {self.height}, and hypersurfaces of a degree up to 6, {where}"
+        whole, lines = ((", ".join(str(one.prime) for one in some)) for some in self._kinds)
+        parts = [f"all members with parameters modulo {whole}"] if whole else []
+        if lines:
+            count = round(min(one.seen / one.prime for one in self._kinds[1]))
+            parts.append(f"{'those' if parts else 'members'} on {count} random lines of parameter space modulo {lines}")
+        small = "single points" if len(self.over) == 1 else "single points, affine spaces, hypersurfaces of these"
+        kinds = [small] if whole else []
+        if len(self.over) > 1:
+            kinds.append(
+                f"hypersurfaces of a total degree up to {self.degree} for each sequence of {WORDS[self.by][0]}"
             )
-        return f"members on random lines of parameter space: {', '.join(parts)}; found are only hypersurfaces, {where}"
+        where = WORDS[self.by][1].format(len(self.generic))
+        if not whole:
+            kinds.append("nothing of smaller dimension, for which all members would have to be tried")
+        return (
+            f"{', and '.join(parts)}; found are {', and '.join(kinds)}, {where}, over Q with numerators and "
+            f"denominators up to {self.height}, or over a quadratic field that splits modulo three of the primes"
+        )
 
     @property
     def text(self) -> str:
         """Lines for people, a word and a tab at the front."""
-        if not self.height:
-            return f"tried\t{self.coverage}"
+        if not self.height or self.ended == "part":
+            return "\n".join(f"{word}\t{rest}" for word, rest in [*self._seen, ("tried", self.coverage), *self._open])
         names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
         lines = [("in general", ", ".join(map(str, self.generic)))]
         for degrees, members in self.classes:
             growth = growth_on(members)
             told = ", ".join("none" if d < 0 else str(d) for d in degrees)
             known = "" if growth is None or growth.recurrence is None else f", {growth.basis.partition(':')[0]}"
-            lines.append(("degrees", told + (f"\t{growth.kind_text}{known}" if growth is not None else "")))
+            lines.append((WORDS[self.by][0], told + (f"\t{growth.kind_text}{known}" if growth is not None else "")))
             for where, sign, here in (
                 ("where", "; ", [one for one in members if not one.is_rational_point]),
                 (f"at {names} =", ", ", [one for one in members if one.is_rational_point]),
@@ -168,27 +203,55 @@ class Scan(Displayed):
                 if one.verdict is not None
             ]
         if not self.components:
-            lines.append(("found", "no condition on the parameters under which degrees are smaller"))
+            lines.append(("found", f"no condition on the parameters {WORDS[self.by][1].format(len(self.generic))}"))
         if self.components:
             lines.append(("growth", f"that of one member; singularities were followed for {STEPS} steps"))
-        lines += [("symmetry", f"exchanging {a} and {b} permutes the slow members") for a, b in self.symmetric]
+        for images in self.symmetric:
+            image = f"({', '.join(images)})" if len(images) > 1 else images[0]
+            lines.append(("symmetry", f"{names} -> {image} permutes the slow members"))
         lines.append(("tried", self.coverage))
         if any(self.left):
             rest = ", ".join(f"{n} modulo {one.prime}" for n, one in zip(self.left, self.sweeps, strict=True))
-            lines.append(("left", f"slow members on no component: {rest}"))
-        else:
+            lines.append(("left", f"slow members on no component: {rest}{self._left_words}"))
+        elif not self.omitted:
             lines.append(("left", "none: every slow member that was seen is on a component"))
-        return "\n".join(f"{word}\t{rest}" for word, rest in lines)
+        return "\n".join(f"{word}\t{rest}" for word, rest in [*lines, *self._open])
+
+    @property
+    def _left_words(self) -> str:
+        """What so many members may be."""
+        most = 0
+        for n, one in zip(self.left, self.sweeps, strict=True):
+            dimension = len(self.over) - 1
+            while dimension > most and n < 0.5 * one.seen / one.prime ** (len(self.over) - dimension):
+                dimension -= 1
+            most = dimension
+        what = "a curve" if most == 1 else f"a variety of dimension {most}"
+        return f"; as many as {what} has, so one may have been missed" if most else ""
+
+    @property
+    def _open(self) -> list[tuple[str, str]]:
+        why = "not asked for were" if self.ended == "part" else "there was no time for"
+        return [("open", f"{why} {', '.join(self.omitted)}")] if self.omitted else []
+
+    @property
+    def _seen(self) -> list[tuple[str, str]]:
+        """The numbers of slow members by degrees, where nothing was lifted."""
+        return [
+            ("slow", f"{', '.join(map(str, degrees))}\t{len(points)} members modulo {one.prime}")
+            for one in self.sweeps
+            for degrees, points in sorted(one.classes.items())
+        ]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            **attributes(self, "over", "seed", "generic"),
+            **attributes(self, "over", "seed", "by", "generic"),
             "classes": [
                 {"degrees": list(degrees), "components": [one.to_json() for one in some]}
                 for degrees, some in self.classes
             ],
-            "symmetric": [list(pair) for pair in self.symmetric],
+            "symmetric": [list(images) for images in self.symmetric],
             "sweeps": [
                 {
                     **attributes(one, "prime", "seen", "complete", "accidents"),
@@ -197,8 +260,21 @@ class Scan(Displayed):
                 }
                 for one, left in zip(self.sweeps, self.left, strict=True)
             ],
-            **attributes(self, "height", "coverage", "ended"),
+            **attributes(self, "height", "coverage", "ended", "omitted"),
         }
+
+    def with_dimensions(self, dim: int) -> Scan:
+        """The scan of maps of this dimension with numbers of polynomials in the place of ranks."""
+
+        def counted(ranks: Degrees) -> Degrees:
+            return tuple(comb(dim + d, d) - rank for d, rank in enumerate(ranks, 1))
+
+        sweeps = (
+            replace(one, generic=counted(one.generic), classes={counted(d): x for d, x in one.classes.items()})
+            for one in self.sweeps
+        )
+        components = tuple(replace(one, degrees=counted(one.degrees)) for one in self.components)
+        return replace(self, generic=counted(self.generic), components=components, sweeps=tuple(sweeps))
 
     def member(self, component: Component) -> SystemFile:
         """The system of a rational member on a component. Raises InputError where none is known."""

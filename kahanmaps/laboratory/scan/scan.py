@@ -11,53 +11,55 @@ from __future__ import annotations
 
 import random
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import combinations
+from functools import partial
+from itertools import product, repeat
+from math import comb, inf
 from typing import Any
 
 from flint import fmpq, fmpz
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
-from kahanmaps.algebra.polynomials import primitive_part, ring
+from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
-from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.errors import BadPrime, InputError, quoted
+from kahanmaps.laboratory.scan.conditions import beside, conditions
 from kahanmaps.laboratory.scan.growth import Progress, with_growth, with_verdicts
-from kahanmaps.laboratory.scan.lift import (
-    RationalRows,
-    flat_equations,
-    lifted_conjugates,
-    lifted_flats,
-    lifted_forms,
-    residues,
-)
-from kahanmaps.laboratory.scan.members import degrees_on, point_on
-from kahanmaps.laboratory.scan.pieces import Rows, pieces, pivots
-from kahanmaps.laboratory.scan.result import Component, Scan
-from kahanmaps.laboratory.scan.sweep import Degrees, Sweep, TimeOver, sweep
+from kahanmaps.laboratory.scan.kept import Kept
+from kahanmaps.laboratory.scan.members import degrees_on, point_on, ranks_on
+from kahanmaps.laboratory.scan.result import WORDS, Component, Scan
+from kahanmaps.laboratory.scan.sweep import Sweep, TimeOver, sweep
+from kahanmaps.laboratory.scan.symmetric import symmetries
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kernels import processors
 
 DEFAULT_SECONDS = 120.0
 MAX_PARAMETERS = 8
-# By the number of parameters, 0 standing for more, where members on random lines are tried: the ones that are wished,
-# then those for families that take their time.
-_PRIMES = {
+# By the number of parameters the primes modulo which all members are tried: the ones that are wished, then those for
+# families that take their time.
+_PRIMES: dict[int, tuple[tuple[int, ...], tuple[int, ...]]] = {
     1: ((307, 311, 313, 317, 331, 337, 347, 349, 353, 359), (101, 103, 107, 109)),
     2: ((53, 59, 61, 67), (29, 31, 37, 41)),
     3: ((19, 23, 29, 31), (11, 13, 17, 19)),
-    0: ((79, 83, 89, 97), (31, 37, 41, 43)),
 }
-_LINES = 150
-_PART = 0.4  # of the time, for all members on their first line
+# Those for members on random lines of parameter space. Each of the fields of the roots of d, d up to 10 and down to
+# -10, splits modulo three of them: else hypersurfaces that split over such a field have no points to be found.
+_SPLIT = (107, 131, 139, 193, 241, 281)
+_LINES = {2: (24, 12), 3: (32, 16)}  # how many are wished, and fewer, by the number of parameters
+_MORE = 4  # times as many, where hypersurfaces were missed
+_MANY_LINES = (150, 60)
+_PART = 0.3  # of the time, for all members on their first line
+_UNTIL = (0.6, 0.75, 0.85, 0.9)  # of the time: when members, conditions, their confirmation and growth have to be done
 _ROOM, _ROOM_OF_MANY = 260, 220  # for degrees before common factors are removed: up to 2 parameters, and more
 _MOST_ROOM = 4096
 _TRIAL_PRIME = 8179  # modulo which hardly a member is special
 _MOST_TERMS = 7
+_MONOMIALS, _FEW_MONOMIALS = {"integrals": 21, "density": 36}, 15  # up to 2 parameters; orbits modulo 19 are short
+_MOST_MONOMIALS, _MOST_TOP = 130, 12
 _MEMBERS = 3  # that confirm a component
-_SHARE = 0.5  # of the prime, points of a curve at least
 _TRIES = 20  # for a rational member
 
 
@@ -66,12 +68,14 @@ def scan(
     over: Sequence[str],
     *,
     eps: Any = None,
+    by: str = "degrees",
     terms: int | None = None,
     primes: Sequence[int] | None = None,
     seconds: float = DEFAULT_SECONDS,
     seed: int = 0,
     jobs: int | None = None,
     analysis: float | None = None,
+    kept: Kept | None = None,
     progress: Progress = lambda _: None,
 ) -> Scan:
     """The conditions on parameters under which the degrees of the iterates are smaller than in general.
@@ -80,20 +84,24 @@ def scan(
         file: the family; its claims are not looked at.
         over: names of its parameters that vary, the others have the values of the file; eps may be one of them.
         eps: an exact number, or None for generic eps: conditions that hold for every eps.
-        terms: how many iterates are measured, by default as many as have small degrees, at most 7.
+        by: what makes members special: smaller "degrees" of iterates; "integrals", more polynomials of some degree
+            that vanish along an orbit; "density", more polynomials phi for which the measure dx/phi is invariant.
+        terms: how many iterates are measured, by default as many as have small degrees, at most 7; or else the degree
+            of the polynomials, by default such that there are few.
         primes: at least three primes, by default such that the members are some ten thousand.
-        seconds: time for everything, about.
+        seconds: time for everything, about; what was left out then is said.
         seed: of everything random.
         jobs: threads, by default as many as processors; they need numba.
         analysis: seconds for an analysis of a member on each component whose degrees do not grow exponentially; of
             points with the same degrees one is enough. None for none.
-        progress: is told what is being done.
+        kept: a file for what is measured modulo each prime, as soon as it is known; that is not done again.
+        progress: is told what is being done, again and again; TimeOver from it ends the scan with what is known.
 
     Returns:
         A `Scan`. Found modulo primes and confirmed at members, which is evidence and no proof.
 
     Raises:
-        InputError: for unknown parameters, wrong primes, a map that exists nowhere.
+        InputError: for a file of another scan, unknown parameters, wrong primes, a map that exists nowhere.
 
     >>> from kahanmaps.documents.files import parse_system
     >>> lines = parse_system('''variables = ["x", "y"]
@@ -119,56 +127,128 @@ def scan(
         raise InputError("found eps as a parameter to scan over, expected a map that depends on it")
     if exact == 0:
         raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
+    if by not in WORDS:
+        raise InputError(f"found a scan by {quoted(by)}, expected one by {', '.join(WORDS)}")
     if jobs is not None and jobs < 1:
         raise InputError(f"found {jobs} jobs, expected at least 1")
     if primes is not None and (len(set(primes)) < 3 or any(p < 5 or not fmpz(p).is_prime() for p in primes)):
         given = ", ".join(map(str, primes))
         raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
-    rng = random.Random(f"scan {seed_for(seed, names, map_.subject, exact)}")
+    rng = random.Random(start := f"scan {seed_for(seed, names, map_.subject, exact)}")
     began = time.monotonic()
-    terms, room, cost = _terms(map_, len(names), exact, terms, rng)
-    lines = None if len(names) in _PRIMES else _LINES
+    terms, room, cost = (_terms if by == "degrees" else partial(_top, by))(map_, len(names), exact, terms, rng)
     jobs = jobs or processors()
-
-    def count(some: Sequence[int]) -> int:
-        return sum(p ** len(names) if lines is None else p * lines for p in some)
-
-    if primes is None:
-        wished, fewer = _PRIMES[len(names) if lines is None else 0]
-        primes = wished if cost * count(wished) / jobs < _PART * seconds else fewer
+    most = _PART * seconds * jobs / cost
+    if kept is not None:
+        most = inf  # the same on every machine, and not all in one go
+    plan = _plan(len(names), primes, most)
+    if kept is not None:
+        document = dict(file.document)
+        kept.open({"document": document, "over": names, "eps": str(exact), "by": by, "terms": terms, "seed": seed})
+    total = sum(_size(len(names), *one) for one in plan)
     sweeps: list[Sweep] = []
-    ended = "complete"
+    omitted: list[str] = []
+
+    doing, interrupted = "scan", False
+
+    def tell(sentence: str) -> None:
+        nonlocal doing, interrupted
+        doing = sentence
+        try:
+            progress(sentence)
+        except TimeOver:
+            interrupted = True
+            raise
+
+    def until(part: float) -> Callable[[], None]:
+        def check() -> None:
+            tell(doing)
+            if time.monotonic() > began + part * seconds:
+                raise TimeOver
+
+        return check
 
     def told(done: int, _: int) -> None:
-        done, total = done + sum(one.seen for one in sweeps), count(primes)
-        left = (time.monotonic() - began) * (total - done) / done
-        progress(f"scan: {done} of {total} members, {left:.0f} s left")
+        done += sum(one.seen for one in sweeps)
+        left = (time.monotonic() - began) * max(0, total - done) / done
+        tell(f"scan: {done} of {total} members, {left:.0f} s left")
 
-    limits: dict[str, Any] = {"lines": lines, "jobs": jobs, "deadline": began + 0.8 * seconds, "progress": told}
-    for p in primes:
+    limits: dict[str, Any] = {"jobs": jobs, "by": by, "check": until(_UNTIL[0]), "progress": told}
+
+    def take(plan: list[tuple[int, int | None]]) -> None:
+        for k, (p, lines) in enumerate(plan):
+            try:
+                one = None if kept is None else kept.get(p, lines)
+                if one is None:
+                    name = f"{start} {p} {lines}"
+                    one = sweep(map_, len(names), p, exact, terms, room, lines=lines, seed=name, **limits)
+                    if kept is not None:
+                        kept.add(one, lines)
+                sweeps.append(one)
+            except BadPrime:
+                continue
+            except TimeOver:
+                omitted.append(f"members modulo {', '.join(str(p) for p, _ in plan[k:])}")
+                break
+        generic = max((one.generic for one in sweeps), default=())
+        sweeps[:] = [one for one in sweeps if one.generic == generic]
+
+    if kept is not None and kept.parts > 1:
+        take(plan[kept.part - 1 :: kept.parts])
+        ended = "interrupted" if interrupted else "time" if omitted else "part"
+        omitted.append("the other parts and conditions")
+        generic = sweeps[0].generic if sweeps else ()
+        return Scan(file, names, exact, seed, generic, (), tuple(sweeps), (), (), ended, tuple(omitted), by)
+    take(plan)
+    known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
+    again = [(one.prime, _MORE * round(one.seen / one.prime)) for one in sweeps if not one.complete]
+    more = sum(_size(len(names), *one) for one in again)
+    if not (missed or omitted) and more <= most and any(map(_lacks_hypersurface, sweeps, repeat(known))):
+        total += more
+        sweeps[:] = [one for one in sweeps if one.complete]
+        take([*again])
+        known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
+    omitted += [f"all conditions for {missed} sequences of degrees"] if missed else []
+    for k, one in enumerate(known):
         try:
-            name = f"{rng.getrandbits(64)} {p}"
-            sweeps.append(sweep(map_, len(names), p, exact, terms, room, seed=name, **limits))
-        except BadPrime:
-            continue
+            tell(f"scan: confirms component {k + 1} of {len(known)}")
+            known[k] = _confirmed(one, names, map_, exact, known, rng, by, until(_UNTIL[2]))
         except TimeOver:
-            ended = "time"
+            omitted.append(f"the confirmation of {len(known) - k} components")
             break
-    generic = max((one.generic for one in sweeps), default=())
-    sweeps = [one for one in sweeps if one.generic == generic]
-    found = _components(sweeps, names, rng)
-    known = []
-    for k, one in enumerate(found):
-        progress(f"scan: confirms component {k + 1} of {len(found)}")
-        known.append(_confirmed(one, names, map_, exact, found, rng))
-    known = with_growth(known, file, map_, exact, began + seconds, seed, progress)
+    check = until(1 if analysis is None else _UNTIL[3])
+    known, missed = with_growth(known, file, map_, exact, began + seconds, check, seed, tell, by)
+    omitted += [f"the growth on {missed} components"] if missed else []
     if analysis is not None:
-        known = with_verdicts(known, file, exact, analysis, seed, progress)
+        known, missed = with_verdicts(known, file, exact, analysis, began + seconds, until(1), seed, tell)
+        omitted += [f"{missed} verdicts"] if missed else []
     left = tuple(_left(one, known) for one in sweeps)
-    symmetric = tuple(
-        (names[i], names[j]) for i, j in combinations(range(len(names)), 2) if _is_symmetric(sweeps, i, j)
+    symmetric = tuple(tuple(map(format_polynomial, images)) for images in symmetries(sweeps, known, names))
+    ended = "interrupted" if interrupted else "time" if omitted else "complete"
+    generic = sweeps[0].generic if sweeps else ()
+    found = Scan(
+        file, names, exact, seed, generic, tuple(known), tuple(sweeps), left, symmetric, ended, tuple(omitted), by
     )
-    return Scan(file, names, exact, seed, generic, tuple(known), tuple(sweeps), left, symmetric, ended)
+    return found if by == "degrees" else found.with_dimensions(map_.dim)
+
+
+def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[tuple[int, int | None]]:
+    """Primes, each with the number of random lines of parameter space, None for all members.
+
+    As many as are wished where these are not more than `most` members, else fewer.
+    """
+    lines = [[(p, n) for p in _SPLIT] for n in _LINES.get(count, _MANY_LINES)]
+    if count in _PRIMES:
+        complete = [[(p, None) for p in some] for some in (_PRIMES[count] if primes is None else (primes,))]
+        plans = [[*some, *(more if count > 1 else ())] for some, more in product(complete, [*lines, []])]
+    else:
+        plans = lines if primes is None else [[(p, n) for p in primes] for n in _MANY_LINES[:1]]
+    return next((plan for plan in plans if sum(_size(count, *one) for one in plan) <= most), plans[-1])
+
+
+def _size(count: int, prime: int, lines: int | None) -> int:
+    """The number of members."""
+    return prime**count if lines is None else prime * lines
 
 
 def _terms(
@@ -201,55 +281,26 @@ def _terms(
     return measured, room, (time.monotonic() - began) / LONG
 
 
-def _components(sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random) -> list[Component]:
-    """What the pieces of each class modulo the primes are lifted to."""
-    found = []
-    for degrees in sorted({degrees for one in sweeps for degrees in one.classes}):
-        parts = [
-            pieces(one.classes[degrees], one.prime, one.seen, one.complete, rng)
-            for one in sweeps
-            if degrees in one.classes
-        ]
-        for dimension in range(len(names)):
-            flats = {part.prime: part.flats[dimension] for part in parts if part.flats.get(dimension)}
-            if dimension == 0 and _is_a_curve({p: len(points) for p, points in flats.items()}):
-                continue
-            lifted = lifted_flats(flats)
-            for rows, at in lifted.items():
-                found.append(Component(flat_equations(rows, names), dimension, degrees, at))
-            if dimension == 0:
-                found += _conjugates(flats, set(lifted), degrees, names)
-        for size in {len(rows) for part in parts for rows in part.forms}:
-            inside = {part.prime: [rows for rows in part.forms if len(rows) == size] for part in parts}
-            for rows in lifted_flats(inside):
-                forms = {part.prime: part.forms.get(residues(rows, part.prime) or (), []) for part in parts}
-                equations = flat_equations(rows, names)
-                free = [name for k, name in enumerate(names) if k not in pivots(rows)]
-                for form, at in lifted_forms(forms, free):
-                    whole = form.project_to_context(ring(names))
-                    found.append(Component((whole, *equations), len(free) - 1, degrees, at))
-    return found
+def _top(
+    by: str, map_: BirationalMap, count: int, eps: fmpq | None, top: int | None, rng: random.Random
+) -> tuple[int, int, float]:
+    """The degree of polynomials, 0, and the seconds for a member, as `_terms` has them for degrees of iterates."""
+    import numpy as np
 
+    from kahanmaps.maps.residues.families import LONG, Family
+    from kahanmaps.maps.residues.relations import ranks
 
-def _conjugates(
-    points: Mapping[int, Sequence[Rows]], rational: Iterable[RationalRows], degrees: Degrees, names: Sequence[str]
-) -> Iterator[Component]:
-    """The points over quadratic fields among those that are not rational."""
-    known = {p: {residues(rows, p) for rows in rational} for p in points}
-    rest = {p: [[-row[-1] % p for row in rows] for rows in some if rows not in known[p]] for p, some in points.items()}
-    for (*line, (s, q)), at in lifted_conjugates(rest, len(names)).items():
-        context = ring(names)
-        t = context.gen(next(k for k in range(len(names)) if k not in pivots(line)))
-        equation = primitive_part(t**2 + s * t + q)[1]
-        yield Component((equation, *flat_equations(tuple(line), names)), 0, degrees, at)
-
-
-def _is_a_curve(counts: dict[int, int]) -> bool:
-    """Whether numbers of points modulo primes grow as those of a curve do."""
-    if len(counts) < 2:
-        return False
-    low, high = min(counts), max(counts)
-    return counts[low] >= _SHARE * low and counts[high] - counts[low] >= _SHARE * (high - low)
+    sizes = [comb(map_.dim + degree, degree) for degree in range(1, _MOST_TOP + 1)]
+    if top is not None and not (1 <= top <= _MOST_TOP and sizes[top - 1] <= _MOST_MONOMIALS):
+        raise InputError(f"found {top} for the degree of polynomials, expected fewer than {_MOST_MONOMIALS} monomials")
+    few = _MONOMIALS[by] if count < 3 or by == "density" else _FEW_MONOMIALS
+    top = top or max(1, sum(size <= few for size in sizes))
+    tried = np.array([[rng.randrange(1, _TRIAL_PRIME) for _ in range(count)] for _ in range(LONG)])
+    began = time.monotonic()
+    found = ranks(Family(map_, _TRIAL_PRIME), tried, eps, top, rng, by)
+    if not found.any():
+        raise InputError("the map has no value anywhere, whatever the parameters are")
+    return top, 0, (time.monotonic() - began) / LONG
 
 
 def _confirmed(
@@ -259,9 +310,17 @@ def _confirmed(
     eps: fmpq | None,
     others: Sequence[Component],
     rng: random.Random,
+    by: str = "degrees",
+    check: Callable[[], None] = lambda: None,
 ) -> Component:
     """The component with what random members on it say, and a rational one that is on no smaller component."""
-    measured = [degrees_on(map_, one.equations, len(names), eps, one.degrees, rng) for _ in range(_MEMBERS)]
+    measured = []
+    for _ in range(_MEMBERS):
+        check()
+        if by == "degrees":
+            measured.append(degrees_on(map_, one.equations, len(names), eps, one.degrees, rng))
+        else:
+            measured.append(ranks_on(map_, one.equations, len(names), eps, len(one.degrees), rng, by))
     known = [degrees for degrees in measured if degrees is not None]
     values = None
     for _ in range(_TRIES):
@@ -279,23 +338,11 @@ def _confirmed(
 def _left(one: Sweep, components: Sequence[Component]) -> int:
     """The number of slow members modulo a prime that are on no component with their degrees."""
     return sum(
-        not any(other.contains(point, one.prime) for other in components if other.degrees == degrees)
+        len(beside(points, [other for other in components if other.degrees == degrees], one.prime))
         for degrees, points in one.classes.items()
-        for point in points
     )
 
 
-def _is_symmetric(sweeps: Sequence[Sweep], i: int, j: int) -> bool:
-    """Whether exchanging two parameters moves slow members, and to members with the same degrees, modulo each prime."""
-
-    def exchanged(point: tuple[int, ...]) -> tuple[int, ...]:
-        values = list(point)
-        values[i], values[j] = values[j], values[i]
-        return tuple(values)
-
-    return bool(sweeps) and all(
-        one.complete
-        and any(exchanged(x) != x for x in one.slow)
-        and all(one.slow.get(exchanged(x)) == degrees for x, degrees in one.slow.items())
-        for one in sweeps
-    )
+def _lacks_hypersurface(one: Sweep, components: Sequence[Component]) -> bool:
+    """Whether members on random lines are left, as many as a hypersurface has."""
+    return not one.complete and _left(one, components) >= 0.5 * one.seen / one.prime

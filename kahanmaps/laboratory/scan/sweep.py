@@ -8,7 +8,6 @@ on further lines until none of them turns out to be generic after all.
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -22,12 +21,12 @@ from kahanmaps.maps.implicit import BirationalMap
 Point = tuple[int, ...]
 Degrees = tuple[int, ...]
 
-_SLICE = 2048
+_SLICE = 512
 _LINES = (3, 12)  # of a slow member: at least, at most
 
 
 class TimeOver(Exception):
-    """The sweep was not finished."""
+    """There is no time left for what is being done, or it was interrupted."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +71,11 @@ def sweep(
     lines: int | None = None,
     seed: str = "",
     jobs: int = 1,
-    deadline: float | None = None,
+    by: str = "degrees",
+    check: Callable[[], None] = lambda: None,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Sweep:
-    """The slow members of a family modulo a prime, by the degrees d_1, ..., d_terms.
+    """The slow members of a family modulo a prime, by the degrees d_1, ..., d_terms, or by ranks up to that degree.
 
     Args:
         map_: a map with symbols, the parameters of the family.
@@ -83,10 +83,11 @@ def sweep(
         prime: below 2^13.
         eps: an exact number, or None for generic eps, in GF(p^2).
         terms, room: see `Family.degrees`.
+        by: what is measured: "degrees", or "integrals" or "density" for what `ranks` counts.
         lines: None for all members, else so many random lines of parameter space.
         seed: of everything random.
         jobs: threads.
-        deadline: a value of time.monotonic().
+        check: is called now and then, and may raise TimeOver.
         progress: is told how many members are done, of how many.
 
     Returns:
@@ -94,21 +95,24 @@ def sweep(
 
     Raises:
         InputError: where the map exists nowhere, or the degrees need more room.
-        TimeOver: at the deadline.
+        TimeOver: from `check`.
     """
     import numpy as np
 
     from kahanmaps.maps.residues.families import TOO_LARGE, Family
+    from kahanmaps.maps.residues.relations import ranks
 
     family, rng = Family(map_, prime), random.Random(seed)
 
     def measure(points: Sequence[Point], told: Callable[[int, int], None] = lambda done, of: None) -> Any:
         parts = []
         for low in range(0, len(points), _SLICE):
-            if deadline is not None and time.monotonic() > deadline:
-                raise TimeOver
+            check()
             some = np.array(points[low : low + _SLICE], dtype=np.int64)
-            parts.append(family.degrees(some, eps, terms, room, rng, jobs=jobs))
+            if by == "degrees":
+                parts.append(family.degrees(some, eps, terms, room, rng, jobs=jobs))
+            else:
+                parts.append(ranks(family, some, eps, terms, rng, by))
             told(low + len(some), len(points))
         return np.concatenate(parts)
 

@@ -45,7 +45,7 @@ class Family:
             raise InputError(f"found a map of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
         self.prime, self.dim, self.symbols = prime, map_.dim, map_.symbols
         field, n = GF(prime), map_.dim
-        self._terms: list[tuple[int, int, int, int]] = []
+        self.terms: list[tuple[int, int, int, int]] = []
         self._values: list[list[tuple[tuple[int, ...], int]]] = []  # polynomials in the symbols, then eps
         places: dict[tuple[int, ...], int] = {}
         for i, row in enumerate(map_.rows):
@@ -58,10 +58,10 @@ class Family:
                         found.setdefault(exponents[:n], []).append((exponents[n:], value))
                 for exponent, polynomial in found.items():
                     place = places.setdefault(exponent, len(places))
-                    self._terms.append((i, j, place, len(self._values)))
+                    self.terms.append((i, j, place, len(self._values)))
                     self._values.append(polynomial)
         self.degree = max(1, *(sum(exponent) for exponent in places))
-        self._exponents = [(*exponent, self.degree - sum(exponent)) for exponent in places]
+        self.exponents = [(*exponent, self.degree - sum(exponent)) for exponent in places]
         self._nu = next(c for c in range(2, prime) if pow(c, (prime - 1) // 2, prime) == prime - 1)
         self._inverses = np.array([0, *(pow(c, -1, prime) for c in range(1, prime))], dtype=float)
 
@@ -90,15 +90,15 @@ class Family:
         """
         draw = np.random.default_rng(rng.getrandbits(64))
         p, count = self.prime, len(members)
-        values = self._coefficients(members, eps, draw)
+        values = self.coefficients(members, eps, draw)
         start = draw.integers(0, p, (count, self.dim + 1, 2, 2)).astype(float)
         start[:, -1] = 0.0
         start[:, -1, 0, 0] = 1.0
         weights = draw.integers(0, p, (terms, 2, 2, self.dim + 1)).astype(float)
         found = np.full((count, terms), TOO_LARGE, dtype=np.int64)
         walk = _walk(choose_kernel(kernel, long=count >= LONG))
-        exponents = np.array(self._exponents, dtype=np.int64)
-        layout = np.array(self._terms, dtype=np.int64)
+        exponents = np.array(self.exponents, dtype=np.int64)
+        layout = np.array(self.terms, dtype=np.int64)
 
         def part(low: int) -> None:
             here = slice(low, low + _CHUNK)
@@ -110,7 +110,7 @@ class Family:
                 pass
         return found
 
-    def _coefficients(self, members: Members, eps: fmpq | None, draw: np.random.Generator) -> NDArray[np.float64]:
+    def coefficients(self, members: Members, eps: fmpq | None, draw: np.random.Generator) -> NDArray[np.float64]:
         """The coefficients of the equation, an array (members, 2, places)."""
         p, count = self.prime, len(members)
         if members.shape[1] > len(self.symbols):

@@ -1,0 +1,134 @@
+"""Conditions over Q on parameters: what the pieces of the slow members modulo primes are lifted to."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from flint import fmpq_mpoly
+
+from kahanmaps.algebra.polynomials import primitive_part, ring
+from kahanmaps.laboratory.scan.lift import (
+    RationalRows,
+    flat_equations,
+    lifted_conjugates,
+    lifted_flats,
+    lifted_forms,
+    residues,
+)
+from kahanmaps.laboratory.scan.pieces import Pieces, Rows, pieces, pivots
+from kahanmaps.laboratory.scan.result import Component
+from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep, TimeOver
+
+_SHARE = 0.5  # of the prime, points of a curve at least
+
+
+def conditions(
+    sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random, check: Callable[[], None]
+) -> tuple[list[Component], int]:
+    """The components, and for how many sequences of degrees there was no time; those with smaller degrees first."""
+    found: list[Component] = []
+    classes = sorted({degrees for one in sweeps for degrees in one.classes})
+    for k, degrees in enumerate(classes):
+        try:
+            found += _of_class(degrees, sweeps, names, rng, check)
+        except TimeOver:
+            return found, len(classes) - k
+    return found, 0
+
+
+def _of_class(
+    degrees: Degrees, sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random, check: Callable[[], None]
+) -> list[Component]:
+    """Hypersurfaces first, from random lines, which hardly meet anything smaller; all else beside them."""
+    found: list[Component] = []
+    count = len(names)
+
+    def parts_of(complete: bool) -> list[Pieces]:
+        parts = []
+        for one in sweeps:
+            if one.complete is complete and degrees in one.classes:
+                rest = beside(one.classes[degrees], found, one.prime)
+                parts += [pieces(rest, one.prime, one.seen, complete, rng, check)] if rest else []
+        if count > 1:
+            forms = {
+                part.prime: [*map(_as_form, part.flats.get(count - 1, [])), *part.forms.get((), [])] for part in parts
+            }
+            found.extend(Component((form,), count - 1, degrees, at) for form, at in lifted_forms(forms, names))
+        return parts
+
+    parts_of(complete=False)
+    parts = parts_of(complete=True)
+    for dimension in range(max(1, count - 1)):
+        flats = {part.prime: part.flats[dimension] for part in parts if part.flats.get(dimension)}
+        if dimension == 0 and _is_a_curve({p: len(points) for p, points in flats.items()}):
+            continue
+        lifted = lifted_flats(flats)
+        found += [Component(flat_equations(rows, names), dimension, degrees, at) for rows, at in lifted.items()]
+        if dimension == 0:
+            found += _conjugates(flats, set(lifted), degrees, names)
+    for size in {len(rows) for part in parts for rows in part.forms if rows}:
+        inside = {part.prime: [rows for rows in part.forms if len(rows) == size] for part in parts}
+        for rows in lifted_flats(inside):
+            forms = {part.prime: part.forms.get(residues(rows, part.prime) or (), []) for part in parts}
+            equations = flat_equations(rows, names)
+            free = [name for k, name in enumerate(names) if k not in pivots(rows)]
+            for form, at in lifted_forms(forms, free):
+                whole = form.project_to_context(ring(names))
+                found.append(Component((whole, *equations), len(free) - 1, degrees, at))
+    return found
+
+
+def beside(points: Sequence[Point], components: Iterable[Component], prime: int) -> list[Point]:
+    """The points modulo a prime that are on none of the components."""
+    import numpy as np
+
+    rest = np.array(points, dtype=np.int64)
+    for one in components:
+        on = np.ones(len(rest), dtype=bool)
+        for equation in one.equations:
+            on &= _values(equation, rest, prime) == 0
+        rest = rest[~on]
+    return [tuple(x) for x in rest.tolist()]
+
+
+def _values(equation: fmpq_mpoly, points: Any, prime: int) -> Any:
+    """The values of a polynomial with integer coefficients at points modulo a prime."""
+    import numpy as np
+
+    total = np.zeros(len(points), dtype=np.int64)
+    for exponents, coefficient in equation.terms():
+        term = np.full(len(points), int(coefficient.p) % prime)
+        for k, exponent in enumerate(exponents):
+            for _ in range(int(exponent)):
+                term = term * points[:, k] % prime
+        total += term
+    return total % prime
+
+
+def _as_form(rows: Rows) -> tuple[int, ...]:
+    """The coefficients of the equation of a hyperplane in the order of those of other hypersurfaces."""
+    (row,) = rows
+    return (row[-1], *row[:-1])
+
+
+def _conjugates(
+    points: Mapping[int, Sequence[Rows]], rational: Iterable[RationalRows], degrees: Degrees, names: Sequence[str]
+) -> Iterator[Component]:
+    """The points over quadratic fields among those that are not rational."""
+    known = {p: {residues(rows, p) for rows in rational} for p in points}
+    rest = {p: [[-row[-1] % p for row in rows] for rows in some if rows not in known[p]] for p, some in points.items()}
+    for (*line, (s, q)), at in lifted_conjugates(rest, len(names)).items():
+        context = ring(names)
+        t = context.gen(next(k for k in range(len(names)) if k not in pivots(line)))
+        equation = primitive_part(t**2 + s * t + q)[1]
+        yield Component((equation, *flat_equations(tuple(line), names)), 0, degrees, at)
+
+
+def _is_a_curve(counts: dict[int, int]) -> bool:
+    """Whether numbers of points modulo primes grow as those of a curve do."""
+    if len(counts) < 2:
+        return False
+    low, high = min(counts), max(counts)
+    return counts[low] >= _SHARE * low and counts[high] - counts[low] >= _SHARE * (high - low)
