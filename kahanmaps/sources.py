@@ -118,6 +118,10 @@ SOURCES: dict[str, str] = {
         "M. Petrera, A. Pfadler, Yu. B. Suris. On integrability of Hirota-Kimura-type discretizations: experimental "
         "study of the discrete Clebsch system. Exp. Math. 18 (2009), 223-247. arXiv:0808.3345"
     ),
+    "petrera-suris-2018": (
+        "M. Petrera, Yu. B. Suris. New results on integrability of the Kahan-Hirota-Kimura discretizations. In: "
+        "Nonlinear Systems and Their Remarkable Mathematical Structures, CRC Press, 2018. arXiv:1805.12490"
+    ),
     "zander-2021": (
         "R. Zander. On the singularity structure of Kahan discretizations of a class of quadratic vector fields. "
         "Eur. J. Math. 7 (2021), 1046-1073. arXiv:2003.01659"

@@ -130,7 +130,8 @@ def _orbits_on_curves_proved(found: Findings) -> bool:
     search = found.integrals
     if search is None or found.dim < 2:
         return False
-    proved = sum(one.verdict is Verdict.PROVED for one in search.integrals)
+    verdicts = [*(one.verdict for one in search.integrals), *(one.verdict for one in search.in_iterates)]
+    proved = verdicts.count(Verdict.PROVED)
     return max(proved, 0 if search.symbols else search.by_theorems) >= found.dim - 1
 
 
