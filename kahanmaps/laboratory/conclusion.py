@@ -130,8 +130,7 @@ def _orbits_on_curves_proved(found: Findings) -> bool:
     search = found.integrals
     if search is None or found.dim < 2:
         return False
-    verdicts = [*(one.verdict for one in search.integrals), *(one.verdict for one in search.in_iterates)]
-    proved = verdicts.count(Verdict.PROVED)
+    proved = sum(verdict is Verdict.PROVED for _, verdict in search.formulas)
     return max(proved, 0 if search.symbols else search.by_theorems) >= found.dim - 1
 
 

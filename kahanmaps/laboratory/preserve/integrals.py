@@ -147,6 +147,12 @@ class IntegralSearch(Displayed):
         return max(self.profile.codimension, self.profile.with_known, self.by_theorems, self.found)
 
     @property
+    def formulas(self) -> list[tuple[str, Verdict]]:
+        """The formulas, those in iterates last, each with its verdict."""
+        every: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
+        return [(one.text, one.verdict) for one in every]
+
+    @property
     def found(self) -> int:
         """How many have a formula."""
         return len(self.integrals) + len(self.in_iterates)
