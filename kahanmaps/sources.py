@@ -118,6 +118,25 @@ SOURCES: dict[str, str] = {
         "M. Petrera, A. Pfadler, Yu. B. Suris. On integrability of Hirota-Kimura-type discretizations: experimental "
         "study of the discrete Clebsch system. Exp. Math. 18 (2009), 223-247. arXiv:0808.3345"
     ),
+    "petrera-suris-2018": (
+        "M. Petrera, Yu. B. Suris. New results on integrability of the Kahan-Hirota-Kimura discretizations. In: "
+        "Nonlinear Systems and Their Remarkable Mathematical Structures, CRC Press, 2018. arXiv:1805.12490"
+    ),
+    "itoh-1987": (
+        "Y. Itoh. Integrals of a Lotka-Volterra system of odd number of variables. Progr. Theoret. Phys. 78 (1987), "
+        "507-510"
+    ),
+    "bogoyavlenskij-1988": (
+        "O. I. Bogoyavlensky. Integrable discretizations of the KdV equation. Phys. Lett. A 134 (1988), 34-38"
+    ),
+    "damianou-2017": (
+        "P. A. Damianou, C. A. Evripidou, P. Kassotakis, P. Vanhaecke. Integrable reductions of the "
+        "Bogoyavlenskij-Itoh Lotka-Volterra systems. J. Math. Phys. 58 (2017), 032704"
+    ),
+    "kouloukas-quispel-vanhaecke-2016": (
+        "T. E. Kouloukas, G. R. W. Quispel, P. Vanhaecke. Liouville integrability and superintegrability of a "
+        "generalized Lotka-Volterra system and its Kahan discretization. J. Phys. A 49 (2016), 225201. arXiv:1601.05006"
+    ),
     "zander-2021": (
         "R. Zander. On the singularity structure of Kahan discretizations of a class of quadratic vector fields. "
         "Eur. J. Math. 7 (2021), 1046-1073. arXiv:2003.01659"

@@ -91,7 +91,8 @@ def check_measure(file: SystemFile, settings: Settings | None = None, extra: Rat
         file.require_claim("a density", extra)
     for function in (file.density, extra):
         if function is not None:
-            candidates.append((ClaimedDensity(function, settings.eps), None, ""))
+            proof = theorems.product_density_invariant(file.system, function) if file.is_quadratic else None
+            candidates.append((ClaimedDensity(function, settings.eps), proof, ""))
     if not candidates:
         raise InputError(
             f"no density of {file.name} is known or claimed: add a section [density] with phi to the file, "

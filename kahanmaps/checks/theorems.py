@@ -12,7 +12,7 @@ from flint import fmpq, fmpq_mat
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
-from kahanmaps.algebra.polynomials import gradient, linear_combinations
+from kahanmaps.algebra.polynomials import RationalFunction, gradient, linear_combinations
 from kahanmaps.checks.claims import Evidence, Finding, Verdict
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.cubics import belongs
@@ -120,6 +120,24 @@ def modified_hamiltonian_conserved(hamiltonian: CubicHamiltonian) -> Evidence | 
 def determinant_density_invariant(hamiltonian: CubicHamiltonian) -> Evidence | None:
     """For f = J grad H, H cubic, J constant and skew, dx / det(I - eps f'(x)) is invariant (cmoq-2013)."""
     return evidence("the theorem of Celledoni, McLachlan, Owren and Quispel", _cubic_hypotheses(hamiltonian))
+
+
+def product_density_invariant(system: QuadraticSystem, phi: RationalFunction) -> Evidence | None:
+    """For x_i' = x_i (r_i + sum_j a_ij x_j) with a skew matrix a, dx/(x_1 ... x_n) is invariant."""
+    x = system.rhs[0].context().gens()[: system.dim]
+    ones = [tuple(map(int, monomial[: system.dim])) for monomial in phi.numerator.monoms()]
+    hypotheses = [
+        ("phi is a multiple of x_1 ... x_n", phi.is_polynomial and ones == [(1,) * system.dim]),
+        ("x_i divides f_i", all(monomial[i] for i, f in enumerate(system.rhs) for monomial in f.monoms())),
+    ]
+    proof = evidence("the lemma on Lotka-Volterra systems (docs/mathematics.md)", hypotheses)
+    if proof is None:
+        return None
+    rates = [f / g for f, g in zip(system.rhs, x, strict=True)]
+    is_skew = all(
+        (rates[i].derivative(j) + rates[j].derivative(i)).is_zero() for i in range(len(x)) for j in range(i + 1)
+    )
+    return evidence(proof.data["theorem"], [*hypotheses, ("a is skew", is_skew)])
 
 
 def shared_integral(member: FamilyMember, associate: AssociatedSystem) -> Evidence | None:

@@ -68,7 +68,11 @@ def integrals_html(search: IntegralSearch) -> str:
         (formula(one.function, one.name, CHARACTERS), markup.verdict(one.verdict), _text(one.origin))
         for one in search.integrals[:_FORMULAS]
     ]
-    said = f"{len(search.integrals)} found; {search.count_text}"
+    rows += [
+        (f"{one.name} = {_code(one.text)}", markup.verdict(one.verdict), _text(one.origin))
+        for one in search.in_iterates
+    ]
+    said = f"{search.found} found; {search.count_text}"
     notes = _notes([_rest(search.integrals, _FORMULAS), search.note, search.reason])
     inside = markup.table(["integral", "verdict", "found by"], rows) if rows else ""
     more = eps_sentence(search.eps, search.file.map)

@@ -1,6 +1,7 @@
 r"""Names, polynomials and rational functions as LaTeX for formulas, exactly.
 
     x1 -> x_1    x12 -> x_{12}    eps -> \varepsilon    alpha2 -> \alpha_2    al -> al    my_H -> \mathrm{my\_H}
+    x1~ -> \tilde{x_1}
 
 The text belongs into math mode. Products are written with a space, so that a reader, and a program, can take the
 factors apart again.
@@ -45,6 +46,9 @@ def latex_name(name: str) -> str:
     """
     if not name or not name.isprintable():
         raise InputError(f"found the name {name[:40]!r}, expected printable text")
+    bare = name.rstrip("~")  # x~ is the image of x, x~~ that of x~
+    if bare and bare != name:
+        return r"\tilde{" + latex_name(name[:-1]) + "}"
     match = _WITH_INDEX.fullmatch(name)
     if match is None:
         return r"\mathrm{" + "".join(_ESCAPES.get(mark, mark) for mark in name) + "}"

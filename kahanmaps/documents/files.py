@@ -22,6 +22,7 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.document import DocumentReader
+from kahanmaps.documents.families import family_member
 from kahanmaps.documents.reader import KINDS
 from kahanmaps.documents.toml_text import to_toml
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
@@ -181,6 +182,9 @@ def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[s
 def _named(base: Path, key: str, name: str) -> tuple[dict[str, Any], str, Any]:
     """What `DocumentReader` asks of parts of compositions: a "system" of the catalogue, a "file" seen from `base`."""
     if key == "system":
+        made = family_member(name)
+        if made is not None:
+            return made[1], made[0], None
         folder = resources.files("kahanmaps.documents").joinpath("catalog")
         for found in (folder.joinpath(f"{name}.toml"), folder.joinpath("maps", f"{name}.toml")):
             if name.isidentifier() and found.is_file():

@@ -101,11 +101,11 @@ def integrals(
 
     found = find_integrals(system, symbols=symbolic or (), eps=eps, max_degree=max_degree, seconds=seconds, seed=seed)
     return {
-        "verdict": _weakest(one.verdict for one in found.integrals),
+        "verdict": _weakest(verdict for _, verdict in found.formulas),
         "status": _state_of_integrals(found),
-        "integrals": len(found.integrals),
+        "integrals": found.found,
         "codimension": found.codimension if found.profile.nullities else found.by_theorems or None,
-        "formulas": [one.text for one in found.integrals],
+        "formulas": [text for text, _ in found.formulas],
         "nullities": list(found.profile.nullities),
         "period": found.profile.period,
         "reason": found.reason,

@@ -130,7 +130,7 @@ def _orbits_on_curves_proved(found: Findings) -> bool:
     search = found.integrals
     if search is None or found.dim < 2:
         return False
-    proved = sum(one.verdict is Verdict.PROVED for one in search.integrals)
+    proved = sum(verdict is Verdict.PROVED for _, verdict in search.formulas)
     return max(proved, 0 if search.symbols else search.by_theorems) >= found.dim - 1
 
 

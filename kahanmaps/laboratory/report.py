@@ -76,6 +76,7 @@ def _integral_lines(found: Findings) -> list[Statement]:
     if search is None:
         return family
     lines = [Statement(str(one.verdict), f"{one.name} = {one.short_text}  [{one.origin}]") for one in search.integrals]
+    lines += [Statement(str(one.verdict), f"{one.name} = {one.text}  [{one.origin}]") for one in search.in_iterates]
     lines += [
         Statement(
             str(one.integral.verdict), f"{one.name} = {one.text} at the n-th point, an integral that depends on n"

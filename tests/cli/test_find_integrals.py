@@ -159,10 +159,21 @@ def test_maps_that_are_none_give_3(kahanmaps, command, words):
     assert words in outcome.out
 
 
-def test_integrals_without_a_formula_give_3(kahanmaps):
+def test_integrals_without_a_formula_give_3(kahanmaps, monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.preserve.iterates.LIFTS", ())
     outcome = kahanmaps("find-integrals clebsch_first_flow --max-degree 2 --json")
     assert (outcome.status, outcome.json["found"], outcome.json["codimension"]) == (3, 1, 4)
     assert "3 of the 4 independent integrals have no closed form P/Q" in outcome.json["reason"]
+
+
+def test_integrals_in_iterates_are_shown_with_the_others(kahanmaps):
+    outcome = kahanmaps("find-integrals lagrange_top --max-degree 2 --json")
+    assert (outcome.status, outcome.json["found"], len(outcome.json["in_iterates"])) == (0, 4, 1)
+    [one] = outcome.json["in_iterates"]
+    assert one["name"] == "I4"
+    assert "p1*m1~*eps^2" in one["integral"]
+    assert r"\tilde{p_1}" in one["latex"]
+    assert f"# I4: {one['integral']}" in kahanmaps("find-integrals lagrange_top --max-degree 2 --toml").out
 
 
 def test_too_little_time_gives_3(kahanmaps):

@@ -18,8 +18,18 @@ over_names = pytest.mark.parametrize("name", catalog.names())
 
 
 def test_every_system_has_a_line(kahanmaps):
-    listed = {line.split()[0]: int(line.split()[1]) for line in kahanmaps("systems").out.splitlines()}
-    assert listed == {name: catalog.load(name).dim for name in (*catalog.names(), *catalog.map_names())}
+    listed = {line.split()[0]: line.split()[1] for line in kahanmaps("systems").out.splitlines()}
+    assert listed.pop("lv(n,k)") == "n"
+    assert listed == {name: str(catalog.load(name).dim) for name in (*catalog.names(), *catalog.map_names())}
+
+
+def test_a_member_of_a_family_is_shown_and_other_arguments_give_2(kahanmaps):
+    shown = kahanmaps("systems", "lv(5,1)").out
+    assert "x5' = x1*x5 - x2*x5 - x3*x5 - x4*x5" in shown
+    assert parse_system(kahanmaps("systems", "lv(5,1)", "--toml").out, "lv(5,1)") == catalog.load("lv(5,1)")
+    outcome = kahanmaps("analyze", "lv(5,3)")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "found lv(5,3), expected lv(n,k) with 2 <= n <= 40, 0 <= k and 2k + 1 <= n" in outcome.err
 
 
 @pytest.mark.parametrize("name", catalog.map_names())

@@ -461,6 +461,7 @@ def test_what_is_said_of_the_numbers_in_relations(integrals, functions, notes):
     search = SimpleNamespace(
         integrals=(),
         in_time=(),
+        in_iterates=(),
         by_theorems=0,
         profile=SimpleNamespace(nullities=(1,), period=2, agree=True),
         reason="",

@@ -50,6 +50,7 @@ def command(system: str | None, **options: Any) -> int:
     \b
       kahanmaps find-integrals euler_top --symbolic a1,a2,a3
       kahanmaps find-integrals volterra_periodic_4 --toml
+      kahanmaps find-integrals kirchhoff_case
       kahanmaps find-integrals lagrange_top --monomials 'm1^2+m2^2,p3^2,p3,1'
       kahanmaps find-integrals volterra_periodic_4 --darboux 2
       kahanmaps find-integrals henon_heiles --flow
@@ -58,8 +59,9 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-integrals --vars x,y --rhs 'x^2-y^2' --rhs='-2*x*y'
 
     Without --eps the formulas contain eps (the time step is 2 eps). How many independent integrals there are is known
-    from theorems, and from orbits, measured modulo primes; every formula is verified as an identity. --flow adds
-    which integrals of the differential equation those of the map tend to as eps -> 0, and which are lost.
+    from theorems, and from orbits, measured modulo primes; every formula is verified as an identity. Where there is
+    none in x alone it may contain x~, the image of x, x~~, that of x~, and so on. --flow adds which integrals of the
+    differential equation those of the map tend to as eps -> 0, and which are lost.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
     combination of values; with --json a record a line.
@@ -117,7 +119,8 @@ def command(system: str | None, **options: Any) -> int:
         both = {**heading("find-integrals", found), **found.to_json(), "beside_map": beside.to_json()}
         print_json({**both, "document": dict(file.document)})
         return 3 if found.reason else 0
-    named = [(one.name, one, f"{one.origin}: ") for one in found.integrals]
+    every: list[Any] = [*found.integrals, *found.in_iterates]
+    named = [(one.name, one, f"{one.origin}: ") for one in every]
     print_search("find-integrals", found, options, named, _count(found))
     if not any((options["as_json"], options["as_toml"], options["as_latex"])):
         for one in found.in_time:
@@ -131,7 +134,7 @@ def command(system: str | None, **options: Any) -> int:
 def _count(found: Any) -> str:
     if not found.profile.nullities and not found.codimension:
         return "orbits\tnot measured"
-    return f"found\t{len(found.integrals)} functionally independent; {found.count_text}"
+    return f"found\t{found.found} functionally independent; {found.count_text}"
 
 
 def _darboux(file: Any, symbols: tuple[str, ...], eps: Any, options: dict[str, Any], progress: Progress) -> int:

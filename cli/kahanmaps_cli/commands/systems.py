@@ -26,10 +26,12 @@ def command(
     \b
       kahanmaps systems
       kahanmaps systems euler_top
+      kahanmaps systems 'lv(7,3)'
       kahanmaps systems euler_top -p a1=2 --toml > my-top.toml
       kahanmaps systems lagrange_top --latex
     """
     from kahanmaps.documents.catalog import load, titles
+    from kahanmaps.documents.families import FAMILIES
 
     if as_toml + as_latex + as_json > 1:
         raise click.UsageError("give --toml, --latex or --json, one of the three")
@@ -44,6 +46,8 @@ def command(
         width = max(map(len, found))
         for key, (dim, title) in found.items():
             tell_entry(f"{key:<{width}}  {dim:>2}  ", title, "bold")
+        for family in FAMILIES.values():
+            tell_entry(f"{family.form:<{width}}   n  ", f"{family.title}, e.g. {family.example}", "bold")
         return
     file = load_reference(name, dict(parameters))
     if as_toml:

@@ -1,6 +1,7 @@
 """The catalogue: named systems, one TOML file each in this folder, with equations, known facts and sources.
 
-The folder maps has the same for maps that are not Kahan's; `load` knows both.
+The folder maps has the same for maps that are not Kahan's; `load` knows both, and names with arguments as lv(7,3),
+which documents/families.py makes.
 
 >>> names()[:3]
 ('clebsch_first_flow', 'dressing_chain_3', 'euler_top')
@@ -30,6 +31,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from kahanmaps.documents.families import family_member
 from kahanmaps.errors import InputError, quoted
 
 if TYPE_CHECKING:
@@ -66,6 +68,11 @@ def _names_in(folder: Traversable) -> tuple[str, ...]:
 
 def text_of(name: str) -> bytes:
     """The file of a system or map of the catalogue. Raises KeyError for other names."""
+    made = family_member(name)
+    if made is not None:
+        from kahanmaps.documents.toml_text import to_toml
+
+        return to_toml(made[1], ("variables",), ("catalog", "system", "integrals", "density")).encode()
     folder = resources.files(__name__)
     if name in map_names():
         return folder.joinpath("maps", name + _ENDING).read_bytes()
@@ -99,8 +106,9 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None) -> 
     existing file. Where a name is both, the catalogue wins; write ./name for the file. `parameters` replace the
     default values: exact numbers (int, Fraction, text such as "2/3").
 
-    Raises InputError for a name that is not in the catalogue and a file that cannot be read, SystemFileError (an
-    InputError too) for a file with mistakes, for parameters that the system does not have and for inexact values.
+    Raises InputError for a name or arguments that are not in the catalogue and a file that cannot be read,
+    SystemFileError (an InputError too) for a file with mistakes, for parameters that the system does not have and for
+    inexact values.
 
     >>> load("henon_heiles", {"c": "-6"}).parameters
     {'c': -6}
@@ -108,6 +116,8 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None) -> 
     Traceback (most recent call last):
         ...
     kahanmaps.errors.InputError: found the unknown system 'henon_hailes', did you mean henon_heiles? ...
+    >>> load("lv(5,2)").dim
+    5
     >>> load("henon_heiles", {"d": 1})
     Traceback (most recent call last):
         ...
@@ -118,8 +128,10 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None) -> 
     from kahanmaps.documents.files import parse_system, read_system
 
     if not isinstance(reference, Path):
-        if reference in (*names(), *map_names()):
-            return parse_system(text_of(reference), reference, parameters)
+        made = family_member(reference)
+        name = reference if made is None else made[0]
+        if made is not None or name in (*names(), *map_names()):
+            return parse_system(text_of(name), name, parameters)
         if not _is_path(reference):
             raise _unknown(reference)
     return read_system(reference, parameters)

@@ -81,12 +81,13 @@ class QuotientForms:
     """The linear forms modulo the affine integrals z = V x: represented by the coordinates x_i with i in `free`.
 
     `section` is the n x m matrix S of dx/dy for these coordinates y at fixed z, so that a form v is v S modulo the
-    integrals, and the system for y has the Jacobi matrix (rows `free` of f') S.
+    integrals, and the system for y has the Jacobi matrix (rows `free` of f') S. `shift` is dx/dz: x = S y + shift z.
     """
 
     integrals: tuple[tuple[fmpz, ...], ...]
     free: tuple[int, ...]
     section: fmpq_mat
+    shift: fmpq_mat
 
     def rows(self, matrix: fmpq_mat) -> fmpq_mat:
         """The rows of a matrix that belong to the free coordinates."""
@@ -108,8 +109,11 @@ def quotient_by(integrals: Sequence[tuple[fmpz, ...]], n: int) -> QuotientForms:
             free.append(j)
     coordinates = fmpq_mat([*rows[len(integrals) :], *rows[: len(integrals)]])  # (y, z) as forms of x
     inverse = coordinates.inv()
-    section = fmpq_mat(n, len(free), [inverse[i, j] for i in range(n) for j in range(len(free))])
-    return QuotientForms(tuple(integrals), tuple(free), section)
+    section, shift = (
+        fmpq_mat(n, len(columns), [inverse[i, j] for i in range(n) for j in columns])
+        for columns in (range(len(free)), range(len(free), n))
+    )
+    return QuotientForms(tuple(integrals), tuple(free), section, shift)
 
 
 def affine_darboux(system: QuadraticSystem, *, seed: int = 0) -> AffineDarbouxList:

@@ -20,6 +20,7 @@ from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part
 from kahanmaps.algebra.text import format_factored
 from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
@@ -226,11 +227,22 @@ def _products(laboratory: Laboratory, max_degree: int | None) -> tuple[FoundDens
     phi = None if found is None else found.function
     if found is None or phi is None:
         return None, None
-    verdict, evidence = laboratory.verdict_on(phi, is_density=True, factor=found.constant)
+    verdict, evidence = _judged(laboratory, phi, found.constant)
     one = FoundDensity(phi, verdict, evidence, found.text)
     if not verdict.holds or (max_degree is not None and one.degree(laboratory.map.dim) > max_degree):
         return None, None
     return (one, None) if found.constant.numerator == found.constant.denominator else (None, one)
+
+
+def _judged(
+    laboratory: Laboratory, phi: RationalFunction, factor: RationalFunction | None = None
+) -> tuple[Verdict, Evidence]:
+    """The verdict on dx/phi: by the lemma on Lotka-Volterra systems, or as an identity."""
+    if laboratory.system is not None and not laboratory.flow:
+        proof = product_density_invariant(laboratory.system, phi)
+        if proof is not None:
+            return Verdict.PROVED, proof
+    return laboratory.verdict_on(phi, is_density=True, factor=factor)
 
 
 def _theorem(laboratory: Laboratory) -> FoundDensity | None:
@@ -279,7 +291,7 @@ def _formulas(
     found = []
     for P in forms.bases[0]:
         phi = RationalFunction(P, P.context().constant(1))
-        verdict, evidence = laboratory.verdict_on(phi, is_density=True)
+        verdict, evidence = _judged(laboratory, phi)
         if verdict.holds:
             found.append(FoundDensity(phi, verdict, evidence))
     return found, f"a density of degree {degree} that was found modulo primes did not pass as an identity"

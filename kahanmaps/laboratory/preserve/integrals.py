@@ -4,7 +4,7 @@ How many there are at least is found first: by theorems (inherited.py) and by th
 measured (hirota_kimura.py). Then spaces of polynomials with a common cofactor are sought modulo a prime (search.py);
 their ratios are the integrals. The coefficients are functions of eps and of the parameters that are left as symbols;
 they are interpolated (closed_forms.py), and what comes out is put to the proof as an identity (identities.py). What the
-theorems give and was not found is added.
+theorems give and was not found is added. What is missing then is sought with iterates of x as letters (iterates.py).
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpz
@@ -25,17 +24,17 @@ from kahanmaps.algebra.text import format_factored, format_polynomial, format_ra
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.displayed import Displayed, latex
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, Point, rank
-from kahanmaps.laboratory.preserve.branches import Branches, Pattern, tell_apart
 from kahanmaps.laboratory.preserve.cofactors import Cofactor
-from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
 from kahanmaps.laboratory.preserve.flow import is_kept_by_flow
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile, orbit_profile
 from kahanmaps.laboratory.preserve.inherited import InheritedIntegrals, inherited_integrals
+from kahanmaps.laboratory.preserve.interpolated import bases_of
+from kahanmaps.laboratory.preserve.iterates import IntegralInIterates, integrals_in_iterates, verdict_on_ratio
 from kahanmaps.laboratory.preserve.products import candidates, products_of
-from kahanmaps.laboratory.preserve.search import AFFINE, Found, classes, may_be_conjugate, repeat, search
+from kahanmaps.laboratory.preserve.search import AFFINE, Found, may_be_conjugate, repeat, search
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -116,10 +115,11 @@ class TimedIntegral:
 class IntegralSearch(Displayed):
     """What `find_integrals` found.
 
-    `integrals` are functionally independent, also together with those that depend on time, `in_time`. `profile` is what
-    relations along orbits show (measured); `by_theorems` is how many independent integrals the Kahan map has by the
-    theorems of inherited.py, and `theorems` says which (with symbols: at random values). `reason` says what is missing
-    and why, empty where nothing is. `eps` is None for every eps.
+    `integrals` are functionally independent, also together with those that depend on time, `in_time`, or those whose
+    formulas contain iterates of x as letters, `in_iterates`. `profile` is what relations along orbits show (measured);
+    `by_theorems` is how many independent integrals the Kahan map has by the theorems of inherited.py, and `theorems`
+    says which (with symbols: at random values). `reason` says what is missing and why, empty where nothing is. `eps` is
+    None for every eps.
     """
 
     file: SystemFile
@@ -134,6 +134,7 @@ class IntegralSearch(Displayed):
     theorems: str
     in_time: tuple[TimedIntegral, ...] = ()
     flow: bool = False  # whether the integrals are those of the differential equation
+    in_iterates: tuple[IntegralInIterates, ...] = ()
 
     @property
     def note(self) -> str:
@@ -143,7 +144,18 @@ class IntegralSearch(Displayed):
     @property
     def codimension(self) -> int:
         """How many independent integrals are known: shown by orbits, given by theorems, or found in closed form."""
-        return max(self.profile.codimension, self.profile.with_known, self.by_theorems, len(self.integrals))
+        return max(self.profile.codimension, self.profile.with_known, self.by_theorems, self.found)
+
+    @property
+    def formulas(self) -> list[tuple[str, Verdict]]:
+        """The formulas, those in iterates last, each with its verdict."""
+        every: list[FoundIntegral | IntegralInIterates] = [*self.integrals, *self.in_iterates]
+        return [(one.text, one.verdict) for one in every]
+
+    @property
+    def found(self) -> int:
+        """How many have a formula."""
+        return len(self.integrals) + len(self.in_iterates)
 
     @property
     def is_exact(self) -> bool:
@@ -167,23 +179,22 @@ class IntegralSearch(Displayed):
         if self.profile.nullities:
             shown = max(self.profile.codimension, self.profile.with_known, self.by_theorems)
             parts.append(f"measured: {tried} show {'no more' if shown == self.by_theorems else shown}")
-            if len(self.integrals) > shown:
-                parts.append(f"{len(self.integrals)} have formulas")
+            if self.found > shown:
+                parts.append(f"{self.found} have formulas")
         at_least = "" if self.is_exact else "at least "
         return f"in all {at_least}{self.codimension} independent ({'; '.join(parts)})"
 
     @property
     def is_complete(self) -> bool:
         """Whether there is a closed form for every integral that is known."""
-        return len(self.integrals) >= self.codimension
+        return self.found >= self.codimension
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
             **({"flow": True} if self.flow else {}),
             **attributes(self, "integrals"),
-            "found": len(self.integrals),
-            **attributes(self, "in_time"),
+            **attributes(self, "found", "in_time", "in_iterates"),
             **attributes(self, "codimension", codimension_is_exact="is_exact"),
             **attributes(self, "by_theorems", relations="profile"),
             **attributes(self, "note", "reason", "primes"),
@@ -192,11 +203,13 @@ class IntegralSearch(Displayed):
     def toml_section(self) -> str:
         """The integrals as a section [integrals] of a system file, which `check-integrals` accepts.
 
-        Empty where there are none; for a given eps a comment says that they hold there only.
+        Empty where there are none; for a given eps a comment says that they hold there only. Those in iterates are
+        comments.
         """
         if not self.integrals:
             return ""
         lines = ["[integrals]", *(f'{one.name} = "{one.text}"' for one in self.integrals)]
+        lines += [f"# {one.name}: {one.text}" for one in self.in_iterates]
         return "\n".join([*toml_comment(self.eps, self.file.map), *lines]) + "\n"
 
 
@@ -280,6 +293,7 @@ def find_integrals(
         inherited = [systems[map_.values] for map_ in laboratory.maps]
     by_theorems = 0
     in_time: list[TimedIntegral] = []
+    in_iterates: list[IntegralInIterates] = []
 
     def gradients(map_: ModularMap, x: Point) -> list[list[int]]:
         return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
@@ -287,8 +301,9 @@ def find_integrals(
     def result(integrals: Sequence[FoundIntegral], profile: Profile, reason: str) -> IntegralSearch:
         values = f", at random values of {', '.join(laboratory.symbols)}" if laboratory.symbols else ""
         theorems = inherited[0].text + values if inherited else ""
-        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems, tuple(in_time), flow)
-        return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found)
+        found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems)
+        more = tuple(in_time), flow, tuple(in_iterates)
+        return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found, *more)
 
     empty = Profile(laboratory.map.dim, (), (), None, True, False)
     if laboratory.defect:
@@ -301,7 +316,15 @@ def find_integrals(
         )
         cofactors = laboratory.cofactors()
         base, found = _search(laboratory, profile, cofactors, deadline, progress)
-        formulas, reason = _formulas(laboratory, base, found, cofactors, deadline, progress)
+        formulas: list[tuple[RationalFunction, str]] = []
+        reason = ""
+        if found.steps:
+            progress("interpolating closed forms")
+            bases, reason = bases_of(laboratory, base.prime, found, cofactors, deadline)
+            origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
+            formulas = [
+                (_ratio(P, Q), origin) for (Q, *more), origin in zip(bases, origins, strict=False) for P in more
+            ]
     except NoPoint as error:
         return result([], empty, str(error))
     integrals = _independent(laboratory, formulas, progress)
@@ -311,7 +334,10 @@ def find_integrals(
         progress("products of powers of known polynomials")
         integrals, in_time = _products(laboratory, cofactors, integrals, progress)
     done = result(integrals, profile, "")
-    missing = done.codimension - len(integrals)
+    if not flow and not done.is_complete:
+        integrals, in_iterates = _in_iterates(laboratory, done, deadline, progress)
+        done = result(integrals, profile, "")
+    missing = done.codimension - done.found
     if missing <= 0:
         reason = ""
     elif not reason:
@@ -345,71 +371,6 @@ def _search(
             if time.monotonic() < deadline and repeat(found, map_, cofactors, base.prime) is None:
                 base, found = map_, search(map_, profile, cofactors, (deadline - time.monotonic()) / 2, progress)
     return base, found
-
-
-def _formulas(
-    laboratory: Laboratory,
-    base: ModularMap,
-    found: Found,
-    cofactors: Sequence[Cofactor],
-    deadline: float,
-    progress: Callable[[str], None],
-) -> tuple[list[tuple[RationalFunction, str]], str]:
-    """All ratios of the spaces in closed form, with how they were found, and a reason where that failed."""
-    if not found.steps:
-        return [], ""
-    reference = base.prime
-    if repeat(found, laboratory.maps[1], cofactors, reference) is None:
-        return [], "what was found at one eps was not found at another"
-    progress("interpolating closed forms")
-
-    branches, reason = _branches(laboratory, found, cofactors, reference, deadline)
-    if reason:
-        return [], f"integrals were found modulo primes, but no closed form: {reason}"
-
-    def spaces_on(map_: ModularMap) -> list[DarbouxSpace] | None:
-        again = repeat(found, map_, cofactors, reference, branches)
-        return None if again is None else again.all_spaces
-
-    forms = laboratory.formulas(found.all_spaces, spaces_on, deadline)
-    if forms.bases is None:
-        return [], f"integrals were found modulo primes, but no closed form: {forms.reason}"
-    origins = [step.text for step, spaces in zip(found.steps, found.spaces, strict=True) for _ in spaces]
-    return [
-        (_ratio(P, basis[0]), origin) for basis, origin in zip(forms.bases, origins, strict=True) for P in basis[1:]
-    ], ""
-
-
-def _branches(
-    laboratory: Laboratory, found: Found, cofactors: Sequence[Cofactor], reference: int, deadline: float
-) -> tuple[dict[int, dict[Pattern, Branches]], str]:
-    """What tells the spaces of each step apart that have zeros at the same places, and a reason where nothing does."""
-    names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
-
-    @cache
-    def again(prime: int, values: tuple[int, ...]) -> Found | None:
-        try:
-            return repeat(found, laboratory.map_for(prime, values), cofactors, reference)
-        except (NoPoint, BadPrime):
-            return None
-
-    branches: dict[int, dict[Pattern, Branches]] = {}
-    for number, group in enumerate(found.spaces):
-        for kind, model in classes(group).items():
-            if len(model) == 1:
-                continue
-
-            def alike(
-                prime: int, values: tuple[int, ...], number: int = number, kind: Pattern = kind
-            ) -> list[DarbouxSpace] | None:
-                other = again(prime, values)
-                return None if other is None else classes(other.spaces[number])[kind]
-
-            told = tell_apart(model, alike, names, laboratory.seed, deadline)
-            if told is None:
-                return {}, f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
-            branches.setdefault(number, {})[kind] = told
-    return branches, ""
 
 
 def _ratio(P: fmpq_mpoly, Q: fmpq_mpoly) -> RationalFunction:
@@ -454,6 +415,26 @@ def _products(
             one = FoundIntegral(name, function, origin, verdict, evidence, product.text)
             in_time.append(TimedIntegral(name, one, product.constant, laboratory.flow))
     return found, in_time
+
+
+def _in_iterates(
+    laboratory: Laboratory, search: IntegralSearch, deadline: float, progress: Callable[[str], None]
+) -> tuple[list[FoundIntegral], list[IntegralInIterates]]:
+    """The integrals found so far with more of them in x, and those in iterates of x; none that was refuted."""
+    map_, known = laboratory.maps[0], search.integrals
+    point = map_.random_point()
+    rows = [gradient_at(map_, one.function, point) for one in known]
+    try:
+        plain, ratios = integrals_in_iterates(laboratory, search.codimension, rows, point, deadline, progress)
+    except NoPoint:
+        return list(known), []
+    integrals, found = _independent(laboratory, plain, progress, known), list[IntegralInIterates]()
+    for ratio, origin in ratios:
+        verdict, evidence = verdict_on_ratio(laboratory, ratio)
+        if verdict.holds:
+            name = f"I{len(integrals) + len(found) + 1}"
+            found.append(IntegralInIterates(name, ratio, origin, verdict, evidence))
+    return integrals, found
 
 
 def _independent(

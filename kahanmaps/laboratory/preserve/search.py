@@ -28,6 +28,7 @@ from kahanmaps.laboratory.preserve.cofactors import (
 from kahanmaps.laboratory.preserve.darboux_spaces import LARGEST_SPAN, DarbouxSpace, darboux_spaces, gradient_rank
 from kahanmaps.laboratory.preserve.flow import ModularFlow
 from kahanmaps.laboratory.preserve.hirota_kimura import Profile
+from kahanmaps.laboratory.preserve.lifted import Lift, lifted_spaces
 from kahanmaps.maps.kahan import KahanMapOver
 
 # Degrees up to which polynomials with a given cofactor are sought, by dimension.
@@ -43,10 +44,11 @@ _FEW = 20  # with more relations than these, cofactors come first
 class Step:
     """One step of a search; `product` is None except for cofactors. `text` says how for people."""
 
-    kind: str  # "affine", "relations" or "cofactor"
+    kind: str  # "affine", "relations", "cofactor" or "iterates"
     degree: int
     product: CofactorProduct | None
     text: str
+    lift: Lift | None = None  # of "iterates"
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,8 @@ def repeat(
         elif step.product is not None:
             assert sample is not None
             group = [cofactor_space(sample, step.product, step.degree)]
+        elif step.lift is not None:
+            group = lifted_spaces(map_, step.lift)
         else:
             group = darboux_spaces(map_, step.degree, again.all_spaces)
         ordered = _in_order(group, model, map_, reference, branches.get(number, {}))

@@ -1,0 +1,318 @@
+"""Integrals whose formulas contain iterates x~, x~~, ... as letters: coefficients of relations along orbits.
+
+Functions F_0, F_1, ... of (x, x^(k)), bilinear, whose values along every orbit span a line or a plane are found modulo
+a prime (lifted.py) and interpolated. On a line the ratios of the F are integrals, on a plane those of 2 x 2 minors. Put
+to the proof is that such a ratio has the same value a step later, stated with x in the middle of the piece of orbit:
+then I(x, x~) = I(x_, x) contains one step forward and one backward, and can be multiplied out.
+
+Affine integrals come first: on their levels, where x has fewer coordinates, relations of a low degree show what on the
+whole space has coefficients of higher degrees. The values c of the levels are symbols of the search, and v.x takes
+their place in what it finds. Source: petrera-suris-2018.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+from flint import fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.duals import DualField
+from kahanmaps.algebra.fields import GF, Field
+from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate, linear_combinations, primitive_part, ring
+from kahanmaps.algebra.text import format_number, format_polynomial, format_rational_function
+from kahanmaps.checks.claims import Evidence, Verdict
+from kahanmaps.checks.decide import Identity, Sides
+from kahanmaps.checks.expand import MAX_DIMENSION
+from kahanmaps.displayed import latex
+from kahanmaps.documents.document import DocumentReader
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import Point, exponents_up_to, rank
+from kahanmaps.laboratory.preserve.affine_functions import affine_integrals, quotient_by
+from kahanmaps.laboratory.preserve.branches import pattern
+from kahanmaps.laboratory.preserve.identities import judged
+from kahanmaps.laboratory.preserve.interpolated import bases_of
+from kahanmaps.laboratory.preserve.lifted import DEGREE, LIFTS, Lift, lifts_with_spaces, pairs_of
+from kahanmaps.laboratory.preserve.search import Found, Step
+from kahanmaps.maps.implicit import BirationalMap, MapOver
+
+
+@dataclass(frozen=True)
+class RatioOfIterates:
+    """A function I of a piece of an orbit: the ratio of two of the `functions` or, of rank 2, of two minors of them.
+
+    The functions are polynomials in (variables, variables of the k-th iterate, symbols, eps). `above` and `below` are
+    the places of one function or of two: then F_a F_b~ - F_b F_a~ is meant.
+    """
+
+    lift: Lift
+    functions: tuple[fmpq_mpoly, ...]
+    above: tuple[int, ...]
+    below: tuple[int, ...]
+
+    @property
+    def length(self) -> int:
+        """How many successive points it is a function of."""
+        return self.lift.shift + self.lift.rank
+
+    @property
+    def formula(self) -> tuple[RationalFunction, list[tuple[str, fmpq_mpoly]]]:
+        """The ratio, of rank 2 in letters F0, F1, ..., F0~, ... for the functions, and what these letters stand for."""
+        if self.lift.rank == 1:
+            return RationalFunction(self.functions[self.above[0]], self.functions[self.below[0]]), []
+        taken = self.functions[0].context().names()
+        letter = next(c for c in "FGKUVW" if not any(name.startswith(c) for name in taken))
+        names = [f"{letter}{k}" for k in range(len(self.functions))]
+        gens = ring([*names, *(f"{name}~" for name in names)]).gens()
+        here, later = gens[: len(names)], gens[len(names) :]
+        P, Q = (here[a] * later[b] - here[b] * later[a] for a, b in (self.above, self.below))
+        used = sorted({*self.above, *self.below})
+        return RationalFunction(P, Q), [(names[k], self.functions[k]) for k in used]
+
+    @property
+    def text(self) -> str:
+        """The formula; x~ is the image of x, x~~ that of x~."""
+        ratio, letters = self.formula
+        return ", ".join([format_rational_function(ratio), *(f"{F} = {format_polynomial(P)}" for F, P in letters)])
+
+    @property
+    def latex(self) -> str:
+        """The formula as LaTeX."""
+        ratio, letters = self.formula
+        return r",\quad ".join([latex(ratio), *(f"{F[0]}_{F[1:]} = {latex(P)}" for F, P in letters)])
+
+    def sides(self, field: Field, points: Sequence[tuple[Any, ...]], values: Sequence[Any]) -> tuple[Any, Any]:
+        """Numerator and denominator on successive points of an orbit, at the values of the symbols and eps."""
+        rows = [
+            [evaluate(F, field, (*here, *there, *values)) for F in self.functions]
+            for here, there in zip(points, points[self.lift.shift :], strict=False)
+        ]
+
+        def minor(places: tuple[int, ...]) -> Any:
+            if len(places) == 1:
+                return rows[0][places[0]]
+            a, b = places
+            return rows[0][a] * rows[1][b] - rows[0][b] * rows[1][a]
+
+        return minor(self.above), minor(self.below)
+
+
+@dataclass(frozen=True)
+class IntegralInIterates:
+    """An integral in the iterates of a point, with the verdict on its being conserved."""
+
+    name: str
+    ratio: RatioOfIterates
+    origin: str
+    verdict: Verdict
+    evidence: Evidence
+
+    @property
+    def text(self) -> str:
+        """The formula."""
+        return self.ratio.text
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            **attributes(self, "name", integral="text"),
+            "latex": self.ratio.latex,
+            **attributes(self, "origin", "verdict", "evidence"),
+        }
+
+
+def verdict_on_ratio(laboratory: Laboratory, ratio: RatioOfIterates) -> tuple[Verdict, Evidence]:
+    """Whether I has the same value a step later, as an identity for the map of the laboratory."""
+    map_, eps = laboratory.map, laboratory.eps
+    n = map_.dim
+
+    def sides(field: Field, place: tuple[Any, ...], step: Any) -> Sides | None:
+        values = (*place[n:], step)
+        points = _orbit_about(map_.at(step, field, place[n:]), place[:n], ratio.length)
+        pairs = [ratio.sides(field, points[k:], values) for k in (0, 1)]
+        (P, Q), (P_later, Q_later) = pairs
+        if field.is_zero(Q) or field.is_zero(Q_later):
+            return None
+        return [P_later * Q], [P * Q_later]
+
+    where = [*(["every eps"] if map_.has_eps and eps is None else []), *([f"eps = {eps}"] if eps is not None else [])]
+    scope = " and ".join([*where, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
+    subject = (map_.symbols, map_.subject, ratio.text, ratio.above, ratio.below)
+    identity = Identity(
+        n + len(map_.symbols),
+        sides,
+        eps,
+        scope=f"for {scope}" if scope else "",
+        has_eps=map_.has_eps,
+        subject=subject,
+    )
+    return judged(identity, laboratory.seed, expands=n <= MAX_DIMENSION)
+
+
+def _orbit_about(over: MapOver, x: tuple[Any, ...], length: int) -> list[tuple[Any, ...]]:
+    """The points of an orbit from x: length steps, x in the middle or, where the inverse is not known, first."""
+    points, before = [x], 0
+    try:
+        inverse = over.inverse
+        before = length // 2
+    except InputError:
+        inverse = over
+    for _ in range(before):
+        points.insert(0, inverse.step(points[0]))
+    while len(points) <= length:
+        points.append(over.step(points[-1]))
+    return points
+
+
+def integrals_in_iterates(
+    laboratory: Laboratory,
+    wanted: int,
+    rows: Sequence[Sequence[int]],
+    point: Point,
+    deadline: float,
+    progress: Callable[[str], None] = lambda _: None,
+) -> tuple[list[tuple[RationalFunction, str]], list[tuple[RatioOfIterates, str]]]:
+    """Integrals that do not depend on known ones: those in x alone, and those in iterates, each with its origin.
+
+    Args:
+        laboratory: the map.
+        wanted: how many independent ones there are to be, with the known ones.
+        rows: the gradients of the known ones at `point`, modulo the prime of the first map of the laboratory.
+        point: a point modulo that prime.
+        deadline: a value of time.monotonic().
+        progress: is told what is being tried.
+
+    Returns:
+        Formulas that are to be put to the proof. Raises NoPoint.
+
+    Source: petrera-suris-2018.
+    """
+    known = [list(row) for row in rows]
+    plain, ratios = list[tuple[RationalFunction, str]](), list[tuple[RatioOfIterates, str]]()
+    level = _level(laboratory)
+    inside, back = (laboratory, None) if level is None else level
+    base, prime = inside.maps[0], laboratory.maps[0].prime
+    for lift in LIFTS if level is not None else LIFTS[1:]:
+        if len(known) >= wanted or time.monotonic() > deadline:
+            break
+        for one, spaces in lifts_with_spaces(base, [lift]):
+            progress(one.text)
+            found = Found()
+            found.add(Step("iterates", 2, None, one.text, one), sorted(spaces, key=pattern))
+            bases, _ = bases_of(inside, base.prime, found, [], deadline)
+            for basis in bases:
+                functions = [_lettered(P, one, inside.map) for P in basis]
+                for ratio in _ratios(one, functions if back is None else [back(F, one.shift) for F in functions]):
+                    row = _gradient(laboratory, ratio, point)
+                    if rank([*known, row], prime) == len(known):
+                        continue
+                    known.append(row)
+                    if lift.shift:
+                        ratios.append((ratio, one.text))
+                    else:
+                        plain.append((_in_x(ratio, laboratory.map), one.text))
+    return plain, ratios
+
+
+def _letters(map_: BirationalMap, shift: int) -> tuple[str, ...]:
+    """The names that formulas are in: variables, those of the iterate, symbols, eps."""
+    names = map_.variables
+    return (*names, *(name + "~" * max(shift, 1) for name in names), *map_.names[len(names) :])
+
+
+def _lettered(P: fmpq_mpoly, lift: Lift, map_: BirationalMap) -> fmpq_mpoly:
+    """The function of x and its iterate that a polynomial of degree 2 in (variables, symbols, eps) stands for."""
+    n, context = map_.dim, ring(_letters(map_, lift.shift))
+    one, gens = context.constant(1), context.gens()
+    X, Y = (one, *gens[:n]), (one, *gens[n * min(lift.shift, 1) :][:n])
+    places = dict(zip(exponents_up_to(n, DEGREE), pairs_of(n), strict=True))
+    total = context.constant(0)
+    for monomial, coefficient in P.terms():
+        exponents = tuple(map(int, monomial))
+        i, j = places[exponents[:n]]
+        rest = context.from_dict({(0,) * (2 * n) + exponents[n:]: coefficient})
+        total = total + rest * (X[i] * Y[j] + lift.sign * X[j] * Y[i])
+    return primitive_part(total)[1]
+
+
+def _level(laboratory: Laboratory) -> tuple[Laboratory, Callable[[fmpq_mpoly, int], fmpq_mpoly]] | None:
+    """The map on levels of its affine integrals, the values of which are symbols; and what puts v.x in their place."""
+    system, n = laboratory.system, laboratory.map.dim
+    integrals = affine_integrals(system) if system is not None else ()
+    quotient = quotient_by(integrals, n)
+    if system is None or not integrals or len(quotient.free) < 2:
+        return None
+    used, levels = {*laboratory.map.names, *laboratory.file.parameters}, list[str]()
+    for k in count(1):
+        if len(levels) == len(integrals):
+            break
+        levels += [f"c{k}"] if f"c{k}" not in used else []
+    free = [laboratory.map.variables[k] for k in quotient.free]
+    context = ring((*free, *laboratory.symbols, *levels))
+    gens = context.gens()
+    forms = fmpq_mat([[*a, *b] for a, b in zip(quotient.section.tolist(), quotient.shift.tolist(), strict=True)])
+    x = linear_combinations(forms, [*gens[: len(free)], *gens[len(gens) - len(levels) :]])
+    symbols = gens[len(free) : len(free) + len(laboratory.symbols)]
+    rhs = [format_polynomial(system.rhs[k].compose(*x, *symbols, ctx=context)) for k in quotient.free]
+    values = {name: format_number(laboratory.file.parameters[name]) for name in laboratory.symbols}
+    document = {
+        "name": laboratory.file.name,
+        "variables": free,
+        "parameters": {**values, **dict.fromkeys(levels, "1")},
+        "system": {"rhs": rhs},
+    }
+    file = SystemFile(*DocumentReader(document, laboratory.file.name, {}).read())
+    inside = Laboratory(file, (*laboratory.symbols, *levels), laboratory.eps, laboratory.seed)
+
+    def back(F: fmpq_mpoly, shift: int) -> fmpq_mpoly:
+        whole = ring(_letters(laboratory.map, shift))
+        *letters, eps = whole.gens()
+        here, there, rest = letters[:n], letters[n : 2 * n], letters[2 * n :]
+        sums = [sum((a * g for a, g in zip(v, here, strict=True)), whole.constant(0)) for v in integrals]
+        kept = [[side[k] for k in quotient.free] for side in (here, there)]
+        return F.compose(*kept[0], *kept[1], *rest, *sums, eps, ctx=whole)
+
+    return inside, back
+
+
+def _in_x(ratio: RatioOfIterates, map_: BirationalMap) -> RationalFunction:
+    """A ratio that contains no iterate as a function of (variables, symbols, eps)."""
+    context = ring(map_.names)
+    *gens, eps = context.gens()
+    n = map_.dim
+    P, Q = (F.compose(*gens[:n], *gens[:n], *gens[n:], eps, ctx=context) for F in ratio.functions)
+    return RationalFunction(P, Q)
+
+
+def _ratios(lift: Lift, functions: Sequence[fmpq_mpoly]) -> Iterator[RatioOfIterates]:
+    """The ratios that generate all others."""
+    if lift.rank == 1:
+        for F in functions[1:]:
+            yield RatioOfIterates(lift, (F, functions[0]), (0,), (1,))
+        return
+    for k in range(2, len(functions)):
+        for first in (0, 1):
+            yield RatioOfIterates(lift, tuple(functions), (first, k), (0, 1))
+
+
+def _gradient(laboratory: Laboratory, ratio: RatioOfIterates, point: Point) -> list[int]:
+    """A multiple of the gradient with respect to the first point, on the first map of the laboratory."""
+    map_ = laboratory.maps[0]
+    field = DualField(GF(map_.prime))
+    values = [field.convert(value) for value in map_.values]
+    eps = field.convert(map_.eps)
+    over = laboratory.map.at(eps, field, values)
+    row = []
+    for k in range(map_.dim):
+        points = [tuple(field.dual(c, int(i == k)) for i, c in enumerate(point))]
+        while len(points) < ratio.length:
+            points.append(over.step(points[-1]))
+        P, Q = ratio.sides(field, points, (*values, eps))
+        row.append(int(P.slope * Q.value - P.value * Q.slope))
+    return row

@@ -1,0 +1,257 @@
+"""LV(n, k), a family of the catalogue whose names take arguments: its names, and the lemmas of docs/mathematics.md.
+
+Lemmas are identities of polynomials, or hold at rational points with ==; each has a system for which it fails.
+"""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import evaluate, gradient, monomials
+from kahanmaps.checks.preserve import check_measure
+from kahanmaps.checks.theorems import product_density_invariant
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
+from kahanmaps.documents.lotka_volterra import degree
+from kahanmaps.errors import InputError
+from kahanmaps.experiments.recipes import find_file
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.modular_points import null_space
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+EPS = fmpq(3, 17)
+ALL = [(n, k) for n in range(2, 8) for k in range((n + 1) // 2)]
+NO_SKEW = """
+variables = ["x1", "x2", "x3"]
+[system]
+rhs = ["x1*(x2 - x3)", "x2*(x3 - 2*x1)", "x3*(x1 - x2)"]
+[density]
+phi = "x1*x2*x3"
+"""
+
+
+def orbit_of(file, count):
+    rng = random.Random(file.name)
+    points = [tuple(fmpq(rng.randint(1, 40), rng.randint(1, 9)) for _ in range(file.dim))]
+    over = file.map.at(EPS)
+    while len(points) < count:
+        points.append(over.step(points[-1]))
+    return points
+
+
+def product_over_determinant(file, point):
+    total = 1 / file.map.at(EPS).determinant(point)
+    for c in point:
+        total = total * c
+    return total
+
+
+# names
+
+
+def test_a_member_is_the_system_that_one_would_write():
+    assert load("lv(3,1)").system == load("volterra_periodic_3").system
+    rhs = ["x1*(x2+x3+x4-x5)", "x2*(x3+x4+x5-x1)", "x3*(x4+x5-x1-x2)", "x4*(x5-x1-x2-x3)", "x5*(x1-x2-x3-x4)"]
+    assert load("lv(5,1)").system == QuadraticSystem.from_text([f"x{i}" for i in range(1, 6)], rhs)
+
+
+def test_the_name_is_written_without_spaces():
+    assert load(" lv( 6, 2 )").name == "lv(6,2)"
+
+
+@pytest.mark.parametrize(
+    ("reference", "words"),
+    [
+        ("lv", "expected lv(n,k) with integers, e.g. lv(7,3)"),
+        ("lv()", "expected lv(n,k) with integers"),
+        ("lv(7)", "expected lv(n,k) with integers"),
+        ("lv(7,3,1)", "expected lv(n,k) with integers"),
+        ("lv(7,1/2)", "expected lv(n,k) with integers"),
+        ("lv(1,0)", "found lv(1,0), expected lv(n,k) with 2 <= n <= 40, 0 <= k and 2k + 1 <= n"),
+        ("lv(6,3)", "2k + 1 <= n"),
+        ("lv(6,-1)", "0 <= k"),
+        ("lv(999,1)", "n <= 40"),
+        ("vl(7,3)", "found the unknown system"),
+    ],
+)
+def test_other_arguments_are_refused_in_one_line(reference, words):
+    with pytest.raises(InputError) as caught:
+        load(reference)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_member_goes_where_a_name_of_the_catalogue_goes(tmp_path):
+    twice = parse_system('[composition]\nof = [{ system = "lv(3,1)", power = 2 }]', "twice")
+    start = (fmpq(1), fmpq(2), fmpq(5))
+    over = load("lv(3,1)").map.at(EPS)
+    assert twice.map.at(EPS).step(start) == over.step(over.step(start))
+    assert find_file("lv(3,1)", tmp_path).system == load("lv(3,1)").system
+    assert parse_system(load("lv(6,1)").to_toml(), "again").system == load("lv(6,1)").system
+
+
+# the measure
+
+
+@pytest.mark.parametrize(("n", "k"), ALL)
+def test_the_measure_of_a_skew_system_is_invariant(n, k):
+    file = load(f"lv({n},{k})")
+    assert str(check_measure(file).verdict) == "proved"
+    here, there = orbit_of(file, 2)
+    left, right = file.map.at(-EPS).determinant(there), file.map.at(EPS).determinant(here)
+    for x, y in zip(here, there, strict=True):
+        left, right = left * x, right * y
+    assert left == right
+
+
+def test_without_skewness_the_lemma_says_nothing_and_the_measure_is_not_invariant():
+    file = parse_system(NO_SKEW, "other")
+    assert product_density_invariant(file.system, file.density) is None
+    assert str(check_measure(file).verdict) == "refuted"
+    lv = load("lv(3,1)")
+    assert product_density_invariant(lv.system, lv.density) is not None
+    assert product_density_invariant(lv.system, lv.integrals["I1"]) is None
+    assert product_density_invariant(load("euler_top").system, lv.density) is None
+
+
+# n = 2k + 1
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+def test_a_cubic_and_a_constant_matrix_make_lv_of_2k_plus_1(k):
+    n = 2 * k + 1
+    system = load(f"lv({n},{k})").system
+    x = system.rhs[0].context().gens()
+    eats = [[(j - i) % n in range(1, k + 1) for j in range(n)] for i in range(n)]
+    H = sum(
+        (
+            x[i] * x[j] * x[m]
+            for i in range(n)
+            for j in range(i, n)
+            for m in range(i, n)
+            if eats[i][j] and eats[j][m] and eats[m][i]
+        ),
+        system.rhs[0].context().constant(0),
+    )
+    slopes = gradient(H)
+    assert all(f == slopes[(r - k) % n] - slopes[(r + k) % n] for r, f in enumerate(system.rhs))
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+def test_the_product_over_the_determinant_is_conserved(k):
+    file = load(f"lv({2 * k + 1},{k})")
+    assert len({product_over_determinant(file, x) for x in orbit_of(file, 3)}) == 1
+
+
+def test_for_other_n_it_is_not():
+    file = load("lv(6,2)")
+    assert len({product_over_determinant(file, x) for x in orbit_of(file, 3)}) == 3
+
+
+def invariant_polynomials(n):
+    """The orbits of monomials of odd degree up to n under the shift of indices."""
+    seen, orbits = set(), []
+    for d in range(1, n + 1, 2):
+        for exponent in map(tuple, monomials(n, d)):
+            if exponent not in seen:
+                orbits.append({exponent[s:] + exponent[:s] for s in range(n)})
+                seen |= orbits[-1]
+    return orbits
+
+
+@pytest.mark.parametrize("k", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
+def test_over_the_determinant_there_are_k_plus_1_integrals(k):
+    n = 2 * k + 1
+    map_ = Laboratory(load(f"lv({n},{k})")).maps[0]
+    p, orbits = map_.prime, invariant_polynomials(n)
+
+    def values(x):
+        powers = [[pow(c, e, p) for e in range(n + 1)] for c in x]
+        total = []
+        for orbit in orbits:
+            value = 0
+            for exponent in orbit:
+                term = 1
+                for table, e in zip(powers, exponent, strict=True):
+                    term = term * table[e] % p
+                value += term
+            total.append(value % p)
+        return total
+
+    rows = []
+    for x, y in map_.pairs(len(orbits) + 8):
+        here, there = (int(map_.map.determinant(point)) for point in (x, y))
+        rows.append([(v * here - u * there) % p for u, v in zip(values(x), values(y), strict=True)])
+    found = null_space(rows, len(orbits), p)
+    lowest = [min(sum(next(iter(o))) for o, c in zip(orbits, vector, strict=True) if c) for vector in found]
+    assert lowest == list(range(1, n + 1, 2))
+
+
+# n > 2k + 1
+
+
+@pytest.mark.parametrize(("n", "k"), [(4, 1), (7, 1), (6, 2), (9, 3), (5, 0)])
+def test_the_map_projects_to_the_one_with_the_sum_of_the_middle_species(n, k):
+    file, image = load(f"lv({n},{k})"), load(f"lv({2 * k + 1},{k})") if k else None  # LV(1, 0) does not move
+
+    def projected(x):
+        return (*x[:k], sum(x[k : n - k], fmpq(0)), *x[n - k :])
+
+    here, there = map(projected, orbit_of(file, 2))
+    assert there == (image.map.at(EPS).step(here) if image else here)
+
+
+@pytest.mark.parametrize(("n", "k"), [(4, 1), (6, 1), (9, 2)])
+def test_a_sum_of_other_species_has_no_such_image(n, k):
+    here, there = ((*x[: n - 2], x[n - 2] + x[n - 1]) for x in orbit_of(load(f"lv({n},{k})"), 2))
+    assert load(f"lv({n - 1},{k})").map.at(EPS).step(here) != there
+
+
+@pytest.mark.parametrize(("n", "k"), [(5, 1), (6, 1), (9, 2), (9, 0), (12, 3)])
+def test_cross_ratios_are_conserved(n, k):
+    file = load(f"lv({n},{k})")
+    assert len(file.integrals) == 1 + n - 2 * k - 2 + (k == 1)
+    points = orbit_of(file, 3)
+    for function in file.integrals.values():
+        values = {
+            evaluate(function.numerator, QQ, (*x, EPS)) / evaluate(function.denominator, QQ, (*x, EPS)) for x in points
+        }
+        assert len(values) == 1
+
+
+# degrees
+
+
+def measured(file, seconds=20):
+    return degree_growth(file.map, seconds=seconds)
+
+
+@pytest.mark.parametrize(("n", "k"), [pair for pair in ALL if pair[0] <= 5])
+def test_the_singularities_give_the_formula_for_the_degrees(n, k):
+    growth = measured(load(f"lv({n},{k})"))
+    assert growth.explained is not None
+    assert list(growth.degrees) == [degree(n, k, m) for m in range(len(growth.degrees))]
+    # The formula satisfies the recurrence that is explained, and agrees at the start.
+    coefficients = [int(c) for c in growth.explained.characteristic.coeffs()]
+    for m in range(3, 30):
+        assert sum(c * degree(n, k, m + i) for i, c in enumerate(coefficients)) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("n", "k"), [pair for pair in ALL if pair[0] > 5])
+def test_measured_degrees_have_the_formula(n, k):
+    degrees = measured(load(f"lv({n},{k})"), 10).degrees
+    assert len(degrees) >= 8
+    assert list(degrees) == [degree(n, k, m) for m in range(len(degrees))]
+
+
+def test_a_sign_changed_changes_the_degrees():
+    file = load("lv(5,2)")
+    rhs = ["x1*(x2 + x3 - x4 + x5)", *map(str, file.system.rhs[1:4]), "x5*(-x1 + x2 - x3 - x4)"]
+    other = parse_system(f"variables = {[*file.variables]}\n[system]\nrhs = {rhs}".replace("'", '"'), "other")
+    assert list(measured(other, 5).degrees)[:5] != [degree(5, 2, m) for m in range(5)]

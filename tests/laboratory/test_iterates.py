@@ -1,0 +1,147 @@
+"""Integrals in iterates: relations of functions of (x, x~, ...) give integrals, exactly where there are some.
+
+Ratios are compared along rational orbits with ==, apart from the search that found them.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import pytest
+from flint import fmpq
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.functions import FunctionField
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
+from kahanmaps.laboratory.laboratory import Laboratory
+from kahanmaps.laboratory.preserve.affine_functions import affine_integrals
+from kahanmaps.laboratory.preserve.iterates import integrals_in_iterates, verdict_on_ratio
+from kahanmaps.laboratory.preserve.lifted import LIFTS, Lift, Lifted, lifts_with_spaces
+
+GAUDIN = """
+variables = ["x1", "x2", "x3", "y1", "y2", "y3"]
+[system]
+rhs = [
+  "y2*x3 - y3*x2 - x2", "y3*x1 - y1*x3 + x1", "y1*x2 - y2*x1",
+  "x2*y3 - x3*y2 - 3*y2", "x3*y1 - x1*y3 + 3*y1", "x1*y2 - x2*y1",
+]
+"""
+
+
+def searched(file, wanted=6, symbols=()):
+    """The laboratory, the integrals in x and those in iterates that do not depend on the affine ones."""
+    laboratory = Laboratory(file, symbols)
+    map_ = laboratory.maps[0]
+    affine = [[int(entry) % map_.prime for entry in v] for v in affine_integrals(laboratory.system)]
+    plain, ratios = integrals_in_iterates(laboratory, wanted, affine, map_.random_point(), time.monotonic() + 60)
+    return laboratory, len(affine), [function for function, _ in plain], [ratio for ratio, _ in ratios]
+
+
+def values_along_orbit(file, ratio, count=3):
+    eps = fmpq(2, 7)
+    map_ = file.map.at(eps)
+    points = [tuple(fmpq(k + 2, 3 * k + 5) for k in range(file.dim))]
+    while len(points) < ratio.length + count:
+        points.append(map_.step(points[-1]))
+    sides = [ratio.sides(QQ, points[k:], [eps]) for k in range(count)]
+    return [P / Q for P, Q in sides]
+
+
+# Affine ones, of the others those in x, and in x and x~, ...: four with the one that bases of quadrics give.
+@pytest.mark.parametrize(
+    ("file", "numbers", "proved"),
+    [
+        (load("clebsch_first_flow"), (0, 0, 4), 2),
+        (load("so4_euler_manakov"), (0, 0, 4), 1),
+        (load("kirchhoff_case"), (1, 1, 2), 1),
+        (load("lagrange_top"), (1, 2, 1), 1),
+        (parse_system(GAUDIN, "gaudin"), (1, 2, 1), 1),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_all_four_integrals_of_tops_and_spin_systems_have_formulas(file, numbers, proved):
+    laboratory, affine, plain, ratios = searched(file)
+    assert (affine, len(plain), len(ratios)) == numbers
+    assert all(laboratory.verdict_on(function)[0] is Verdict.PROVED for function in plain)
+    verdicts = [verdict_on_ratio(laboratory, ratio)[0] for ratio in ratios]
+    assert all(verdict.holds for verdict in verdicts)
+    assert verdicts.count(Verdict.PROVED) == proved
+    for ratio in ratios:
+        first, *others = values_along_orbit(file, ratio)
+        assert others == [first, first]
+
+
+def test_the_bilinear_integral_of_the_clebsch_system_is_written_with_the_image():
+    [ratio, *_] = searched(load("clebsch_first_flow"), wanted=1)[3]
+    assert ratio.text == "(p1*p1~*eps^2 - 2*p3*p3~*eps^2 - 1)/(3*p1*p1~*eps^2 + 2*p2*p2~*eps^2 - 1)"
+
+
+@pytest.mark.parametrize("name", ["clebsch_first_flow", "so4_euler_manakov", "kirchhoff_case"])
+def test_both_sides_of_a_symmetric_bilinear_integral_are_even_in_eps_and_densities(name):
+    file = load(name)
+    laboratory, _, _, [ratio, *_] = searched(file)
+    field = FunctionField((*file.variables, "eps"), reduces=True)
+    *x, eps = field.variables
+    over = file.map.at(eps, field)
+    image, D = over.step(x), over.determinant(x)
+    for F in ratio.functions:
+        q = (evaluate(F, field, (*x, *image, eps)) * D).above
+        assert not any(int(monomial[-1]) % 2 for monomial in q.monoms())
+        density = RationalFunction(q, q.context().constant(1))
+        assert laboratory.verdict_on(density, is_density=True)[0].holds
+        assert not laboratory.verdict_on(density)[0].holds
+
+
+def test_formulas_hold_for_every_value_of_a_symbol():
+    laboratory, _, _, [ratio, *_] = searched(load("clebsch_first_flow"), wanted=1, symbols=["w1"])
+    assert "w1" in ratio.text
+    assert verdict_on_ratio(laboratory, ratio)[0] is Verdict.PROVED
+
+
+# kirchhoff_generic has no relations at all; those of the others belong to the one integral that they have.
+@pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("kirchhoff_generic", (0, 0)),
+        ("lorenz", (0, 0)),
+        ("zhukovski_volterra_2", (0, 1)),
+        ("volterra_periodic_5", (0, 0)),
+    ],
+)
+def test_a_map_that_is_not_integrable_gains_nothing(name, numbers):
+    _, _, plain, ratios = searched(load(name))
+    assert (len(plain), len(ratios)) == numbers
+
+
+def test_a_ratio_that_is_not_conserved_is_refuted():
+    file = load("clebsch_first_flow")
+    laboratory, _, _, [ratio, *_] = searched(file, wanted=1)
+    P, Q = ratio.functions
+    wrong = replace(ratio, functions=(P + 1, Q))
+    assert verdict_on_ratio(laboratory, wrong)[0] is Verdict.REFUTED
+    assert len(set(values_along_orbit(file, wrong))) == 3
+
+
+def test_ratios_of_functions_of_rank_two_are_no_integrals_but_those_of_minors_are():
+    laboratory, _, _, ratios = searched(load("clebsch_first_flow"))
+    minors = ratios[-1]
+    assert minors.lift.rank == 2
+    single = replace(minors, lift=minors.lift._replace(rank=1), above=(0,), below=(1,))
+    assert verdict_on_ratio(laboratory, single)[0] is Verdict.REFUTED
+
+
+def test_an_orbit_that_closes_has_as_many_rows_as_points():
+    map_ = Laboratory(load("harmonic", {"w": 1}), eps="1").maps[0]  # a rotation by a right angle
+    rows, _, period = Lifted(map_, Lift(1, 1)).along_orbit(2, 10)
+    assert (len(rows), period) == (4, 4)
+
+
+def test_lifts_of_rank_one_come_before_those_of_rank_two():
+    map_ = Laboratory(load("so4_euler_manakov")).maps[0]
+    ranks = [lift.rank for lift, _ in lifts_with_spaces(map_)]
+    assert ranks == [1, 1, 1, 1, 2, 2]
+    assert len(LIFTS) == len(ranks)
