@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from kahanmaps.paper.objects import PaperObjects
+from kahanmaps.paper.poisson_structure import jacobi_identity, jacobi_identity_of
 from kahanmaps.paper.registry import Kind, Pairs, claim
 
 _ITERATES = 4  # the first one that tells a planar Hamiltonian map from others
@@ -74,19 +77,130 @@ def degrees_of_the_iterates(o: PaperObjects) -> Pairs:
         yield o.rank(o.K.matrix(size, size, quotients)), degree
 
 
+@claim("Tensor theorem", "", "A^T dPhi = dPhi A^T, for any quadratic f over Q[A^T]", breaks=("A",), symplectic=False)
+def map_over_the_algebra(o: PaperObjects) -> Pairs:
+    """The Kahan map of a system over Q[A^T] is one over Q[A^T]"""
+    jacobian = o.jacobian_of_step(o.arbitrary_system_over_the_algebra(), o.x)
+    yield o.AT * jacobian, jacobian * o.AT
+
+
 @claim(
-    "Steps",
+    "Tensor theorem",
     "",
-    "Phi_f(., eps) o Phi_g(., 2 eps) != Phi_g(., 2 eps) o Phi_f(., eps)",
+    "Phi_f o Phi_g = Phi_g o Phi_f, g = B^T f, for any quadratic f over Q[A^T]",
+    breaks=("B",),
+    symplectic=False,
+)
+def commuting_systems_over_the_algebra(o: PaperObjects) -> Pairs:
+    """A system over Q[A^T] need not be Hamiltonian for its sign systems to commute"""
+    f = o.arbitrary_system_over_the_algebra()
+    for B in o.associates():
+        g = f.transformed(B.transpose())
+        yield o.step(f, o.step(g, o.x)), o.step(g, o.step(f, o.x))
+
+
+@claim(
+    "Tensor theorem",
+    "",
+    "dPhi (A^T)^k Pi(x) dPhi^T = (A^T)^k Pi(x~), k < m",
+    distinct_roots=True,
+    breaks=("H", "map"),
+    blockwise=True,
+)
+def poisson_map_for_each_power(o: PaperObjects) -> Pairs:
+    """Not one invariant Poisson tensor but m, one for each element of a basis of the algebra"""
+    jacobian = o.jacobian_of_step(o.f, o.x)
+    for k in range(o.m):
+        power = o.A_to(k).transpose()
+        yield jacobian * power * o.Pi(o.x) * jacobian.transpose(), power * o.Pi(o.x_tilde)
+
+
+@claim(
+    "Tensor theorem",
+    "",
+    "sum c_k (A^T)^k Pi is a Poisson tensor for any constants c_k",
+    least_m=2,
+    pairwise=True,
+    distinct_roots=True,
+    breaks=("H", "f"),
+)
+def compatible_poisson_tensors(o: PaperObjects) -> Pairs:
+    """The m invariant Poisson tensors are compatible"""
+    yield from jacobi_identity_of(o, o.polynomial_in_A([o.vector("c")[k, 0] for k in range(o.m)]).transpose())
+
+
+@claim(
+    "Maximality",
+    "",
+    "Phi_f o Phi_g = Phi_g o Phi_f for g = B^T f, B^3 = B",
+    least_m=2,
+    breaks=("roots",),
+    distinct_roots=True,
+    blockwise=True,
+)
+def commutativity_for_idempotents(o: PaperObjects) -> Pairs:
+    """B may have the eigenvalue 0 as well: the map of the part of f on one block commutes with that of f"""
+    for i in o.each:
+        g = o.g(o.projector(i))
+        yield o.step(o.f, o.step(g, o.x)), o.step(g, o.x_tilde)
+
+
+@claim(
+    "Maximality",
+    "",
+    "Res(N_1, N_2) != 0, (l^3 - l) N_i(l) the components of Phi_f o Phi_{l f} - Phi_{l f} o Phi_f on a block",
     kind=Kind.DIFFERENT,
     in_general=True,
-    distinct_roots=True,
     breaks=("linear",),
+    distinct_roots=True,
 )
-def different_steps_do_not_commute(o: PaperObjects) -> Pairs:
-    """Maps of associated fields with different eps do not commute in general, nor does a map with itself"""
-    for g in [o.f, *(o.g_(i) for i in o.each)]:
-        yield o.step(g, o.x_tilde, times=2), o.step(o.f, o.step(g, o.x, times=2))
+def only_cube_roots_commute(o: PaperObjects) -> Pairs:
+    """The maps of f and l f, so those of f at eps and at l eps, commute for l^3 = l only; hence those of f and B^T f"""
+    for i in o.each:
+        x = o.projector(i).transpose() * o.x
+        fx, x_tilde = o.value(o.f, x), o.step(o.f, x)
+        square = o.eps * o.eps
+        # N has degree 5 in l over these denominators, and vanishes at 0, 1 and -1: a quadratic, known at 2, 3 and 4.
+        values = []
+        for l in (2, 3, 4):
+            below = o.K.one + square * o.number(l * l) * o.block_determinant(i, x)
+            moved = x + fx * (o.eps * o.number(2 * l))
+            first = o.K.one + square * o.number(l * l) * o.block_determinant(i, x_tilde)
+            second = below * below + square * o.block_determinant(i, moved)
+            difference = o.step(o.f, x_tilde, times=l) - o.step(o.f, o.step(o.f, x, times=l))
+            values.append(difference * (first * second * o.number(1, l**3 - l)))
+        low, middle, high = values
+        slope, curve = (high - low) * o.number(1, 2), (high + low) * o.number(1, 2) - middle
+        (a, b, c), (p, q, r) = ([o.dot(o.vector(form), v) for v in (curve, slope, middle)] for form in ("v", "w"))
+        yield (a * r - c * p) * (a * r - c * p) - (a * q - b * p) * (b * r - c * q), o.K.zero
+
+
+@claim(
+    "Periodic levels",
+    "",
+    "32 [015] [234] = (32 - 27 g) [024] [135],  (32 - 27 g) [016] [235] = (28 - 27 g) [025] [136]",
+    breaks=("H", "eps"),
+    distinct_roots=True,
+    blockwise=True,
+)
+def division_polynomials(o: PaperObjects) -> Pairs:
+    """Determinants [ijk] of points of an orbit in a plane: T has order 5 where g = 32/27, and 6 where g = 28/27"""
+    for i in o.free:
+        E = o.projector(i).transpose()
+        points = [E * o.x]
+        for _ in range(6):
+            points.append(o.step(o.f, points[-1]))
+
+        def det(*which: int, points: list[Any] = points) -> Any:
+            return o.sum([o.dot(points[a], o.J * points[b]) for a, b in zip(which, which[1:] + which[:1], strict=True)])
+
+        x, fx = points[0], o.value(o.f, points[0])
+        D, D_f = o.block_determinant(i, x), o.block_determinant(i, fx)
+        along, s = o.block_determinant(i, x + fx) - D - D_f, o.K.one + o.eps * o.eps * D
+        g = s * s * o.number(27) + (along * along + D * D * D) * o.eps**6 * o.number(4)  # 27 g s^2
+        five, six = s * s * o.number(32) - g, s * s * o.number(28) - g
+        yield s * s * o.number(32) * det(0, 1, 5) * det(2, 3, 4), five * det(0, 2, 4) * det(1, 3, 5)
+        yield five * det(0, 1, 6) * det(2, 3, 5), six * det(0, 2, 5) * det(1, 3, 6)
 
 
 @claim("Inhomogeneous H", "", "Phi_f o Phi_g = Phi_g o Phi_f", breaks=("B", "H"), blockwise=True)
@@ -157,8 +271,6 @@ def poisson_map_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
 )
 def jacobi_identity_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
     """Pi is still a Poisson tensor"""
-    from kahanmaps.paper.poisson_structure import jacobi_identity
-
     yield from jacobi_identity(o.inhomogeneous())
 
 

@@ -296,6 +296,10 @@ class PaperObjects(Calculus):
         jacobian = self.jac(self.f, x)
         return self.trace(self.projector(i).transpose() * jacobian * jacobian) * self.number(1, 2)
 
+    def block_determinant(self, i: int, x: Any) -> Any:
+        """D_i, the determinant of the planar f'."""
+        return -self.eigenvalue_of_square(i, x)
+
     @remembered
     def eighth_of_trace(self, x: Any) -> Any:
         """tr f'^2/8."""
@@ -425,6 +429,29 @@ class PaperObjects(Calculus):
             return SystemOver(K, K.matrix(n * n, n, tensor))
         linear = self.columns([self.vector(f"B {j}") for j in range(n)])
         return SystemOver(K, K.matrix(n * n, n, tensor), linear, self.vector("c"))
+
+    def arbitrary_system_over_the_algebra(self) -> SystemOver:
+        """A planar quadratic system over Q[A^T]: f = sum of M_a(x) M_b(x) e, M_c(x) e' and a constant, vectors drawn.
+
+        M_a(x) = sum_k (a^T (A^T)^k x) C_k(A)^T with Horner's polynomials C_k of chi; since chi(A) = 0 it is linear over
+        Q[A^T], as every linear form with values there.
+        """
+        n, K = self.n, self.K
+
+        def form(name: str) -> list[Any]:
+            parts = [self.A_to(k) * self.vector(name) for k in range(self.m)]
+            horner = [self.horner(k).transpose() for k in range(self.m)]
+            return [self.sum([h * p[j, 0] for h, p in zip(horner, parts, strict=True)]) for j in range(n)]
+
+        rows: list[list[Any]] = [[K.zero] * (n * n) for _ in range(n)]
+        for term in ("1", "2"):
+            a, b, e = form(f"a{term}"), form(f"b{term}"), self.vector(f"e{term}")
+            for j, k in itertools.product(range(n), repeat=2):
+                value = a[j] * (b[k] * e) + a[k] * (b[j] * e)
+                for i in range(n):
+                    rows[i][j * n + k] = rows[i][j * n + k] + value[i, 0]
+        linear = self.columns([M * self.vector("e'") for M in form("c")])
+        return SystemOver(K, K.matrix(n * n, n, [entry for row in rows for entry in row]), linear, self.vector("f(0)"))
 
     def arbitrary_hamiltonian(self, standard: bool = False) -> PaperObjects:
         """A cubic H with terms of all degrees and (unless it is to be standard) a skew J, without any structure."""
