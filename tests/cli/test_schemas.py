@@ -51,6 +51,8 @@ CASES = [
     "period {pair} --start 1/2,-1/3,0,1 --eps 1/10 --json",
     "period {pair} --start 1/2,-1/3,0,1 --eps 1/10 --arithmetic mod:10007 --json",
     "period {pair} --start 0,0,0,0 --eps 1/10 --json",
+    "period --levels 7 --json",
+    "period {pair} --eps 1/10 --levels 6 --json",
     "ensemble euler_top --random 5 --eps 1/10 --steps 10 --integral x1 --backward --json",
     "ensemble {pair} --random 5 --eps 1/10 --steps 10 --json -q -o {here}/e.npy",
     "ensemble euler_top --random 5 --eps 1/10 --steps 10 --arithmetic mod:101 --integral x1 --json",

@@ -257,8 +257,9 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
       kahanmaps family tensor --vars x,y --rhs 't*x^2' --rhs '-2*x*y' -p t=0 \\
           --algebra 't^2+1'
 
-    A variable x becomes x_0, x_1, ..., for x_0 + x_1 t + ... in K. Roots of chi may be repeated. A parameter t of SYSTEM stands for the generator of K. Integrals and the density that
-    SYSTEM claims become the m integrals and the density that its map over Q inherits.
+    A variable x becomes x_0, x_1, ..., for x_0 + x_1 t + ... in K. Roots of chi may be repeated. A
+    parameter t of SYSTEM stands for the generator of K. Integrals and the density that SYSTEM claims become the m
+    integrals and the density that its map over Q inherits.
     """
     from kahanmaps.documents.tensor import tensor_file
     from kahanmaps.family.draw import parse_chi
