@@ -118,6 +118,7 @@ SOURCES: dict[str, str] = {
         "M. Petrera, A. Pfadler, Yu. B. Suris. On integrability of Hirota-Kimura-type discretizations: experimental "
         "study of the discrete Clebsch system. Exp. Math. 18 (2009), 223-247. arXiv:0808.3345"
     ),
+    "mazur-1977": ("B. Mazur. Modular curves and the Eisenstein ideal. Publ. Math. IHES 47 (1977), 33-186."),
     "zander-2021": (
         "R. Zander. On the singularity structure of Kahan discretizations of a class of quadratic vector fields. "
         "Eur. J. Math. 7 (2021), 1046-1073. arXiv:2003.01659"

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+from kahanmaps.paper.evaluate import entries
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.paper.poisson_structure import jacobi_identity, jacobi_identity_of
-from kahanmaps.paper.registry import Kind, Pairs, claim
+from kahanmaps.paper.poisson_structure import jacobi_identity, jacobi_identity_of, poisson_map, poisson_map_of_g
+from kahanmaps.paper.registry import ClaimFunction, Kind, Pairs, claim
+from kahanmaps.paper.variations import VARIATIONS, Variation, varied
 
 _ITERATES = 4  # the first one that tells a planar Hamiltonian map from others
 
@@ -77,7 +80,14 @@ def degrees_of_the_iterates(o: PaperObjects) -> Pairs:
         yield o.rank(o.K.matrix(size, size, quotients)), degree
 
 
-@claim("Tensor theorem", "", "A^T dPhi = dPhi A^T, for any quadratic f over Q[A^T]", breaks=("A",), symplectic=False)
+@claim(
+    "Tensor theorem",
+    "",
+    "A^T dPhi = dPhi A^T, for any quadratic f over Q[A^T]",
+    breaks=("A",),
+    symplectic=False,
+    theorem="the tensor theorem (docs/mathematics.md)",
+)
 def map_over_the_algebra(o: PaperObjects) -> Pairs:
     """The Kahan map of a system over Q[A^T] is one over Q[A^T]"""
     jacobian = o.jacobian_of_step(o.arbitrary_system_over_the_algebra(), o.x)
@@ -90,6 +100,7 @@ def map_over_the_algebra(o: PaperObjects) -> Pairs:
     "Phi_f o Phi_g = Phi_g o Phi_f, g = B^T f, for any quadratic f over Q[A^T]",
     breaks=("B",),
     symplectic=False,
+    theorem="the splitting lemma (docs/mathematics.md)",
 )
 def commuting_systems_over_the_algebra(o: PaperObjects) -> Pairs:
     """A system over Q[A^T] need not be Hamiltonian for its sign systems to commute"""
@@ -203,100 +214,129 @@ def division_polynomials(o: PaperObjects) -> Pairs:
         yield five * det(0, 1, 6) * det(2, 3, 5), six * det(0, 2, 5) * det(1, 3, 6)
 
 
-@claim("Inhomogeneous H", "", "Phi_f o Phi_g = Phi_g o Phi_f", breaks=("B", "H"), blockwise=True)
-def commutativity_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """H with quadratic and linear terms, A nabla^2 H = nabla^2 H A^T: the maps still commute"""
-    p = o.inhomogeneous()
-    for B in p.associates():
-        f, g = p.f, p.g(B)
-        yield p.step(f, p.step(g, p.x)), p.step(g, p.step(f, p.x))
+def _commuting(o: PaperObjects) -> Pairs:
+    """The maps of the class commute"""
+    for B in o.associates():
+        yield o.step(o.f, o.step(o.g(B), o.x)), o.step(o.g(B), o.x_tilde)
 
 
-@claim(
-    "Inhomogeneous H",
-    "",
-    "modified K = K + (2 eps/3) nabla K^T (I - eps g')^{-1} g is shared",
-    breaks=("B", "H"),
-    blockwise=True,
-)
-def integrals_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
+def _measure(o: PaperObjects) -> Pairs:
+    """The map of f has its invariant measure"""
+    determinant = o.det(o.jacobian_of_step(o.f, o.x))
+    yield determinant * o.det(o.minus_eps_jac(o.f, o.x)), o.det(o.minus_eps_jac(o.f, o.x_tilde))
+
+
+def _shared_measure(o: PaperObjects) -> Pairs:
+    """All maps of the class have that measure"""
+    for B in o.associates():
+        determinant = o.det(o.jacobian_of_step(o.g(B), o.x))
+        x_hat = o.step(o.g(B), o.x)
+        yield determinant * o.det(o.minus_eps_jac(o.f, o.x)), o.det(o.minus_eps_jac(o.f, x_hat))
+
+
+def _modified(o: PaperObjects) -> Pairs:
+    """The map of f conserves modified H"""
+    yield o.modified_H(o.x_tilde), o.modified_H(o.x)
+
+
+def _shared_modified(o: PaperObjects) -> Pairs:
     """The modified Hamiltonians are shared by all maps of the class"""
-    p = o.inhomogeneous()
-    x_tilde = p.step(p.f, p.x)
-    for B in p.associates():
-        x_hat = p.step(p.g(B), p.x)
-        for image in (x_tilde, x_hat):
-            yield p.modified(B, image), p.modified(B, p.x)
-            yield p.modified_H(image), p.modified_H(p.x)
+    for B in o.associates():
+        yield o.modified_H(o.step(o.g(B), o.x)), o.modified_H(o.x)
+        yield o.modified(B, o.x_tilde), o.modified(B, o.x)
 
 
-@claim(
-    "Inhomogeneous H",
-    "",
-    "eps^{-1} x^T J x~ is not conserved",
-    kind=Kind.DIFFERENT,
-    in_general=True,
-    breaks=("homogeneous",),
-)
-def paper_integral_fails_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """The paper's own form eps^{-1} x^T J x~ is NOT conserved"""
-    p = o.inhomogeneous()
-    yield p.H_tilde(p.step(p.f, p.x)), p.H_tilde(p.x)
+def _paper_integral(o: PaperObjects) -> Pairs:
+    """The map of f conserves the paper's form eps^{-1} x^T J^{-1} x~"""
+    images = [o.solve(o.J, o.step(o.f, x)) for x in (o.x_tilde, o.x)]
+    yield o.dot(o.x_tilde, images[0]), o.dot(o.x, images[1])
 
 
-@claim(
-    "Inhomogeneous H",
-    "",
-    "dPhi Pi(x) dPhi^T = Pi(x~), for f and g",
-    distinct_roots=True,
-    breaks=("H", "B"),
-    blockwise=True,
-)
-def poisson_map_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """Pi = J - eps^2 f'^2 J is still invariant"""
-    p = o.inhomogeneous()
-    for g in [p.f, *(p.g(B) for B in p.associates())]:
-        jacobian = p.jacobian_of_step(g, p.x)
-        yield jacobian * p.Pi(p.x) * jacobian.transpose(), p.Pi(p.step(g, p.x))
+def _modified_K(k: int) -> Callable[[PaperObjects, Any], Any]:
+    """The modified Hamiltonian of the k-th associated field, for other numbers as well."""
+    return lambda o, x: o.modified(list(o.associates())[k], x)
 
 
-@claim(
-    "Inhomogeneous H",
-    "",
-    "{x_i,{x_j,x_k}} + cyclic = 0",
-    least_m=2,
-    pairwise=True,
-    distinct_roots=True,
-    breaks=("H", "f"),
-)
-def jacobi_identity_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """Pi is still a Poisson tensor"""
-    yield from jacobi_identity(o.inhomogeneous())
-
-
-@claim("Inhomogeneous H", "", "nabla (modified K_s) = B_s nabla (modified H)", breaks=("H", "B"), blockwise=True)
-def gradients_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """The modified Hamiltonians satisfy the same differential equation"""
+def _gradients(o: PaperObjects) -> Pairs:
+    """The modified Hamiltonians satisfy the same differential equation as H and K"""
     v = o.vector("v")
-    p = o.inhomogeneous()
-    for signs in p.all_signs():
-        left = p.slope(lambda p, x: p.modified(p.B_signs(signs), x), p.x, v)
-        yield left, p.slope(lambda p, x: p.modified_H(x), p.x, p.B_signs(signs).transpose() * v)
+    for k, B in enumerate(o.associates()):
+        left = o.slope(_modified_K(k), o.x, v)
+        yield left, o.slope(lambda o, x: o.modified_H(x), o.x, B.transpose() * v)
 
 
-@claim(
-    "Inhomogeneous H",
-    "",
-    "modified H != P_0 H + eps^2 sum Q_i K_i",
-    kind=Kind.DIFFERENT,
-    in_general=True,
-    breaks=("homogeneous",),
-    distinct_roots=True,
-)
-def formula_through_H_and_K_fails_for_inhomogeneous_cubics(o: PaperObjects) -> Pairs:
-    """The formula (106) through H and the K_i does NOT survive"""
-    p = o.inhomogeneous()
-    right = p.P0(p.x) * p.H(p.x)
-    for i in p.each:
-        right = right + p.eps * p.eps * p.Q(i, p.x) * p.Kf(p.B(i), p.x)
-    yield p.modified_H(p.x), right
+def _involution(o: PaperObjects) -> Pairs:
+    """The modified Hamiltonians are in involution for Pi"""
+    gradient = o.gradient(lambda o, x: o.modified_H(x), o.x)
+    for k, _ in enumerate(o.associates()):
+        other = o.gradient(_modified_K(k), o.x)
+        yield o.dot(gradient, o.Pi(o.x) * other), o.K.zero
+
+
+def _formula(o: PaperObjects) -> Pairs:
+    """The formula (106) for the integral through H and the K_i"""
+    right = o.P0(o.x) * o.H(o.x)
+    for i in o.each:
+        right = right + o.eps * o.eps * o.Q(i, o.x) * o.Kf(o.B(i), o.x)
+    yield o.modified_H(o.x), right
+
+
+# What is asked of every variation: the formula, the controls of what holds, how it is proved, and an answer for each of
+# VARIATIONS in turn: + holds, - fails, and a blank where it is not asked: of a variation that concerns g nothing is
+# asked that concerns f alone.
+_ALONE, _BOTH = {"blockwise": True}, {"blockwise": True, "needs_g": True}
+STATEMENTS: list[tuple[ClaimFunction, str, tuple[str, ...], dict[str, Any], str]] = [
+    (_commuting, "Phi_f o Phi_g = Phi_g o Phi_f", ("B", "map"), _BOTH, "++--++"),
+    (_measure, "dx/det(I - eps f') is invariant for f", ("map",), _ALONE, "+++ ++"),
+    (_shared_measure, "dx/det(I - eps f') is invariant for g", ("B", "map"), _BOTH, "++--++"),
+    (_modified, "modified H is conserved by f", ("map",), _ALONE, "+++ ++"),
+    (_shared_modified, "modified H is conserved by g, modified K by f", ("B", "map"), _BOTH, "++--++"),
+    (_paper_integral, "eps^{-1} x^T J^{-1} x~ is conserved by f", ("map",), _ALONE, "-++ ++"),
+    (poisson_map, "dPhi_f Pi(x) dPhi_f^T = Pi(x~)", ("map",), _ALONE, "++- +-"),
+    (poisson_map_of_g, "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", ("B", "map"), _BOTH, "++--+-"),
+    (jacobi_identity, "{x_i,{x_j,x_k}} + cyclic = 0 for Pi", ("f''",), {"pairwise": True, "least_m": 2}, "++- +-"),
+    (_gradients, "nabla (modified K) = B nabla (modified H)", ("B",), _BOTH, "++--++"),
+    (_involution, "{modified H, modified K} = 0 for Pi", ("B",), {"pairwise": True, "needs_g": True}, "++--++"),
+    (_formula, "modified H = P_0 H + eps^2 sum Q_i K_i", ("B",), {}, "-+-   "),
+]
+
+
+def _register() -> None:
+    for function, formula, breaks, how, answers in STATEMENTS:
+        for (name, variation), answer in zip(VARIATIONS.items(), answers, strict=True):
+            if answer != " ":
+                _register_cell(function, formula, breaks, how, name, variation, answer == "+")
+
+
+def _register_cell(
+    function: ClaimFunction,
+    formula: str,
+    breaks: tuple[str, ...],
+    how: dict[str, Any],
+    name: str,
+    variation: Variation,
+    holds: bool,
+) -> None:
+    def cell(o: PaperObjects) -> Pairs:
+        pairs = list(function(varied(name, o)))
+        if holds or not pairs:
+            yield from pairs
+        else:  # one of them has to differ
+            yield tuple(o.K.column([e for pair in pairs for e in entries(pair[side])]) for side in (0, 1))
+
+    cell.__name__ = f"{function.__name__}_{name}"
+    cell.__doc__ = f"{(function.__doc__ or '').splitlines()[0].rstrip('.')}: {variation.title}"
+    more = dict(how)
+    needs_g = more.pop("needs_g", False) and variation.least_m > 1 and name != "any-structure"
+    least = max(variation.least_m, more.pop("least_m", 1), 3 if needs_g else 1)
+    more |= {"distinct_roots": True, "least_m": least, "statement": formula, "variation": name}
+    if holds:
+        more |= {"symplectic": not variation.theorem, "theorem": variation.theorem}
+    else:
+        more |= {"kind": Kind.DIFFERENT, "in_general": True}
+    claim(
+        variation.title, "", formula if holds else f"not {formula}", breaks=breaks if holds else ("unvaried",), **more
+    )(cell)
+
+
+_register()

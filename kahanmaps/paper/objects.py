@@ -44,9 +44,7 @@ class PaperObjects(Calculus):
     order: int = 3  # to which order in eps^2 series are expanded
     lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient of the inhomogeneous part, where it is given
     known_chi: tuple[Any, ...] | None = None  # coefficients of chi, constant term first, where they are in K
-    # The rest is for controls only: the explicit Euler method instead of Kahan's, an inhomogeneous H without lower
-    # terms, a tensor f'' that is not the derivative of f'.
-    has_lower_terms: bool = True
+    varied: bool = True  # whether variations vary anything: not in their control
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -401,7 +399,7 @@ class PaperObjects(Calculus):
             linear = self.zeros(self.n, 1)
             if self.lower_terms is not None:
                 X, linear = self.lower_terms
-            elif self.has_lower_terms:
+            elif self.varied:
                 linear = self.vector("linear")
                 for name in ("u1", "u2", "u3"):
                     u = self.vector(name)
