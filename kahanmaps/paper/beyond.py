@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import comb
 from typing import Any
 
 from kahanmaps.paper.evaluate import entries
 from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.poisson_structure import jacobi_identity, jacobi_identity_of, poisson_map, poisson_map_of_g
 from kahanmaps.paper.registry import ClaimFunction, Kind, Pairs, claim
-from kahanmaps.paper.variations import VARIATIONS, Variation, varied
+from kahanmaps.paper.variations import VARIATIONS, Variation, jordan_block, varied
 
 _ITERATES = 4  # the first one that tells a planar Hamiltonian map from others
 
@@ -141,6 +142,21 @@ def compatible_poisson_tensors(o: PaperObjects) -> Pairs:
 
 
 @claim(
+    "A with a Jordan block",
+    "",
+    "dim of the cubics = 4m, lambda_1 double, chi the minimal polynomial",
+    kind=Kind.ATTAINED,
+    at_most="docs/mathematics.md proves it for every A that is not derogatory",
+    least_m=2,
+    breaks=("J",),
+    distinct_roots=True,
+)
+def dimension_of_the_cubics_for_a_jordan_block(o: PaperObjects) -> Pairs:
+    """For A that is not diagonalisable, but not derogatory, the cubics form a space of dimension 4m as well"""
+    yield comb(o.n + 2, 3) - jordan_block(o).rank_of_cubic_equations(), 4 * o.m
+
+
+@claim(
     "Maximality",
     "",
     "Phi_f o Phi_g = Phi_g o Phi_f for g = B^T f, B^3 = B",
@@ -190,7 +206,7 @@ def only_cube_roots_commute(o: PaperObjects) -> Pairs:
     "Periodic levels",
     "",
     "32 [015] [234] = (32 - 27 g) [024] [135],  (32 - 27 g) [016] [235] = (28 - 27 g) [025] [136]",
-    breaks=("H", "eps"),
+    breaks=("H", "f"),
     distinct_roots=True,
     blockwise=True,
 )
@@ -257,6 +273,12 @@ def _modified_K(k: int) -> Callable[[PaperObjects, Any], Any]:
     return lambda o, x: o.modified(list(o.associates())[k], x)
 
 
+def _all_integrals(o: PaperObjects) -> Pairs:
+    """The map of f conserves the m functions eps^{-1} x^T J (A^T)^k x~"""
+    for k in range(o.m):
+        yield o.H_tilde_(k, o.x_tilde), o.H_tilde_(k, o.x)
+
+
 def _gradients(o: PaperObjects) -> Pairs:
     """The modified Hamiltonians satisfy the same differential equation as H and K"""
     v = o.vector("v")
@@ -292,6 +314,7 @@ STATEMENTS: list[tuple[ClaimFunction, str, tuple[str, ...], dict[str, Any], str]
     (_modified, "modified H is conserved by f", ("map",), _ALONE, "+++ ++"),
     (_shared_modified, "modified H is conserved by g, modified K by f", ("B", "map"), _BOTH, "++--++"),
     (_paper_integral, "eps^{-1} x^T J^{-1} x~ is conserved by f", ("map",), _ALONE, "-++ ++"),
+    (_all_integrals, "eps^{-1} x^T J (A^T)^k x~ is conserved by f, k < m", ("map",), _ALONE, "-   ++"),
     (poisson_map, "dPhi_f Pi(x) dPhi_f^T = Pi(x~)", ("map",), _ALONE, "++- +-"),
     (poisson_map_of_g, "dPhi_g Pi(x) dPhi_g^T = Pi(x^)", ("B", "map"), _BOTH, "++--+-"),
     (jacobi_identity, "{x_i,{x_j,x_k}} + cyclic = 0 for Pi", ("f''",), {"pairwise": True, "least_m": 2}, "++- +-"),

@@ -157,7 +157,7 @@ class Examiner(ABC):
         roots, outcome, tried = False, None, 0
         for number in range(_POLES):
             # Large matrices over Q are dear, and where there is a reason for the other side a point over GF(p) will do.
-            modular = bool(claim.at_most) and self.m > 4
+            modular = bool(claim.at_most) and self.m > 3
             objects = (None if modular else self.exact_point(roots, number)) or self.point(roots, number)
             if objects is None:
                 text = "no prime was found at which chi splits into distinct factors"

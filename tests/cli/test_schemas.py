@@ -108,6 +108,7 @@ SLOW = [
     "verify --m 3 --universal --json -q",
     "verify --chi (t-1)^2 --json -q",
     "verify --eigenvalues 1,-1 --controls --json -q",
+    "verify --beyond --m 2 --json -q",
     "analyze euler_top --symbolic a1 --json -q",
     "analyze lorenz --eps 1/10 --seconds 4 --json -q",
     "analyze {pair} --seconds 20 --json -q",
