@@ -16,7 +16,6 @@ from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import monomials
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 from kahanmaps.checks.settings import Settings
-from kahanmaps.display import markup
 from kahanmaps.paper.beyond import STATEMENTS
 from kahanmaps.paper.evaluate import UNDEFINED, Outcome, same, witness_of
 from kahanmaps.paper.examiner import VerifyOptions
@@ -70,7 +69,7 @@ def table(report: Report) -> str:
     cells = {(found.place["statement"], found.place["variation"]): found for found in report.findings}
     for _, formula, *_ in STATEMENTS:
         row = [str(cells[formula, name].verdict) if (formula, name) in cells else "" for name in VARIATIONS]
-        lines.append(f"| {markup.code(formula)} | {' | '.join(row)} |".replace("  |", " |"))
+        lines.append(f"| `{formula}` | {' | '.join(row)} |".replace("  |", " |"))
     lines.append("")
     for found in report.findings:
         if found.witness is not None:

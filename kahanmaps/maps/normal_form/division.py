@@ -3,7 +3,7 @@
 On a level of a plane the Kahan map is the translation by T = (0, 0) on y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, with
 gamma = 1 - disc(h) level^2 (docs/mathematics.md, "A translation, and tau functions"). So it has period N on the smooth
 levels where psi_N(gamma) = 0 and no psi_d does for a d < N. By Mazur's theorem no rational gamma has a period of 11 or
-more than 12. Source: ward-1948 for the recurrence.
+more than 12. Source: ward-1948 for the recurrence, mazur-1977.
 """
 
 from __future__ import annotations
