@@ -53,11 +53,7 @@ def _sections() -> list[tuple[str, set[str], Callable[[Findings], list[Statement
             lambda found: [*_integral_lines(found), *_curve_lines(found)],
         ),
         ("measure", {"densities"}, _measure_lines),
-        (
-            "the flow",
-            {"the flow"},
-            lambda found: [Statement(*line) for line in found.flow.lines()] if found.flow else [],
-        ),
+        ("the flow", {"the flow"}, _flow_lines),
         ("Poisson tensors", {"Poisson tensors"}, _poisson_lines),
         ("growth", {"degrees", "heights"}, _growth_lines),
         ("singularities", {"singularities"}, _singularity_lines),
