@@ -2,7 +2,7 @@
 
 The pages are Markdown that is to be read on a Git host as well, so there is no syntax in them that only Sphinx knows,
 but for the tables of contents and for comments `<!-- generated: ... -->`, which `_ext/kahanmaps_docs` replaces by what
-it makes of the code. Nothing is fetched: formulas are MathML, letters those of the reader's machine.
+it makes of the code. Nothing is fetched: formulas are MathML, set in a font that comes with the pages.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ nitpick_ignore_regex = [(r"py:(class|obj|data|exc|attr|meth|func|mod)", r".*")]
 
 html_theme = "furo"
 html_title = f"kahanmaps {release}"
-html_static_path = ["_static"]
+html_static_path = ["_static", "../kahanmaps/reports/fonts"]  # reports and pages share the font of formulas
 html_css_files = ["kahanmaps.css"]
 html_math_renderer = "mathml"
 html_use_index = False  # there is the search

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
+from html import unescape
 from html.parser import HTMLParser
+from importlib import resources
 from itertools import pairwise
+from unicodedata import decomposition
+
+from fontTools.ttLib import TTFont
 
 _VOID = {"meta", "link", "br", "img", "hr", "input"}
 _FETCHING = {"src", "srcset", "data", "poster", "background"}
@@ -60,7 +66,7 @@ class Page(HTMLParser):
     def handle_data(self, data):
         if "style" in self._open:
             assert "@import" not in data
-            assert "url(" not in data.replace("url(#", "")
+            assert not re.search(r"url\((?!#|data:)", data)
             return
         self.text += data
         if self._open and self._open[-1] in ("h1", "h2", "h3", "h4"):
@@ -83,3 +89,24 @@ def require_sound(html: str) -> Page:
     assert all(later <= earlier + 1 for earlier, later in pairwise(levels)), "a level left out"
     assert all(page.alttexts), "a formula without its text"
     return page
+
+
+# What a browser shows for a name of one letter: "<font> 0061" is how Unicode writes the italic a.
+ITALICS = {
+    chr(int(decomposition(chr(code)).split()[1], 16)): chr(code)
+    for code in [0x210E, *range(0x1D434, 0x1D468), *range(0x1D6E2, 0x1D71C)]
+    if decomposition(chr(code))
+}
+
+
+def letters_of_formulas(html):
+    """The letters of the formulas of a page, as they are shown; a name of one letter is shown in italics."""
+    formulas = "".join(re.findall("<math.*?</math>", html, re.DOTALL))
+    single = {ITALICS.get(letter, letter) for letter in re.findall("<mi>(.)</mi>", formulas)}
+    return set(unescape(re.sub("<[^>]*>|\\s", "", formulas))) | single
+
+
+def letters_of_the_font():
+    """The letters that the font of formulas has."""
+    with (resources.files("kahanmaps.reports") / "fonts" / "kahanmaps-math.woff").open("rb") as file:
+        return set(map(chr, TTFont(file).getBestCmap()))

@@ -20,6 +20,7 @@ sys.path.insert(0, str(DOCS / "_ext"))
 from check_pages import mistakes  # noqa: E402
 from kahanmaps_docs import docstrings, expanded, part, reference  # noqa: E402
 from kahanmaps_docs.links import outside_code  # noqa: E402
+from page_helpers import letters_of_formulas, letters_of_the_font  # noqa: E402
 
 import kahanmaps  # noqa: E402
 from kahanmaps.documents.catalog import names  # noqa: E402
@@ -210,3 +211,6 @@ def test_the_pages_are_built_without_a_warning_and_no_link_is_broken(tmp_path):
     assert (built.returncode, built.stderr) == (0, "")
     assert mistakes(tmp_path / "html") == []
     assert "<math" in (tmp_path / "html" / "reference" / "catalogue.html").read_text(encoding="utf-8")
+    assert (tmp_path / "html" / "_static" / "kahanmaps-math.woff").is_file()
+    letters = (letters_of_formulas(page.read_text(encoding="utf-8")) for page in (tmp_path / "html").rglob("*.html"))
+    assert set().union(*letters) - letters_of_the_font() == set()

@@ -124,7 +124,13 @@ def matrix(entries: fmpq_mat, left: str = "", most: int = 8) -> str:
 def _left(name: str) -> str:
     if name == "'" or not name.endswith("'"):
         return mathml_name(name)
-    return f"<msup>{mathml_name(name[:-1])}{_PRIME}</msup>"
+    return _raised(mathml_name(name[:-1]), _PRIME)
+
+
+def _raised(base: str, exponent: str) -> str:
+    """An element with an exponent, which stands above the index if there is one."""
+    index = base.removeprefix("<msub>").removesuffix("</msub>")
+    return f"<msup>{base}{exponent}</msup>" if index == base else f"<msubsup>{index}{exponent}</msubsup>"
 
 
 def _math(inside: str, alttext: str) -> str:
@@ -181,7 +187,7 @@ def _pieces(polynomial: fmpq_mpoly) -> list[tuple[str, str]]:
         form = "infix" if found else "prefix"
         mark = f'<mo form="{form}">{sign}</mo>' if sign else ""
         text = {"−": "- ", "+": "+ ", "": ""}[sign] if found else "-" * bool(sign)
-        marked = factors_of(size, exponents, ordered, "<msup>{}<mn>{}</mn></msup>".format, mathml_number)
+        marked = factors_of(size, exponents, ordered, lambda base, n: _raised(base, f"<mn>{n}</mn>"), mathml_number)
         found.append(
             (
                 mark + _TIMES.join(marked),

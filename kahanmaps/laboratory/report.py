@@ -99,14 +99,14 @@ def _integral_lines(found: Findings) -> list[Statement]:
         if not profile.agree:
             lines.append(Statement(NOTE, "the orbits that were compared do not agree"))
     lines += [Statement(MEASURED, f"along orbits {relation.text}") for relation in found.relations]
-    integrals = [name for relation in found.relations for name in relation.integrals]
+    integrals = list(dict.fromkeys(name for relation in found.relations for name in relation.integrals))
     if integrals:
         if len(integrals) == 1:
             text = "is constant on each orbit and differs between orbits, so it is an integral"
         else:
             text = "are constant on each orbit and differ between orbits, so they are integrals"
         lines.append(Statement(NOTE, f"{_listed(integrals)} {text}"))
-    functions = [name for relation in found.relations for name in relation.functions_of_eps]
+    functions = list(dict.fromkeys(name for relation in found.relations for name in relation.functions_of_eps))
     if functions:
         depend = "depends" if len(functions) == 1 else "depend"
         lines.append(Statement(NOTE, f"{_listed(functions)} {depend} on eps only"))
@@ -125,8 +125,7 @@ def _relations(profile: Profile) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """The names without repetition, only the first and the last one of many."""
-    names = list(dict.fromkeys(names))
+    """The names, only the first and the last one of many."""
     return ", ".join(names) if len(names) <= _NAMES else f"{names[0]}, ..., {names[-1]}"
 
 

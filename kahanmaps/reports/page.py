@@ -12,7 +12,7 @@ from kahanmaps.display import markup
 from kahanmaps.display.checks import Room
 from kahanmaps.plots.recipe import Recipe
 from kahanmaps.reports.pictures import Pictures
-from kahanmaps.reports.stylesheet import STYLESHEET
+from kahanmaps.reports.stylesheet import STYLESHEET, font_face
 
 CHARACTERS = 6_000  # of one formula, about; and of one line of text
 ROOM = Room(CHARACTERS, CHARACTERS, CHARACTERS, 100)  # a reader can check a witness that is whole
@@ -39,6 +39,7 @@ def page(
     present = [section for section in (*sections, note, _remake(recipe, seed)) if section.html]
     links = "".join(f'<li><a href="#{one.id}">{markup.escape(one.title)}</a></li>' for one in present)
     body = "\n".join(map(_section_html, present))
+    font = font_face() if "<math" in lead + body else ""
     name = markup.escape(title)
     return f"""<!DOCTYPE html>
 <html lang="en">
@@ -48,7 +49,7 @@ def page(
 <meta name="generator" content="kahanmaps {recipe.version}"/>
 <link rel="icon" href="data:,"/>
 <title>{name}</title>
-<style>{STYLESHEET}</style>
+<style>{font}{STYLESHEET}</style>
 </head>
 <body>
 <header>

@@ -1,4 +1,14 @@
-"""How a page looks: one column, light or dark as the reader's system is, on paper black on white."""
+"""How a page looks: one column, light or dark as the reader's system is, on paper black on white.
+
+Formulas are set in a font of their own, which is part of the page: without a font that has a table for mathematics,
+browsers do not know where exponents and primes belong.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from functools import cache
+from importlib import resources
 
 STYLESHEET = """
 :root { color-scheme: light dark; --back: #ffffff; --text: #1f2328; --soft: #59636e; --line: #d1d9e0; --card: #f6f8fa;
@@ -22,7 +32,7 @@ ul.statements > li { display: grid; grid-template-columns: 7.2rem minmax(0, 1fr)
 @media (max-width: 34rem) { ul.statements > li { grid-template-columns: minmax(0, 1fr); gap: 0; padding: .45rem 0; } }
 .verdict { font-weight: 600; }
 .formula { line-height: 1.9; }
-math { font-size: 1.08em; font-family: "STIX Two Math", "Latin Modern Math", "Cambria Math", math; }
+math { font-size: 1.18em; font-family: "kahanmaps math", math; }
 .wide, section { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .95em; }
 caption { text-align: left; padding-bottom: .2rem; }
@@ -47,3 +57,11 @@ figure { margin: 1rem 0; }
   details::details-content { content-visibility: visible; height: auto; }
 }
 """
+
+
+@cache
+def font_face() -> str:
+    """The font of formulas as a rule of a stylesheet, which nothing has to be fetched for."""
+    font = resources.files("kahanmaps.reports") / "fonts" / "kahanmaps-math.woff"
+    code = b64encode(font.read_bytes()).decode("ascii")
+    return f'@font-face {{ font-family: "kahanmaps math"; src: url(data:font/woff;base64,{code}) format("woff"); }}'

@@ -27,7 +27,7 @@ from kahanmaps.display.mathml import (
 NAMES = ["x1", "x12", "al", "eps", "beta", "my_H"]
 RING = ring(NAMES)
 BY_MATHML = {mathml_name(name): gen for name, gen in zip(NAMES, RING.gens(), strict=True)}
-CORE = {"math", "mrow", "mi", "mn", "mo", "mfrac", "mstyle", "msup", "msub", "span", "br"}
+CORE = {"math", "mrow", "mi", "mn", "mo", "mfrac", "mstyle", "msup", "msub", "msubsup", "span", "br"}
 LONG = parse_polynomial("(x + y + 1)^6", ["x", "y"])
 POWER = parse_polynomial("(x + y)^40", ["x", "y"])
 
@@ -60,9 +60,12 @@ def read_factor(child):
         return RING.constant(int(child.text))
     if child.tag == "mfrac":
         return RING.constant(fmpq(int(child[0].text), int(child[1].text)))
-    assert child.tag == "msup"
-    assert int(child[1].text) > 1
-    return read_factor(child[0]) ** int(child[1].text)
+    assert child.tag in ("msup", "msubsup")
+    *base, exponent = child
+    assert int(exponent.text) > 1
+    inside = "".join(ElementTree.tostring(one, encoding="unicode") for one in base)
+    name = ElementTree.fromstring(inside if child.tag == "msup" else f"<msub>{inside}</msub>")
+    return read_factor(name) ** int(exponent.text)
 
 
 def polynomials():
@@ -142,7 +145,7 @@ def test_a_coefficient_that_is_too_long_is_not_shown():
 def test_the_derivative_has_a_prime():
     found = element(equations(["x1"], [parse_polynomial("x1^2", ["x1"])]))
     assert next(found.iter("math")).get("alttext") == "x1' ="
-    assert "".join(next(found.iter("msup")).itertext()) == "x1′"
+    assert "".join(next(found.iter("msubsup")).itertext()) == "x1′"
 
 
 @pytest.mark.parametrize(
