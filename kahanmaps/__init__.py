@@ -20,17 +20,21 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from kahanmaps.door import opened
 from kahanmaps.version import __version__ as __version__
 
 # The one list of public names is what type checkers read: __init__.pyi.
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="ascii")
 _MODULE_OF = {name: module for module, name in re.findall(r"^from (\S+) import (\w+) as", _STUB, re.MULTILINE)}
-__all__ = [*_MODULE_OF]
+# The same under the names of the commands.
+_OTHER_NAMES = dict(re.findall(r"^(\w+) = (\w+)$", _STUB, re.MULTILINE))
+__all__ = [*_MODULE_OF, *_OTHER_NAMES]
 
 
 def __getattr__(name: str) -> Any:
-    if name in _MODULE_OF:
-        value = getattr(import_module(_MODULE_OF[name]), name)
+    known = _OTHER_NAMES.get(name, name)
+    if known in _MODULE_OF:
+        value = opened(getattr(import_module(_MODULE_OF[known]), known))
         globals()[name] = value
         return value
     raise AttributeError(f"module 'kahanmaps' has no attribute {name!r}")

@@ -26,6 +26,7 @@ from kahanmaps.documents.catalog import names as names
 from kahanmaps.documents.files import SystemFile as SystemFile
 from kahanmaps.documents.files import parse_system as parse_system
 from kahanmaps.documents.files import read_system as read_system
+from kahanmaps.documents.inline import System as System
 from kahanmaps.documents.tensor import tensor_file as tensor_file
 from kahanmaps.errors import InputError as InputError
 from kahanmaps.errors import KahanmapsError as KahanmapsError
@@ -123,3 +124,11 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian as CubicHamiltonian
 from kahanmaps.systems.hamiltonian import standard_structure as standard_structure
 from kahanmaps.systems.quadratic import QuadraticSystem as QuadraticSystem
 from kahanmaps.version import __version__ as __version__
+
+cycles = cycle_census
+degrees = degree_growth
+find_commuting = commuting_systems
+find_density = find_densities
+find_symmetry = linear_symmetries
+heights = height_survey
+lyapunov = lyapunov_exponents

@@ -21,6 +21,7 @@ FLOORS = [
     *("algebra", "systems", "family", "maps", "documents", "invariants"),
     *("checks", "paper", "laboratory", "experiments"),
     *("display", "languages", "plots", "reports"),
+    "door",
 ]
 
 NEVER_IN_THE_LIBRARY = {"click", "rich", "kahanmaps_cli"}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -211,6 +210,7 @@ def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile
     Of the options those of `inline_options` are looked at, as far as they are there.
     """
     from kahanmaps.documents.files import MAX_FILE_BYTES, parse_system
+    from kahanmaps.documents.inline import inline_file
     from kahanmaps.errors import InputError, reading
 
     variables, rhs = options.get("variables"), options.get("rhs", ())
@@ -227,7 +227,7 @@ def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile
         if variables is None or not image:
             raise click.UsageError("an inline map needs --vars X,Y,... and one --image EXPR for each variable")
         section = {"image": _list(image), **({"inverse": _list(inverse)} if inverse else {})}
-        return parse_system(_inline_file(variables, given, "map", section), "inline")
+        return parse_system(inline_file(variables, given, "map", section), "inline")
     if variables is not None or rhs:
         if reference is not None:
             raise click.UsageError(f"give a SYSTEM ({reference}) or an inline one (--vars and --rhs), not both")
@@ -237,7 +237,7 @@ def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile
                 "or --rhs \"x' = x*y; y' = -x\""
             )
         return parse_system(
-            _inline_file(variables, given, "system", {"rhs": list(rhs) if "=" not in rhs[0] else "; ".join(rhs)}),
+            inline_file(variables, given, "system", {"rhs": list(rhs) if "=" not in rhs[0] else "; ".join(rhs)}),
             "inline",
         )
     if reference is None:
@@ -284,20 +284,6 @@ def _files_like(path: str) -> str:
 def _list(texts: Sequence[str]) -> list[str]:
     """The expressions of an option that may be repeated, or have several between semicolons."""
     return [part.strip() for text in texts for part in text.split(";")]
-
-
-def _inline_file(
-    variables: str | None, parameters: Mapping[str, str], kind: str, section: Mapping[str, str | list[str]]
-) -> str:
-    """The system file that an inline system abbreviates, so that the same rules hold for it."""
-
-    def value(data: Any) -> str:  # JSON strings, and lists of them, are those of TOML
-        return json.dumps(data, ensure_ascii=False)
-
-    lines = [] if variables is None else [f"variables = {value([name.strip() for name in variables.split(',')])}"]
-    lines += [f"[{kind}]", *(f"{key} = {value(data)}" for key, data in section.items()), "[parameters]"]
-    lines += [f"{value(name)} = {value(text.strip())}" for name, text in parameters.items()]
-    return "\n".join(lines)
 
 
 def settings_from(options: dict[str, Any], progress: Callable[[str], None]) -> Settings:

@@ -114,7 +114,7 @@ def with_our_rules(command: click.Command) -> click.Command:
     That is to say: none that takes one value is given more than once.
     """
     parse_args = command.parse_args
-    # click offers no other place for it
+    # click has no other place for it
     command.parse_args = lambda ctx, args: parse_args(ctx, _require_once(command, ctx, args))  # type: ignore[method-assign]
     for parameter in command.params:
         if parameter.type is click.INT:

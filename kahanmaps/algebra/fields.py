@@ -13,8 +13,8 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from fractions import Fraction
 from functools import lru_cache
+from numbers import Rational
 from typing import Any, Self
 
 import flint
@@ -48,8 +48,8 @@ _COMPLEX = re.compile(r"(?:(.*) ([+-]) )?(.*)j")  # the sign between the parts; 
 def rational(value: Any) -> fmpq:
     """The exact rational number that `value` stands for.
 
-    Accepts int, Fraction, text (`"1/3"`, `"0.1"`), fmpz and fmpq. Raises `InexactNumber` for machine floats and
-    numpy scalars, whose decimal look is not their value.
+    Accepts int, Fraction, text (`"1/3"`, `"0.1"`), fmpz and fmpq, and all that Python's `numbers` calls rational:
+    numbers of SymPy, integers of numpy. Raises `InexactNumber` for floats, whose decimal look is not their value.
 
     >>> rational("0.1")
     1/10
@@ -66,8 +66,8 @@ def rational(value: Any) -> fmpq:
         raise InputError(f"found {value}, expected a number")
     if isinstance(value, int | fmpz):
         return fmpq(value)
-    if isinstance(value, Fraction):
-        return fmpq(value.numerator, value.denominator)
+    if isinstance(value, Rational):
+        return fmpq(int(value.numerator), int(value.denominator))
     if isinstance(value, float | complex) or type(value).__module__ == "numpy":
         raise InexactNumber(
             f"found the machine number {value!s}, expected an exact one: "

@@ -20,31 +20,11 @@ from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, MapOver, StepOver, nonzero_eps
+from kahanmaps.maps.implicit import BirationalMap, ComposedMapOver, ImplicitMap, MapOver, nonzero_eps
 from kahanmaps.maps.inverse import Rows, TooLarge
 
 _BUDGET = 20_000_000  # products of terms
 _TRIES = 20
-
-
-class ComposedMapOver(MapOver):
-    """Maps over one field at one eps, one after the other."""
-
-    def __init__(self, parts: Sequence[MapOver], eps: Any, variables: tuple[str, ...]) -> None:
-        self.parts, self.eps, self.variables = tuple(parts), eps, variables
-        self.field, self.dim = parts[0].field, parts[0].dim
-
-    @cached_property
-    def factors(self) -> tuple[StepOver, ...]:
-        return tuple(one for part in self.parts for one in part.factors)
-
-    @cached_property
-    def inverse(self) -> ComposedMapOver:
-        """The inverses in the opposite order."""
-        return ComposedMapOver([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
-
-    def __repr__(self) -> str:
-        return f"ComposedMapOver({', '.join(self.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
 
 
 @dataclass(frozen=True, eq=False)

@@ -85,6 +85,24 @@ class MapOver(ABC):
             raise InputError(f"found a point with {len(values)} coordinates, expected {self.dim}{named}")
         return tuple(self.field.convert(value) for value in values)
 
+    def __call__(self, point: Sequence[Any]) -> tuple[Any, ...]:
+        """The same as `step`."""
+        return self.step(point)
+
+    def __matmul__(self, other: MapOver) -> MapOver:
+        """A step of `other` and then one of this, as one map. Raises InputError for another dimension or field."""
+        if not isinstance(other, MapOver):
+            return NotImplemented
+        if (self.field, self.dim) != (other.field, other.dim):
+            raise InputError(f"found maps {self!r} and {other!r}, expected one field and one dimension")
+        return ComposedMapOver([other, self], self.eps, self.variables)
+
+    def __pow__(self, power: int) -> MapOver:
+        """So many steps as one map, of the inverse for a negative number. Raises InputError for 0."""
+        if power == 0:
+            raise InputError("found the power 0, expected another number: the identity is no map here")
+        return ComposedMapOver([self if power > 0 else self.inverse] * abs(power), self.eps, self.variables)
+
     def step(self, point: Sequence[Any]) -> tuple[Any, ...]:
         """The image x~ of a point. Raises SingularStep where det M(x) = 0."""
         x = self.point(point)
@@ -151,6 +169,26 @@ class MapOver(ABC):
             point,
             self.eps,
         )
+
+
+class ComposedMapOver(MapOver):
+    """Maps over one field at one eps, one after the other."""
+
+    def __init__(self, parts: Sequence[MapOver], eps: Any, variables: tuple[str, ...]) -> None:
+        self.parts, self.eps, self.variables = tuple(parts), eps, variables
+        self.field, self.dim = parts[0].field, parts[0].dim
+
+    @cached_property
+    def factors(self) -> tuple[StepOver, ...]:
+        return tuple(one for part in self.parts for one in part.factors)
+
+    @cached_property
+    def inverse(self) -> ComposedMapOver:
+        """The inverses in the opposite order."""
+        return ComposedMapOver([part.inverse for part in reversed(self.parts)], self.eps, self.variables)
+
+    def __repr__(self) -> str:
+        return f"ComposedMapOver({', '.join(self.variables)}; eps={self.field.format(self.eps)}, over {self.field})"
 
 
 class StepOver(MapOver):

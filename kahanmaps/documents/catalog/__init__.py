@@ -99,19 +99,19 @@ def titles() -> dict[str, tuple[int, str]]:
     return found
 
 
-def load(reference: str | Path, parameters: Mapping[str, Any] | None = None) -> SystemFile:
+def load(reference: str | Path, parameters: Mapping[str, Any] | None = None, **values: Any) -> SystemFile:
     """The system of that name in the catalogue, or the one in a TOML file.
 
     `reference` is a name, or a path: a `Path`, or text that ends in .toml, contains a path separator or names an
-    existing file. Where a name is both, the catalogue wins; write ./name for the file. `parameters` replace the
-    default values: exact numbers (int, Fraction, text such as "2/3").
+    existing file. Where a name is both, the catalogue wins; write ./name for the file. `parameters` and `values`
+    replace the default values: exact numbers (int, Fraction, text such as "2/3").
 
     Raises InputError for a name or arguments that are not in the catalogue and a file that cannot be read,
     SystemFileError (an InputError too) for a file with mistakes, for parameters that the system does not have and for
     inexact values.
 
-    >>> load("henon_heiles", {"c": "-6"}).parameters
-    {'c': -6}
+    >>> load("henon_heiles", {"c": "-6"}).parameters, load("henon_heiles", c=1).parameters
+    ({'c': -6}, {'c': 1})
     >>> load("henon_hailes")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
@@ -127,6 +127,7 @@ def load(reference: str | Path, parameters: Mapping[str, Any] | None = None) -> 
     # Imported here, so that listing names loads no arithmetic.
     from kahanmaps.documents.files import parse_system, read_system
 
+    parameters = {**(parameters or {}), **values}
     if not isinstance(reference, Path):
         made = family_member(reference)
         name = reference if made is None else made[0]

@@ -1,0 +1,59 @@
+"""The system file that equations on a command line, or in Python, abbreviate, so that the same rules hold for them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from kahanmaps.documents.files import SystemFile, parse_system
+
+
+def inline_file(
+    variables: str | None, parameters: Mapping[str, str], kind: str, section: Mapping[str, str | Sequence[str]]
+) -> str:
+    """The text of the file with one section of this kind; `variables` are names between commas.
+
+    >>> print(inline_file("x,y", {"a": "1/2"}, "system", {"rhs": ["a*y", "-x"]}))
+    variables = ["x", "y"]
+    [system]
+    rhs = ["a*y", "-x"]
+    [parameters]
+    "a" = "1/2"
+    """
+
+    def value(data: Any) -> str:  # JSON strings, and lists of them, are those of TOML
+        return json.dumps(data, ensure_ascii=False)
+
+    lines = [] if variables is None else [f"variables = {value([name.strip() for name in variables.split(',')])}"]
+    lines += [f"[{kind}]", *(f"{key} = {value(data)}" for key, data in section.items()), "[parameters]"]
+    lines += [f"{value(name)} = {value(text.strip())}" for name, text in parameters.items()]
+    return "\n".join(lines)
+
+
+def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = None, **parameters: Any) -> SystemFile:
+    """A system x' = f(x) of degree at most 2, from its equations.
+
+    Args:
+        equations: "x' = 2*x*y - 1; y' = -x^2", or right-hand sides by variable, or a list of them; texts or expressions
+            of SymPy.
+        variables: for a list of right-hand sides, their names in this order.
+        parameters: the values of other names, exact numbers.
+
+    Returns:
+        A `SystemFile`, as if read from a file.
+
+    Raises:
+        InputError: for what cannot be read.
+
+    >>> System("x' = 2*x*y - a; y' = -x^2 - y^2 - x", a="1/2").system.rhs
+    (2*x*y - 1/2, -x^2 - y^2 - x)
+    """
+    if isinstance(equations, Mapping):
+        variables, equations = list(equations), list(equations.values())
+    rhs = equations if isinstance(equations, str) else [str(one) for one in equations]
+    if isinstance(variables, str):
+        variables = variables.replace(",", " ").split()
+    names = None if variables is None else ",".join(map(str, variables))
+    values = {name: str(value) for name, value in parameters.items()}
+    return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
