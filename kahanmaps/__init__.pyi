@@ -26,6 +26,7 @@ from kahanmaps.documents.catalog import names as names
 from kahanmaps.documents.files import SystemFile as SystemFile
 from kahanmaps.documents.files import parse_system as parse_system
 from kahanmaps.documents.files import read_system as read_system
+from kahanmaps.documents.tensor import tensor_file as tensor_file
 from kahanmaps.errors import InputError as InputError
 from kahanmaps.errors import KahanmapsError as KahanmapsError
 from kahanmaps.errors import SingularStep as SingularStep
@@ -50,6 +51,8 @@ from kahanmaps.family.planar import NormalForm as NormalForm
 from kahanmaps.family.planar import normal_form as normal_form
 from kahanmaps.family.structure import Structure as Structure
 from kahanmaps.family.structure import structure_of as structure_of
+from kahanmaps.family.tensor import TensorStructure as TensorStructure
+from kahanmaps.family.tensor import tensor_structure as tensor_structure
 from kahanmaps.invariants.heights import HeightGrowth as HeightGrowth
 from kahanmaps.invariants.heights import height as height
 from kahanmaps.invariants.heights import height_growth as height_growth

@@ -137,6 +137,7 @@ SOURCES: dict[str, str] = {
         "T. E. Kouloukas, G. R. W. Quispel, P. Vanhaecke. Liouville integrability and superintegrability of a "
         "generalized Lotka-Volterra system and its Kahan discretization. J. Phys. A 49 (2016), 225201. arXiv:1601.05006"
     ),
+    "mazur-1977": ("B. Mazur. Modular curves and the Eisenstein ideal. Publ. Math. IHES 47 (1977), 33-186."),
     "zander-2021": (
         "R. Zander. On the singularity structure of Kahan discretizations of a class of quadratic vector fields. "
         "Eur. J. Math. 7 (2021), 1046-1073. arXiv:2003.01659"

@@ -25,4 +25,6 @@ def schema_of(line: str) -> str:
     """The schema of what a command line prints."""
     words = line.split()
     name = "-".join(words[:2]) if words[0] in ("family", "batch") else words[0]
+    if "--levels" in words:
+        name += "-levels"
     return ALIASES.get(name, name)

@@ -41,6 +41,11 @@ _LEGEND = {
 
 def print_verification(report: Report, as_json: bool, as_markdown: bool, verbose: bool, quiet: bool) -> int:
     """Print the report and return the exit status."""
+    from kahanmaps.paper.survivors import table
+
+    if report.context.get("beyond") and not as_json:
+        echo(table(report))
+        return exit_status(report)
     if as_markdown:
         echo(markdown(report))
         return exit_status(report)

@@ -16,7 +16,8 @@ from kahanmaps.algebra.polynomials import RationalFunction, gradient, linear_com
 from kahanmaps.checks.claims import Evidence, Finding, Verdict
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.cubics import belongs
-from kahanmaps.family.skew_hamiltonian import defects, evaluate_at_matrix
+from kahanmaps.family.skew_hamiltonian import defects, evaluate_at_matrix, minimal_degree
+from kahanmaps.family.tensor import commutes
 from kahanmaps.invariants.integrals import CommutantIntegral
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
@@ -86,7 +87,7 @@ def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence |
         [
             ("g = C f with a constant matrix C", f.transformed(C) == _renamed(g, f)),
             ("C^3 = C", bool(C * C * C == C)),
-            ("C f'(x) = f'(x) C for every x", _commutes(C, f)),
+            ("C f'(x) = f'(x) C for every x", commutes(C, f)),
         ],
     )
 
@@ -161,13 +162,13 @@ def commutant_integral(hamiltonian: CubicHamiltonian, integral: CommutantIntegra
                 "H is a homogeneous cubic and J = [[0, I], [-I, 0]]",
                 hamiltonian.is_homogeneous and hamiltonian.is_standard,
             ),
-            (f"{name} f'(x) = f'(x) {name} for every x", _commutes(integral.matrix, hamiltonian.system)),
+            (f"{name} f'(x) = f'(x) {name} for every x", commutes(integral.matrix, hamiltonian.system)),
         ],
     )
 
 
 def poisson_tensor_invariant(hamiltonian: CubicHamiltonian, member: FamilyMember | None) -> Evidence | None:
-    """Pi(x) = J - eps^2 f'(x)^2 J is an invariant Poisson tensor for generic members, and in dimension 2 for all H."""
+    """Pi(x) = J - eps^2 f'(x)^2 J is an invariant Poisson tensor where A is not derogatory, and in dimension 2."""
     if hamiltonian.dim == 2:
         # f' is a traceless 2 x 2 matrix: f'^2 = -det f' I, so Pi = det(I - eps f') J, and this is the invariant
         # measure.
@@ -179,7 +180,7 @@ def poisson_tensor_invariant(hamiltonian: CubicHamiltonian, member: FamilyMember
         [
             *member_hypotheses(member),
             *associated_hypotheses(member, member.chosen),
-            ("chi has no repeated root", member.is_generic),
+            ("the minimal polynomial of A has degree m", minimal_degree(member.A) == member.m),
         ],
     )
 
@@ -219,18 +220,6 @@ def _cubic_hypotheses(hamiltonian: CubicHamiltonian) -> list[tuple[str, bool]]:
             hamiltonian.system.rhs == linear_combinations(J, hamiltonian.gradient),
         ),
     ]
-
-
-def _commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
-    """Whether C f'(x) = f'(x) C as polynomials in x: for B and for each of the constant matrices df'/dx_k."""
-    n = f.dim
-    if C * f.B != f.B * C:
-        return False
-    for k in range(n):
-        slope = fmpq_mat(n, n, [2 * f.Q[i][j, k] for i in range(n) for j in range(n)])
-        if C * slope != slope * C:
-            return False
-    return True
 
 
 def _coefficients(system: QuadraticSystem) -> fmpq_mat:

@@ -20,6 +20,7 @@ from kahanmaps.displayed import Displayed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError, KahanmapsError
 from kahanmaps.family.structure import Structure, structure_of
+from kahanmaps.family.tensor import tensor_structure
 from kahanmaps.laboratory.conclusion import Conclusion, conclude
 from kahanmaps.laboratory.findings import Findings
 from kahanmaps.laboratory.growth.degrees import degree_growth
@@ -105,6 +106,7 @@ class Analysis(Findings, Displayed):
             **attributes(self, "symmetries", "commuting"),
             "family": (self.structure.text or None) if self.structure is not None else None,
             "member": self._member(),
+            "algebra": None if self.tensor is None else attributes(self.tensor, "text", "C", "rank", chi="chi_text"),
             "skipped": self.skipped,
             "document": dict(self.file.document),
         }
@@ -205,6 +207,8 @@ def analyze(
         elif system is not None:
             found.centre = (fmpq(0),) * dim
             found.structure = structure_of(system)
+        if system is not None and not isinstance(found.structure, Structure):  # of a member its normal form says more
+            found.tensor = tensor_structure(system)
 
     def degrees() -> None:
         # Where they are known to the end and are those that `degrees` would ask for itself.

@@ -8,6 +8,7 @@ from flint import fmpq
 
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.family.structure import NoStructure, Structure
+from kahanmaps.family.tensor import TensorStructure
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 from kahanmaps.laboratory.preserve.densities import DensitySearch
@@ -45,6 +46,7 @@ class Findings:
     hamiltonian: ConstantStructures | None = None
     structure: Structure | NoStructure | None = None  # in coordinates with the centre as origin
     centre: tuple[fmpq, ...] | None = None
+    tensor: TensorStructure | None = None  # over which algebra larger than Q it is a system
     skipped: list[str] = field(default_factory=list)
     pending: list[str] = field(default_factory=list)  # the parts that were not gone through yet
     elapsed: float = 0.0

@@ -253,6 +253,9 @@ def _structure_lines(found: Findings) -> list[Statement]:
     if found.structure is not None and found.structure.text:
         text = f"belongs to the commuting family: {found.structure.text}{_coordinates(found, found.structure.T)}"
         lines.append(Statement(PROVED, text))
+    if found.tensor is not None:
+        text = "the map is that over K, and inherits what it has (docs/beyond.md)"
+        lines.append(Statement(PROVED, f"{found.tensor.text}: {text}"))
     if isinstance(found.structure, Structure):
         form = found.structure.form
         lines.append(

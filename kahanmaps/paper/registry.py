@@ -75,6 +75,9 @@ class Claim:
     blockwise: bool = False
     pairwise: bool = False
     symplectic: bool = True  # keeps its form under symplectic changes of coordinates and extensions of the field
+    theorem: str = ""  # what proves it for all data, its hypotheses true by construction, where nothing is expanded
+    statement: str = ""  # of one that is asked of several variations: the statement, and the variation
+    variation: str = ""
     misprint: str = ""  # not empty: this is the form printed, it fails, and here is why
 
     def makes_sense(self, m: int) -> bool:

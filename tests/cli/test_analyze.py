@@ -99,6 +99,7 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
         "hirota_kimura": ["x1^2 + c1*x3^2 + c2 = 0", "x2^2 + c3*x3^2 + c4 = 0"],
         "family": None,
         "member": None,
+        "algebra": None,
         "skipped": [],
     }
 

@@ -292,3 +292,31 @@ def test_files_stay_in_their_folder_whatever_the_name_of_the_system(kahanmaps, t
     assert kahanmaps("family associated", tmp_path / "a.toml", "--write-to", folder).status == 0
     assert len(list(folder.iterdir())) == 2
     assert sorted(path.name for path in tmp_path.rglob("*.toml") if path.parent != folder) == ["a.toml"]
+
+
+# tensor
+
+
+def test_a_system_over_an_algebra_is_written_over_Q_with_what_it_inherits(kahanmaps, tmp_path):
+    file = tmp_path / "top.toml"
+    assert (
+        "dimension 6; 4 of 4 integrals inherited" in kahanmaps("family tensor euler_top --algebra t^2-2 -o", file).err
+    )
+    assert kahanmaps("check-integrals", file).status == 0
+    assert kahanmaps("check-measure", file).status == 0
+    statements = kahanmaps("analyze", file, "--seconds 5 --json").json
+    assert statements["algebra"]["text"] == "a system in 3 variables over K = Q[t]/(t^2 - 2)"
+
+
+def test_a_parameter_t_is_the_generator_of_the_algebra(kahanmaps):
+    text = kahanmaps("family tensor --vars x --rhs t*x^2 -p t=0 --algebra t^2+1").out
+    assert 'rhs = ["-2*x_0*x_1", "x_0^2 - x_1^2"]' in text
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [("euler_top", "Missing option '--algebra'"), ("euler_top --algebra 3", "expected a polynomial in t")],
+)
+def test_an_algebra_that_is_none_is_refused(kahanmaps, words, message):
+    answer = kahanmaps(f"family tensor {words}")
+    assert (answer.status, message in answer.err) == (2, True)

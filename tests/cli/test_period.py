@@ -178,7 +178,7 @@ def test_hidden_members_have_periods(kahanmaps):
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("period", "Missing option '--start'"),
+        ("period", "give --start X, or --levels N"),
         ("period paper_m2 --start 1,2,3,4", "missing --eps E"),
         ("period --start 1,2 --eps 1", "missing SYSTEM"),
         ("period lorenz --start 1,2,3 --eps 1/10", "x' is not J grad H"),
@@ -206,3 +206,34 @@ def test_wrong_use_gives_2(kahanmaps, command, words):
 def test_a_prime_that_the_coordinates_of_the_normal_form_do_not_have_is_refused(kahanmaps, files):
     outcome = kahanmaps("period", files / "scaled.toml", "--start 1,2 --eps 1 --arithmetic mod:3")
     assert (outcome.status, "the prime 3 divides" in outcome.err) == (2, True)
+
+
+# Levels
+
+
+def test_the_levels_with_a_period_are_printed(kahanmaps):
+    assert kahanmaps("period --levels 6").out.splitlines()[1:] == [
+        "period 6 only\t-27*gamma + 28",
+        "rational gamma\t28/27",
+    ]
+    assert "rational gamma\tnone" in kahanmaps("period --levels 7").out
+
+
+def test_the_levels_of_a_system_are_those_of_its_planes(kahanmaps):
+    text = "--vars u,v --rhs 2*u^2-2*u*v+6*v^2 --rhs -4*u*v+v^2"
+    assert "(h/(1 + eps^2*D))^2 = 1/324" in kahanmaps(f"period {text} --eps 1/2 --levels 5").out
+    assert "no real level" in kahanmaps(f"period {text} --eps 1/2 --levels 9").out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("paper_m2 --eps 1", "give --start X, or --levels N"),
+        ("paper_m2 --eps 1 --levels 5 --start 1,2,3,4", "give --start X, or --levels N"),
+        ("--levels 99", "expected 1 to 60"),
+        ("euler_top --eps 1 --levels 5", "no levels of euler_top"),
+    ],
+)
+def test_levels_asked_for_wrongly_are_refused(kahanmaps, words, message):
+    answer = kahanmaps(f"period {words}")
+    assert (answer.status, message in answer.err) == (2, True)

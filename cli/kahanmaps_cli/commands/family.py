@@ -1,4 +1,4 @@
-"""kahanmaps family new | show | space | associated."""
+"""kahanmaps family new | show | space | associated | tensor."""
 
 from __future__ import annotations
 
@@ -43,6 +43,7 @@ def command() -> None:
       kahanmaps family show paper_m3
       kahanmaps family space paper_m3
       kahanmaps family associated paper_m3
+      kahanmaps family tensor euler_top --algebra 't^2-2' -o top.toml
     """
 
 
@@ -240,6 +241,37 @@ def associated(
     for row in rows:
         powers = ", ".join(row["B_in_powers_of_A"])
         tell(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {_formula(row['K'])}")
+
+
+@command.command("tensor")
+@system_options
+@click.option("--algebra", metavar="CHI", required=True, help="K = Q[t]/(chi), chi a polynomial in t: 't^2-2'.")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="Write to FILE.")
+@quiet_option
+def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **options: Any) -> None:
+    """Write a quadratic system over the algebra K = Q[t]/(chi) as one over Q.
+
+    \b
+      kahanmaps family tensor euler_top --algebra 't^2-2' -o top.toml
+      kahanmaps family tensor nahm_octahedral --algebra 't^3'
+      kahanmaps family tensor --vars x,y --rhs 't*x^2' --rhs '-2*x*y' -p t=0 \\
+          --algebra 't^2+1'
+
+    A variable x becomes x_0, x_1, ..., for x_0 + x_1 t + ... in K. Roots of chi may be repeated. A
+    parameter t of SYSTEM stands for the generator of K. Integrals and the density that SYSTEM claims become the m
+    integrals and the density that its map over Q inherits.
+    """
+    from kahanmaps.documents.tensor import tensor_file
+    from kahanmaps.family.draw import parse_chi
+
+    output = None if output == "-" else output
+    over_algebra, chi = load_system(system, options), parse_chi(algebra)
+    file = tensor_file(over_algebra, chi)
+    _write(file, output)
+    if not quiet:
+        where = f"{output}: " if output else ""
+        claimed = len(over_algebra.integrals) * int(chi.degree())
+        say(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed} integrals inherited")
 
 
 def _normal_form(member: FamilyMember) -> NormalForm:

@@ -24,7 +24,8 @@ _LONG_PRIME, _LONGEST_PRIME = 90, 192  # bits, between which it takes from secon
 
 @click.command("period")
 @system_options
-@click.option("--start", type=PointText(), required=True, metavar="X", help="The start, e.g. 1/2,-1/3,0.25.")
+@click.option("--start", type=PointText(), metavar="X", help="The start, e.g. 1/2,-1/3,0.25.")
+@click.option("--levels", type=int, metavar="N", help="Instead: the levels on which all orbits have period N.")
 @eps_options
 @click.option(
     "--arithmetic", type=Arithmetic(), metavar="KIND", default="exact", show_default=True, help="exact or mod:P."
@@ -40,6 +41,8 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
           --arithmetic mod:2305843009213693951
       kahanmaps period paper_m2 --start 1,2,3,4 --eps 1/10 \\
           --arithmetic mod:10007 --json
+      kahanmaps period --levels 5
+      kahanmaps period nahm_tetrahedral --eps 1/10 --levels 5
 
     In every plane of its normal form the map is a translation on a cubic curve, and the period is the order of a point.
     Modulo P it is computed; over Q the orbit is proved periodic or aperiodic.
@@ -47,12 +50,20 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     SYSTEM may be a member of the family without saying so. The translation goes on where the map does not, through
     poles: if the orbit meets one, the period is that of the orbit continued, and the output says so.
 
+    --levels N prints the polynomial psi_N whose roots gamma = 1 - disc(h) level^2 are the levels with period N or a
+    divisor, and the rational gamma with period N; with SYSTEM and eps also these levels in each plane at a rational
+    root of chi, as values of the integral h/(1 + eps^2 D).
+
     Exit status: 0 found (or proved that there is none), 2 wrong use, also where there is no normal form, 3 undecided,
     or the orbit comes to a point where it cannot be continued.
     """
     from kahanmaps.errors import InputError
     from kahanmaps.maps.normal_form.periods import period_of
 
+    if (options["levels"] is None) == (options["start"] is None):
+        raise click.UsageError("give --start X, or --levels N, one of the two")
+    if options["levels"] is not None:
+        return _levels(system, as_json, options)
     kind, prime = options["arithmetic"]
     if kind not in ("exact", "mod"):
         raise click.UsageError(f"found --arithmetic {kind}, expected exact or mod:P: a period is exact")
@@ -81,6 +92,47 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
     if status and not quiet and as_json:
         say(f"{found.status}: {_message(found)}")
     return status
+
+
+def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
+    """The levels with a period; in the planes of a system if one is given."""
+    from kahanmaps.algebra.text import format_number
+    from kahanmaps.errors import InputError
+    from kahanmaps.maps.normal_form.division import PeriodicLevels, text_in_gamma
+    from kahanmaps.maps.normal_form.planar_block import PlanarBlock
+
+    levels = PeriodicLevels(options["levels"])
+    data: dict[str, Any] = {
+        **envelope("period levels"),
+        "period": levels.period,
+        "psi": text_in_gamma(levels.psi),
+        "primitive": text_in_gamma(levels.primitive),
+        "gamma": [format_number(gamma) for gamma in levels.gammas],
+    }
+    if system is not None or options["rhs"]:
+        file = load_system(system, options)
+        structure = _structure(file) if file.is_quadratic else "it is no Kahan map"
+        if isinstance(structure, str):
+            raise InputError(f"no levels of {file.name} can be computed: {structure}")
+        eps = the_eps(options["eps"], options["time_step"])
+        data |= {"system": file.name, "eps": format_number(eps), "time_step": format_number(2 * eps), "planes": []}
+        for part in structure.form.parts:
+            disc = PlanarBlock(*(part.h[3 - k, k] for k in range(4))).discriminant
+            squares = levels.squares(disc, eps) if disc != 0 else ()
+            plane = {"root": format_number(part.root), "h": part.text, "D": part.D_text}
+            data["planes"].append({**plane, "squares": [format_number(square) for square in squares]})
+    if as_json:
+        print_json(data)
+        return 0
+    tell(f"psi_{levels.period}\t{data['psi']}" + " times gamma^(1/3)" * (levels.period % 3 == 0))
+    tell(f"period {levels.period} only\t{data['primitive']}")
+    tell(f"rational gamma\t{', '.join(data['gamma']) or 'none'}")
+    for plane in data.get("planes", ()):
+        tell(f"plane t = {plane['root']}\th = {plane['h']}, D = {plane['D']}")
+        for square in plane["squares"]:
+            real = "" if square[0] != "-" else ", no real level"
+            tell(f"level\t(h/(1 + eps^2*D))^2 = {square}{real}")
+    return 0
 
 
 def _arithmetic(options: dict[str, Any]) -> str:

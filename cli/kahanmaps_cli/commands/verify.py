@@ -27,6 +27,9 @@ from kahanmaps_cli.verify_table import print_verification
 @draw_options
 @eps_options
 @click.option("--universal", is_flag=True, help="Not one member: everything at random over GF(p), for every member.")
+@click.option(
+    "--beyond", is_flag=True, help="A table of what survives for other H, J, steps and A, with counterexamples."
+)
 @click.option("--controls", is_flag=True, help="Run every claim on input that breaks one hypothesis: it has to fail.")
 @click.option(
     "--section",
@@ -60,6 +63,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps verify --universal --m 3      # theorems for the generic member
       kahanmaps verify --controls --section 6            # what makes it fail
       kahanmaps verify --m 2 --json | jq '.claims[0]'
+      kahanmaps verify --beyond               # what survives where hypotheses are varied
 
     The member is SYSTEM, or drawn from --m, --eigenvalues, --generic or --chi; without any of these m = 3. Claims are
     proved by expanding them symbolically, verified exactly, or supported at random points over GF(p) with a bound on
@@ -72,17 +76,19 @@ def command(system: str | None, **options: Any) -> int:
     from kahanmaps.checks.settings import Settings
     from kahanmaps.documents.files import SystemFile
     from kahanmaps.paper.examiner import VerifyOptions
+    from kahanmaps.paper.survivors import survivors
     from kahanmaps.paper.verify import verify, verify_universal
 
     if options["as_json"] and options["as_markdown"]:
         raise click.UsageError("give --json or --markdown, not both")
     drawn = {name: options[name] for name in ("m", "eigenvalues", "generic", "chi", "size")}
     given = [name for name, value in drawn.items() if value is not None and value is not False]
-    if options["universal"]:
+    if options["universal"] or options["beyond"]:
         clash = [f"--{name}" for name in given if name != "m"]
         clash += ["SYSTEM"] * (system is not None)
         if clash:
-            raise click.UsageError(f"found --universal and {clash[0]}, expected --universal with --m only")
+            flag = "--beyond" if options["beyond"] else "--universal"
+            raise click.UsageError(f"found {flag} and {clash[0]}, expected {flag} with --m only")
     elif system is not None and given:
         raise click.UsageError("give a SYSTEM or say which member to draw (--m, --eigenvalues, ...), not both")
     if system is None and options["parameters"]:
@@ -94,8 +100,16 @@ def command(system: str | None, **options: Any) -> int:
             error_bits=options["error_bits"],
             progress=progress,
         )
-        what = VerifyOptions(options["sections"] or None, options["order"], options["ball_bits"], options["controls"])
-        if options["universal"]:
+        what = VerifyOptions(
+            options["sections"] or None,
+            options["order"],
+            options["ball_bits"],
+            options["controls"],
+            options["beyond"],
+        )
+        if options["beyond"] and not options["controls"]:
+            report = survivors(3 if drawn["m"] is None else drawn["m"], settings)
+        elif options["universal"] or options["beyond"]:
             report = verify_universal(3 if drawn["m"] is None else drawn["m"], settings, what)
         else:
             if system is not None:

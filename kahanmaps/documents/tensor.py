@@ -1,0 +1,48 @@
+"""The file of a system over an algebra K = Q[t]/(chi), written over Q, with the claims that it inherits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flint import fmpq_poly
+
+from kahanmaps.algebra.functions import BudgetExceeded
+from kahanmaps.algebra.text import format_polynomial, format_rational_function, format_univariate
+from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.documents.symbols import with_symbols
+from kahanmaps.documents.toml_text import to_toml
+from kahanmaps.family.tensor import GENERATOR, inherited_density, inherited_integrals, over_algebra
+
+
+def tensor_file(file: SystemFile, chi: fmpq_poly) -> SystemFile:
+    """The system of a file over K = Q[t]/(chi), as a file over Q; a parameter t of the file is the generator of K.
+
+    Integrals and density are inherited, but where the file has a parameter t, which they may depend on, or where they
+    are too large to be written out. Raises InputError where the file holds no quadratic system.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> found = tensor_file(load("euler_top"), fmpq_poly([-2, 0, 1]))
+    >>> found.dim, list(found.integrals)
+    (6, ['F1_0', 'F1_1', 'F2_0', 'F2_1'])
+    """
+    symbols = [GENERATOR] if GENERATOR in file.parameters else []
+    system = over_algebra(with_symbols(file, symbols), chi)
+    document: dict[str, Any] = {
+        "name": f"{file.name} over Q[t]/({format_univariate(chi)})",
+        "variables": list(system.variables),
+        "system": {"rhs": [format_polynomial(polynomial) for polynomial in system.rhs]},
+    }
+    if not symbols:
+        try:
+            integrals = {
+                f"{name}_{k}": format_rational_function(part)
+                for name, function in file.integrals.items()
+                for k, part in enumerate(inherited_integrals(function, chi))
+            }
+            if integrals:
+                document["integrals"] = integrals
+            if file.density is not None:
+                document["density"] = {"phi": format_rational_function(inherited_density(file.density, chi))}
+        except BudgetExceeded:
+            pass
+    return parse_system(to_toml(document, ("name", "variables"), tuple(document)[2:]), document["name"])

@@ -1,0 +1,238 @@
+"""Systems over an algebra K = Q[t]/(chi), written over Q, and systems over Q that are of this kind.
+
+A quadratic system in n variables over K is one in n m variables over Q, m = deg chi: x = x_0 + x_1 t + ... for every
+variable. Its Kahan map is that over K, and inherits what that has, roots of chi repeated or not: docs/mathematics.md,
+"The tensor theorem". The systems over Q that come about in this way are those with a matrix C that commutes with f'(x)
+for all x and makes Q^(n m) a free module over Q[C].
+"""
+
+from __future__ import annotations
+
+import itertools
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz_mat
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.functions import DEFAULT_BUDGET, Function, FunctionField, FunctionMatrix
+from kahanmaps.algebra.matrices import combination_of, nullspace, primitive_integers
+from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
+from kahanmaps.algebra.text import format_univariate
+from kahanmaps.errors import InputError
+from kahanmaps.family.skew_hamiltonian import evaluate_at_matrix
+from kahanmaps.systems.quadratic import MAX_DIMENSION, QuadraticSystem
+
+GENERATOR = "t"
+_LARGEST = 12  # dimension up to which the commuting matrices are looked for: they have its square as many entries
+_DRAWS = 40
+
+
+def over_algebra(system: QuadraticSystem, chi: fmpq_poly) -> QuadraticSystem:
+    """The system over Q of a system over K = Q[t]/(chi): x stands for x_0 + x_1 t + ....
+
+    `system` may have the symbol t in its coefficients, which stands for the generator of K, and no other; chi may have
+    repeated roots. Exact. Raises InputError for a constant chi and for other symbols.
+
+    >>> print(over_algebra(QuadraticSystem.from_text(["x"], ["x^2"]), fmpq_poly([-2, 0, 1])))
+    x_0' = x_0^2 + 2*x_1^2
+    x_1' = 2*x_0*x_1
+    """
+    if chi.degree() < 1:
+        raise InputError(f"found the algebra Q[t]/({format_univariate(chi)}), expected a polynomial in t")
+    if set(system.symbols) - {GENERATOR}:
+        raise InputError(f"found the symbols {', '.join(system.symbols)}, expected none but {GENERATOR}")
+    if system.dim * chi.degree() > MAX_DIMENSION:
+        raise InputError(
+            f"found {system.dim} variables over an algebra of dimension {chi.degree()}, expected at most "
+            f"{MAX_DIMENSION} over Q"
+        )
+    variables = split_names(system.variables, chi.degree())
+    parts = [_components(polynomial, variables, chi, variables) for polynomial in system.rhs]
+    return QuadraticSystem(tuple(itertools.chain.from_iterable(parts)))
+
+
+def split_names(variables: Sequence[str], m: int) -> tuple[str, ...]:
+    """x_0, ..., x_(m-1) for every variable x."""
+    return tuple(f"{name}_{k}" for name in variables for k in range(m))
+
+
+def inherited_integrals(function: RationalFunction, chi: fmpq_poly) -> tuple[RationalFunction, ...]:
+    """The m functions over Q that a rational function of the variables and eps is over K, t^0 first.
+
+    If the Kahan map over K conserves it, that over Q conserves them all. Raises BudgetExceeded where they are large.
+
+    >>> x, eps = ring(["x", "eps"]).gens()
+    >>> for one in inherited_integrals(RationalFunction(x**2, x**0), fmpq_poly([-2, 0, 1])):
+    ...     print(one.numerator)
+    x_0^2 + 2*x_1^2
+    2*x_0*x_1
+    """
+    K, above, below = _quotient(function, chi)
+    found = below.solve(K.matrix(above.nrows(), 1, [above[i, 0] for i in range(above.nrows())]))
+    return tuple(_rational(entry) for entry in found.entries())
+
+
+def inherited_density(function: RationalFunction, chi: fmpq_poly) -> RationalFunction:
+    """The norm from K to Q: where dx/phi is invariant over K, dx/N(phi) is over Q.
+
+    >>> x, eps = ring(["x", "eps"]).gens()
+    >>> print(inherited_density(RationalFunction(x, x**0), fmpq_poly([-2, 0, 1])).numerator)
+    x_0^2 - 2*x_1^2
+    """
+    _, above, below = _quotient(function, chi)
+    return _rational(above.det() / below.det())
+
+
+@dataclass(frozen=True, eq=False)
+class TensorStructure:
+    """A system over Q as one in `rank` variables over K = Q[t]/(chi), where t acts as the matrix `C`.
+
+    Verified at construction: C f'(x) = f'(x) C for all x, chi is the minimal polynomial of C, and the module is free.
+    Raises InputError otherwise.
+    """
+
+    system: QuadraticSystem
+    C: fmpq_mat
+    chi: fmpq_poly
+
+    def __post_init__(self) -> None:
+        if not commutes(self.C, self.system) or self.C.minpoly() != self.chi or not _is_free(self.C, self.chi):
+            raise InputError("C does not make this a system over Q[C]")
+
+    @property
+    def rank(self) -> int:
+        """The number of variables over K."""
+        return self.system.dim // int(self.chi.degree())
+
+    @property
+    def chi_text(self) -> str:
+        """chi as text, `t^2 - 2`."""
+        return format_univariate(self.chi)
+
+    @property
+    def text(self) -> str:
+        """In a sentence: what the system is over K."""
+        what = {1: "a system in one variable", 2: "a planar system"}.get(
+            self.rank, f"a system in {self.rank} variables"
+        )
+        _, factors = self.chi.factor()
+        note = ""
+        if len(factors) > 1:
+            note = f", a product of {len(factors)} systems"
+        elif factors[0][1] > 1:
+            note = ", which has nilpotent elements"
+        return f"{what} over K = Q[t]/({self.chi_text}){note}"
+
+
+def tensor_structure(system: QuadraticSystem) -> TensorStructure | None:
+    """The largest algebra K = Q[C] over which this is a system, or None where that is Q, or no single C generates it.
+
+    All C with C f'(x) = f'(x) C are found by linear algebra over Q, up to dimension 12; where they do not commute with
+    each other (f does not depend on all variables, or is linear), None. Exact.
+
+    >>> f = over_algebra(QuadraticSystem.from_text(["x", "y"], ["y^2", "x^2"]), fmpq_poly([0, 0, 1]))
+    >>> print(tensor_structure(f).text)
+    a planar system over K = Q[t]/(t^2), which has nilpotent elements
+    >>> tensor_structure(QuadraticSystem.from_text(["x", "y"], ["y^2", "x^2 + y"])) is None
+    True
+    """
+    if system.dim > _LARGEST or system.symbols:
+        return None
+    space = centroid(system)
+    if len(space) == 1 or any(B * C != C * B for B, C in itertools.combinations(space, 2)):
+        return None
+    rng = random.Random(len(space))
+    draws = ([rng.randint(-2, 2) for _ in space] for _ in range(_DRAWS))
+    found = []
+    for C in [*space, *(combination_of(weights, space) for weights in draws)]:
+        chi = C.minpoly()
+        if chi.degree() == len(space) and _is_free(C, chi):
+            found.append((sum(abs(c).p.bit_length() + c.q.bit_length() for c in chi.coeffs()), C, chi))
+    if not found:
+        return None
+    _, C, chi = min(found, key=lambda choice: choice[0])
+    return TensorStructure(system, C, chi)
+
+
+def centroid(system: QuadraticSystem) -> list[fmpq_mat]:
+    """A basis, short and integral, of all C with C f'(x) = f'(x) C for all x, by exact linear algebra."""
+    n = system.dim
+    slopes = [system.B, *(fmpq_mat(n, n, [q[j, k] for q in system.Q for j in range(n)]) for k in range(n))]
+    rows = []
+    for S in slopes:
+        for i, j in itertools.product(range(n), repeat=2):
+            row = [fmpq(0)] * (n * n)
+            for k in range(n):  # (C S - S C)_ij
+                row[i * n + k] += S[k, j]
+                row[k * n + j] -= S[i, k]
+            if any(row):
+                rows.append(row)
+    if not rows:
+        rows = [[fmpq(0)] * (n * n)]
+    basis = [primitive_integers(vector) for vector in nullspace(QQ, fmpq_mat(rows))]
+    return [fmpq_mat(n, n, [fmpq(entry) for entry in row]) for row in fmpz_mat(basis).lll().tolist()]
+
+
+def commutes(C: fmpq_mat, f: QuadraticSystem) -> bool:
+    """Whether C f'(x) = f'(x) C as polynomials in x: for B and for each of the constant matrices df'/dx_k."""
+    n = f.dim
+    slopes = (fmpq_mat(n, n, [q[j, k] for q in f.Q for j in range(n)]) for k in range(n))
+    return C * f.B == f.B * C and all(C * S == S * C for S in slopes)
+
+
+def _is_free(C: fmpq_mat, chi: fmpq_poly) -> bool:
+    """Whether Q^n is free over Q[C]: each factor p of chi annihilates as much as in a free module, and no more."""
+    copies, rest = divmod(C.nrows(), int(chi.degree()))
+    return rest == 0 and all(
+        C.nrows() - evaluate_at_matrix(p, C).rank() == copies * p.degree() for p, _ in chi.factor()[1]
+    )
+
+
+def _components(
+    polynomial: fmpq_mpoly, variables: Sequence[str], chi: fmpq_poly, names: Sequence[str]
+) -> list[fmpq_mpoly]:
+    """The coefficients of 1, t, ..., t^(m-1) of a polynomial in x = x_0 + x_1 t + ..., in the ring of `names`.
+
+    Of the polynomial's own variables the first ones are split, and t and those in `names` are kept.
+    """
+    m = int(chi.degree())
+    context = ring((*names, GENERATOR))
+    gens = dict(zip(context.names(), context.gens(), strict=True))
+    t, zero = gens[GENERATOR], context.constant(0)
+    old = names_of(polynomial)
+    count = len(variables) // m
+    images = [sum((gens[f"{name}_{k}"] * t**k for k in range(m)), zero) for name in old[:count]]
+    images += [gens[name] for name in old[count:]]
+    modulus = sum((t**k * chi[k] for k in range(m + 1)), zero)
+    _, reduced = divmod(polynomial.compose(*images, ctx=context), modulus)
+    parts: list[dict[tuple[int, ...], fmpq]] = [{} for _ in range(m)]
+    for exponent, coefficient in reduced.terms():
+        parts[exponent[-1]][tuple(exponent[:-1])] = coefficient
+    target = ring(names)
+    return [target.from_dict(part) for part in parts]
+
+
+def _quotient(function: RationalFunction, chi: fmpq_poly) -> tuple[FunctionField, FunctionMatrix, FunctionMatrix]:
+    """Numerator and denominator as multiplications on K, matrices over the functions of the split variables and eps."""
+    m = int(chi.degree())
+    variables = split_names(function.names[:-1], m)
+    names = (*variables, "eps")
+    K = FunctionField(names, DEFAULT_BUDGET, reduces=True)
+    companion = fmpq_mat([[-chi[i] / chi[m] if j == m - 1 else fmpq(i == j + 1) for j in range(m)] for i in range(m)])
+
+    def matrix(polynomial: fmpq_mpoly) -> FunctionMatrix:
+        total, power = K.matrix(m, m, [K.zero] * (m * m)), QQ.identity(m)
+        for part in _components(polynomial, variables, chi, names):
+            total = total + K.convert_matrix(power) * Function(K, part, K.context.constant(1))
+            power = power * companion
+        return total
+
+    return K, matrix(function.numerator), matrix(function.denominator)
+
+
+def _rational(element: Function) -> RationalFunction:
+    """A quotient in lowest terms."""
+    common = element.above.gcd(element.below)
+    return RationalFunction(element.above / common, element.below / common)

@@ -1,0 +1,97 @@
+"""On which levels all orbits are periodic: the division polynomials of the translation T, in gamma.
+
+On a level of a plane the Kahan map is the translation by T = (0, 0) on y^2 + 6xy + 16 gamma y = x^3 + 3 gamma x^2, with
+gamma = 1 - disc(h) level^2 (docs/mathematics.md, "A translation, and tau functions"). So it has period N on the smooth
+levels where psi_N(gamma) = 0 and no psi_d does for a d < N. By Mazur's theorem no rational gamma has a period of 11 or
+more than 12. Source: ward-1948 for the recurrence, mazur-1977.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from flint import fmpq, fmpq_poly, fmpz_poly
+
+from kahanmaps.algebra.text import format_univariate
+from kahanmaps.errors import InputError
+
+MAX_PERIOD = 60  # psi_N has degree about N^2/12
+_GAMMA = fmpz_poly([0, 1])
+
+
+@dataclass(frozen=True)
+class PeriodicLevels:
+    """psi_N, its part that belongs to the exact period N, and the rational gamma with that period.
+
+    `psi` is without the factor gamma^(1/3) that it has where 3 divides N.
+    """
+
+    period: int
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.period <= MAX_PERIOD:
+            raise InputError(f"found the period {self.period}, expected 1 to {MAX_PERIOD}")
+
+    @cached_property
+    def psi(self) -> fmpz_poly:
+        """psi_N, a polynomial in gamma with integer coefficients."""
+        return division_polynomials(self.period)[self.period]
+
+    @cached_property
+    def primitive(self) -> fmpz_poly:
+        """psi_N without the factors that it shares with psi_d for a proper divisor d of N, its content taken out."""
+        found, table = self.psi, division_polynomials(self.period)
+        for d in range(1, self.period):
+            if self.period % d == 0:
+                while (common := found.gcd(table[d])).degree() > 0:
+                    found = found / common
+        return found / found.content()
+
+    @cached_property
+    def gammas(self) -> tuple[fmpq, ...]:
+        """The rational gamma with the exact period N, in increasing order; 0 and 1, where E is not smooth, left out."""
+        roots = (-fmpq(f[0], f[1]) for f, _ in self.primitive.factor()[1] if f.degree() == 1)
+        return tuple(sorted(root for root in roots if root != 0 and root != 1))
+
+    def squares(self, discriminant: fmpq, eps: fmpq) -> tuple[fmpq, ...]:
+        """For each of `gammas` the square of the value of h/(1 + eps^2 D) on that level, in a plane with this disc(h).
+
+        The levels are real where it is positive. Raises InputError for disc(h) = 0 or eps = 0.
+
+        >>> PeriodicLevels(5).squares(fmpq(-27), fmpq(1, 2))
+        (5/729,)
+        """
+        if discriminant == 0 or eps == 0:
+            raise InputError("found disc(h) = 0 or eps = 0, expected a plane with smooth levels and a step")
+        return tuple((1 - gamma) / (64 * eps**6 * discriminant) for gamma in self.gammas)
+
+
+def division_polynomials(largest: int) -> list[fmpz_poly]:
+    """psi_0, ..., psi_N in gamma, without the factor gamma^(1/3) of those whose index 3 divides.
+
+    >>> division_polynomials(6)[5:]
+    [(-27)*x + 32, (-162)*x + 168]
+    """
+    psi = [fmpz_poly([c]) for c in (0, 1, 2, 3, 4)]
+
+    def product(n: int, indices: tuple[int, ...]) -> fmpz_poly:
+        """The product of psi at these indices, as a term of psi_n: with gamma for each three cube roots too many."""
+        excess = sum(k % 3 == 0 for k in indices) - (n % 3 == 0)
+        value = _GAMMA ** (excess // 3)
+        for k in indices:
+            value = value * psi[k]
+        return value
+
+    for n in range(5, largest + 1):
+        k = n // 2
+        if n % 2:
+            psi.append(product(n, (k + 2, k, k, k)) - product(n, (k - 1, k + 1, k + 1, k + 1)))
+        else:
+            psi.append((product(n, (k, k + 2, k - 1, k - 1)) - product(n, (k, k - 2, k + 1, k + 1))) / 2)
+    return psi[: largest + 1]
+
+
+def text_in_gamma(polynomial: fmpz_poly) -> str:
+    """A polynomial in gamma as text."""
+    return format_univariate(fmpq_poly(polynomial)).replace("t", "gamma")

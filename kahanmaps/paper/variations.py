@@ -1,0 +1,113 @@
+"""Variations of what the paper assumes: the statements are asked again of other H, other J, other steps, other A.
+
+A variation takes the paper's objects and returns others, like a control; but it is not said beforehand that a statement
+fails. `varied=False` of the objects leaves everything as in the paper, which is the control of what fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from kahanmaps.paper.objects import PaperObjects
+
+
+@dataclass(frozen=True)
+class Variation:
+    """One variation: its title, the least m for which it is one, and the theorem that proves what is not expanded."""
+
+    title: str
+    function: Callable[[PaperObjects], PaperObjects]
+    least_m: int = 1
+    theorem: str = ""
+
+
+def other_structure(o: PaperObjects) -> PaperObjects:
+    """Any constant skew J with A^T J = J A, singular or not: a polynomial in A^T times the standard one."""
+    weights = o.vector("weights")
+    factor = o.polynomial_in_A([weights[k, 0] for k in range(o.m)]).transpose()
+    return o.changed(J=factor * o.J, base=None, draw=o.vector)
+
+
+def any_structure(o: PaperObjects) -> PaperObjects:
+    """Any constant skew J, with A^T J = J A or not."""
+    J = o.columns([o.vector(f"J {j}") for j in range(o.n)])
+    return o.changed(J=J - J.transpose(), base=None, draw=o.vector)
+
+
+def different_steps(o: PaperObjects) -> PaperObjects:
+    """The maps of the associated g = B^T f with 2 eps: those of 2 g with eps."""
+    return o.changed(associate_matrices=tuple(B * o.number(2) for B in o.associates()), draw=o.vector)
+
+
+def jordan_block(o: PaperObjects) -> PaperObjects:
+    """A with lambda_1 twice, not diagonalisable: chi is the minimal polynomial; H random in its space."""
+    roots = (o.lam[0], o.lam[0], *o.lam[2:])
+    chi = tuple(o.changed(roots=roots).chi_of_roots)
+    S, _ = o.symplectic_normal_form()
+    m, K = o.m, o.K
+    block = [-chi[i] if j == m - 1 else K.one if i == j + 1 else K.zero for i in range(m) for j in range(m)]
+    W = [
+        block[i * m + j] if i < m and j < m else block[(j - m) * m + i - m] if i >= m and j >= m else K.zero
+        for i in range(o.n)
+        for j in range(o.n)
+    ]
+    A = -(S * K.matrix(o.n, o.n, W) * o.J * S.transpose() * o.J)
+    p = o.changed(A=A, known_chi=chi, base=None, draw=o.vector)
+    return p.changed(roots=None, third=_cubic(p), associate_matrices=_signs(o, A, roots), draw=o.vector)
+
+
+def derogatory(o: PaperObjects) -> PaperObjects:
+    """A diagonalisable with lambda_1 = lambda_2, and H anything on the space of that root."""
+    E = o.projector(0) + o.projector(1)
+    A = o.A + o.projector(0) * (o.lam[1] - o.lam[0])
+    third = o.third + _product(o, [(w, w, w) for w in (E * o.vector(name) for name in ("d1", "d2", "d3"))])
+    signs = _signs(o, A, (o.lam[1], *o.lam[1:]))
+    return o.changed(A=A, known_chi=None, base=None, roots=None, third=third, associate_matrices=signs, draw=o.vector)
+
+
+def _signs(o: PaperObjects, A: Any, roots: tuple[Any, ...]) -> tuple[Any, ...]:
+    """B = I - 2 E with the projector E of A to its third root, which is simple, if there is one."""
+    if o.m < 3:
+        return ()
+    E, simple = o.I, roots[2]
+    for root in (*roots[:2], *roots[3:]):
+        E = E * (A - o.I * root) * (o.K.one / (simple - root))
+    return (o.I + E * (o.minus - o.K.one),)
+
+
+def _cubic(p: PaperObjects) -> Any:
+    """The third derivatives of a sum of l(M_a(x)^3), l the functional that pairs t^k with C_k: it is of the space."""
+    terms = []
+    for name in ("d1", "d2", "d3"):
+        powers = [p.A_to(k) * p.vector(name) for k in range(p.m)]
+        for k in range(p.m):
+            for l in range(p.m):
+                terms.append((powers[k], powers[l], p.horner(k) * p.horner(l) * p.vector(name)))
+    return _product(p, terms)
+
+
+def _product(p: PaperObjects, terms: list[tuple[Any, Any, Any]]) -> Any:
+    """The sum of the tensors u (x) v (x) w, as an n^2 x n matrix."""
+    total = p.zeros(p.n * p.n, p.n)
+    for u, v, w in terms:
+        pairs = p.K.matrix(p.n * p.n, 1, [u[i, 0] * v[j, 0] for i in range(p.n) for j in range(p.n)])
+        total = total + pairs * w.transpose()
+    return total
+
+
+_CMOQ = "the theorem of Celledoni, McLachlan, Owren and Quispel"
+VARIATIONS: dict[str, Variation] = {
+    "inhomogeneous": Variation("H inhomogeneous", PaperObjects.inhomogeneous),
+    "structure": Variation("other J, A^T J = J A", other_structure),
+    "any-structure": Variation("other J, any", any_structure, 2, _CMOQ),
+    "steps": Variation("g at 2 eps", different_steps),
+    "jordan": Variation("A with a Jordan block", jordan_block, 2, "the theorem on A that is not derogatory"),
+    "derogatory": Variation("A derogatory", derogatory, 2, f"the splitting lemma, with {_CMOQ},"),
+}
+
+
+def varied(name: str, o: PaperObjects) -> PaperObjects:
+    """The objects varied, or as they are where `o.varied` is False."""
+    return VARIATIONS[name].function(o) if o.varied else o

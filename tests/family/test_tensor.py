@@ -1,0 +1,131 @@
+"""Systems over an algebra Q[t]/(chi), written over Q: their Kahan maps are those over the algebra and inherit all.
+
+The algebra is a product of fields or has nilpotent elements; what is not over an algebra is not taken for it.
+"""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpq, fmpq_mat, fmpq_poly
+
+from kahanmaps.algebra.etale import EtaleAlgebra
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.tensor import tensor_file
+from kahanmaps.errors import InputError
+from kahanmaps.family.tensor import (
+    TensorStructure,
+    centroid,
+    commutes,
+    inherited_density,
+    inherited_integrals,
+    over_algebra,
+    tensor_structure,
+)
+from kahanmaps.maps.kahan import KahanMap, KahanMapOver
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+t = fmpq_poly([0, 1])
+MODULI = [t**2 - 2, t**2, t**2 - 1, t**3 - t - 1, t**3, (t - 1) ** 2 * (t + 2)]
+PLANAR = QuadraticSystem.from_text(["x", "y"], ["x*y + x - 1", "y^2 - x^2 + 2*y"])
+over_moduli = pytest.mark.parametrize("chi", MODULI, ids=str)
+
+
+@pytest.mark.parametrize("chi", [t**2 - 2, t**2 - 1, t**3 - t - 1], ids=str)
+def test_the_map_over_Q_is_the_map_over_the_algebra(chi):
+    K, m, rng = EtaleAlgebra(chi), chi.degree(), random.Random(1)
+    point = [K.random(rng), K.random(rng)]
+    expected = KahanMap(PLANAR, fmpq(1, 7), K).step(point)
+    split = [element.polynomial[k] for element in point for k in range(m)]
+    found = KahanMap(over_algebra(PLANAR, chi), fmpq(1, 7), QQ).step(split)
+    assert list(found) == [element.polynomial[k] for element in expected for k in range(m)]
+
+
+def test_over_nilpotent_elements_the_map_is_that_of_curves():
+    # Over Q[t]/t^2 a step takes (x, v) to the image of x and the derivative of the map along v.
+    map_ = KahanMap(PLANAR, fmpq(1, 7), QQ)
+    x, v = [fmpq(1, 3), fmpq(2)], [fmpq(1), fmpq(-1, 2)]
+    split = [x[0], v[0], x[1], v[1]]
+    found = KahanMap(over_algebra(PLANAR, t**2), fmpq(1, 7), QQ).step(split)
+    along = (KahanMapOver(PLANAR.over(QQ), fmpq(1, 7)).jacobian(x) * fmpq_mat([[v[0]], [v[1]]])).entries()
+    assert list(found) == [value for pair in zip(map_.step(x), along, strict=True) for value in pair]
+
+
+def test_a_parameter_t_is_the_generator():
+    x_0, x_1 = ring(["x_0", "x_1"]).gens()
+    symbolic = QuadraticSystem((ring(["x", "t"]).gen(1) * ring(["x", "t"]).gen(0) ** 2,), ("t",))
+    assert over_algebra(symbolic, t**2 + 1).rhs == (-2 * x_0 * x_1, x_0**2 - x_1**2)
+
+
+@over_moduli
+def test_integrals_and_densities_are_inherited(chi):
+    file = tensor_file(load("nahm_tetrahedral"), chi)
+    point = [fmpq(k + 1, 2 * k + 5) for k in range(file.dim)]
+    eps = fmpq(1, 9)
+    map_ = KahanMap(file.system, eps, QQ)
+    image = map_.step(point)
+    assert len(file.integrals) == chi.degree()
+    for integral in file.integrals.values():
+        assert integral.value(QQ, [*image, eps]) == integral.value(QQ, [*point, eps])
+    before, after = (file.density.value(QQ, [*x, eps]) for x in (point, image))
+    assert KahanMapOver(file.system.over(QQ), eps).jacobian(point).det() == after / before
+
+
+def test_the_components_of_another_function_are_not_conserved():
+    x, y, eps = ring(["x", "y", "eps"]).gens()
+    system = over_algebra(load("nahm_tetrahedral").system, t**2 - 2)
+    point = [fmpq(1), fmpq(2), fmpq(1, 3), fmpq(1, 5)]
+    image = KahanMap(system, fmpq(1, 9), QQ).step(point)
+    wrong = inherited_integrals(RationalFunction(y * (3 * x**2 - y**2), eps**0), t**2 - 2)
+    assert all(part.value(QQ, [*image, fmpq(1, 9)]) != part.value(QQ, [*point, fmpq(1, 9)]) for part in wrong)
+    assert (
+        inherited_density(RationalFunction(x, x**0), t**2).numerator
+        == ring(["x_0", "x_1", "y_0", "y_1", "eps"]).gen(0) ** 2
+    )
+
+
+@over_moduli
+def test_what_was_made_over_an_algebra_is_recognised(chi):
+    found = tensor_structure(over_algebra(PLANAR, chi))
+    assert found is not None
+    assert (found.rank, found.chi.degree()) == (2, chi.degree())
+    assert sorted(e for _, e in found.chi.factor()[1]) == sorted(e for _, e in chi.factor()[1])
+    assert found.text.startswith("a planar system over K = Q[t]/(")
+
+
+@pytest.mark.parametrize("name", ["nahm_tetrahedral", "lotka_volterra", "euler_top", "kirchhoff_case"])
+def test_what_is_over_no_algebra_is_not(name):
+    assert tensor_structure(load(name).system) is None
+    assert centroid(load(name).system) == [QQ.identity(load(name).dim)]
+
+
+def test_a_perturbed_system_is_no_longer_over_the_algebra():
+    system = over_algebra(PLANAR, t**2 - 2)
+    x = ring(system.variables).gens()
+    moved = QuadraticSystem((system.rhs[0] + x[3] ** 2, *system.rhs[1:]))
+    C = tensor_structure(system).C
+    assert commutes(C, system)
+    assert not commutes(C, moved)
+    assert tensor_structure(moved) is None
+    with pytest.raises(InputError, match="C does not make this a system"):
+        TensorStructure(moved, C, t**2 - 2)
+
+
+def test_where_f_does_not_depend_on_all_variables_nothing_is_said():
+    assert tensor_structure(QuadraticSystem.from_text(["x", "y", "z"], ["x^2", "0", "0"])) is None
+
+
+@pytest.mark.parametrize(
+    ("system", "chi", "message"),
+    [
+        (PLANAR, fmpq_poly([3]), "expected a polynomial in t"),
+        (PLANAR, t**1000, "expected at most"),
+        (QuadraticSystem((ring(["x", "a"]).gen(1) * ring(["x", "a"]).gen(0),), ("a",)), t**2, "expected none but t"),
+    ],
+)
+def test_wrong_input_is_refused(system, chi, message):
+    with pytest.raises(InputError, match=message):
+        over_algebra(system, chi)
