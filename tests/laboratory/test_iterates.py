@@ -13,13 +13,14 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.functions import FunctionField
-from kahanmaps.algebra.polynomials import RationalFunction, evaluate
+from kahanmaps.algebra.polynomials import RationalFunction, evaluate, ring
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.preserve.affine_functions import affine_integrals
-from kahanmaps.laboratory.preserve.iterates import integrals_in_iterates, verdict_on_ratio
+from kahanmaps.laboratory.preserve.integrals import find_integrals
+from kahanmaps.laboratory.preserve.iterates import RatioOfIterates, integrals_in_iterates, verdict_on_ratio
 from kahanmaps.laboratory.preserve.lifted import LIFTS, Lift, Lifted, lifts_with_spaces
 
 GAUDIN = """
@@ -94,6 +95,22 @@ def test_both_sides_of_a_symmetric_bilinear_integral_are_even_in_eps_and_densiti
         density = RationalFunction(q, q.context().constant(1))
         assert laboratory.verdict_on(density, is_density=True)[0].holds
         assert not laboratory.verdict_on(density)[0].holds
+
+
+def test_functions_get_letters_that_no_variable_begins_with():
+    names = ["F", "G", "K", "U", "V", "W"]
+    functions = ring([*names, *(f"{name}~" for name in names)]).gens()
+    minors = RatioOfIterates(Lift(1, -1, 2), functions, (0, 11), (0, 1))
+    assert minors.text.endswith("FF0 = F, FF1 = G, FF11 = W~")
+    assert minors.latex.endswith(r"FF_0 = F,\quad FF_1 = G,\quad FF_{11} = \tilde{W}")
+
+
+# docs/beyond.md: where a1 + a2 = a3 + a4, as in the catalogue, it is the one in x up to its sign.
+@pytest.mark.parametrize(("a4", "independent"), [(-1, False), (7, True)])
+def test_the_bilinear_integral_on_so4_depends_on_the_one_in_x_for_special_parameters_only(a4, independent):
+    found = find_integrals(load("so4_euler_manakov", {"a4": a4}), seconds=60)
+    assert (len(found.integrals), len(found.in_iterates)) == (1, 3)
+    assert any(one.ratio.lift == Lift(1, 1) for one in found.in_iterates) is independent
 
 
 def test_formulas_hold_for_every_value_of_a_symbol():

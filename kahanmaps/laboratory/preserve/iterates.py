@@ -67,7 +67,8 @@ class RatioOfIterates:
         if self.lift.rank == 1:
             return RationalFunction(self.functions[self.above[0]], self.functions[self.below[0]]), []
         taken = self.functions[0].context().names()
-        letter = next(c for c in "FGKUVW" if not any(name.startswith(c) for name in taken))
+        letters = (c * k for k in count(1) for c in "FGKUVW")
+        letter = next(c for c in letters if not any(name.startswith(c) for name in taken))
         names = [f"{letter}{k}" for k in range(len(self.functions))]
         gens = ring([*names, *(f"{name}~" for name in names)]).gens()
         here, later = gens[: len(names)], gens[len(names) :]
@@ -85,7 +86,7 @@ class RatioOfIterates:
     def latex(self) -> str:
         """The formula as LaTeX."""
         ratio, letters = self.formula
-        return r",\quad ".join([latex(ratio), *(f"{F[0]}_{F[1:]} = {latex(P)}" for F, P in letters)])
+        return r",\quad ".join([latex(ratio), *(f"{latex(ring([F]).gens()[0])} = {latex(P)}" for F, P in letters)])
 
     def sides(self, field: Field, points: Sequence[tuple[Any, ...]], values: Sequence[Any]) -> tuple[Any, Any]:
         """Numerator and denominator on successive points of an orbit, at the values of the symbols and eps."""
