@@ -9,6 +9,7 @@ import pytest
 from flint import fmpq
 
 from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.text import format_polynomial, parse_polynomial
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import parse_system
 from kahanmaps.documents.symbols import map_with_symbols
@@ -343,3 +344,13 @@ def test_a_reflection_that_moves_points_is_found():
     [system]
     rhs = ["y", "x^2 + (a - 1)*(a - 4)*y"]"""
     assert scan(parse_system(text), ["a"], terms=6, primes=(101, 103, 107)).symmetric == (("-a + 5",),)
+
+
+@pytest.mark.parametrize("condition", ["a^3 - 2", "(a^2 - 3)*(a - 1)*(a^3 + a + 1)"])
+def test_points_over_number_fields_are_told_by_their_polynomials(condition):
+    """Of one parameter, where primes at which a polynomial splits show all its zeros."""
+    text = f'variables = ["x", "y"]\nparameters.a = 0\n[system]\nrhs = ["y", "x^2 + ({condition})*y"]'
+    found = scan(parse_system(text), ["a"])
+    factors = {format_polynomial(one) for one, _ in parse_polynomial(condition, ["a"]).factor()[1]}
+    assert {format_polynomial(equation) for one in found.components for equation in one.equations} == factors
+    assert not any(found.left)

@@ -15,6 +15,7 @@ from kahanmaps.laboratory.scan.lift import (
     lifted_conjugates,
     lifted_flats,
     lifted_forms,
+    lifted_points,
     residues,
 )
 from kahanmaps.laboratory.scan.pieces import Pieces, Rows, pieces, pivots
@@ -68,6 +69,11 @@ def _of_class(
         found += [Component(flat_equations(rows, names), dimension, degrees, at) for rows, at in lifted.items()]
         if dimension == 0:
             found += _conjugates(flats, set(lifted), degrees, names)
+            if count == 1:
+                rest = {p: beside([(-rows[0][-1] % p,) for rows in some], found, p) for p, some in flats.items()}
+                lines = {p: [x for (x,) in points] for p, points in rest.items()}
+                split, primes = lifted_points(lines, names[0])
+                found += [Component((equation,), 0, degrees, primes) for equation in split]
     for size in {len(rows) for part in parts for rows in part.forms if rows}:
         inside = {part.prime: [rows for rows in part.forms if len(rows) == size] for part in parts}
         for rows in lifted_flats(inside):

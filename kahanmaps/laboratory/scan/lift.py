@@ -160,6 +160,19 @@ def lifted_forms(
     return known + [(factor, at) for factor in factors]
 
 
+def lifted_points(found: Mapping[int, Sequence[int]], name: str) -> tuple[list[fmpq_mpoly], tuple[int, ...]]:
+    """The polynomials whose zeros are points of a line, found modulo primes, and these primes.
+
+    Where a polynomial of degree d splits it has d zeros: that many are multiplied, for the largest d that fits.
+    """
+    for size in sorted({len(points) for points in found.values()} - {0}, reverse=True):
+        forms = {p: [(-x % p, 1) for x in points] for p, points in found.items() if len(points) == size}
+        equations, at = _lifted_product(forms, (name,))
+        if equations:
+            return equations, at
+    return [], ()
+
+
 def _lifted_product(
     found: Mapping[int, Sequence[Sequence[int]]], names: Sequence[str]
 ) -> tuple[list[fmpq_mpoly], tuple[int, ...]]:

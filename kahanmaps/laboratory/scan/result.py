@@ -24,6 +24,7 @@ from kahanmaps.laboratory.scan.pieces import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
 
 # By what is scanned: a word for the numbers, and where members are found.
+_LISTED = 12  # primes
 WORDS = {
     "degrees": ("degrees", "where one of the first {} degrees is smaller"),
     "integrals": ("relations", "where more polynomials of degree up to {} vanish along an orbit"),
@@ -96,6 +97,11 @@ def growth_on(some: Sequence[Component]) -> DegreeGrowth | None:
     return next((one.growth for one in some if one.growth is not None), None)
 
 
+def _listed(texts: Sequence[str]) -> str:
+    """All of them, or the first ones and the last one."""
+    return ", ".join(texts if len(texts) <= _LISTED else [*texts[:3], "...", f"{texts[-1]} ({len(texts)} of them)"])
+
+
 @dataclass(frozen=True)
 class Scan(Displayed):
     """What a scan found: components, the ones with the slowest growth first.
@@ -157,7 +163,7 @@ class Scan(Displayed):
         """What was tried, and what can have been missed: a sentence or two."""
         if not self.height:
             return f"members modulo three primes are needed, those modulo {len(self.sweeps)} were tried"
-        whole, lines = ((", ".join(str(one.prime) for one in some)) for some in self._kinds)
+        whole, lines = (_listed([str(one.prime) for one in some]) for some in self._kinds)
         parts = [f"all members with parameters modulo {whole}"] if whole else []
         if lines:
             count = round(min(one.seen / one.prime for one in self._kinds[1]))
@@ -171,9 +177,10 @@ class Scan(Displayed):
         where = WORDS[self.by][1].format(len(self.generic))
         if not whole:
             kinds.append("nothing of smaller dimension, for which all members would have to be tried")
+        field = "a number field" if len(self.over) == 1 else "a quadratic field"
         return (
             f"{', and '.join(parts)}; found are {', and '.join(kinds)}, {where}, over Q with numerators and "
-            f"denominators up to {self.height}, or over a quadratic field that splits modulo three of the primes"
+            f"denominators up to {self.height}, or over {field} that splits modulo three of the primes"
         )
 
     @property
@@ -211,7 +218,8 @@ class Scan(Displayed):
             lines.append(("symmetry", f"{names} -> {image} permutes the slow members"))
         lines.append(("tried", self.coverage))
         if any(self.left):
-            rest = ", ".join(f"{n} modulo {one.prime}" for n, one in zip(self.left, self.sweeps, strict=True))
+            counts = zip(self.left, self.sweeps, strict=True)
+            rest = _listed([f"{n} modulo {one.prime}" for n, one in counts if n or len(self.left) <= _LISTED])
             lines.append(("left", f"slow members on no component: {rest}{self._left_words}"))
         elif not self.omitted:
             lines.append(("left", "none: every slow member that was seen is on a component"))

@@ -39,9 +39,13 @@ from kahanmaps.maps.kernels import processors
 DEFAULT_SECONDS = 120.0
 MAX_PARAMETERS = 8
 # By the number of parameters the primes modulo which all members are tried: the ones that are wished, then those for
-# families that take their time.
-_PRIMES: dict[int, tuple[tuple[int, ...], tuple[int, ...]]] = {
-    1: ((307, 311, 313, 317, 331, 337, 347, 349, 353, 359), (101, 103, 107, 109)),
+# families that take their time. A polynomial of degree 3 in one parameter has all its zeros modulo one prime in 6.
+_PRIMES: dict[int, tuple[tuple[int, ...], ...]] = {
+    1: (
+        tuple(p for p in range(307, 500) if fmpz(p).is_prime()),
+        (307, 311, 313, 317, 331, 337, 347, 349, 353, 359),
+        (101, 103, 107, 109),
+    ),
     2: ((53, 59, 61, 67), (29, 31, 37, 41)),
     3: ((19, 23, 29, 31), (11, 13, 17, 19)),
 }
