@@ -117,6 +117,8 @@ def test_the_time_is_shared_by_everything_and_what_is_left_out_is_said(kahanmaps
         ("henon_heiles --over c,eps --toml", "they hold no eps"),
         ("henon_heiles --over c --toml --json", "not both"),
         ("henon_heiles --over c --shard 1/2", "goes with --keep"),
+        ("henon_heiles --over c --keep kept --shard 1/2 --write-to here", "a part finds no components"),
+        ("henon_heiles --over c --keep /dev/full", "expected a file that a scan has kept"),
         ("lyness --over a,eps", "expected a map that depends on it"),
         ("henon_heiles --over c --jobs 0", "expected at least 1"),
         ("paper_m2 --over c", "found the symbol 'c'"),
@@ -182,3 +184,21 @@ def test_what_another_scan_has_kept_is_refused(kahanmaps, tmp_path):
     (tmp_path / "other").write_text("name = 1\n")
     assert "expected a file that a scan has kept" in kahanmaps(f"scan {QUICK} --keep {tmp_path}/other").err
     assert (tmp_path / "other").read_text() == "name = 1\n"
+
+
+def test_a_part_is_json_too_in_the_numbers_of_the_whole(kahanmaps, tmp_path):
+    found = kahanmaps(f"scan {QUICK} --keep {tmp_path}/1 --shard 1/2 --json").json
+    assert (found["ended"], found["classes"]) == ("part", [])
+    assert [(one["prime"], one["slow"], one["left"]) for one in found["sweeps"]] == [(101, 1, 1), (107, 1, 1)]
+    dense = """--rhs "x' = x*y; y' = a*x" --over a --primes 101,103,107 --terms 2 --by density"""
+    part = kahanmaps(f"scan {dense} --keep {tmp_path}/2 --shard 1/2 --json").json
+    assert part["generic"] == kahanmaps(f"scan {dense} --json").json["generic"]
+
+
+def test_numbers_that_are_none_in_a_kept_file_are_refused(kahanmaps, tmp_path):
+    assert kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept").status == 0
+    text = (tmp_path / "kept").read_text().replace('"generic": [3,', '"generic": ["q",')
+    (tmp_path / "kept").write_text(text)
+    outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "expected a file that a scan has kept" in outcome.err

@@ -15,6 +15,7 @@ from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.scan.growth import _goes_on
+from kahanmaps.laboratory.scan.kept import Kept
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirmed, scan
 from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
@@ -343,3 +344,16 @@ def test_a_reflection_that_moves_points_is_found():
     [system]
     rhs = ["y", "x^2 + (a - 1)*(a - 4)*y"]"""
     assert scan(parse_system(text), ["a"], terms=6, primes=(101, 103, 107)).symmetric == (("-a + 5",),)
+
+
+def test_a_part_that_was_interrupted_says_nothing_of_conditions(tmp_path):
+    def stop(sentence):
+        if "members" in sentence and int(sentence.split()[1]) > 101 + 107 + 113:
+            raise TimeOver
+
+    part = Kept(str(tmp_path / "kept"), 1, 2)
+    primes = [101, 103, 107, 109, 113, 127, 131, 137]
+    found = scan(load("henon_heiles"), ["c"], terms=4, primes=primes, kept=part, progress=stop)
+    assert (found.ended, len(found.sweeps)) == ("interrupted", 3)
+    assert "slow\t3, 5, 9, 13\t1 members modulo 101" in found.text
+    assert "no condition" not in found.text
