@@ -61,8 +61,8 @@ def table(
         done += cell.is_done
     if len(refused) == len(rows):
         raise refused[0][1]
-    for name, error in refused:
-        say(f"{name}: {error}")
+    for name, reason in refused:
+        say(f"{name}: {reason}")
     if done < len(rows) and not quiet:
         say(f"undecided, or stopped early: {len(rows) - done} of {len(rows)}")
     return 0 if done == len(rows) else 3

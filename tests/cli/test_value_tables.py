@@ -5,7 +5,10 @@ from __future__ import annotations
 import pytest
 
 TABLES = {
-    "heights henon_heiles -p c=-1..0 --steps 30": ["bit lengths grow quadratically on all 6", "bit lengths grow exponentially on all 6"],
+    "heights henon_heiles -p c=-1..0 --steps 30": [
+        "bit lengths grow quadratically on all 6",
+        "bit lengths grow exponentially on all 6",
+    ],
     "find-integrals henon_heiles -p c=-1..0": ["2 functionally independent", "1 functionally independent"],
     "cycles henon_heiles -p c=-1..0 --prime 11 --eps 3": ["longest cycle 45 modulo 11", "longest cycle 103 modulo 11"],
 }
