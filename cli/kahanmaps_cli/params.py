@@ -185,7 +185,7 @@ class Steps(OptionType):
             return value
         steps = []
         for piece in value.split(","):
-            piece = piece.strip()
+            piece = _spelt_out(piece.strip())
             if not (piece.isascii() and piece.isdigit()) or len(piece) > _MOST_STEP_DIGITS:
                 self.fail(
                     f"found {quoted(piece)}, expected step numbers of at most {_MOST_STEP_DIGITS} digits, separated by "

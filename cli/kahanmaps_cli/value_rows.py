@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps.errors import KahanmapsError
 from kahanmaps_cli.options import load_system
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
@@ -35,20 +36,33 @@ class Cell:
 def table(
     system: str | None, options: dict[str, Any], quiet: bool, found: Callable[[SystemFile, Progress], Cell]
 ) -> int | None:
-    """A line for each combination of values, in JSON a record each, and the exit status; None without a range."""
+    """A line for each combination of values, in JSON a record each, and the exit status; None without a range.
+
+    A combination at which there is an error is told of on standard error, and the others go on; one everywhere is
+    raised.
+    """
     rows = rows_of(options["parameters"], system)
     if rows is None:
         return None
-    files = [load_system(system, {**options, "parameters": row}) for row in rows]
-    done = 0
-    for row, file in zip(rows, files, strict=True):
-        with Progress(quiet) as progress:
-            cell = found(file, progress)
+    done, refused = 0, list[tuple[str, KahanmapsError]]()
+    for row in rows:
+        name = ", ".join(f"{name} = {value}" for name, value in row)
+        try:
+            file = load_system(system, {**options, "parameters": row})
+            with Progress(quiet) as progress:
+                cell = found(file, progress)
+        except KahanmapsError as error:
+            refused.append((name, error))
+            continue
         if options["as_json"]:
             print_json(cell.record())
         else:
-            tell(f"{', '.join(f'{name} = {value}' for name, value in row)}\t{cell.line}")
+            tell(f"{name}\t{cell.line}")
         done += cell.is_done
+    if len(refused) == len(rows):
+        raise refused[0][1]
+    for name, reason in refused:
+        say(f"{name}: {reason}")
     if done < len(rows) and not quiet:
         say(f"undecided, or stopped early: {len(rows) - done} of {len(rows)}")
     return 0 if done == len(rows) else 3

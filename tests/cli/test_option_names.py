@@ -96,3 +96,9 @@ def test_a_time_that_is_none_is_refused_by_every_command(kahanmaps, words, value
 def test_the_old_name_of_an_option_still_works(kahanmaps):
     new = kahanmaps("heights weierstrass --eps 1/10 --random 1 --steps 20")
     assert kahanmaps("heights weierstrass --eps 1/10 --starts 1 --steps 20") == new
+
+
+def test_step_numbers_may_have_an_exponent_as_integers_may(kahanmaps):
+    line = """orbit --rhs "x' = x" --start 1 --eps 1/10 --at"""
+    assert kahanmaps(f"{line} 1e1,2").out == kahanmaps(f"{line} 10,2").out
+    assert kahanmaps(f"{line} 1e-1").status == 2

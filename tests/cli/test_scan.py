@@ -11,7 +11,8 @@ import tomllib
 import pytest
 from cli_helpers import COMMAND
 
-QUICK = "henon_heiles --over c --primes 101,103,107 --terms 4"
+FAMILY = "henon_heiles --over c --terms 4"
+QUICK = f"{FAMILY} --primes 101,103,107"
 PLANE = """--rhs "x' = x*(x+2*y); y' = -y*((g+1)*x+g*y)" --over g --primes 101,103,107 --terms 4"""
 
 
@@ -25,7 +26,7 @@ def test_blocks_say_degrees_growth_and_where(kahanmaps):
         "at c =\t-1",
         "growth\tthat of one member; singularities were followed for 40 steps",
         "tried\tall members with parameters modulo 101, 103, 107; found are single points, where one of the first 4 "
-        "degrees is smaller, over Q with numerators and denominators up to 72, or over a quadratic field that splits "
+        "degrees is smaller, over Q with numerators and denominators up to 72, or over a number field that splits "
         "modulo three of the primes",
         "left\tnone: every slow member that was seen is on a component",
     ]
@@ -67,7 +68,7 @@ def test_verdicts_are_asked_for(kahanmaps):
 def test_a_folder_that_cannot_be_made_is_refused_before_the_scan(kahanmaps, tmp_path):
     (tmp_path / "file").write_text("")
     began = time.monotonic()
-    outcome = kahanmaps(f"scan {QUICK} --primes 8101,8111,8117 --write-to {tmp_path}/file/cases")
+    outcome = kahanmaps(f"scan {FAMILY} --primes 8101,8111,8117 --write-to {tmp_path}/file/cases")
     assert (outcome.status, outcome.out) == (2, "")
     assert "file/cases" in outcome.err
     assert time.monotonic() - began < 1
@@ -117,6 +118,8 @@ def test_the_time_is_shared_by_everything_and_what_is_left_out_is_said(kahanmaps
         ("henon_heiles --over c,eps --toml", "they hold no eps"),
         ("henon_heiles --over c --toml --json", "not both"),
         ("henon_heiles --over c --shard 1/2", "goes with --keep"),
+        ("henon_heiles --over c --keep kept --shard 1/2 --write-to here", "a part finds no components"),
+        ("henon_heiles --over c --keep /dev/full", "expected a file that a scan has kept"),
         ("lyness --over a,eps", "expected a map that depends on it"),
         ("henon_heiles --over c --jobs 0", "expected at least 1"),
         ("paper_m2 --over c", "found the symbol 'c'"),
@@ -143,7 +146,7 @@ def test_ctrl_c_ends_it_with_what_was_seen():
 
 def test_a_scan_that_was_killed_goes_on_where_it_was(kahanmaps, tmp_path):
     kept = tmp_path / "kept.jsonl"
-    line = [*COMMAND, "scan", *QUICK.split(), "--primes", "101,103,107,109,113,127", "--keep", str(kept)]
+    line = [*COMMAND, "scan", *FAMILY.split(), "--primes", "101,103,107,109,113,127", "--keep", str(kept)]
     process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={**os.environ})
     while not kept.exists() or kept.read_bytes().count(b"\n") < 2:
         time.sleep(0.01)
@@ -152,7 +155,7 @@ def test_a_scan_that_was_killed_goes_on_where_it_was(kahanmaps, tmp_path):
     process.wait()
     before = kept.read_bytes()
     kept.write_bytes(before + b'{"prime": 10')  # as if it had been writing
-    command = f"scan {QUICK} --primes 101,103,107,109,113,127"
+    command = f"scan {FAMILY} --primes 101,103,107,109,113,127"
     again = kahanmaps(f"{command} --keep {kept}")
     assert again.status == 0
     assert kept.read_bytes().startswith(before)
@@ -182,3 +185,21 @@ def test_what_another_scan_has_kept_is_refused(kahanmaps, tmp_path):
     (tmp_path / "other").write_text("name = 1\n")
     assert "expected a file that a scan has kept" in kahanmaps(f"scan {QUICK} --keep {tmp_path}/other").err
     assert (tmp_path / "other").read_text() == "name = 1\n"
+
+
+def test_a_part_is_json_too_in_the_numbers_of_the_whole(kahanmaps, tmp_path):
+    found = kahanmaps(f"scan {QUICK} --keep {tmp_path}/1 --shard 1/2 --json").json
+    assert (found["ended"], found["classes"]) == ("part", [])
+    assert [(one["prime"], one["slow"], one["left"]) for one in found["sweeps"]] == [(101, 1, 1), (107, 1, 1)]
+    dense = """--rhs "x' = x*y; y' = a*x" --over a --primes 101,103,107 --terms 2 --by density"""
+    part = kahanmaps(f"scan {dense} --keep {tmp_path}/2 --shard 1/2 --json").json
+    assert part["generic"] == kahanmaps(f"scan {dense} --json").json["generic"]
+
+
+def test_numbers_that_are_none_in_a_kept_file_are_refused(kahanmaps, tmp_path):
+    assert kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept").status == 0
+    text = (tmp_path / "kept").read_text().replace('"generic": [3,', '"generic": ["q",')
+    (tmp_path / "kept").write_text(text)
+    outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "expected a file that a scan has kept" in outcome.err

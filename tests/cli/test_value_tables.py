@@ -5,7 +5,10 @@ from __future__ import annotations
 import pytest
 
 TABLES = {
-    "heights henon_heiles -p c=-1..0 --steps 30": ["quadratic: 6 orbits", "exponential: 6 orbits"],
+    "heights henon_heiles -p c=-1..0 --steps 30": [
+        "bit lengths grow quadratically on all 6",
+        "bit lengths grow exponentially on all 6",
+    ],
     "find-integrals henon_heiles -p c=-1..0": ["2 functionally independent", "1 functionally independent"],
     "cycles henon_heiles -p c=-1..0 --prime 11 --eps 3": ["longest cycle 45 modulo 11", "longest cycle 103 modulo 11"],
 }
@@ -45,3 +48,21 @@ def test_a_table_of_integrals_goes_without_other_forms(kahanmaps, option):
     outcome = kahanmaps(f"find-integrals lyness -p a=1..2 {option}")
     assert (outcome.status, outcome.out) == (2, "")
     assert "a range of values goes without" in outcome.err
+
+
+@pytest.mark.parametrize("form", ["", "--json"])
+def test_a_value_without_a_map_is_told_and_the_others_go_on(kahanmaps, form):
+    outcome = kahanmaps(f"degrees --vars x,y --image y --image x/a+y^2 -p a=-1..1 --terms 4 {form}")
+    assert outcome.status == 3
+    assert len(outcome.out.splitlines()) == 2
+    assert "a = 0: inline: 1 mistake\n  map.image[2]: found a division by 0" in outcome.err
+    assert outcome.err.endswith("undecided, or stopped early: 1 of 3\n")
+    outcome = kahanmaps("cycles henon_heiles -p c=1..2:1/3 --prime 3 --eps 1")
+    assert [row.split("\t")[0] for row in outcome.out.splitlines()] == ["c = 1", "c = 2"]
+    assert "c = 4/3: the prime 3 divides a denominator" in outcome.err
+
+
+def test_what_is_wrong_for_every_value_is_wrong_use(kahanmaps):
+    outcome = kahanmaps("heights henon_heiles -p c=1..2 --start 1,2")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert outcome.err == "Error: found a point with 2 coordinates, expected 4: q1, q2, p1, p2\n"

@@ -16,6 +16,7 @@ from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.recurrences import GrowthClass
 from kahanmaps.laboratory.scan.growth import _goes_on
+from kahanmaps.laboratory.scan.kept import Kept
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.scan import _confirmed, scan
 from kahanmaps.laboratory.scan.sweep import TimeOver, sweep
@@ -155,7 +156,7 @@ def test_points_over_quadratic_fields_have_their_minimal_polynomial():
     assert quadratic["a^2 - 2 = 0"].growth.degrees[:8] == (1, 2, 4, 8, 13, 20, 28, 38)
     assert "where\ta^2 - 2 = 0" in found.text.splitlines()
     assert any(one.text == "a^2 + 1 = 0" for one in found.components)  # where the primes are 1 modulo 4
-    assert found.left == (0,) * 10
+    assert found.left == (0,) * len(found.sweeps)
 
 
 REPAIRED = """variables = ["x", "y"]
@@ -354,3 +355,16 @@ def test_points_over_number_fields_are_told_by_their_polynomials(condition):
     factors = {format_polynomial(one) for one, _ in parse_polynomial(condition, ["a"]).factor()[1]}
     assert {format_polynomial(equation) for one in found.components for equation in one.equations} == factors
     assert not any(found.left)
+
+
+def test_a_part_that_was_interrupted_says_nothing_of_conditions(tmp_path):
+    def stop(sentence):
+        if "members" in sentence and int(sentence.split()[1]) > 101 + 107 + 113:
+            raise TimeOver
+
+    part = Kept(str(tmp_path / "kept"), 1, 2)
+    primes = [101, 103, 107, 109, 113, 127, 131, 137]
+    found = scan(load("henon_heiles"), ["c"], terms=4, primes=primes, kept=part, progress=stop)
+    assert (found.ended, len(found.sweeps)) == ("interrupted", 3)
+    assert "slow\t3, 5, 9, 13\t1 members modulo 101" in found.text
+    assert "no condition" not in found.text

@@ -13,13 +13,16 @@ from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError
+from kahanmaps.laboratory.singular import contracted
 from kahanmaps.laboratory.singular.critical import critical_points, pole_points
 from kahanmaps.laboratory.singular.fates import CONFINED, NOT_CONFINED
 from kahanmaps.laboratory.singular.jets import (
     Jet,
     NotGeneric,
     PrecisionTooLow,
+    form_order,
     image_of,
     valuation,
     walk,
@@ -392,3 +395,15 @@ def test_steps_are_between_one_and_the_limit(monkeypatch):
 def test_how_far_hypersurfaces_are_followed(dim, steps, expected):
     found = _range(dim, steps, 0.0)
     assert (found.shown, found.reach, found.along, found.end) == (*expected, 0.0)
+
+
+def test_a_curve_whose_first_step_is_not_seen_before_the_time_is_over_is_told():
+    text = 'variables = ["x", "y"]\n[map]\nimage = ["x", "y*x^9 + 1"]\ninverse = ["x", "(y - 1)/x^9"]'
+    map_, field = parse_system(text).map, GF(2**31 - 1)
+    here, over = map_.at(fmpq(1)), map_.at(fmpq(1), field)
+    forms = contracted._forms(here.equations[0], here.inverse.equations[0], 1)
+    functions = tuple(form_order(form, field) for form in forms.all)
+    _, _, curves = contracted._on_line(over.factors[0], forms, functions, 0.0, random.Random(1))
+    assert len(curves) == 2
+    with pytest.raises(contracted.Untold, match="the time was over"):
+        [curve.key for curve in curves]

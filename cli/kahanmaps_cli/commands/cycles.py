@@ -60,7 +60,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     against random permutations; "compatible" is no proof of anything.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
-    combination of values; with --json a record a line.
+    combination of values; with --json a record a line. Values without a map are named at the end.
 
     Exit status: 0 done, 2 wrong use, 3 samples stopped by the clock.
     """

@@ -64,7 +64,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     In the plane a dynamical degree above 1 is proved: its bounds are then exact.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
-    combination of values; with --json a record a line.
+    combination of values; with --json a record a line. Values without a map are named at the end.
 
     Exit status: 0 a recurrence was found, or all terms asked for were measured, or the iterates cease to exist or to
     vary; 2 wrong use; 3 undecided, or stopped early.

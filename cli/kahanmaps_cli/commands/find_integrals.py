@@ -64,7 +64,7 @@ def command(system: str | None, **options: Any) -> int:
     differential equation those of the map tend to as eps -> 0, and which are lost.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
-    combination of values; with --json a record a line.
+    combination of values; with --json a record a line. Values without a map are named at the end.
 
     Exit status: 0 every integral that theorems give or orbits show has a formula, 2 wrong use, 3 some have none,
     orbits were not measured, or the time was too short.

@@ -69,7 +69,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     values 1/10 and 3/11 are taken and compared: one eps may be special. This is evidence, and no proof.
 
     A parameter with a range of values, FIRST..LAST or FIRST..LAST:STEP, gives a table, a line for each value or
-    combination of values; with --json a record a line.
+    combination of values; with --json a record a line. Values without a map are named at the end.
 
     Exit status: 0 all orbits that were decided agree, 2 wrong use, 3 undecided, or the orbits disagree, or the time was
     over.

@@ -73,6 +73,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     """
     if options["shard"] is not None and options["keep"] is None:
         raise click.UsageError("--shard goes with --keep FILE, where its part is kept")
+    if options["shard"] is not None and (options["as_toml"] or options["folder"] is not None):
+        raise click.UsageError("found --shard with system files: a part finds no components")
     if as_json and options["as_toml"]:
         raise click.UsageError("give --toml or --json, not both")
     found = scanned(system, quiet, options)

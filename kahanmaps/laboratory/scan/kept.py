@@ -32,6 +32,8 @@ class Kept:
     def open(self, settings: dict[str, Any]) -> None:
         """Read what is there of the scan with these settings. Raises InputError for a file of anything else."""
         settings = json.loads(json.dumps(settings, default=str))
+        if os.path.exists(self._path) and not os.path.isfile(self._path):  # a device may have no end
+            raise InputError(f"found {self._path}, expected a file that a scan has kept")
         with open(self._path, "ab+") as stream:
             stream.seek(0)
             content = stream.read()
@@ -70,7 +72,7 @@ def _write(file: int, record: dict[str, Any]) -> None:
 
 
 def _sweep(record: dict[str, Any]) -> tuple[tuple[int, int | None], Sweep]:
-    classes = {tuple(degrees): [tuple(point) for point in points] for degrees, points in record["classes"]}
-    known = {**record, "classes": classes, "generic": tuple(record["generic"])}
+    classes = {tuple(map(int, degrees)): [tuple(map(int, x)) for x in points] for degrees, points in record["classes"]}
+    known = {**record, "classes": classes, "generic": tuple(map(int, record["generic"]))}
     lines = known.pop("lines")
     return (record["prime"], lines), Sweep(**known)

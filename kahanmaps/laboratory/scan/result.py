@@ -111,7 +111,8 @@ class Scan(Displayed):
     `height`, or there by chance. `symmetric` are changes of parameters that permute the slow members, by their
     images. `by` says what is meant by degrees: those of iterates, or how many polynomials of degree 1, 2, ... there
     are that vanish along an orbit ("integrals"), or phi with an invariant measure dx/phi ("density").
-    `ended` is "complete", "time", "interrupted" or, for a shard, "part"; `omitted` says what was left out.
+    `ended` is "complete", "time", "interrupted" or, for a shard, "part"; `omitted` says what was left out. Of a shard
+    (`is_part`) there are sweeps only, and no components were looked for.
     """
 
     file: SystemFile
@@ -126,6 +127,7 @@ class Scan(Displayed):
     ended: str
     omitted: tuple[str, ...] = ()
     by: str = "degrees"
+    is_part: bool = False
 
     @property
     def height(self) -> int:
@@ -186,7 +188,7 @@ class Scan(Displayed):
     @property
     def text(self) -> str:
         """Lines for people, a word and a tab at the front."""
-        if not self.height or self.ended == "part":
+        if not self.height or self.is_part:
             return "\n".join(f"{word}\t{rest}" for word, rest in [*self._seen, ("tried", self.coverage), *self._open])
         names = f"({', '.join(self.over)})" if len(self.over) > 1 else self.over[0]
         lines = [("in general", ", ".join(map(str, self.generic)))]

@@ -202,7 +202,9 @@ def scan(
         ended = "interrupted" if interrupted else "time" if omitted else "part"
         omitted.append("the other parts and conditions")
         generic = sweeps[0].generic if sweeps else ()
-        return Scan(file, names, exact, seed, generic, (), tuple(sweeps), (), (), ended, tuple(omitted), by)
+        left = tuple(_left(one, ()) for one in sweeps)
+        part = Scan(file, names, exact, seed, generic, (), tuple(sweeps), left, (), ended, tuple(omitted), by, True)
+        return part if by == "degrees" else part.with_dimensions(map_.dim)
     take(plan)
     known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
     again = [(one.prime, _MORE * round(one.seen / one.prime)) for one in sweeps if not one.complete]

@@ -108,8 +108,13 @@ class _Curve:
 
     @cached_property
     def key(self) -> Key:
-        """What tells hypersurfaces apart: whether it is contracted, which forms vanish there, and the first orders."""
+        """What tells hypersurfaces apart: whether it is contracted, which forms vanish there, and the first orders.
+
+        Raises Untold where there is no first step.
+        """
         run = walked([self.equation], self.point, self.direction, [], _FIRST, self.end, functions=self.functions)[0]
+        if not run:
+            raise Untold("the time was over, or a curve touches a hypersurface in too high an order")
         is_contracted = image_of([self.inverse], run[0].limit) is None
         return is_contracted, self.own[: len(self.forms.poles)], self.own[-1], *self.levels(run)[:1], self.rows(run)
 
