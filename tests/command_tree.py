@@ -37,6 +37,7 @@ LEAST = {
     "family new": "--m 1",
     "family show": "paper_m2",
     "family space": "paper_m2",
+    "family tensor": "harmonic --algebra t^2-2",
     "family associated": "paper_m2",
     "batch run": "SPEC --dry-run",
     "batch status": "--db DB",

@@ -18,7 +18,7 @@ import click
 from kahanmaps.errors import InputError, KahanmapsError, bounded, is_of_the_machine, is_out_of_memory
 from kahanmaps_cli.colour_option import colour_option, with_colour_option
 from kahanmaps_cli.groups import SuggestingGroup, in_our_words
-from kahanmaps_cli.params import with_our_rules
+from kahanmaps_cli.params import HELP_OPTIONS, with_our_rules
 from kahanmaps_cli.progress import as_typed, say
 from kahanmaps_cli.streams import have_standard_streams, leave_nothing_to_flush
 
@@ -144,7 +144,7 @@ class LazyGroup(SuggestingGroup):
     cls=LazyGroup,
     params=[colour_option()],
     invoke_without_command=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": HELP_OPTIONS},
 )
 @click.option("--version", "show_version", is_flag=True, help="Print the version and exit.")
 @click.pass_context

@@ -17,6 +17,7 @@ else:
     OptionType = click.ParamType
 
 
+HELP_OPTIONS = ["-h", "--help"]
 _WITH_EXPONENT = re.compile(r"([+-]?[0-9]+)(?:\.([0-9]+))?[eE]\+?([0-9]{1,3})")
 _MOST_STEP_DIGITS, _MOST_DIGITS = 40, 100  # of a step number, of any other integer: floats go further
 
@@ -116,6 +117,8 @@ def with_our_rules(command: click.Command) -> click.Command:
     parse_args = command.parse_args
     # click has no other place for it
     command.parse_args = lambda ctx, args: parse_args(ctx, _require_once(command, ctx, args))  # type: ignore[method-assign]
+    # click keeps the option for help as the first context has it, which need not be one below the group.
+    command.context_settings.setdefault("help_option_names", HELP_OPTIONS)
     for parameter in command.params:
         if parameter.type is click.INT:
             parameter.type = ShortInteger()

@@ -51,6 +51,7 @@ READS = {
         },
     ),
     "family new": (".toml", {}),
+    "family tensor": (".toml", {"system": "family tensor IN --algebra t^2-2"}),
     "batch export": (".csv", {"db": "batch export --db IN"}),
     "report": (".html", {"system": "report IN --from checks --no-pictures", "db": "report --db IN"}),
     "convert": (".tex", {"system": "convert IN --to latex"}),

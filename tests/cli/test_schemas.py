@@ -43,7 +43,7 @@ CASES = [
     f"orbit {INLINE} --start 1 --arithmetic ball:64 {ORBIT}",
     f"orbit lorenz --start 1,2,3 --max-digits 5 {ORBIT} -q",  # budget
     f"orbit euler_top --start 1,2,3 --arithmetic float --integral x1^2 {ORBIT}",
-    f"orbit {INLINE} --start 1 --eps 1e300 --steps 3 --arithmetic float --start 1e300 --format jsonl -q",  # overflow
+    f"orbit {INLINE} --eps 1e300 --steps 3 --arithmetic float --start 1e300 --format jsonl -q",  # overflow
     "orbit {pair} --start 1,2,3,4 --eps 1/10 --steps 40 --every 20 --arithmetic float --format jsonl",
     "orbit euler_top --start 1,2,3 --eps 1/10 --steps 30 --arithmetic mod:7 --format jsonl",  # periodic
     "orbit lorenz --start 1000,2,3 --eps 1/10 --steps 9 --arithmetic ball:32 --format jsonl -q",  # precision

@@ -63,7 +63,7 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps verify --universal --m 3      # theorems for the generic member
       kahanmaps verify --controls --section 6            # what makes it fail
       kahanmaps verify --m 2 --json | jq '.claims[0]'
-      kahanmaps verify --beyond               # what survives where hypotheses are varied
+      kahanmaps verify --beyond             # what survives of them
 
     The member is SYSTEM, or drawn from --m, --eigenvalues, --generic or --chi; without any of these m = 3. Claims are
     proved by expanding them symbolically, verified exactly, or supported at random points over GF(p) with a bound on

@@ -273,7 +273,7 @@ def find_integrals(
     >>> from kahanmaps.documents.catalog import load
     >>> found = find_integrals(load("nahm_tetrahedral"))
     >>> [(one.text, str(one.verdict)) for one in found.integrals], found.codimension
-    ([('(3*x^2*y - y^3)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
+    ([('y*(3*x^2 - y^2)/(4*x^2*eps^2 + 4*y^2*eps^2 - 1)', 'proved')], 1)
     """
     if not seconds > 0:
         raise InputError(f"found {seconds} seconds, expected a time above 0")
