@@ -286,61 +286,6 @@ def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path, number, arithm
 # Wrong use
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("ensemble", "Missing option '--steps'"),
-        ("ensemble --steps 1 --eps 1", "give --starts FILE or --random N"),
-        (f"{TOP} --steps 1 --random 3 --starts x", "give --starts FILE or --random N"),
-        (f"{TOP} --steps 1 --starts x --seed 1", "--box and --seed are for --random"),
-        (f"{TOP} --steps 1 --starts x --box 1", "--box and --seed are for --random"),
-        ("ensemble --random 3 --steps 1 --eps 1", "missing SYSTEM"),
-        ("ensemble euler_top --random 3 --steps 1", "missing --eps E"),
-        ("ensemble euler_top --random 3 --steps 1 --eps 0", "found eps = 0"),
-        ("ensemble euler_top --random 3 --steps 1 --eps 1e-400", "take a larger eps"),
-        ("ensemble euler_top --random 3 --steps 1 --eps 1e400", "beyond the range of machine floats"),
-        ("ensemble - --starts - --steps 1 --eps 1", "found - twice"),
-        (f"{TOP} --random 0 --steps 1", "found '0', expected an integer, 1 or more"),
-        (f"{TOP} --random -1 --steps 1", "found '-1', expected an integer, 1 or more"),
-        (f"{TOP} --random {10**12} --steps 1", "expected at most"),
-        (f"{TOP} --random 3 --box 0 --steps 1", "found --box 0"),
-        (f"{TOP} --random 3 --box=-1 --steps 1", "found --box -1"),
-        (f"{TOP} --random 3 --box 1e400 --steps 1", "beyond the range of machine floats"),
-        (f"{TOP} --random 3 --box 1e-400 --steps 1", "0 in machine numbers"),
-        (f"{TOP} --random 3 --seed -1 --steps 1", "found '-1', expected an integer, 0 or more"),
-        (f"{TOP} --random 3 --seed x --steps 1", "found 'x', expected an integer"),
-        (f"{TOP} --random 3 --steps -1", "found --steps -1"),
-        (f"{TOP} --random 3 --steps {10**40}", "it would take years"),
-        (f"{TOP} --random 3 --steps 1 --every 0 -o x.npy", "found --every 0"),
-        (f"{TOP} --random 3 --steps 1 --every 1", "--every K is for -o"),
-        (f"{TOP} --random 3 --steps 1 --threads 0", "found --threads 0"),
-        (f"{TOP} --random 3 --steps 1 -o x.csv", "ends with .npy"),
-        (f"{TOP} --random 3 --steps 1 -o -", "ends with .npy"),
-        (f"{TOP} --random 3 --steps 1 -o no/such/folder/x.npy", "No such file or directory: no/such/folder/x.npy"),
-        (f"{TOP} --random 3 --steps 1 --method normal-form", "there is none"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic exact", "expected float or mod:P"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic ball:64", "expected float or mod:P"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic mod:91", "91 is composite"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic mod:2", "the prime 2 divides the denominator of 1/10"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic mod:{2**89 - 1}", "found a modulus of 89 bits, expected at most 61"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic mod:7 --box 1", "--box is for float"),
-        (f"{TOP} --random 3 --steps 1 --integral F1 --integral F1", "found two integrals of the name F1"),
-        (f"{TOP} --random 3 --steps 1 --integral q", "found the unknown name 'q'"),
-        (f"{TOP} --random 3 --steps 1 --integral 1/0", "found a division by 0"),
-        (f"{TOP} --starts nowhere.txt --steps 1", "No such file or directory: nowhere.txt"),
-        (f"{TOP} --starts . --steps 1", "s a directory"),
-        (f"{TOP} --starts '' --steps 1", "No such file or directory: ''"),
-    ],
-    ids=lambda text: text[:90],
-)
-def test_wrong_use_gives_2(kahanmaps, command, words, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    outcome = kahanmaps(command)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-    assert list(tmp_path.iterdir()) == []
-
-
 def npy(array) -> bytes:
     stream = io.BytesIO()
     np.save(stream, array, allow_pickle=True)

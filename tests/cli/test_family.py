@@ -311,12 +311,3 @@ def test_a_system_over_an_algebra_is_written_over_Q_with_what_it_inherits(kahanm
 def test_a_parameter_t_is_the_generator_of_the_algebra(kahanmaps):
     text = kahanmaps("family tensor --vars x --rhs t*x^2 -p t=0 --algebra t^2+1").out
     assert 'rhs = ["-2*x_0*x_1", "x_0^2 - x_1^2"]' in text
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [("euler_top", "Missing option '--algebra'"), ("euler_top --algebra 3", "expected a polynomial in t")],
-)
-def test_an_algebra_that_is_none_is_refused(kahanmaps, words, message):
-    answer = kahanmaps(f"family tensor {words}")
-    assert (answer.status, message in answer.err) == (2, True)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import shlex
 
-import pytest
-
 from kahanmaps.version import __version__
 
 
@@ -87,19 +85,3 @@ def test_what_stays_open_gives_3(kahanmaps):
     assert "undecided: the fields g with [f, g] = 0 have dimension 31" in outcome.err
     quiet = kahanmaps(command, "-q --json")
     assert (quiet.status, quiet.err, quiet.json["status"], quiet.json["verdict"]) == (3, "", "undecided", "undecided")
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("find-commuting", "missing SYSTEM"),
-        ("find-commuting lorenz --shape cubic", "'cubic' is not one of"),
-        ("find-commuting lorenz --seconds 0", "found '0', expected a number of seconds above 0"),
-        ("find-commuting lorenz --error-bits 0", "found an error bound of 0 bits"),
-        ("find-commuting --vars x --rhs x^3", "degree 3"),
-    ],
-)
-def test_wrong_use_gives_2(kahanmaps, command, words):
-    outcome = kahanmaps(command)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err

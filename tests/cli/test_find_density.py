@@ -114,25 +114,3 @@ def test_a_density_of_the_flow(kahanmaps):
     record = kahanmaps("find-density zander_120 --flow --json -q").json
     assert record["flow"] is True
     assert mistakes("find-density", record) == []
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ("euler_top --symbolic zz", "found the symbol 'zz'"),
-        ("euler_top --symbolic eps --eps 1", "give --eps as a number, or eps among --symbolic"),
-        ("euler_top --eps 0", "found eps = 0"),
-        ("euler_top --seconds 0", "found '0'"),
-        ("euler_top --max-degree -1", "found -1, expected 0 to 20"),
-        ("euler_top --toml --latex", "give one of --toml, --latex and --json"),
-        ("--vars x,y --rhs x/a --rhs x -p a=1 --symbolic a", "a division by something with variables in it"),
-        ("", "missing SYSTEM"),
-        ("lyness --flow", "found an explicit map, expected a polynomial vector field"),
-        ("lotka_volterra --flow --toml", "--flow goes without --toml"),
-    ],
-)
-def test_wrong_use_gives_2(kahanmaps, options, words):
-    outcome = kahanmaps(f"find-density {options}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-    assert "Traceback" not in outcome.err

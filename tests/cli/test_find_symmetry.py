@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from kahanmaps.version import __version__
 
 
@@ -56,17 +54,3 @@ def test_a_search_that_is_too_large_gives_3(kahanmaps):
     assert outcome.out.endswith("# undecided: see standard error\n")
     assert "undecided: signed permutations are tried up to dimension 12, found 17" in outcome.err
     assert kahanmaps(f"find-symmetry --vars {','.join(names)} {words} -q").err == ""
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("find-symmetry", "missing SYSTEM"),
-        ("find-symmetry lorenz --seconds 0", "found '0', expected a number of seconds above 0"),
-        ("find-symmetry nowhere.toml", "nowhere.toml"),
-    ],
-)
-def test_wrong_use_gives_2(kahanmaps, command, words):
-    outcome = kahanmaps(command)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err

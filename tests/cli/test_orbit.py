@@ -468,24 +468,6 @@ def test_the_method_is_chosen_from_what_is_asked_for(kahanmaps, line, method):
     assert f"method {method}: " in run.err
 
 
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("orbit lotka_volterra --start 1,2 --eps 1/10 --steps 8 --method normal-form", "there is none"),
-        (f"{IRREDUCIBLE} --steps 20 --method normal-form", "does not split over Q"),
-        (f"{MEMBER} --steps 20 --method jump", "--at N1,N2"),
-        (f"{MEMBER} --at 20 --method jump --arithmetic float", "--at N1,N2"),
-        (f"{MEMBER} --steps 20 --accuracy 20", "ball:auto"),
-        (f"{MEMBER} --steps 20 --kernel numpy", "--arithmetic float"),
-        (f"orbit lotka_volterra --start 1,2 --eps 1/10 --at {10**20}", "too far"),
-    ],
-)
-def test_a_method_that_cannot_be_is_refused_with_the_reason(kahanmaps, line, said):
-    run = kahanmaps(line)
-    assert run.status == 2
-    assert said in run.err
-
-
 def test_an_iterate_modulo_p_may_have_a_number_of_thirty_digits(kahanmaps):
     # P_{a+b} is the b-th iterate of P_a
     p = "mod:2305843009213693951"
@@ -543,22 +525,6 @@ def test_npy_holds_the_points_of_a_float_orbit(kahanmaps, tmp_path, every):
     assert (outcome.status, outcome.out) == (0, "")
     assert np.load(tmp_path / "x.npy").tolist() == points
     assert outcome.err.startswith(f"{tmp_path / 'x.npy'}: completed: 30 steps; block integrals moved by at most ")
-
-
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        ("--format npy --arithmetic float", "npy grows in a file: add -o FILE.npy"),
-        ("-o x.npy", "npy is for --arithmetic float: take npz, or jsonl"),
-        ("-o x.npy --arithmetic mod:7", "npy is for --arithmetic float"),
-        ("-o x.npy --arithmetic float --integral x1", "for --at or --integral take npz"),
-        ("-o no/such/folder/x.npy --arithmetic float", "No such file or directory: no/such/folder/x.npy"),
-    ],
-)
-def test_npy_is_for_float_points_in_a_file(kahanmaps, more, words):
-    outcome = kahanmaps(f"{MEMBER} --steps 3 {more}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
 
 
 def test_an_interrupted_npy_file_is_valid(tmp_path):

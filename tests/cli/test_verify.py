@@ -243,51 +243,6 @@ def test_a_member_that_is_not_generic_gives_3(kahanmaps):
     assert all("repeated roots" in claim["evidence"]["summary"] for claim in undecided)
 
 
-WRONG_USE = [
-    ("verify lorenz", "expected one of kind [family]"),
-    ("verify no-such-file", "no-such-file"),
-    ("verify paper_m2 --m 2", "give a SYSTEM or say which member to draw"),
-    ("verify paper_m2 --eigenvalues 1,2", "give a SYSTEM or say which member to draw"),
-    ("verify --universal --generic", "found --universal and --generic, expected --universal with --m only"),
-    ("verify --universal --chi t^2+1", "found --universal and --chi"),
-    ("verify --universal --eigenvalues 1,2", "found --universal and --eigenvalues"),
-    ("verify --universal paper_m2", "found --universal and SYSTEM"),
-    ("verify --universal --m 2 --eps 1/10", "found an eps, expected none"),
-    ("verify --universal --m 9", "found m = 9, expected 1 <= m <= 8"),
-    ("verify --universal --m 0", "found m = 0, expected 1 <= m <= 8"),
-    ("verify --m 9", "found a member with m = 9, expected m <= 8"),
-    ("verify --m 0", "found m = 0"),
-    ("verify --m 2 --eigenvalues 1,2,3", "found 3 eigenvalues, expected m = 2"),
-    ("verify --m 3 --chi t^2+1", "chi has degree 2, expected m = 3"),
-    ("verify --eigenvalues 1,2 --generic", "give one of --eigenvalues, --generic and --chi"),
-    ("verify --chi 7", "expected a polynomial in t"),
-    ("verify --chi t^2+x", "x"),
-    ("verify --m 2 --size 0", "found --size 0, expected 1 to 1000000"),
-    ("verify --m 2 --section 11", "found the section 11, expected 1 to 10"),
-    ("verify --m 2 --section 0", "found the section 0, expected 1 to 10"),
-    ("verify --m 2 --section six", "six"),
-    ("verify --m 2 --order 0", "found the order 0, expected 1 to 20"),
-    ("verify --m 2 --order 21", "found the order 21, expected 1 to 20"),
-    ("verify --m 2 --balls 8", "found 8 bits for the balls, expected 32 to 100000"),
-    ("verify --m 2 --error-bits 0", "found an error bound of 0 bits"),
-    ("verify --m 2 --eps 0", "found eps = 0"),
-    ("verify --m 2 --eps 0.1x", "0.1x"),
-    ("verify --m 2 --eps 1/10 --time-step 1/5", "--time-step"),
-]
-
-
-@pytest.mark.parametrize(("command", "message"), WRONG_USE, ids=[command for command, _ in WRONG_USE])
-def test_wrong_use_gives_2_and_a_sentence(kahanmaps, command, message):
-    outcome = kahanmaps(command)
-    assert outcome.status == 2
-    assert outcome.out == ""
-    assert message in outcome.err
-    assert "Traceback" not in outcome.err
-
-
-# Help
-
-
 # A terminal
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")
