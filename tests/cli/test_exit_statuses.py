@@ -192,25 +192,6 @@ def test_a_wrong_file_gives_2_and_a_message_with_the_file_and_the_key(kahanmaps,
     assert words in outcome.err
 
 
-def test_all_mistakes_of_a_file_are_told_at_once(kahanmaps, tmp_path):
-    path = tmp_path / "wrong.toml"
-    path.write_text(
-        'nam = "q"\nvariables = ["x", "y"]\n[parameters]\neps = "1"\n'
-        '[system]\nrhs = ["x^3", "y +"]\nlhs = 1\n[integrals]\nI = "z"\n[density]\nphi = "0"\n'
-    )
-    outcome = kahanmaps("systems", path)
-    keys = [line.split(":")[0].strip() for line in outcome.err.splitlines() if line.startswith("  ") and ": " in line]
-    assert keys == [
-        "nam",
-        "parameters.eps",
-        "system.lhs",
-        "system.rhs[1]",
-        "system.rhs[2]",
-        "integrals.I",
-        "density.phi",
-    ]
-
-
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
 def test_a_file_that_may_not_be_read_gives_2(kahanmaps, tmp_path):
     path = tmp_path / "secret.toml"

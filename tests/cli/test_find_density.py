@@ -6,7 +6,6 @@ import pytest
 from schema_helpers import mistakes
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.version import __version__
 
 RAMP = "--vars x,y --rhs x --rhs 3*y"
 
@@ -55,30 +54,6 @@ def test_a_density_for_one_eps_is_refuted_at_another(kahanmaps, tmp_path):
     path = tmp_path / "system.toml"
     path.write_text(without_density("euler_top") + section)
     assert kahanmaps("check-measure", path, "--eps 1/4").status == 1
-
-
-def test_json_is_one_object_with_all_that_is_needed_to_redo_it(kahanmaps):
-    outcome = kahanmaps("find-density lotka_volterra --eps 1/7 --seed 2 --json -q")
-    found = outcome.json
-    assert (outcome.status, outcome.err) == (0, "")
-    keys = ("command", "version", "system", "symbols", "eps", "time_step", "seed", "degree_tried", "period", "reason")
-    assert [found[key] for key in keys] == [
-        "find-density",
-        __version__,
-        "lotka_volterra",
-        [],
-        "1/7",
-        "2/7",
-        2,
-        2,
-        None,
-        "",
-    ]
-    assert [one["phi"] for one in found["densities"]] == ["x*y"]
-    assert len(found["primes"]) == 2
-    assert "document" in found
-    assert "convention" in found
-    assert kahanmaps("find-density lotka_volterra --eps 1/7 --seed 2 --json -q").json == found
 
 
 @pytest.mark.parametrize(

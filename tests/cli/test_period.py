@@ -10,8 +10,6 @@ import random
 
 import pytest
 
-from kahanmaps.version import __version__
-
 PAIR = "--start 1/2,-1/5,0,1 --eps 1/10"
 M3 = "paper_m3 --start 1,2,3,4,5,6 --eps 1/11"
 
@@ -85,37 +83,6 @@ def test_that_a_pole_is_met_is_told(kahanmaps, pair):
     assert "period\t332306998856115862344354572863389520\n" in out
     assert "poles\tthe orbit meets one\n" in out
     assert "continued through its poles the orbit has period" in out.splitlines()[-1]
-
-
-def test_the_json_has_the_documented_shape_and_periods_are_text(kahanmaps, pair):
-    found = kahanmaps("period", pair, PAIR, "--arithmetic mod:10007 --json").json
-    document = found.pop("document")
-    assert document["name"] == "pair"
-    assert found.pop("planes")[0] == {
-        "name": "t = 10005 mod 10007",
-        "status": "periodic",
-        "period": "5073",
-        "meets_pole": False,
-        "kind": "smooth",
-        "kind_text": "a smooth level cubic",
-        "field_size": "10007",
-        "reason": "",
-    }
-    assert found == {
-        "command": "period",
-        "version": __version__,
-        "system": "pair",
-        "structure": "a member of the family, chi = (t + 2)*(t - 1)",
-        "eps": "1/10",
-        "time_step": "1/5",
-        "convention": "eps is the paper's epsilon, the time step is 2 eps",
-        "arithmetic": "mod:10007",
-        "start": ["1/2", "-1/5", "0", "1"],
-        "status": "periodic",
-        "period": "17121375",
-        "meets_pole": False,
-        "message": "the orbit has period 17121375 and meets no pole of the map",
-    }
 
 
 def test_over_the_rationals_an_orbit_is_proved_aperiodic(kahanmaps, pair):
