@@ -233,6 +233,7 @@ def test_parameters_without_a_system_are_refused(kahanmaps):
 # What survives
 
 
+@pytest.mark.slow
 def test_what_survives_of_variations_is_a_table(kahanmaps):
     answer = kahanmaps("verify --beyond --m 2 -q")
     assert answer.status == 0
