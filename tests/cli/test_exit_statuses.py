@@ -11,10 +11,12 @@ import os
 from pathlib import Path
 
 import pytest
+from helpers import table
 
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict
 from kahanmaps_cli.render import exit_status
 
+COMMANDS = table(Path(__file__).with_name("exit_statuses.txt"))
 TOP = "euler_top --start 1,2,3 --eps 1/10"
 ROTATION = "--vars x,y --rhs y --rhs=-x"
 SQUARE = "--vars x --rhs x^2"  # the Kahan map x/(1 - 2 eps x) ...
@@ -55,26 +57,7 @@ def test_an_undecided_check_gives_3(kahanmaps, monkeypatch):
 # 0
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        f"orbit {TOP} --steps 2",
-        f"orbit {TOP} --steps 0",
-        "orbit harmonic --start 1,0 --eps 1 --steps 8",  # the start comes back after four steps
-        "check-integrals euler_top",
-        "check-integrals euler_top --eps 1/10",
-        f"check-integrals {ROTATION} --integral x^2+y^2",
-        "check-measure euler_top",
-        f"check-commute {ROTATION} harmonic",
-        "family new --m 1",
-        "family show paper_m2",
-        "family space paper_m2",
-        "family associated paper_m2",
-        "systems",
-        "systems euler_top",
-        "version",
-    ],
-)
+@pytest.mark.parametrize("command", COMMANDS["0"])
 def test_work_that_is_done_and_claims_that_hold_give_0(kahanmaps, command):
     assert kahanmaps(command).status == 0
 
@@ -82,18 +65,7 @@ def test_work_that_is_done_and_claims_that_hold_give_0(kahanmaps, command):
 # 1
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "check-integrals euler_top --integral x1",
-        "check-integrals euler_top --eps 1/10 --integral x1",
-        f"check-integrals {SQUARE} --integral x --start 1 --eps 1/2",  # refuted, although the orbit cannot start
-        "check-measure lorenz --density 1",
-        "check-poisson henon_heiles",
-        "check-commute euler_top lorenz",
-        "check-commute harmonic harmonic --eps 1/10 --eps2 1/7 -p w=2",
-    ],
-)
+@pytest.mark.parametrize("command", COMMANDS["1"])
 def test_a_refuted_claim_gives_1(kahanmaps, command):
     outcome = kahanmaps(command)
     assert (outcome.status, outcome.err) == (1, "")
@@ -103,18 +75,7 @@ def test_a_refuted_claim_gives_1(kahanmaps, command):
 # 3
 
 
-@pytest.mark.parametrize(
-    ("command", "status"),
-    [
-        (f"orbit {AT_ITS_POLE} --steps 2", "singular"),
-        (f"orbit {AT_ITS_POLE} --steps 2 --arithmetic float", "singular"),
-        (f"orbit {AT_ITS_POLE} --steps 2 --arithmetic ball:64", "singular"),
-        (f"orbit {AT_ITS_POLE} --steps 2 --arithmetic mod:7", "singular"),
-        (f"orbit {TOP} --steps 20 --max-digits 20", "budget"),
-        (f"orbit {TOP} --steps 20 --arithmetic ball:2", "precision"),
-        ("orbit lorenz --start 1,2,3 --eps 1/10 --steps 10000 --every 5000 --arithmetic float", "overflow"),
-    ],
-)
+@pytest.mark.parametrize(("command", "status"), [line.split(" => ") for line in COMMANDS["3: an orbit"]])
 def test_an_orbit_stopped_early_gives_3_and_a_sentence_on_standard_error(kahanmaps, command, status):
     outcome = kahanmaps(command)
     assert outcome.status == 3
@@ -122,14 +83,7 @@ def test_an_orbit_stopped_early_gives_3_and_a_sentence_on_standard_error(kahanma
     assert outcome.out.splitlines()[-1] == f"# {outcome.err.strip()}"
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        f"check-integrals {AT_ITS_POLE} --integral 7",
-        f"check-integrals {SQUARE} --eps 1/2 --integral 7 --start 1/3 --steps 9",  # 1/3, 1/2, 1, pole
-        "check-integrals euler_top --steps 30 --max-digits 20",
-    ],
-)
+@pytest.mark.parametrize("command", COMMANDS["3: a check"])
 def test_a_check_whose_orbit_was_asked_for_and_cut_short_gives_3(kahanmaps, command):
     assert kahanmaps(command).status == 3
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from helpers import table
 
-LINES = Path(__file__).with_name("wrong_use.txt").read_text().splitlines()
-CASES = [tuple(line.split(" => ", 1)) for line in LINES if line and not line.startswith("#")]
+TABLE = table(Path(__file__).with_name("wrong_use.txt"))
+CASES = [tuple(line.split(" => ", 1)) for lines in TABLE.values() for line in lines]
 
 
 @pytest.mark.parametrize(("command", "words"), CASES, ids=[command[:70] for command, _ in CASES])
