@@ -8,6 +8,7 @@ from __future__ import annotations
 import random
 from collections.abc import Collection, Iterable, Sequence
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -170,3 +171,15 @@ def quick(cases: Iterable[Any], which: Collection[Any]) -> list[Any]:
     """The cases as parameters of a test; those not among `which` are left to the thorough runs."""
     seldom = ((case if isinstance(case, tuple) else (case,), case in which) for case in cases)
     return [pytest.param(*values, marks=() if often else THOROUGH) for values, often in seldom]
+
+
+def table(path: Path) -> dict[str, list[str]]:
+    """The lines of a text file below each of its headings `== NAME`, without remarks (`  # ...`) and empty lines."""
+    found: dict[str, list[str]] = {}
+    for line in path.read_text(encoding="utf-8").splitlines():
+        line = "" if line.startswith("# ") else line.partition("  # ")[0]
+        if line.startswith("== "):
+            lines = found.setdefault(line.removeprefix("== "), [])
+        elif line:
+            lines.append(line)
+    return found

@@ -11,11 +11,13 @@ import shlex
 from pathlib import Path
 
 import pytest
+from helpers import quick
 
 from kahanmaps_cli.main import main
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("**/*.md")])
+QUICK = [page for page in PAGES if page.stem not in ("find-integrable-cases", "laboratory")]
 FLAGS = doctest.ELLIPSIS
 
 
@@ -48,7 +50,7 @@ def name_of(page: Path) -> str:
     return str(page.relative_to(ROOT))
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if sessions(page)], ids=name_of)
+@pytest.mark.parametrize("page", quick([page for page in PAGES if sessions(page)], QUICK), ids=name_of)
 def test_console_sessions_print_what_the_page_shows(page, tmp_path, monkeypatch, capfd):
     go_where_the_files_of(page, tmp_path, monkeypatch)
     checker = doctest.OutputChecker()
@@ -64,7 +66,7 @@ def test_console_sessions_print_what_the_page_shows(page, tmp_path, monkeypatch,
         assert checker.check_output(expected, err + out, FLAGS), f"$ {command}\n{err + out}"
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if ">>> " in page.read_text()], ids=name_of)
+@pytest.mark.parametrize("page", quick([page for page in PAGES if ">>> " in page.read_text()], QUICK), ids=name_of)
 def test_python_sessions_print_what_the_page_shows(page, tmp_path, monkeypatch):
     go_where_the_files_of(page, tmp_path, monkeypatch)
     outcome = doctest.testfile(str(page), module_relative=False, optionflags=FLAGS)

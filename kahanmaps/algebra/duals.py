@@ -7,7 +7,6 @@ are M0 + d M1 with two matrices over K, FLINT's own where K has them, so that pr
 
 from __future__ import annotations
 
-import random
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Any
@@ -55,21 +54,6 @@ class DualField(Field):
     def format(self, element: Dual) -> str:
         """`value + d*(slope)`, each as `base` writes it."""
         return f"{self.base.format(element.value)} + d*({self.base.format(element.slope)})"
-
-    def parse(self, text: str) -> Dual:
-        stripped = text.strip()
-        depth = 0
-        for place in range(len(stripped) - 1, -1, -1):  # back to the bracket that the last one closes
-            depth += {")": 1, "(": -1}.get(stripped[place], 0)
-            if depth == 0:
-                value, mark, rest = stripped[:place], " + d*", stripped[place + 1 : -1]
-                if stripped.endswith(")") and value.endswith(mark):
-                    return Dual(self, self.base.parse(value.removesuffix(mark)), self.base.parse(rest))
-                break
-        return self.convert(self.base.parse(text))
-
-    def random(self, rng: random.Random, height: int = 10) -> Dual:
-        return Dual(self, self.base.random(rng, height), self.base.random(rng, height))
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> DualMatrix:
         elements = [self.convert(entry) for entry in entries]

@@ -7,7 +7,6 @@ a zero divisor, and neither zero nor invertible.
 
 from __future__ import annotations
 
-import random
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -16,7 +15,7 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 
 from kahanmaps.algebra.fields import Element, Field, rational
 from kahanmaps.algebra.matrices import EntryMatrix, trace
-from kahanmaps.algebra.text import format_univariate, parse_polynomial
+from kahanmaps.algebra.text import format_univariate
 from kahanmaps.errors import InputError
 
 # Bits of coefficients from which on a quotient is a linear system rather than Euclid's algorithm.
@@ -70,17 +69,8 @@ class EtaleAlgebra(Field):
             return EtaleElement(self, value % self.chi)
         return EtaleElement(self, fmpq_poly([rational(value)]))
 
-    def parse(self, text: str) -> EtaleElement:
-        """The class of a polynomial in t."""
-        terms = parse_polynomial(text, ["t"]).terms()
-        return sum((self.generator ** int(exponent) * coefficient for (exponent,), coefficient in terms), self.zero)
-
     def format(self, element: EtaleElement) -> str:
         return format_univariate(element.polynomial)
-
-    def random(self, rng: random.Random, height: int = 10) -> EtaleElement:
-        coefficients = [fmpq(rng.randint(-height, height), rng.randint(1, height)) for _ in range(self.degree)]
-        return EtaleElement(self, fmpq_poly(coefficients))
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> EtaleMatrix:
         return EtaleMatrix(self, rows, columns, [self.convert(entry) for entry in entries])

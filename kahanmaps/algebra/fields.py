@@ -102,12 +102,12 @@ class Field(ABC):
         return self.convert(text)
 
     def format(self, element: Any) -> str:
-        """The element as text that `parse` reads back."""
+        """The element as text; `parse` reads that of a number back."""
         return str(element)
 
-    @abstractmethod
     def random(self, rng: random.Random, height: int = 10) -> Any:
-        """A random element; `height` bounds numerator and denominator where that has a meaning."""
+        """A random rational number, `height` bounding numerator and denominator; of residues any one."""
+        return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
 
     @abstractmethod
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> Any:
@@ -276,9 +276,6 @@ class RationalField(Field):
     def format(self, element: fmpq) -> str:
         return format_number(element)
 
-    def random(self, rng: random.Random, height: int = 10) -> fmpq:
-        return fmpq(rng.randint(-height, height), rng.randint(1, height))
-
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> fmpq_mat:
         return fmpq_mat(rows, columns, [rational(entry) for entry in entries])
 
@@ -417,9 +414,6 @@ class BallField(_Balls):
         with self.working():
             return arb(text.strip())
 
-    def random(self, rng: random.Random, height: int = 10) -> arb:
-        return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
-
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> arb_mat:
         return arb_mat(rows, columns, [self.convert(entry) for entry in entries])
 
@@ -452,10 +446,6 @@ class ComplexBallField(_Balls):
         with self.working():
             imaginary = real.parse(right)
             return acb(real.zero if left is None else real.parse(left), -imaginary if sign == "-" else imaginary)
-
-    def random(self, rng: random.Random, height: int = 10) -> acb:
-        real = RR(self.bits)
-        return acb(real.random(rng, height), real.random(rng, height))
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> acb_mat:
         return acb_mat(rows, columns, [self.convert(entry) for entry in entries])

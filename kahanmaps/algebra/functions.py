@@ -8,17 +8,16 @@ instead: dearer a step, but quotients of many factors stay small. Work is counte
 
 from __future__ import annotations
 
-import random
 from collections.abc import Sequence
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly
+from flint import fmpq_mpoly
 from flint.utils.flint_exceptions import DomainError
 
 from kahanmaps.algebra.fields import Element, Field, rational
 from kahanmaps.algebra.matrices import EntryMatrix
-from kahanmaps.algebra.polynomials import RationalFunction, names_of, ring
-from kahanmaps.algebra.text import format_rational_function, parse_rational_function
+from kahanmaps.algebra.polynomials import RationalFunction, ring
+from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.errors import KahanmapsError
 
 DEFAULT_BUDGET = 100_000_000  # about a second, with coefficients of a few words
@@ -64,14 +63,6 @@ class FunctionField(Field):
 
     def format(self, element: Function) -> str:
         return format_rational_function(RationalFunction(element.above, element.below))
-
-    def parse(self, text: str) -> Function:
-        """The element written as a quotient of polynomials."""
-        function = parse_rational_function(text, names_of(self._one))
-        return Function(self, function.numerator, function.denominator)
-
-    def random(self, rng: random.Random, height: int = 10) -> Function:
-        return self.convert(fmpq(rng.randint(-height, height), rng.randint(1, height)))
 
     def matrix(self, rows: int, columns: int, entries: Sequence[Any]) -> FunctionMatrix:
         return FunctionMatrix(self, rows, columns, [self.convert(entry) for entry in entries])

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import CC, QQ
 from kahanmaps.algebra.matrices import det, solve
-from kahanmaps.errors import ExpressionError, InexactNumber, InputError, SingularMatrix
+from kahanmaps.errors import InexactNumber, InputError, SingularMatrix
 from kahanmaps.maps.kahan import KahanMap
 
 polynomials = st.lists(rationals(6), max_size=5).map(fmpq_poly)
@@ -319,39 +319,12 @@ def test_an_element_prints_as_a_polynomial_in_t(text, coefficients):
     assert str(CUBIC.convert(fmpq_poly(coefficients))) == text
 
 
-@given(p=polynomials)
-def test_an_element_comes_back_from_its_text(p):
-    assert CUBIC.parse(CUBIC.format(CUBIC.convert(p))) == CUBIC.convert(p)
-
-
-def test_text_of_high_degree_is_reduced():
-    assert GOLDEN.parse("t^3 + 1/2") == 2 * GOLDEN.generator + fmpq(3, 2)
-
-
-@pytest.mark.parametrize("text", ["", "x", "1/t", "t +"])
-def test_text_that_spells_no_polynomial_in_t_is_refused(text):
-    with pytest.raises(ExpressionError):
-        CUBIC.parse(text)
-
-
-def test_random_elements_are_determined_by_the_seed_and_bounded_by_the_height():
-    drawn = [CUBIC.random(random.Random(seed), 4) for seed in (1, 1, *range(2, 50))]
-    assert drawn[0] == drawn[1] != drawn[2]
-    numbers = [c for element in drawn for c in element.coefficients]
-    assert (min(c.p for c in numbers), max(c.p for c in numbers), max(c.q for c in numbers)) == (-4, 4, 4)
-    assert all(CUBIC.random(random.Random(k)) == CUBIC.random(random.Random(k), 10) for k in range(20))
-    assert all(element.polynomial.degree() <= 2 for element in drawn)
-
-
 # Long coefficients: quotients by a linear system.
 
 
 def long_elements(field: EtaleAlgebra, count: int) -> list:
     rng = random.Random(f"{field}")
-    return [
-        field.convert(fmpq_poly([field.random(rng, 10**700).polynomial[k] for k in range(field.degree)]))
-        for _ in range(count)
-    ]
+    return [field.convert(fmpq_poly([QQ.random(rng, 10**700) for _ in range(field.degree)])) for _ in range(count)]
 
 
 @pytest.mark.parametrize("field", [GOLDEN, CUBIC, SPLIT], ids=repr)

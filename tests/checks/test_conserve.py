@@ -7,14 +7,10 @@ computed a second time with Python's Fractions.
 
 from __future__ import annotations
 
-from fractions import Fraction
-from itertools import pairwise
-
 import pytest
 from check_helpers import (
     QUICK,
     claim,
-    dot,
     exact,
     file_of,
     function_value,
@@ -23,10 +19,7 @@ from check_helpers import (
     kahan_step,
     modified_value,
     only,
-    rows_of,
     system_of,
-    times,
-    transposed,
     verdicts,
     verify_witness,
 )
@@ -47,7 +40,7 @@ from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
 from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 PROVED, REFUTED, SUPPORTED, UNDECIDED = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED
@@ -155,12 +148,6 @@ def test_modified_h_written_out_is_supported():
     assert int(found.evidence.data["error_bound"].split("^")[1]) <= -100
 
 
-@pytest.mark.parametrize("eps", ["1/10", "-3", "7/1000"])
-def test_modified_h_written_out_is_supported_at_one_eps(eps):
-    how = Settings(eps=eps, steps=2)
-    assert check_claim(WEIERSTRASS.system, written_out(WEIERSTRASS), how).verdict is SUPPORTED
-
-
 @pytest.mark.parametrize("power", [1, 10, 50, 300])
 @pytest.mark.parametrize("term", ["q", "eps^2*q^2", "eps^2/(1 - 2*eps^2*q)"])
 def test_modified_h_with_one_coefficient_wrong_in_a_far_digit_is_refuted(term, power):
@@ -213,12 +200,6 @@ def test_the_integrals_of_the_discrete_euler_top_are_supported(text):
 )
 def test_wrong_integrals_of_the_discrete_euler_top_are_refuted(text):
     assert check_claim(EULER_TOP, text).verdict is REFUTED
-
-
-def test_an_integral_at_another_scale_of_eps_is_supported_at_that_scale_only():
-    # Doubling the system is doubling eps.
-    text = "(1 - 4*eps^2*x2^2)/(1 + 8*eps^2*x3^2)"
-    assert check_claim(EULER_TOP.scaled(2), text).verdict is SUPPORTED
 
 
 # One eps, every eps
@@ -284,29 +265,6 @@ def test_every_map_of_a_class_conserves_the_integrals_of_the_whole_class(member,
         assert set(verdicts(report)) == {PROVED}
 
 
-@over_family
-def test_the_integrals_of_a_class_are_conserved_when_computed_without_the_library(member, classes):
-    x, eps = exact(*(fmpq((-1) ** k * (k + 2), k + 1) for k in range(member.dim))), Fraction(1, 7)
-    image = kahan_step(member.chosen.system, eps, x)
-    assert image is not None
-    for associate in member.associated():
-        assert modified_value(associate.hamiltonian, eps, image) == modified_value(associate.hamiltonian, eps, x)
-
-
-@over_family
-def test_the_integrals_of_the_commutant_are_conserved_when_computed_without_the_library(member, classes):
-    orbit, eps = [exact(*(fmpq((-1) ** k * (k + 2), k + 1) for k in range(member.dim)))], Fraction(1, 7)
-    for _ in range(2):
-        image = kahan_step(member.chosen.system, eps, orbit[-1])
-        assert image is not None
-        orbit.append(image)
-    matrix = rows_of(standard_structure(member.dim))
-    for _ in range(member.m):
-        before, after = (dot(x, [dot(row, image) for row in matrix]) for x, image in pairwise(orbit))
-        assert before == after
-        matrix = times(matrix, transposed(rows_of(member.A)))
-
-
 def test_a_matrix_that_does_not_commute_with_the_jacobian_gives_no_integral(monkeypatch):
     member = FAMILY["m=2"][0]
     swap = fmpq_mat([[0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1], [0, 0, 1, 0]])
@@ -362,10 +320,6 @@ def test_of_many_proved_integrals_the_first_ones_are_tried_along_the_orbit():
     tried = [any(evidence.method == "exact orbit" for evidence in found.also) for found in report.findings]
     assert tried == [True] * 32 + [False] * 6
     assert report.notes == ["of the proved integrals the first 32 were also tried along an orbit"]
-
-
-def test_of_few_integrals_all_are_tried_along_the_orbit_and_nothing_is_noted():
-    assert check_integrals(SystemFile.from_member(FAMILY["m=3"][0]), Settings(steps=1)).notes == []
 
 
 def test_a_class_of_many_systems_lists_the_single_minus_signs():
@@ -430,10 +384,6 @@ def test_a_claim_is_shown_by_its_formula():
     assert found.formula == format_rational_function(function)
 
 
-def test_a_constant_is_an_integral_of_everything():
-    assert check_claim(LORENZ, "3/7 + eps").verdict is SUPPORTED
-
-
 def test_the_names_of_parameters_may_be_used_in_claims():
     text = 'variables = ["x", "y"]\n[parameters]\na = "3/2"\n[system]\nrhs = ["y", "0"]\n[integrals]\nI = "a*y"\n'
     assert only(check_integrals(parse_system(text), QUICK)).verdict is SUPPORTED
@@ -465,13 +415,6 @@ def test_an_orbit_can_refute_what_random_points_could_not_decide(monkeypatch):
     monkeypatch.setattr("kahanmaps.checks.decide.log2_error", lambda *_: 0.0)
     assert check_claim(LOTKA_VOLTERRA, "x").evidence.method == "exact orbit"
     assert check_claim(LOTKA_VOLTERRA, "1").verdict is UNDECIDED
-
-
-def test_a_singular_start_is_told():
-    file = file_of(system_of("x", "x^2"), I="x")
-    report = check_integrals(file, Settings(eps="1/10", start=(5,), orbit_is_asked=True))
-    assert report.ended_early
-    assert report.to_json()["orbit"]["status"] == "singular"
 
 
 @pytest.mark.parametrize(("asked", "told"), [(True, True), (False, False)])

@@ -160,32 +160,6 @@ def test_a_verdict_gives_0_whatever_it_is(kahanmaps, command):
     assert kahanmaps(f"analyze {command}").status == 0
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("", "missing SYSTEM"),
-        ("nosuch", "found the unknown system 'nosuch'"),
-        ("euler_top --eps 0", "found eps = 0"),
-        ("euler_top --eps 1/3 --time-step 2/3", "give --eps or --time-step, not both"),
-        ("euler_top --eps 1/0", "1/0"),
-        ("euler_top --markdown --json", "give --markdown or --json, one of the two"),
-        ("euler_top --symbolic zz", "found the symbol 'zz', expected eps or a parameter of the system: a1, a2, a3"),
-        ("euler_top --symbolic eps --eps 1/3", "not both"),
-        ("paper_m2 --symbolic a", "found the symbol 'a'"),
-        ("euler_top --seconds 0", "found '0', expected a number of seconds above 0"),
-        ("euler_top --seconds nan", "found 'nan', expected a number of seconds above 0"),
-        ("euler_top --seconds inf", "found 'inf', expected a number of seconds above 0"),
-        ("euler_top -p a9=1", "a9"),
-        ("--vars x --rhs x^3", "found a polynomial of degree 3"),
-        ("--vars x,y --rhs x", "rhs"),
-    ],
-)
-def test_wrong_use_gives_2(kahanmaps, command, words):
-    outcome = kahanmaps(f"analyze {command}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-
-
 # Time, progress and interrupts
 
 

@@ -97,14 +97,6 @@ def test_the_second_run_has_nothing_to_do(batch):
     assert done.err == "nothing to do: every task has a result in study.db\n"
 
 
-def test_json_is_one_object_with_everything_counted(batch):
-    done = batch("run", SPACE, "--json -q")
-    (one,) = done.json["experiments"]
-    assert (one["name"], one["tasks"], one["missing"], one["outcomes"]) == ("space", 6, 0, {"ok": 6})
-    assert done.json["done"] == {"ok": 6}
-    assert not done.json["interrupted"]
-
-
 def test_jsonl_has_every_record_as_it_comes(batch):
     records = batch("run", SPACE, "--jsonl -q").records
     assert sorted(record["result"]["dimension"] for record in records) == [8, 8, 8, 12, 12, 12]
@@ -191,12 +183,6 @@ def test_wrong_use_is_status_2_and_a_sentence(batch, words: str, message: str, s
     assert "Traceback" not in done.err
 
 
-def test_status_may_be_asked_in_json(batch, space):
-    data = batch("status --db study.db --json").json
-    assert data["experiments"][0]["outcomes"] == {"ok": 6}
-    assert data["unplanned"] == 0
-
-
 def test_results_that_no_experiment_asks_for_are_told(batch, space):
     batch("run", SPACE.replace("2..3", "3..3"), "-q")
     assert "3 more results belong to tasks that no experiment has now" in batch("status --db study.db").out
@@ -246,13 +232,6 @@ def test_export_writes_a_table_or_lines_to_a_file_or_out(batch, space):
     records = batch("export --db study.db --jsonl --stable").records
     assert [record["record"] for record in records] == ["header", *["result"] * 6, "end"]
     assert "seconds" not in records[1]
-
-
-def test_export_to_parquet(batch):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    batch("run", SPACE, "-q")
-    assert batch("export --db study.db --parquet -o study.parquet").status == 0
-    assert parquet.read_table("study.parquet")["dimension"].to_pylist() == [8] * 3 + [12] * 3
 
 
 def test_a_summary_groups_and_counts(batch, space):

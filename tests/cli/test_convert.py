@@ -78,33 +78,6 @@ def test_a_file_is_written_whole_and_told_on_standard_error(kahanmaps, tmp_path)
     assert kahanmaps("convert euler_top --to julia -q -o", path).err == ""
 
 
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
-        ("euler_top", "Missing option '--to'. Choose from:"),
-        ("--to pari", "missing SYSTEM"),
-        ("euler_top --to matlab", "'matlab' is not one of 'latex', 'sympy'"),
-        ("euler_top --to pari --what maps", "found the part 'maps', expected one of system, map"),
-        ("euler_top --to pari --what ,", "found no part, expected some of system, map"),
-        ("lorenz --to pari --what integrals", "found no integral of lorenz, expected a section [integrals]"),
-        ("lorenz --to pari --what density", "found no density of lorenz, expected a section [density]"),
-        ("paper_m3 --to pari --what map-formulas", "the closed form of the map is too large"),
-        ("euler_top --to pari --symbolic b", "found the symbol 'b', expected eps or a parameter of the system"),
-        ("paper_m2 --to pari --symbolic a", "found the symbol 'a'"),
-        ("euler_top --to toml --what map", "a system file holds the whole system"),
-        ("euler_top --to pari --name 1x", "found the name '1x', expected a letter"),
-        ("no_such_system --to pari", "no_such_system"),
-        ("euler_top --to pari -o no_such_folder/x.gp", "no_such_folder"),
-    ],
-)
-def test_wrong_use_is_told_with_what_was_expected(kahanmaps, options, told, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    outcome = kahanmaps(f"convert {options}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert told in outcome.err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_help_names_every_language_and_part(kahanmaps):
     words = kahanmaps("convert --help").out.replace("\n", " ").replace(",", " ").replace(".", " ").split()
     assert {*LANGUAGES, "toml", *PARTS} <= set(words)

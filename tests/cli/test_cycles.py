@@ -68,30 +68,6 @@ def test_a_map_without_values_is_told(kahanmaps):
     assert "singular everywhere modulo this prime" in outcome.out
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ("weierstrass", "missing --prime P, or -p P"),
-        ("weierstrass --prime 2", "modulo 2 every Kahan map is the identity"),
-        ("weierstrass --prime 15", "15 is composite"),
-        ("weierstrass --prime 7 --eps 1/7", "divides 1/7"),
-        ("lorenz --prime 3 --eps 1/7", "a denominator of the system"),
-        ("weierstrass --prime 7 --eps 0", "eps = 0"),
-        ("weierstrass --prime 7 --samples 0", "expected 1 to"),
-        ("weierstrass --prime 7 --steps 5", "--steps N is for --samples N"),
-        ("weierstrass --prime 7 --seed -1", "found '-1', expected an integer, 0 or more"),
-        ("weierstrass --prime 7 --seconds 0", "found '0', expected a number of seconds above 0"),
-        ("weierstrass --prime 7 --reversor '1,0;0,1'", "does not reverse"),
-        ("weierstrass --prime 7 --reversor '1,0;0'", "rows of different lengths"),
-        ("weierstrass --prime 7 --reversor '1,a;0,1'", "found 'a'"),
-    ],
-)
-def test_wrong_use(kahanmaps, arguments, words):
-    outcome = kahanmaps(f"cycles {arguments}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-
-
 def test_help_fits_the_screen(tmp_path):
     outcome = shell("kahanmaps cycles --help", tmp_path, COLUMNS="80")
     assert outcome.status == 0

@@ -93,23 +93,6 @@ def test_degenerate_maps_are_no_errors(kahanmaps, command, growth):
     assert (outcome.status, f"growth\t{growth}\n" in outcome.out) == (0, True)
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("degrees", "missing SYSTEM"),
-        ("degrees lorenz --eps 0", "found eps = 0"),
-        ("degrees lorenz --eps 1 --time-step 2", "not both"),
-        ("degrees lorenz --seconds 0", "found '0', expected a number of seconds above 0"),
-        ("degrees lorenz --terms -2", "found -2 terms"),
-        ("degrees lorenz --max-degree 0", "the largest degree 0"),
-    ],
-)
-def test_wrong_use_gives_2(kahanmaps, command, words):
-    outcome = kahanmaps(command)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-
-
 def test_a_pattern_longer_than_the_degrees_explains_them(kahanmaps):
     """The lines x, y, x + 2 y with exponents (1, 3, 3): 2^n up to n = 7, and 255 after that."""
     outcome = kahanmaps("degrees --vars x,y --rhs 3*x*(x+2*y)+6*x*y --rhs=-(y*(x+2*y)+3*x*y) --max-degree 150")
@@ -148,20 +131,3 @@ def test_a_table_in_json_has_a_record_for_each_value(kahanmaps):
 def test_a_table_says_how_many_values_are_undecided(kahanmaps):
     outcome = kahanmaps("degrees henon_heiles -p c=-1..0 --terms 40 --max-degree 20")
     assert (outcome.status, outcome.err) == (3, "undecided, or stopped early: 2 of 2\n")
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("henon_heiles -p c=2..0", "found a range without values"),
-        ("henon_heiles -p c=0..2:x", "expected an integer, p/q or a decimal"),
-        ("henon_heiles -p c=0..2:0", "range of step 0"),
-        ("henon_heiles -p c=0..100000", "found 100001 combinations of values, expected at most 10000"),
-        ("henon_heiles -p d=0..2", "unknown parameter 'd'"),
-        ("- -p c=0..2", "the system on standard input"),
-    ],
-)
-def test_a_wrong_range_is_one_line(kahanmaps, options, message):
-    outcome = kahanmaps(f"degrees {options}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert message in outcome.err

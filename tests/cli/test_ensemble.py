@@ -18,7 +18,6 @@ import pytest
 from cli_helpers import COMMAND, shell
 
 from kahanmaps.maps.floats.stream import NpyFile
-from kahanmaps.version import __version__
 from kahanmaps_cli import ensemble_starts
 
 TOP = "ensemble euler_top --eps 1/10 --kernel numpy"
@@ -97,34 +96,6 @@ def test_the_seed_settles_what_is_drawn(kahanmaps, tmp_path):
 # Orbits
 
 
-def test_every_orbit_is_the_one_it_would_be_alone(kahanmaps, tmp_path):
-    (tmp_path / "s.txt").write_text("1,2,3\n1/3,-1,1/7\n")
-    out = tmp_path / "x.npy"
-    assert kahanmaps(f"{TOP} --steps 20 --every 10 --starts", tmp_path / "s.txt", "-o", out).status == 0
-    for k, start in enumerate(("1,2,3", "1/3,-1,1/7")):
-        alone = kahanmaps(
-            f"orbit euler_top --eps 1/10 --start {start} --steps 20 --every 10 --arithmetic float --format jsonl"
-        ).records[1:-1]
-        assert np.load(out)[:, k].tolist() == [[float(entry) for entry in point["x"]] for point in alone]
-
-
-@pytest.mark.parametrize("prime", [7, 10007, PRIME])
-@pytest.mark.parametrize("backward", ["", " --backward"])
-def test_residues_are_those_of_single_orbits(kahanmaps, tmp_path, pair, prime, backward):
-    (tmp_path / "s.txt").write_text("1,2,3,4\n5,-1,1/11,0\n")
-    out = tmp_path / "x.npy"
-    rest = f"--eps 1/10 --arithmetic mod:{prime} --steps 9 --every 3{backward}"
-    outcome = kahanmaps("ensemble", pair, f"{rest} --kernel numpy --json --starts", tmp_path / "s.txt", "-o", out)
-    for k, start in enumerate(("1,2,3,4", "5,-1,1/11,0")):
-        *points, end = kahanmaps("orbit", pair, f"{rest} --start {start} --format jsonl").records[1:]
-        walked = np.load(out)[:, k].tolist()
-        assert walked[: len(points)] == [[int(entry) for entry in point["x"]] for point in points]
-        failures = {failure["orbit"]: failure for failure in outcome.json["failures"]}
-        assert (k in failures) == (end["status"] == "singular")
-        if k in failures:
-            assert (failures[k]["steps"], failures[k]["message"]) == (end["steps"], end["message"])
-
-
 def test_members_are_stepped_in_their_normal_form(kahanmaps, pair):
     command = ("ensemble", pair, "--random 5 --eps 1/10 --steps 20 --kernel numpy --json")
     chosen, generic = kahanmaps(*command).json, kahanmaps(*command, "--method generic").json
@@ -146,19 +117,6 @@ def test_modulo_a_prime_where_chi_does_not_split_there_is_elimination(kahanmaps)
     assert (outcome.status, "needs a chi that splits modulo P" in outcome.err) == (2, True)
 
 
-@pytest.mark.parametrize("arithmetic", ["float", f"mod:{PRIME}"])
-def test_the_kernels_agree(kahanmaps, tmp_path, pair, arithmetic):
-    pytest.importorskip("numba")
-    command = ("ensemble", pair, f"--random 9 --eps 1/10 --steps 20 --every 5 --arithmetic {arithmetic}")
-    found = []
-    for kernel in ("--kernel numpy", "--kernel numba --threads 2"):
-        outcome = kahanmaps(*command, kernel, "--json -o", tmp_path / "x.npy")
-        assert outcome.status == 0
-        assert outcome.json["kernel"].startswith(kernel.split()[1])
-        found.append(np.load(tmp_path / "x.npy").tolist())
-    assert found[0] == found[1]
-
-
 # The summary
 
 
@@ -177,39 +135,6 @@ def test_the_summary_is_a_table_of_lines(kahanmaps, tmp_path):
         "singular\t1",
     ]
     assert lines[-1] == "ended early\torbit 0\tsingular: I - eps f'(x) is singular in machine numbers at step 1"
-
-
-def test_the_json_has_the_documented_shape(kahanmaps, tmp_path):
-    path = tmp_path / "x.npy"
-    found = kahanmaps(f"{TOP} --random 4 --box 1/2 --steps 30 --every 10 --integral F1 --json -o", path).json
-    drift = found.pop("drift")
-    assert found.pop("document")["name"] == "euler_top"
-    assert [sorted(record) for record in drift] == [["initial", "largest", "name", "orbit", "orbits"]]
-    assert drift[0]["name"] == "F1"
-    assert 0 < drift[0]["largest"] < 1e-14  # thirty steps, each wrong by some 1e-16
-    assert found == {
-        "command": "ensemble",
-        "version": __version__,
-        "system": "euler_top",
-        "variables": ["x1", "x2", "x3"],
-        "eps": "1/10",
-        "time_step": "1/5",
-        "convention": "eps is the paper's epsilon, the time step is 2 eps",
-        "arithmetic": "float",
-        "method": "generic",
-        "kernel": "numpy generic",
-        "direction": "forward",
-        "starts": {"random": 4, "box": "1/2"},
-        "seed": 0,
-        "orbits": 4,
-        "steps": 30,
-        "status": "completed",
-        "steps_taken": 30,
-        "counts": {"completed": 4, "overflow": 0, "singular": 0},
-        "failures": [],
-        "near_singular": {"steps": 0, "orbits": 0, "first": None},
-        "output": {"file": str(path), "shape": [4, 4, 3], "every": 10, "axes": ["record", "orbit", "x"]},
-    }
 
 
 def test_near_singular_steps_are_counted(kahanmaps, tmp_path):
@@ -284,61 +209,6 @@ def test_an_interrupt_gives_130_and_leaves_a_valid_file(tmp_path, number, arithm
 
 
 # Wrong use
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("ensemble", "Missing option '--steps'"),
-        ("ensemble --steps 1 --eps 1", "give --starts FILE or --random N"),
-        (f"{TOP} --steps 1 --random 3 --starts x", "give --starts FILE or --random N"),
-        (f"{TOP} --steps 1 --starts x --seed 1", "--box and --seed are for --random"),
-        (f"{TOP} --steps 1 --starts x --box 1", "--box and --seed are for --random"),
-        ("ensemble --random 3 --steps 1 --eps 1", "missing SYSTEM"),
-        ("ensemble euler_top --random 3 --steps 1", "missing --eps E"),
-        ("ensemble euler_top --random 3 --steps 1 --eps 0", "found eps = 0"),
-        ("ensemble euler_top --random 3 --steps 1 --eps 1e-400", "take a larger eps"),
-        ("ensemble euler_top --random 3 --steps 1 --eps 1e400", "beyond the range of machine floats"),
-        ("ensemble - --starts - --steps 1 --eps 1", "found - twice"),
-        (f"{TOP} --random 0 --steps 1", "found '0', expected an integer, 1 or more"),
-        (f"{TOP} --random -1 --steps 1", "found '-1', expected an integer, 1 or more"),
-        (f"{TOP} --random {10**12} --steps 1", "expected at most"),
-        (f"{TOP} --random 3 --box 0 --steps 1", "found --box 0"),
-        (f"{TOP} --random 3 --box=-1 --steps 1", "found --box -1"),
-        (f"{TOP} --random 3 --box 1e400 --steps 1", "beyond the range of machine floats"),
-        (f"{TOP} --random 3 --box 1e-400 --steps 1", "0 in machine numbers"),
-        (f"{TOP} --random 3 --seed -1 --steps 1", "found '-1', expected an integer, 0 or more"),
-        (f"{TOP} --random 3 --seed x --steps 1", "found 'x', expected an integer"),
-        (f"{TOP} --random 3 --steps -1", "found --steps -1"),
-        (f"{TOP} --random 3 --steps {10**40}", "it would take years"),
-        (f"{TOP} --random 3 --steps 1 --every 0 -o x.npy", "found --every 0"),
-        (f"{TOP} --random 3 --steps 1 --every 1", "--every K is for -o"),
-        (f"{TOP} --random 3 --steps 1 --threads 0", "found --threads 0"),
-        (f"{TOP} --random 3 --steps 1 -o x.csv", "ends with .npy"),
-        (f"{TOP} --random 3 --steps 1 -o -", "ends with .npy"),
-        (f"{TOP} --random 3 --steps 1 -o no/such/folder/x.npy", "No such file or directory: no/such/folder/x.npy"),
-        (f"{TOP} --random 3 --steps 1 --method normal-form", "there is none"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic exact", "expected float or mod:P"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic ball:64", "expected float or mod:P"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic mod:91", "91 is composite"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic mod:2", "the prime 2 divides the denominator of 1/10"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic mod:{2**89 - 1}", "found a modulus of 89 bits, expected at most 61"),
-        (f"{TOP} --random 3 --steps 1 --arithmetic mod:7 --box 1", "--box is for float"),
-        (f"{TOP} --random 3 --steps 1 --integral F1 --integral F1", "found two integrals of the name F1"),
-        (f"{TOP} --random 3 --steps 1 --integral q", "found the unknown name 'q'"),
-        (f"{TOP} --random 3 --steps 1 --integral 1/0", "found a division by 0"),
-        (f"{TOP} --starts nowhere.txt --steps 1", "No such file or directory: nowhere.txt"),
-        (f"{TOP} --starts . --steps 1", "s a directory"),
-        (f"{TOP} --starts '' --steps 1", "No such file or directory: ''"),
-    ],
-    ids=lambda text: text[:90],
-)
-def test_wrong_use_gives_2(kahanmaps, command, words, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    outcome = kahanmaps(command)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-    assert list(tmp_path.iterdir()) == []
 
 
 def npy(array) -> bytes:

@@ -56,11 +56,6 @@ def test_chi_is_the_one_asked_for_made_monic(kahanmaps, tmp_path):
     assert shown["chi"] == "t^3 - t^2 - 2*t + 2"
 
 
-def test_a_generic_member_has_a_chi_without_repeated_roots(kahanmaps, tmp_path):
-    kahanmaps("family new --m 4 --generic --seed 3 -o", tmp_path / "a.toml")
-    assert kahanmaps("family show", tmp_path / "a.toml", "--json").json["generic"] is True
-
-
 def test_repeated_eigenvalues_are_said_not_to_be_generic(kahanmaps):
     outcome = kahanmaps("family new --eigenvalues 1,1")
     assert outcome.status == 0
@@ -84,27 +79,6 @@ def test_a_file_gets_what_standard_output_would(kahanmaps, tmp_path):
 # show
 
 
-def test_a_member_is_shown_for_scripts(kahanmaps, pair):
-    shown = kahanmaps("family show", pair, "--json").json
-    assert set(shown) == {
-        "command",
-        "version",
-        "system",
-        "m",
-        "dim",
-        "variables",
-        "A",
-        "chi",
-        "factors",
-        "generic",
-        "diagnosis",
-        "signs",
-        "hamiltonians",
-    }
-    assert (shown["system"], shown["m"], shown["dim"], shown["variables"]) == ("pair", 2, 4, ["x1", "x2", "x3", "x4"])
-    assert (shown["chi"], shown["generic"], shown["signs"]) == ("t^2 + t - 2", True, [1, 1])
-
-
 def test_a_member_is_shown_to_people(kahanmaps, pair):
     lines = kahanmaps("family show", pair).out.splitlines()
     assert lines[0] == "pair: m = 2, dimension 4, variables x1, x2, x3, x4"
@@ -118,14 +92,6 @@ def test_the_normal_form_is_shown_for_scripts_that_ask_for_it(kahanmaps, pair):
     assert set(form) == {"chi", "h", "D", "S", "h_in_powers_of_t", "parts"}
     assert (form["chi"], [len(c) for c in form["h_in_powers_of_t"]]) == (shown["chi"], [2, 2, 2, 2])
     assert [(part["root"], part["weight"]) for part in form["parts"]] == [("-2", "-1/3"), ("1", "1/3")]
-
-
-def test_the_transpose_of_a_is_multiplication_by_t_in_the_columns_of_s(kahanmaps, pair):
-    shown = kahanmaps("family show", pair, "--normal-form --json").json
-    a, s = ([[Fraction(entry) for entry in row] for row in rows] for rows in (shown["A"], shown["normal_form"]["S"]))
-    image = [[sum(a[k][i] * s[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
-    # t^2 = 2 - t: the columns of S are e, t e for two vectors e
-    assert image == [[row[1], 2 * row[0] - row[1], row[3], 2 * row[2] - row[3]] for row in s]
 
 
 def test_people_see_the_normal_form_after_the_member(kahanmaps, pair):
@@ -228,24 +194,6 @@ def test_where_nothing_is_found_it_is_said_what_was_looked_for(kahanmaps, name, 
 # space
 
 
-def test_the_space_of_a_generic_member_has_dimension_4m(kahanmaps, pair):
-    space = kahanmaps("family space", pair, "--json").json
-    assert set(space) == {
-        "command",
-        "version",
-        "A",
-        "dim",
-        "dimension",
-        "expected_for_generic_A",
-        "unknowns",
-        "rank",
-        "diagnosis",
-        "basis",
-    }
-    assert (space["dim"], space["dimension"], space["expected_for_generic_A"]) == (4, 8, 8)
-    assert len(space["basis"]) == 8
-
-
 def test_the_unknowns_are_the_cubic_monomials(kahanmaps, pair):
     space = kahanmaps("family space", pair, "--json").json
     assert (space["unknowns"], space["unknowns"] - space["rank"]) == (20, space["dimension"])  # 4*5*6/6
@@ -258,21 +206,6 @@ def test_the_matrix_may_stand_on_the_command_line(kahanmaps, matrix):
 
 
 # associated
-
-
-def test_the_associated_systems_are_listed_for_scripts(kahanmaps, pair):
-    listed = kahanmaps("family associated", pair, "--json").json
-    assert set(listed) == {"command", "version", "system", "factors", "associated"}
-    assert listed["factors"] == ["t + 2", "t - 1"]
-    assert [row["label"] for row in listed["associated"]] == ["++", "+-"]
-    assert all(set(row) == {"label", "signs", "B_in_powers_of_A", "B", "K"} for row in listed["associated"])
-
-
-def test_b_has_the_square_one(kahanmaps, pair):
-    for row in kahanmaps("family associated", pair, "--json").json["associated"]:
-        b = [[Fraction(entry) for entry in line] for line in row["B"]]
-        square = [[sum(b[i][k] * b[k][j] for k in range(4)) for j in range(4)] for i in range(4)]
-        assert square == [[int(i == j) for j in range(4)] for i in range(4)]
 
 
 def test_the_associated_systems_are_written_as_files(kahanmaps, pair, tmp_path):
@@ -304,19 +237,10 @@ def test_a_system_over_an_algebra_is_written_over_Q_with_what_it_inherits(kahanm
     )
     assert kahanmaps("check-integrals", file).status == 0
     assert kahanmaps("check-measure", file).status == 0
-    statements = kahanmaps("analyze", file, "--seconds 5 --json").json
+    statements = kahanmaps("analyze", file, "--seconds 1 --json").json
     assert statements["algebra"]["text"] == "a system in 3 variables over K = Q[t]/(t^2 - 2)"
 
 
 def test_a_parameter_t_is_the_generator_of_the_algebra(kahanmaps):
     text = kahanmaps("family tensor --vars x --rhs t*x^2 -p t=0 --algebra t^2+1").out
     assert 'rhs = ["-2*x_0*x_1", "x_0^2 - x_1^2"]' in text
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [("euler_top", "Missing option '--algebra'"), ("euler_top --algebra 3", "expected a polynomial in t")],
-)
-def test_an_algebra_that_is_none_is_refused(kahanmaps, words, message):
-    answer = kahanmaps(f"family tensor {words}")
-    assert (answer.status, message in answer.err) == (2, True)

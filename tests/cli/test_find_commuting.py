@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import shlex
 
-import pytest
-
-from kahanmaps.version import __version__
-
 
 def test_the_associated_systems_of_a_member_that_does_not_say_so(kahanmaps):
     rhs = kahanmaps("systems paper_m2 --json").json["rhs"]
@@ -48,37 +44,6 @@ def test_where_chi_does_not_split_the_note_says_so(kahanmaps):
     assert "note\tmore solutions, not rational: groups of 3 conjugate solutions" in outcome.out
 
 
-def test_the_json_has_the_documented_shape(kahanmaps):
-    found = kahanmaps("find-commuting --vars x,y --rhs x^2+1 --rhs 'y^2 - x*y' --seed 4 --json").json
-    assert found.pop("document")["variables"] == ["x", "y"]
-    solutions = found.pop("solutions")
-    assert found == {
-        "command": "find-commuting",
-        "version": __version__,
-        "system": "inline",
-        "eps": "every",
-        "time_step": "every",
-        "convention": "eps is the paper's epsilon, the time step is 2 eps",
-        "arithmetic": "exact",
-        "seed": 4,
-        "error_bits": 100,
-        "seconds": 60.0,
-        "shape": "linear",
-        "status": "complete",
-        "verdict": "proved",
-        "bracket_space": {"dimension": 1, "basis": [["x^2 + 1", "-x*y + y^2"]]},
-        "families": [],
-        "every_g_commutes": False,
-        "irrational": [],
-        "discarded": 0,
-        "order": 4,
-        "undecided": [],
-    }
-    assert [(g["trivial"], g["verdict"]) for g in solutions] == [("0", "proved"), ("f", "proved"), ("-f", "proved")]
-    assert solutions[1]["B"] == [["1", "0"], ["0", "1"]]
-    assert solutions[2]["rhs"] == ["-x^2 - 1", "x*y - y^2"]
-
-
 def test_what_stays_open_gives_3(kahanmaps):
     command = "find-commuting --vars a,b,c,d --rhs a^2 --rhs 0 --rhs 0 --rhs 0 --shape quadratic"
     outcome = kahanmaps(command)
@@ -87,19 +52,3 @@ def test_what_stays_open_gives_3(kahanmaps):
     assert "undecided: the fields g with [f, g] = 0 have dimension 31" in outcome.err
     quiet = kahanmaps(command, "-q --json")
     assert (quiet.status, quiet.err, quiet.json["status"], quiet.json["verdict"]) == (3, "", "undecided", "undecided")
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("find-commuting", "missing SYSTEM"),
-        ("find-commuting lorenz --shape cubic", "'cubic' is not one of"),
-        ("find-commuting lorenz --seconds 0", "found '0', expected a number of seconds above 0"),
-        ("find-commuting lorenz --error-bits 0", "found an error bound of 0 bits"),
-        ("find-commuting --vars x --rhs x^3", "degree 3"),
-    ],
-)
-def test_wrong_use_gives_2(kahanmaps, command, words):
-    outcome = kahanmaps(command)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err

@@ -6,7 +6,6 @@ import pytest
 from schema_helpers import mistakes
 
 from kahanmaps.documents.catalog import load
-from kahanmaps.version import __version__
 
 RAMP = "--vars x,y --rhs x --rhs 3*y"
 
@@ -57,30 +56,6 @@ def test_a_density_for_one_eps_is_refuted_at_another(kahanmaps, tmp_path):
     assert kahanmaps("check-measure", path, "--eps 1/4").status == 1
 
 
-def test_json_is_one_object_with_all_that_is_needed_to_redo_it(kahanmaps):
-    outcome = kahanmaps("find-density lotka_volterra --eps 1/7 --seed 2 --json -q")
-    found = outcome.json
-    assert (outcome.status, outcome.err) == (0, "")
-    keys = ("command", "version", "system", "symbols", "eps", "time_step", "seed", "degree_tried", "period", "reason")
-    assert [found[key] for key in keys] == [
-        "find-density",
-        __version__,
-        "lotka_volterra",
-        [],
-        "1/7",
-        "2/7",
-        2,
-        2,
-        None,
-        "",
-    ]
-    assert [one["phi"] for one in found["densities"]] == ["x*y"]
-    assert len(found["primes"]) == 2
-    assert "document" in found
-    assert "convention" in found
-    assert kahanmaps("find-density lotka_volterra --eps 1/7 --seed 2 --json -q").json == found
-
-
 @pytest.mark.parametrize(
     ("command", "words"),
     [
@@ -114,25 +89,3 @@ def test_a_density_of_the_flow(kahanmaps):
     record = kahanmaps("find-density zander_120 --flow --json -q").json
     assert record["flow"] is True
     assert mistakes("find-density", record) == []
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ("euler_top --symbolic zz", "found the symbol 'zz'"),
-        ("euler_top --symbolic eps --eps 1", "give --eps as a number, or eps among --symbolic"),
-        ("euler_top --eps 0", "found eps = 0"),
-        ("euler_top --seconds 0", "found '0'"),
-        ("euler_top --max-degree -1", "found -1, expected 0 to 20"),
-        ("euler_top --toml --latex", "give one of --toml, --latex and --json"),
-        ("--vars x,y --rhs x/a --rhs x -p a=1 --symbolic a", "a division by something with variables in it"),
-        ("", "missing SYSTEM"),
-        ("lyness --flow", "found an explicit map, expected a polynomial vector field"),
-        ("lotka_volterra --flow --toml", "--flow goes without --toml"),
-    ],
-)
-def test_wrong_use_gives_2(kahanmaps, options, words):
-    outcome = kahanmaps(f"find-density {options}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-    assert "Traceback" not in outcome.err

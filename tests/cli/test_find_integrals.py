@@ -214,38 +214,6 @@ def test_bases_where_orbits_close_or_are_none(kahanmaps):
     assert (none.status, "no value anywhere" in none.out) == (3, True)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ("euler_top --symbolic zz", "found the symbol 'zz', expected eps or a parameter of the system: a1, a2, a3"),
-        ("euler_top --symbolic a1,eps --eps 1", "give --eps as a number, or eps among --symbolic"),
-        ("paper_m2 --symbolic A", "a parameter of the system: none"),
-        ("euler_top --eps 0", "found eps = 0"),
-        ("euler_top --eps 1 --time-step 2", "not both"),
-        ("euler_top --eps 0.1x", "0.1x"),
-        ("euler_top --seconds 0", "found '0'"),
-        ("euler_top --max-degree 0", "found 0, expected 1 to 20"),
-        ("euler_top --toml --json", "give one of --toml, --latex and --json"),
-        ("euler_top --monomials x1^2,1 --toml", "--monomials goes with --json"),
-        ("euler_top --monomials x1^2,1 --symbolic a1", "--monomials goes without --symbolic"),
-        ("euler_top --monomials x1^2,,1", "found the set 'x1^2,,1', expected polynomials with commas between them"),
-        ("euler_top --monomials ''", "found the set ''"),
-        ("euler_top --monomials x1,q", "found the unknown name 'q'"),
-        ("euler_top --monomials 1/x1,1", "found a division by something with variables in it"),
-        ("euler_top --monomials x1,0", "found 0 as function 2"),
-        ("euler_top --monomials x1,x2,x1", "found function 3 twice"),
-        ("--vars x,y --rhs a*x^3+y --rhs x -p a=0 --symbolic a", "found a polynomial of degree 3"),
-        ("no_such_system", "no_such_system"),
-        ("", "missing SYSTEM"),
-    ],
-)
-def test_wrong_use_gives_2(kahanmaps, options, words):
-    outcome = kahanmaps(f"find-integrals {options}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-    assert "Traceback" not in outcome.err
-
-
 def test_symbols_in_a_family_file_are_refused(kahanmaps, tmp_path):
     path = tmp_path / "member.toml"
     path.write_text(load("paper_m2").to_toml().replace("[family]", '[parameters]\nt = "1"\n[family]'))

@@ -53,18 +53,3 @@ def test_none_gives_3(kahanmaps):
         ["note\tno tensor of degree at most 2 is preserved (measured modulo a prime)"],
     )
     assert kahanmaps("find-poisson lorenz --toml").out == ""
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ("euler_top --degree -1", "expected 0 to 20"),
-        ("euler_top --denominator q", "found the unknown name 'q'"),
-        ("euler_top --toml --json", "give one of --toml, --latex and --json"),
-        ("", "missing SYSTEM"),
-    ],
-)
-def test_wrong_use_gives_2(kahanmaps, options, words):
-    outcome = kahanmaps(f"find-poisson {options}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err

@@ -107,24 +107,6 @@ def test_wrong_values_in_the_library():
             height_survey(system, **options)
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("heights", "missing SYSTEM"),
-        ("heights lorenz --eps 0", "found eps = 0"),
-        ("heights lorenz --start 1,2", "with 2 coordinates, expected 3"),
-        ("heights lorenz --starts 0", "found '0', expected an integer, 1 or more"),
-        ("heights lorenz --steps -1", "found -1 steps"),
-        ("heights lorenz --max-digits 0", "found --max-digits 0"),
-        ("heights lorenz --seconds 0", "found '0', expected a number of seconds above 0"),
-    ],
-)
-def test_wrong_use_gives_2(kahanmaps, command, words):
-    outcome = kahanmaps(command)
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-
-
 def test_starts_given_and_random_do_not_go_together(kahanmaps):
     outcome = kahanmaps("heights weierstrass --start 1,2 --starts 2")
     assert outcome.status == 2

@@ -60,30 +60,6 @@ def test_a_clock_that_stops_is_status_three(kahanmaps):
     assert "stopped by the clock" in outcome.err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ("lorenz", "missing --eps"),
-        ("lorenz --eps 0", "eps = 0"),
-        ("lorenz --eps 1/10 --steps 1", "found --steps 1 and"),
-        (
-            "lorenz --eps 1/10 --transient -1",
-            "found --steps 10000 and --transient -1, expected 2 to 1000000000 and 0 to 1000000000",
-        ),
-        ("lorenz --eps 1/10 --random 0", "found '0', expected an integer, 1 or more"),
-        ("lorenz --eps 1/10 --seed -1", "found '-1', expected an integer, 0 or more"),
-        ("lorenz --eps 1/10 --box 0", "--box 0"),
-        ("lorenz --eps 1/10 --starts nowhere.csv", "nowhere.csv"),
-        ("lorenz --eps 1/10 --starts nowhere.csv --seed 1", "do not go with --starts"),
-        ("lorenz --eps 1/10 --seconds 0", "found '0', expected a number of seconds above 0"),
-    ],
-)
-def test_wrong_use(kahanmaps, arguments, words):
-    outcome = kahanmaps(f"lyapunov {arguments}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-
-
 def test_help_fits_the_screen(tmp_path):
     outcome = shell("kahanmaps lyapunov --help", tmp_path, COLUMNS="80")
     assert outcome.status == 0

@@ -115,26 +115,6 @@ def test_starts_are_chosen_for_fields_only(kahanmaps, tmp_path):
     assert (found.status, "expected --start X, --starts FILE or --random N" in found.err) == (2, True)
 
 
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("--image y --image x", "an inline map needs --vars"),
-        ("--vars x,y --inverse 'y; x'", "an inline map needs --vars"),
-        ("--vars x,y --image y", "found 1 function, expected 2"),
-        ("--vars x,y --image 'y; x' --rhs x", "not both"),
-        ("lyness --vars x,y --image 'y; x'", "not both"),
-        ("--vars x,y --image 'y; x^2'", "at least 2 preimages"),
-        ("--vars x,y --image 'y; 1'", "det dPhi is 0 everywhere"),
-        ("--vars x,y --image 'y; x + y^2' --inverse 'y - x^2; -x'", "does not lead back"),
-        ("--vars x,y --image 'y; a*x'", "unknown name 'a'"),
-    ],
-)
-def test_a_wrong_map_on_the_line_gets_one_clear_line(kahanmaps, line, said):
-    found = kahanmaps(f"degrees {line}")
-    assert found.status == 2
-    assert said in " ".join(found.err.split())
-
-
 def test_a_map_on_the_line_with_a_parameter(kahanmaps):
     found = kahanmaps("find-integrals --vars x,y --image 'y; (a + y)/x' -p a=3 --symbolic a -q")
     assert "I1\tproved\t(x^2*y + x*y^2 + x^2 + y^2 + x*a + y*a + x + y + a)/(x*y)" in found.out

@@ -44,25 +44,3 @@ def test_missing_points_are_told_with_status_3(kahanmaps, tmp_path):
     assert outcome.status == 3
     assert "points are missing: Phi_f: the map has no value at a point on the way" in outcome.err
     assert (tmp_path / "a.png").exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("lorenz --start 1,2,3 --eps 1/10", "one system commutes with itself"),
-        ("lorenz paper_m2 --start 1,2,3 --eps 1/10", "expected the same dimension"),
-        ("paper_m2 --start 1,2,3 --eps 1/10", "found a point with 3 coordinates, expected 4"),
-        ("paper_m2 --start 1,2,3,4 --eps 1/10 --steps 13", "found 13 steps, expected 1 to 12"),
-        ("paper_m2 --start 1,2,3,4 --eps 1/10 --eps2 1/20", "--eps2 needs a second system"),
-        ("paper_m2 --start 1,2,3,4 --eps 1/10 --axes x1", "expected two of the variables"),
-        ("lorenz lorenz --start 1,2,3 --eps 1/10 --eps2 0", "eps2 = 0"),
-        ("paper_m2 --start 1,2,3,4", "missing --eps E"),
-        ("- - --start 1,2,3,4 --eps 1/10", "found - twice"),
-        ("paper_m2 --start 1e200,2,3,4 --eps 1/10", "it cannot be drawn"),
-    ],
-)
-def test_wrong_use_is_told(kahanmaps, words, message):
-    outcome = kahanmaps(f"plot commute {words}")
-    assert outcome.status == 2
-    assert message in outcome.err
-    assert outcome.out == ""

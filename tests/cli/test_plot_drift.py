@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-import pytest
-
 
 def test_all_methods_are_drawn(kahanmaps):
     done = kahanmaps("plot drift weierstrass --eps 1/20 --start 1/4,1/8 --steps 300")
@@ -40,24 +38,3 @@ def test_an_absolute_error_is_told(kahanmaps):
     done = kahanmaps("plot drift --vars x,y --rhs y --rhs=-x --eps 1/20 --start 1,0 --steps 9 --integral I=y")
     assert "absolute error of I" in done.out
     assert "I: absolute errors, for it is 0 at the start" in done.err
-
-
-@pytest.mark.parametrize(
-    ("command", "expected"),
-    [
-        ("plot drift harmonic", "missing --eps"),
-        ("plot drift --eps 1/10", "missing SYSTEM"),
-        ("plot drift lotka_volterra --eps 1/10", "found no known integral of lotka_volterra"),
-        ("plot drift harmonic --eps 0", "found eps = 0"),
-        ("plot drift harmonic --eps 1/10 --steps 0", "found 0 steps"),
-        ("plot drift harmonic --eps 1/10 --start 1", "found a start with 1 coordinate, expected 2"),
-        ("plot drift harmonic --eps 1/10 --integral 'E=x+'", "expected a number"),
-        ("plot drift harmonic --eps 1/10 --integral E=1/x --start 0,1", "take another start"),
-        ("plot drift harmonic --eps 1/10 --method normal-form", "there is none"),
-        ("plot drift harmonic --eps 1/10 -o nosuch/x.pdf", "there is no folder nosuch"),
-    ],
-)
-def test_wrong_use_is_refused(kahanmaps, command, expected):
-    done = kahanmaps(command)
-    assert (done.status, done.out) == (2, "")
-    assert expected in done.err

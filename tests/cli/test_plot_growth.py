@@ -60,29 +60,6 @@ def test_a_system_that_is_stopped_early_is_told_and_drawn(kahanmaps):
     assert "euler_top: stopped" not in done.err
 
 
-@pytest.mark.parametrize(
-    ("command", "expected"),
-    [
-        ("plot degrees", "missing SYSTEM"),
-        ("plot degrees nosuch", "nosuch"),
-        ("plot degrees euler_top --vars x --rhs x", "not both"),
-        ("plot degrees euler_top lotka_volterra -p a=1", "-p is for one system"),
-        ("plot degrees euler_top -o x.jpg", "expected .pdf, .svg or .png"),
-        ("plot degrees --from nosuch.json", "cannot read nosuch.json"),
-        ("plot degrees euler_top --eps 0", "found eps = 0"),
-        ("plot heights", "missing SYSTEM"),
-        ("plot heights euler_top --from x.json", "not both"),
-        ("plot heights euler_top --random 2 --start 1,2,3", "not both"),
-        ("plot heights euler_top --max-digits 0", "expected at least 1"),
-        ("plot heights euler_top --steps=-1", "steps"),
-    ],
-)
-def test_wrong_use_is_refused(kahanmaps, command, expected):
-    done = kahanmaps(command)
-    assert (done.status, done.out) == (2, "")
-    assert expected in done.err
-
-
 @pytest.mark.parametrize("command", ["degrees", "heights"])
 @pytest.mark.parametrize("text", ["", "[", "{}", "[1, 2]", '{"command": "orbit"}', "[" * 100_000])
 def test_a_file_that_is_no_record_is_refused(kahanmaps, tmp_path, command, text):

@@ -62,27 +62,6 @@ def test_the_orbit_itself_is_shown_in_two_variables(kahanmaps, tmp_path):
     assert "found --original x1,y, expected two of the variables x1, x2, x3, x4, as X,Y" in outcome.err
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("paper_m2 --eps 1/20", "Missing option '--start'"),
-        ("paper_m2 --start 1,2,3,4", "missing --eps E"),
-        ("paper_m2 --start 1,2 --eps 1/20", "found a point with 2 coordinates, expected 4"),
-        ("paper_m2 --start 1,2,3,4 --eps 0", "found eps = 0"),
-        ("paper_m2 --start 1,2,3,4 --eps 1/20 --steps 2000000", "at most 1000000 points"),
-        ("paper_m2 --start 1,2,3,1e300 --eps 1/20", "scale the start"),
-        ("euler_top --start 1,2,3 --eps 1/20", "euler_top has no normal form"),
-        ("lyness --start 1,2", "it is an explicit map"),
-        ("nonsense --start 1,2,3 --eps 1/20", "nonsense"),
-    ],
-)
-def test_wrong_use_is_told(kahanmaps, words, message):
-    outcome = kahanmaps(f"plot invariant-curves {words}")
-    assert outcome.status == 2
-    assert message in outcome.err
-    assert outcome.out == ""
-
-
 def test_a_repeated_root_is_told(kahanmaps, tmp_path):
     kahanmaps("family new --eigenvalues 1,1 --seed 7 -q -o", tmp_path / "twice.toml")
     outcome = kahanmaps("plot invariant-curves", tmp_path / "twice.toml", "--start 1,0,0,1 --eps 1/20")

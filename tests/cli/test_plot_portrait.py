@@ -238,38 +238,6 @@ def test_files_that_hold_no_orbit_are_refused(kahanmaps, tmp_path, name, content
     assert message in outcome.err
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("lotka_volterra", "missing --eps"),
-        ("lotka_volterra --eps 0", "found eps = 0"),
-        ("lotka_volterra --eps 1/20 --start 1", "found a start with 1 coordinates, expected 2: x, y"),
-        ("lotka_volterra --eps 1/20 --start 1,1 --random 3", "give --start or --random, not both"),
-        ("lotka_volterra --eps 1/20 --box 3", "--box and --seed are for --random N"),
-        ("lotka_volterra --eps 1/20 --steps -1", "found --steps -1"),
-        ("lotka_volterra --eps 1/20 --start 1,2 --steps 1000000000", "take fewer, or a density"),
-        ("lotka_volterra --eps 1/20 --axes x", "found --axes x, expected two or three"),
-        ("lotka_volterra --eps 1/20 --axes x,z", "found the name z, known are x, y, eps, a, b, c, d"),
-        ("lotka_volterra --eps 1/20 --axes x,y+", "expected"),
-        ("lotka_volterra --eps 1/20 --axes x,y --3d", "give --axes A,B,C or --3d, not both"),
-        ("lotka_volterra --eps 1/20 --start 1,2 --3d", "found 2 variables, expected at least 3"),
-        ("lotka_volterra --eps 1/20 --start 1,2 --window 0,1,2", "found a window of 3 numbers, expected 4"),
-        ("lotka_volterra --eps 1/20 --levels-at 1", "add --levels F"),
-        ("lotka_volterra --eps 1/20 --start 1,2 --axes x,x+y --levels x", "in the plane of two variables"),
-        ("euler_top --eps 1/20 --start 1,2,3 --axes x1,x2 --levels x3", "found x3 in it"),
-        ("lotka_volterra --eps 1/20 --density --lines", "it does not go with --lines"),
-        ("lotka_volterra --eps 1/20 --density --colour-by step", "it does not go with --colour-by"),
-        ("riccati --eps 1/20 --start 0 --steps 9 --density", "it takes two axes, and step is not one"),
-        ("- --eps 1/20 --starts -", "found - twice"),
-        ("lotka_volterra --eps 1/20 -o picture.gif", "found the ending .gif"),
-    ],
-)
-def test_wrong_use_is_refused_in_a_sentence(kahanmaps, words, message):
-    outcome = kahanmaps(f"plot portrait {words}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert message in outcome.err
-
-
 def test_a_file_of_another_system_is_refused(kahanmaps, tmp_path):
     np.save(tmp_path / "o.npy", np.ones((3, 2)))
     outcome = kahanmaps("plot portrait euler_top --from", tmp_path / "o.npy")

@@ -63,35 +63,6 @@ def test_a_batch(kahanmaps, tmp_path):
     assert "1 of 2 tasks done" in require_sound(outcome.out).text
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        ("", "missing SYSTEM"),
-        ("nothing_of_this_name", "nothing_of_this_name"),
-        ("euler_top --from nonsense", "'nonsense'"),
-        ("euler_top --m 2", "--m is for --from verify or checks"),
-        ("euler_top --from verify --m 2", "give a system or say which member to draw (--m)"),
-        ("euler_top --from verify", "expected one of kind [family]"),
-        ("euler_top --from checks --symbolic a1", "--symbolic is for --from analyze"),
-        ("euler_top --db a.db", "found --db and SYSTEM"),
-        ("--db a.db --eps 1", "found --db and --eps"),
-        ("euler_top --by m", "--by is for --db"),
-        ("--db does-not-exist.db", "does-not-exist.db"),
-        ("euler_top --eps 0", "eps = 0"),
-        ("euler_top -o no/such/folder/a.html", "there is no folder no/such/folder"),
-        ("euler_top -o .", "is a directory"),
-        ("--from checks --vars x --rhs x", "no check applies"),
-        ("--from verify --m 1 -p a=1", "a member that is drawn has no parameters"),
-        ("--from verify -p a=1", "a member that is drawn has no parameters"),
-        ("--from checks --m 1 -p a=1", "a member that is drawn has no parameters"),
-    ],
-)
-def test_wrong_use_is_told_and_has_status_2(kahanmaps, arguments, says):
-    outcome = kahanmaps(f"report {arguments}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert says in outcome.err
-
-
 def test_a_folder_that_cannot_be_written_is_told_before_the_work(kahanmaps, tmp_path, monkeypatch):
     monkeypatch.setattr("os.access", lambda *_: False)
     monkeypatch.setattr("kahanmaps.laboratory.analysis.analyze", lambda *_, **__: pytest.fail("it was analysed"))

@@ -8,7 +8,6 @@ import subprocess
 import time
 import tomllib
 
-import pytest
 from cli_helpers import COMMAND
 
 FAMILY = "henon_heiles --over c --terms 4"
@@ -101,34 +100,6 @@ def test_the_time_is_shared_by_everything_and_what_is_left_out_is_said(kahanmaps
     assert outcome.status == 3
     assert "open\tthere was no time for " in outcome.out
     assert "stopped early" in outcome.err
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("henon_heiles", "Missing option '--over'"),
-        ("henon_heiles --over c,d", "found the symbol 'd', expected eps or a parameter of the system: c"),
-        ("henon_heiles --over ,", "found no parameter to scan over"),
-        ("henon_heiles --over c --primes 5,x", "expected primes separated by commas"),
-        ("henon_heiles --over c --primes 5,7", "expected at least three different ones"),
-        ("henon_heiles --over c --primes 5,7,9973", "expected an odd prime below 8192"),
-        ("henon_heiles --over c --terms 99", "expected 1 to 14"),
-        ("henon_heiles --over c --analyze -1", "expected a number of seconds above 0"),
-        ("henon_heiles --over c,eps --write-to here", "they hold no eps"),
-        ("henon_heiles --over c,eps --toml", "they hold no eps"),
-        ("henon_heiles --over c --toml --json", "not both"),
-        ("henon_heiles --over c --shard 1/2", "goes with --keep"),
-        ("henon_heiles --over c --keep kept --shard 1/2 --write-to here", "a part finds no components"),
-        ("henon_heiles --over c --keep /dev/full", "expected a file that a scan has kept"),
-        ("lyness --over a,eps", "expected a map that depends on it"),
-        ("henon_heiles --over c --jobs 0", "expected at least 1"),
-        ("paper_m2 --over c", "found the symbol 'c'"),
-    ],
-)
-def test_wrong_use_is_one_line(kahanmaps, options, message):
-    outcome = kahanmaps(f"scan {options}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert message in outcome.err
 
 
 def test_ctrl_c_ends_it_with_what_was_seen():

@@ -13,107 +13,13 @@ from typing import Any
 
 import pytest
 from cli_helpers import Outcome
+from helpers import table
 from schema_helpers import mistakes, schema_of
 
 Run = Callable[..., Outcome]
 
-INLINE = "--vars x --rhs x^2"
+COMMANDS = table(Path(__file__).with_name("json_commands.txt"))
 ORBIT = "--eps 1/10 --steps 3 --format jsonl"
-
-# Command lines that are done at once; {pair} is a member with m = 2, {here} an empty folder.
-CASES = [
-    "check-commute {pair} --json",
-    "check-commute euler_top lorenz --json",  # refuted
-    "check-commute lotka_volterra weierstrass --eps 1/10 --eps2 1/7 --json",
-    "check-integrals {pair} --json",
-    "check-integrals euler_top --json",
-    "check-integrals euler_top --integral x1 --json",  # one of three refuted
-    "check-integrals henon_heiles --start 1,2,3,4 --steps 9 --max-digits 20 --json -q",  # ended early
-    "check-measure euler_top --json",
-    "check-poisson {pair} --json",
-    "check-poisson henon_heiles --eps 1/10 --json",
-    "verify --m 2 --section 2 --json -q",
-    "verify --m 2 --section 9 --json -q",  # misprints
-    "verify --universal --m 1 --section 6 --json -q",
-    "verify --m 2 --section 6 --controls --json -q",
-    "verify {pair} --section 6 --balls 64 --json -q",
-    "verify --chi (t-1)^2 --section 5 --json -q",  # undecided: outside the hypotheses
-    f"orbit {{pair}} --start 1,2,3,4 --integral known {ORBIT}",
-    f"orbit {INLINE} --start 5 {ORBIT} -q",  # singular
-    f"orbit {INLINE} --start 1 --arithmetic ball:64 {ORBIT}",
-    f"orbit lorenz --start 1,2,3 --max-digits 5 {ORBIT} -q",  # budget
-    f"orbit euler_top --start 1,2,3 --arithmetic float --integral x1^2 {ORBIT}",
-    f"orbit {INLINE} --eps 1e300 --steps 3 --arithmetic float --start 1e300 --format jsonl -q",  # overflow
-    "orbit {pair} --start 1,2,3,4 --eps 1/10 --steps 40 --every 20 --arithmetic float --format jsonl",
-    "orbit euler_top --start 1,2,3 --eps 1/10 --steps 30 --arithmetic mod:7 --format jsonl",  # periodic
-    "orbit lorenz --start 1000,2,3 --eps 1/10 --steps 9 --arithmetic ball:32 --format jsonl -q",  # precision
-    "orbit {pair} --start 1,2,3,4 --eps 1/10 --at 10,1000000000000000000000 --arithmetic mod:10007 --format jsonl",
-    "period {pair} --start 1/2,-1/3,0,1 --eps 1/10 --json",
-    "period {pair} --start 1/2,-1/3,0,1 --eps 1/10 --arithmetic mod:10007 --json",
-    "period {pair} --start 0,0,0,0 --eps 1/10 --json",
-    "period --levels 7 --json",
-    "period {pair} --eps 1/10 --levels 6 --json",
-    "ensemble euler_top --random 5 --eps 1/10 --steps 10 --integral x1 --backward --json",
-    "ensemble {pair} --random 5 --eps 1/10 --steps 10 --json -q -o {here}/e.npy",
-    "ensemble euler_top --random 5 --eps 1/10 --steps 10 --arithmetic mod:101 --integral x1 --json",
-    "ensemble lorenz --random 3 --box 1e200 --eps 1/10 --steps 10 --json",  # all overflow
-    "degrees euler_top --json -q",
-    "degrees henon_heiles --max-degree 50 --json -q",  # ended early
-    "degrees weierstrass --eps 1/10 --terms 3 --json -q",
-    "degrees weierstrass --terms 0 --json -q",
-    "scan henon_heiles --over c --primes 11,13,17 --terms 3 --json -q",
-    "scan henon_heiles --over c --eps 1/10 --seconds 0.001 --json -q",  # nothing tried
-    "heights weierstrass --steps 20 --starts 1 --json -q",
-    "heights henon_heiles --starts 1 --max-digits 200 --json -q",
-    "find-integrals weierstrass --json -q",
-    "find-integrals weierstrass --eps 1/10 --json -q",
-    "find-integrals lorenz --max-degree 2 --json -q",  # none
-    "find-integrals euler_top --monomials x1^2,x2^2,1 --json -q",
-    "find-integrals lotka_volterra --darboux 1 --json -q",
-    "find-density weierstrass --json -q",
-    "find-density lorenz --max-degree 1 --json -q",  # none
-    "find-poisson weierstrass --json -q",
-    "find-poisson euler_top --degree 3 --json -q",  # several, and Casimirs
-    "find-poisson lorenz --degree 1 --json -q",  # none
-    "find-poisson lotka_volterra --degree 3 --denominator x --json -q",
-    "find-symmetry weierstrass --json -q",
-    "find-symmetry harmonic --json -q",  # one-parameter groups
-    "find-commuting {pair} --json -q",
-    "find-commuting --vars x,y --rhs x^2 --rhs y^2 --shape quadratic --json -q",
-    "find-commuting --vars x,y --rhs 0 --rhs 0 --json -q",
-    "singularities weierstrass --json -q",
-    "singularities lotka_volterra --seconds 0.001 --json -q",  # stopped by the clock
-    f"singularities {INLINE} --eps 1/10 --json -q",
-    "cycles weierstrass -p 31 --eps 1/10 --json -q",
-    "cycles euler_top -p 101 --samples 5 --steps 20 --json -q",
-    "lyapunov lorenz --eps 1/400 --random 3 --box 5 --steps 50 --json -q",
-    "lyapunov lorenz --eps 1/10 --random 3 --box 1e200 --steps 50 --json -q",  # all ended
-    "analyze --vars x --rhs 1 --json -q",
-    "analyze weierstrass --json -q",
-    "systems --json",
-    "systems euler_top --json",
-    "systems paper_m2 --json",
-    "version --json",
-    "schema --json",
-    "family show {pair} --normal-form --json",
-    "family space {pair} --json",
-    "family space --matrix 1,0;0,1 --json",
-    "family associated {pair} --json",
-    "family associated {pair} --write-to {here} --json",
-    "batch tasks --json",
-    "batch tasks verify-universal --json",
-]
-SLOW = [
-    "verify --m 2 --json -q",
-    "verify --m 3 --universal --json -q",
-    "verify --chi (t-1)^2 --json -q",
-    "verify --eigenvalues 1,-1 --controls --json -q",
-    "verify --beyond --m 2 --json -q",
-    "analyze euler_top --symbolic a1 --json -q",
-    "analyze lorenz --eps 1/10 --seconds 4 --json -q",
-    "analyze {pair} --seconds 20 --json -q",
-    "analyze zander_111 --seconds 4 --json -q",
-]
 
 
 @pytest.fixture
@@ -128,7 +34,10 @@ def lines(kahanmaps: Run, pair: Path, tmp_path: Path) -> Callable[[str], list[An
     return run
 
 
-@pytest.mark.parametrize("line", [*CASES, *(pytest.param(line, marks=pytest.mark.slow) for line in SLOW)])
+@pytest.mark.parametrize(
+    "line",
+    [*COMMANDS["done at once"], *(pytest.param(line, marks=pytest.mark.slow) for line in COMMANDS["slow"])],
+)
 def test_what_a_command_prints_satisfies_its_schema(lines: Callable[[str], list[Any]], line: str) -> None:
     found = lines(line)
     assert found
@@ -185,32 +94,6 @@ def test_what_plot_recipe_prints_satisfies_its_schema(kahanmaps: Run, tmp_path: 
     assert mistakes("plot-recipe", kahanmaps("plot recipe --json", tmp_path / "picture.svg").json) == []
 
 
-# One output of each kind that is then spoilt.
-SPOILT = [
-    "check-commute {pair} --json",
-    "check-integrals euler_top --integral x1 --json",
-    "verify --m 2 --section 6 --controls --json -q",
-    f"orbit {{pair}} --start 1,2,3,4 --integral known {ORBIT}",
-    "period {pair} --start 1/2,-1/3,0,1 --eps 1/10 --json",
-    "ensemble lorenz --random 3 --box 1e200 --eps 1/10 --steps 10 --json",
-    "degrees euler_top --json -q",
-    "heights weierstrass --steps 20 --starts 1 --json -q",
-    "find-integrals weierstrass --json -q",
-    "find-integrals euler_top --monomials x1^2,x2^2,1 --json -q",
-    "find-density weierstrass --json -q",
-    "find-poisson weierstrass --json -q",
-    "find-symmetry weierstrass --json -q",
-    "find-commuting {pair} --json -q",
-    "singularities weierstrass --json -q",
-    "cycles weierstrass -p 31 --eps 1/10 --json -q",
-    "lyapunov lorenz --eps 1/400 --random 3 --box 5 --steps 50 --json -q",
-    pytest.param("analyze --vars x --rhs 1 --json -q", marks=pytest.mark.slow),
-    "systems euler_top --json",
-    "version --json",
-    "family show {pair} --normal-form --json",
-    "family associated {pair} --json",
-    "batch tasks orbit --json",
-]
 FREE = ("document", "other_document", "parameters", "reasons", "integrals", "options", "vectors", "counts", "failures")
 # Keys that are not always there, and do not come in company.
 AT_WILL = {
@@ -222,7 +105,7 @@ AT_WILL = {
 OF_EVIDENCE = {"method", "summary"}
 
 
-@pytest.mark.parametrize("line", SPOILT)
+@pytest.mark.parametrize("line", COMMANDS["spoilt"])
 def test_a_key_left_out_added_or_a_misspelt_verdict_is_refused(lines: Callable[[str], list[Any]], line: str) -> None:
     name, found = schema_of(line), lines(line)
     for one in found:

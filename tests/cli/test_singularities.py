@@ -56,23 +56,6 @@ def test_other_verdicts(kahanmaps, arguments, verdict, status):
     assert kahanmaps(f"singularities {arguments} --json").json["verdict"] == verdict
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ("weierstrass --eps 0", "eps = 0"),
-        ("weierstrass --eps 1 --time-step 2", "not both"),
-        ("weierstrass --steps 0", "found 0 steps"),
-        ("weierstrass --seed -1", "found '-1', expected an integer, 0 or more"),
-        ("weierstrass --seconds -1", "found '-1', expected a number of seconds above 0"),
-        ("nowhere", "nowhere"),
-    ],
-)
-def test_wrong_use(kahanmaps, arguments, words):
-    outcome = kahanmaps(f"singularities {arguments}")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert words in outcome.err
-
-
 def test_long_polynomials_are_shortened_on_a_terminal_only(kahanmaps):
     assert "chars)" in terminal("singularities", "lorenz", "--eps", "1/7", "--steps", "2").out
     assert "chars)" not in kahanmaps("singularities lorenz --eps 1/7 --steps 2").out

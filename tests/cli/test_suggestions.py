@@ -10,32 +10,6 @@ ORBIT = "--start 1,2,3 --eps 1/10 --steps 1"
 
 
 @pytest.mark.parametrize(
-    ("command", "meant"),
-    [
-        ("family nwe", "Did you mean new?"),
-        ("family asociated", "Did you mean associated?"),
-        ("batch staus", "Did you mean status"),
-        (f"orbit euler_top {ORBIT} --arithmtic exact", "--arithmetic"),
-        (f"orbit euler_top {ORBIT} --format cvs", "Did you mean csv?"),
-        (f"orbit euler_top {ORBIT} --method normalform", "Did you mean normal-form?"),
-        ("find-commuting three_wave --shape liner", "Did you mean linear?"),
-        ("--color allways systems", "Did you mean always?"),
-        ("analyze kirchhoff_case -p a1=1 -p b13=2", "did you mean b3 or b1?"),
-        ("batch tasks hieghts", "did you mean heights?"),
-        ("euler_top", "kahanmaps analyze euler_top"),
-        ("my.toml", "kahanmaps analyze my.toml"),
-        ("help", "kahanmaps COMMAND --help"),
-        ("check euler_top", "Did you mean check-commute or check-integrals or check-measure or check-poisson?"),
-        ("analyse euler_top", "Did you mean analyze?"),  # and not manual, which is less like it
-    ],
-)
-def test_what_was_meant_is_suggested(kahanmaps, command, meant):
-    outcome = kahanmaps(command)
-    assert outcome.status == 2
-    assert meant in outcome.err
-
-
-@pytest.mark.parametrize(
     "command", ["family xyzzy", f"orbit euler_top {ORBIT} --format xyzzy", "find-commuting three_wave --shape xyzzy"]
 )
 def test_nothing_is_suggested_for_what_is_like_nothing(kahanmaps, command):

@@ -21,9 +21,7 @@ from flint import fmpq, fmpq_mat
 from helpers import quick, random_point
 
 import kahanmaps
-from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.polynomials import RationalFunction, gradient, linear_combinations, ring
-from kahanmaps.algebra.text import parse_number, parse_polynomial, parse_rational_function
+from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
@@ -33,7 +31,6 @@ from kahanmaps.documents.catalog import load, map_names, names, titles
 from kahanmaps.documents.files import parse_system
 from kahanmaps.errors import InputError, SystemFileError
 from kahanmaps.family.draw import draw_generic, draw_with_eigenvalues
-from kahanmaps.invariants.integrals import ModifiedHamiltonian
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.sources import SOURCES
 from kahanmaps.systems.hamiltonian import standard_structure
@@ -193,192 +190,6 @@ def test_every_altered_claim_is_refuted_with_a_rational_witness(name, eps):
         assert finding.witness.left != finding.witness.right
 
 
-@pytest.mark.parametrize("name", [name for name in names() if load(name).integrals])
-def test_at_the_witness_an_altered_integral_has_the_two_values_that_it_says(name):
-    file = with_altered_claims(load(name))
-    for finding, function in zip(
-        check_integrals(file, Settings(steps=3)).findings, file.integrals.values(), strict=True
-    ):
-        point = tuple(parse_number(entry) for entry in finding.witness.point)
-        eps = parse_number(finding.witness.eps)
-        after = function.value(QQ, (*KahanMap(file.system, eps).step(point), eps))
-        assert (str(after), str(function.value(QQ, (*point, eps)))) == (*finding.witness.left, *finding.witness.right)
-
-
-# What the files claim, proved by expansion.
-
-
-class Expansion:
-    """The Kahan map of a file as polynomials in the variables, eps and the parameters: x~ = `image` / `det`.
-
-    `det` is det(I - eps f') and `adjugate` belongs to it.
-    """
-
-    def __init__(self, file):
-        self.dim = n = len(file.variables)
-        self.ring = ring([*file.variables, "eps", *file.parameters])
-        self.x, self.eps = self.ring.gens()[:n], self.ring.gens()[n]
-        self.zero, self.one = self.ring.constant(0), self.ring.constant(1)
-        self.rhs = self._right_hand_side(file.document)
-        matrix = [[self.one * (i == j) - self.eps * f.derivative(j) for j in range(n)] for i, f in enumerate(self.rhs)]
-        # Faddeev and LeVerrier: the adjugate and the determinant without a division of polynomials.
-        self.adjugate, coefficient = [[self.one * (i == j) for j in range(n)] for i in range(n)], self.one
-        for k in range(1, n + 1):
-            product = self._product(matrix, self.adjugate)
-            coefficient = -sum((product[i][i] for i in range(n)), self.zero) / k
-            if k < n:
-                self.adjugate = [[product[i][j] + coefficient * (i == j) for j in range(n)] for i in range(n)]
-        self.adjugate = [[(-1) ** (n - 1) * entry for entry in row] for row in self.adjugate]
-        self.det = (-1) ** n * coefficient
-        self.increment = [2 * self.eps * entry for [entry] in self._product(self.adjugate, [[f] for f in self.rhs])]
-        self.image = [self.det * x + step for x, step in zip(self.x, self.increment, strict=True)]
-
-    def parse(self, text):
-        """A rational function of the variables, eps and the parameters."""
-        return parse_rational_function(text, self.ring.names())
-
-    def after_a_step(self, function):
-        """A rational function at x~: numerator and denominator."""
-        (above, high), (below, low) = self._at_image(function.numerator), self._at_image(function.denominator)
-        return above * self.det ** max(low - high, 0), below * self.det ** max(high - low, 0)
-
-    def _right_hand_side(self, document):
-        def parse(text):
-            return parse_polynomial(str(text), self.ring.names())
-
-        if "system" in document:
-            return [parse(text) for text in document["system"]["rhs"]]
-        section = document.get("hamiltonian", document.get("family"))
-        slopes = gradient(parse(section["H"]))[: self.dim]
-        if section.get("J", "standard") == "standard":
-            return list(linear_combinations(standard_structure(self.dim), slopes))
-        return [entry for [entry] in self._product([[*map(parse, row)] for row in section["J"]], [[h] for h in slopes])]
-
-    def _product(self, left, right):
-        columns = range(len(right[0]))
-        return [[sum((a * right[k][j] for k, a in enumerate(row)), self.zero) for j in columns] for row in left]
-
-    def _at_image(self, polynomial):
-        """det^d P(image/det) and d, the degree of P in the variables."""
-        n, d = self.dim, max((int(sum(monomial[: self.dim])) for monomial in polynomial.monoms()), default=0)
-        total = self.zero
-        for monomial, coefficient in polynomial.terms():
-            exponents = [int(exponent) for exponent in monomial]
-            term = self.ring.from_dict({(*[0] * n, *exponents[n:]): coefficient})
-            for base, exponent in zip([*self.image, self.det], [*exponents[:n], d - sum(exponents[:n])], strict=True):
-                term = term * base**exponent
-            total = total + term
-        return total, d
-
-
-def test_the_expansion_of_the_map_agrees_with_its_step():
-    file = load("zhukovski_volterra_1")
-    expanded, x = Expansion(file), random_point(3, seed=1)
-    values = (*x, ONE_EPS, *file.parameters.values())
-    phi = KahanMap(file.system, ONE_EPS)
-    assert expanded.det(*values) == phi.determinant(x)
-    assert tuple(entry(*values) / expanded.det(*values) for entry in expanded.image) == phi.step(x)
-
-
-@pytest.mark.parametrize("name", [name for name in names() if load(name).integrals and load(name).member is None])
-def test_every_integral_is_conserved_identically_in_eps_and_the_parameters(name):
-    file = load(name)
-    expanded = Expansion(file)
-    for text in file.document["integrals"].values():
-        integral = expanded.parse(text)
-        above, below = expanded.after_a_step(integral)
-        assert above * integral.denominator == below * integral.numerator
-
-
-def test_an_altered_integral_is_not_conserved_by_the_expanded_map():
-    file = load("euler_top")
-    expanded = Expansion(file)
-    integral = altered(expanded.parse(file.document["integrals"]["F1"]), file.system.dim)
-    above, below = expanded.after_a_step(integral)
-    assert above * integral.denominator != below * integral.numerator
-
-
-WITH_DENSITY = [name for name in names() if load(name).density and not load(name).hamiltonian]
-LARGE = {"volterra_periodic_5"}  # its expansion has a hundred thousand terms
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LARGE)) for name in WITH_DENSITY]
-)
-def test_every_density_is_one_identically_in_eps_and_the_parameters(name):
-    file = load(name)
-    expanded = Expansion(file)
-    density = expanded.parse(file.document["density"]["phi"])
-    above, below = expanded.after_a_step(density)
-    reversed_eps = [-gen if gen == expanded.eps else gen for gen in expanded.ring.gens()]
-    # phi(x~)/phi(x) = det(I + eps f'(x~))/det(I - eps f'(x))
-    there, scale = expanded.after_a_step(RationalFunction(expanded.det.compose(*reversed_eps), expanded.one))
-    assert above * density.denominator * expanded.det * scale == below * density.numerator * there
-
-
-@pytest.mark.parametrize("name", [name for name in names() if load(name).density and load(name).hamiltonian])
-def test_the_density_of_a_hamiltonian_system_is_the_determinant_but_for_a_constant(name):
-    # The determinant is one by the theorem of Celledoni, McLachlan, Owren and Quispel (cmoq-2013).
-    expanded = Expansion(load(name))
-    density = expanded.parse(load(name).document["density"]["phi"])
-    if name == "harmonic":  # linear: the determinant 1 + eps^2 w is a constant
-        assert density == expanded.parse("1")
-    else:
-        assert density == RationalFunction(expanded.det, expanded.one)
-
-
-# What the facts say.
-
-
-@pytest.mark.parametrize(
-    ("name", "parameters", "eps"),
-    [("henon_heiles", {}, 1), ("henon_heiles", {"c": "2/3"}, -1), ("harmonic", {"w": 9}, "1/3")],
-)
-def test_the_fourth_iterate_is_the_identity_where_eps_squared_times_the_frequency_squared_is_one(name, parameters, eps):
-    phi = KahanMap(load(name, parameters).system, eps)
-    orbit = [random_point(phi.dim, seed=3)]
-    for _ in range(4):
-        orbit.append(phi.step(orbit[-1]))
-    assert orbit[4] == orbit[0]
-    assert len(set(orbit)) == 4
-
-
-def test_the_riccati_map_is_the_moebius_map_of_its_facts():
-    expanded = Expansion(load("riccati"))
-    (above, below) = (expanded.parse(text).numerator for text in ("(1 + eps*b)*x + 2*eps*c", "1 - eps*b - 2*eps*a*x"))
-    assert (expanded.image, expanded.det) == ([above], below)
-
-
-@pytest.mark.parametrize(
-    ("name", "claim", "multiple"),
-    [
-        ("planar_cubic_hamiltonian", "modified_H", 1),
-        ("weierstrass", "modified_H", 1),
-        ("henon_heiles", "modified_H", 1),
-        ("nahm_tetrahedral", "F", 3),
-    ],
-)
-def test_the_integral_written_out_is_a_multiple_of_modified_h(name, claim, multiple):
-    file = load(name)
-    x = random_point(file.system.dim, seed=5)
-    modified = ModifiedHamiltonian(file.hamiltonian).value(QQ, ONE_EPS, x)
-    assert file.integrals[claim].value(QQ, (*x, ONE_EPS)) == multiple * modified
-
-
-def test_the_three_integrals_of_the_euler_top_go_into_each_other_cyclically():
-    file = load("euler_top")
-    expanded = Expansion(file)
-    x1, x2, x3, eps, a1, a2, a3 = expanded.ring.gens()
-    F1, F2 = (expanded.parse(text) for text in file.document["integrals"].values())
-    F3 = RationalFunction(F1.denominator * F2.denominator, F1.numerator * F2.numerator)
-
-    def turned(F):
-        images = (x2, x3, x1, eps, a2, a3, a1)
-        return RationalFunction(F.numerator.compose(*images), F.denominator.compose(*images))
-
-    assert (turned(F1), turned(F2), turned(F3)) == (F2, F3, F1)
-
-
 # The members of the family.
 
 DRAWN = {
@@ -391,26 +202,6 @@ DRAWN = {
 @pytest.mark.parametrize("name", DRAWN)
 def test_a_member_of_the_family_is_drawn_as_its_file_says(name):
     assert load(name).member == DRAWN[name]()
-
-
-@pytest.mark.parametrize("name", ["paper_m2", "paper_m3"])
-def test_the_integrals_of_a_member_add_up_to_modified_k_with_the_signs_of_every_associated_system(name):
-    # The theorem on shared integrals gives the left side, for all signs, and so each of the integrals on the right.
-    file = load(name)
-    integrals = [Expansion(file).parse(text) for text in file.document["integrals"].values()]
-    for associate in file.member.associated():
-        plain = dataclasses.replace(file, document={"family": {"H": str(associate.K)}})
-        expanded = Expansion(plain)
-        K = expanded.parse(str(associate.K)).numerator
-        slopes = zip(gradient(K), expanded.increment, strict=False)  # the last derivative is that by eps
-        above, below = 3 * K * expanded.det + sum((g * step for g, step in slopes), expanded.zero), 3 * expanded.det
-        total = RationalFunction(expanded.zero, expanded.one)
-        for sign, integral in zip(associate.signs, integrals, strict=True):
-            total = RationalFunction(
-                total.numerator * integral.denominator + sign * integral.numerator * total.denominator,
-                total.denominator * integral.denominator,
-            )
-        assert above * total.denominator == below * total.numerator, associate.label
 
 
 @pytest.mark.parametrize("name", DRAWN)

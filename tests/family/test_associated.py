@@ -7,18 +7,18 @@ at which an irreducible chi splits; and the neighbours that do not commute. Sour
 
 from __future__ import annotations
 
-from itertools import combinations, product
+from itertools import product
 
 import pytest
 from flint import fmpq_mat, fmpq_poly
-from helpers import random_point, step_or_none
+from helpers import random_point
 
-from kahanmaps.algebra.fields import GF, QQ
+from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import gradient, linear_combinations
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember, sign_polynomial
-from kahanmaps.family.cubics import belongs, cubic_space
+from kahanmaps.family.cubics import belongs
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import Factor, defects, evaluate_at_matrix
 from kahanmaps.maps.kahan import KahanMap
@@ -188,32 +188,6 @@ def test_the_system_and_its_associate_are_those_of_the_planar_cubics_with_signs(
 # Their Kahan maps commute.
 
 
-def commute_at(phi: KahanMap, psi: KahanMap, x) -> bool | None:
-    """Whether phi(psi(x)) = psi(phi(x)); None where one of the four steps has no value."""
-    one, two = step_or_none(psi, x), step_or_none(phi, x)
-    if one is None or two is None:
-        return None
-    one, two = step_or_none(phi, one), step_or_none(psi, two)
-    return None if one is None or two is None else one == two
-
-
-def verdicts(phi: KahanMap, psi: KahanMap, count: int = 3) -> set[bool]:
-    """What is found at the first `count` random points where all four steps have a value."""
-    found: list[bool] = []
-    seeds = iter(range(10 * count))
-    while len(found) < count:
-        verdict = commute_at(phi, psi, random_point(phi.dim, next(seeds)))
-        if verdict is not None:
-            found.append(verdict)
-    return set(found)
-
-
-@over_members
-def test_the_kahan_maps_of_associated_systems_commute(member):
-    maps = [KahanMap(g.system, "1/7") for g in member.associated()]
-    assert all(verdicts(phi, psi) == {True} for phi, psi in combinations(maps, 2))
-
-
 def test_the_kahan_map_of_the_opposite_system_is_the_inverse():
     member = MEMBERS["m = 2, split"]
     phi, psi = (KahanMap(member.associate(signs).system, "1/7") for signs in ([1, 1], [-1, -1]))
@@ -221,49 +195,9 @@ def test_the_kahan_map_of_the_opposite_system_is_the_inverse():
     assert psi.step(phi.step(x)) == x
 
 
-@pytest.mark.parametrize("m", [5, 6])
-def test_the_kahan_maps_of_associated_systems_commute_also_for_larger_m(m):
-    member = split(m)
-    maps = [KahanMap(flipped(member, i).system, "1/7") for i in range(m)]
-    assert all(verdicts(phi, psi, count=1) == {True} for phi, psi in combinations(maps, 2))
-
-
-@pytest.mark.parametrize("name", [name for name in MEMBERS if "m = 4" not in name])
-def test_the_kahan_maps_of_h0_and_h1_do_not_commute(name):
-    # The flows do: this is what tells the associated systems from the rest of the chain.
-    member = MEMBERS[name]
-    J = standard_structure(member.dim)
-    phi, psi = (KahanMap(CubicHamiltonian(H, J).system, "1/7") for H in member.chain[:2])
-    assert verdicts(phi, psi) == {False}
-
-
-def test_the_kahan_maps_of_associated_systems_with_different_steps_do_not_commute():
-    one, two = MEMBERS["m = 2, split"].associated()
-    assert verdicts(KahanMap(one.system, "1/7"), KahanMap(two.system, "1/5")) == {False}
-
-
-def test_the_kahan_maps_of_two_other_cubics_of_the_space_do_not_commute():
-    member = MEMBERS["m = 2, split"]
-    K = cubic_space(member.A).basis[0]
-    phi = KahanMap(next(member.associated()).system, "1/7")
-    assert verdicts(phi, KahanMap(CubicHamiltonian(K, standard_structure(4)).system, "1/7")) == {False}
-
-
 # chi = t^2 - 2 is irreducible over Q. Modulo p = 2^61 - 1 its roots are +-2^31, since 2^62 = 2; there
 # B = A / 2^31 = 2^30 A has the signs + and -, and K = 2^30 H_1 is associated to H. Modulo 2^31 - 1 it is not.
 MERSENNE, OTHER = 2**61 - 1, 2**31 - 1
-
-
-@pytest.mark.parametrize(
-    ("field", "expected"), [(GF(MERSENNE), True), (GF(OTHER), False), (QQ, False)], ids=["splits", "other prime", "QQ"]
-)
-def test_for_irreducible_chi_the_maps_commute_modulo_a_prime_at_which_it_splits(field, expected):
-    member = MEMBERS["m = 2, irreducible"]
-    H0, H1 = member.chain
-    J = standard_structure(4)
-    phi = KahanMap(CubicHamiltonian(H0, J).system, "1/7", field)
-    psi = KahanMap(CubicHamiltonian(2**30 * H1, J).system, "1/7", field)
-    assert verdicts(phi, psi) == {expected}
 
 
 # Members as values.

@@ -32,8 +32,7 @@ from kahanmaps.family.cubics import (
 )
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import diagnosis, is_generic, minimal_degree, random_skew_hamiltonian
-from kahanmaps.maps.kahan import KahanMap
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.hamiltonian import standard_structure
 
 t = fmpq_poly([0, 1])
 DIAGONAL = fmpq_mat([[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]])
@@ -359,40 +358,3 @@ def test_the_dimension_is_4m_for_jordan_blocks_and_larger_only_for_a_derogatory_
     assert (dimension == 4 * m) is (degree == m)
     assert ("dimension 4m" in diagnosis(A)) is (degree == m)
     assert ("larger than 4m" in diagnosis(A)) is (degree < m)
-
-
-def both_tensors(H, x, eps):
-    """dPhi Pi(x) dPhi^T and Pi(x~)."""
-    n = len(x)
-    J, identity = standard_structure(n), fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
-    system = CubicHamiltonian(H, J).system
-    y = KahanMap(system, eps).step(x)
-    before, after = (
-        fmpq_mat(n, n, [rhs.derivative(j)(*point) for rhs in system.rhs for j in range(n)]) for point in (x, y)
-    )
-    slope = (identity - eps * before).inv() * (identity + eps * after)
-    here, there = (J - eps * eps * (f * f * J) for f in (before, after))
-    return slope * here * slope.transpose(), there
-
-
-@pytest.mark.parametrize(("jordan", "holds"), [([(1, 2)], True), ([(1, 3)], True), ([(1, 1), (1, 1), (2, 1)], False)])
-def test_the_poisson_tensor_is_invariant_for_jordan_blocks_and_not_for_a_derogatory_A(jordan, holds):
-    A = blocks(*jordan)
-    weights = (2, -1, 3, 1, -2, 1, -3, 2)
-    H = sum(weights[k % 8] * cubic for k, cubic in enumerate(cubic_space(A).basis))
-    moved, there = both_tensors(H, [fmpq(k + 1, 2 * k + 3) for k in range(A.nrows())], fmpq(1, 7))
-    assert (moved == there) is holds
-
-
-# docs/mathematics.md: with h = (u_1^2 + u_2^2) v_2 the two brackets of v_1 and u_2 are -24 s and 8 s, for all sizes.
-@pytest.mark.parametrize(("large", "small"), [(2, 1), (3, 1), (3, 2), (4, 2), (5, 3)])
-def test_the_poisson_tensor_is_not_invariant_for_blocks_of_different_sizes(large, small):
-    m = large + small
-    gens = ring([f"x{k}" for k in range(2 * m)]).gens()
-    u1, u2, v2 = gens[:small], gens[large:m], gens[m + large :][::-1]
-    places = [(a, b, small - 1 - a - b) for a in range(small) for b in range(small - a)]
-    H = sum((u1[a] * u1[b] + u2[a] * u2[b]) * v2[c] for a, b, c in places)
-    assert belongs(blocks((1, large), (1, small)), H)
-    moved, there = both_tensors(H, [fmpq(int(k == 0)) for k in range(2 * m)], fmpq(1))
-    place = m + small - 1, m - 1
-    assert (moved[place], there[place]) == (-24, 8)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import re
 from functools import cache, partial
 
 import pytest
@@ -362,111 +361,6 @@ def test_affine_integrals_are_proved_in_any_dimension_and_nothing_else_passes_fo
         assert _is_affine_integral(laboratory.system, function) is expected
 
 
-@pytest.mark.parametrize(
-    ("nullities", "codimensions", "with_known", "period", "theorems", "formulas", "expected"),
-    [
-        ((), (), 0, None, 0, 0, (0, False, True, "orbits were not measured")),
-        (
-            (0, 0),
-            (0, 0),
-            0,
-            None,
-            0,
-            0,
-            (0, False, True, "none shows in relations of degree up to 2 along orbits (measured)"),
-        ),
-        (
-            (0, 1),
-            (0, 1),
-            0,
-            None,
-            0,
-            1,
-            (
-                1,
-                False,
-                True,
-                "in all at least 1 independent (<2> 1)",
-            ),
-        ),
-        (
-            (0, 1),
-            (0, 1),
-            0,
-            None,
-            1,
-            0,
-            (
-                1,
-                False,
-                False,
-                "in all at least 1 independent (1 by theorems: Prop. 1; <2> no more)",
-            ),
-        ),
-        (
-            (0, 2),
-            (0, 2),
-            0,
-            None,
-            1,
-            2,
-            (
-                2,
-                True,
-                True,
-                "in all 2 independent (1 by theorems: Prop. 1; <2> 2)",
-            ),
-        ),
-        (
-            (0, 2),
-            (0, 2),
-            0,
-            6,
-            0,
-            2,
-            (
-                2,
-                False,
-                True,
-                "in all at least 2 independent (<2> 2)",
-            ),
-        ),
-        (
-            (3,),
-            (3,),
-            0,
-            6,
-            0,
-            2,
-            (3, True, False, "in all 3 independent (<1> 3)"),
-        ),
-        (
-            (0,),
-            (0,),
-            2,
-            None,
-            1,
-            0,
-            (
-                2,
-                True,
-                False,
-                "in all 2 independent (1 by theorems: Prop. 1; <1> 2)",
-            ),
-        ),
-        ((), (), 0, None, 2, 0, (2, False, False, "in all at least 2 independent (2 by theorems: Prop. 1)")),
-        ((), (), 0, None, 3, 3, (3, True, True, "in all 3 independent (3 by theorems: Prop. 1)")),
-    ],
-)
-def test_how_many_integrals_there_are_is_told_with_how_it_is_known(
-    nullities, codimensions, with_known, period, theorems, formulas, expected
-):
-    profile = Profile(3, nullities, codimensions, period, True, True, with_known)
-    found = IntegralSearch(None, (), None, (None,) * formulas, profile, "", (), 0, theorems, "Prop. 1")
-    text = re.sub(r"measured: relations of degree up to (\d) along orbits show", r"<\1>", found.count_text)
-    assert (found.codimension, found.is_exact, found.is_complete, text) == expected
-
-
 def test_on_the_line_orbits_that_show_nothing_show_that_there_is_no_integral():
     found = IntegralSearch(None, (), None, (), Profile(1, (0,), (0,), None, True, True), "", (), 0, 0, "")
     assert found.count_text == "there is no integral (measured, relations of degree up to 1 along orbits)"
@@ -500,6 +394,7 @@ COUNTS = [  # dimension, codimensions by degree, period, with the known ones, by
     (1, (0, 0), None, 0, 0, 0, (0, True, True), f"there is no integral (measured, {UP_TO_2})"),
     (3, (), None, 0, 0, 0, (0, False, True), "orbits were not measured"),
     (3, (), None, 0, 2, 0, (2, False, False), "in all at least 2 independent (2 by theorems: T)"),
+    (3, (), None, 0, 3, 3, (3, True, True), "in all 3 independent (3 by theorems: T)"),
     (2, (1, 1), 4, 0, 0, 0, (1, False, False), f"in all at least 1 independent (measured: {UP_TO_2} show 1)"),
     (2, (1, 2), 4, 0, 0, 0, (2, True, False), f"in all 2 independent (measured: {UP_TO_2} show 2)"),
 ]  # fmt: skip

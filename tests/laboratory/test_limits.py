@@ -74,16 +74,16 @@ def test_the_combination_has_the_series_that_is_told(name):
     field = FunctionField(names, reduces=True)
     for one in flow_and_map(search).limits:
         formula = parse_rational_function(one.combination, [*(each.name for each in search.integrals), "eps"])
-        values = [field.parse(each.text) for each in search.integrals]
+        values = [each.function.value(field, field.variables) for each in search.integrals]
         above, below = (
             evaluate(part, field, [*values, field.variables[-1]]) for part in (formula.numerator, formula.denominator)
         )
-        rest = above / below - field.parse(format_rational_function(one.leading))
+        rest = above / below - one.leading.value(field, field.variables[: len(names) - 1])
         if one.second is None:
             assert field.is_zero(rest)
             continue
         assert order_in_eps(rest) == one.order
-        rest = rest - field.variables[-1] ** one.order * field.parse(format_rational_function(one.second))
+        rest = rest - field.variables[-1] ** one.order * one.second.value(field, field.variables[: len(names) - 1])
         assert field.is_zero(rest) or order_in_eps(rest) > one.order
 
 

@@ -113,17 +113,6 @@ def test_backward_undoes_forward(name):
     assert abs(back.x - start).max() < 1e-9  # 20 steps, condition up to 1e4, roundings of 1e-16
 
 
-def test_both_methods_agree_where_steps_are_small():
-    # Generic elimination loses more digits; 5 steps near 0 leave at least ten of them.
-    system = MEMBERS["three real roots"].chosen.system
-    starts = starts_of(6, 50) / 200
-    one = FloatEnsemble(system, EPS, starts, form=FORMS["three real roots"], kernel="numpy")
-    other = FloatEnsemble(system, EPS, starts, kernel="numpy")
-    one.advance(5)
-    other.advance(5)
-    assert abs(one.x - other.x).max() < 1e-9 * abs(one.x).max()
-
-
 def test_the_normal_form_loses_fewer_digits_than_elimination():
     system = MEMBERS["three real roots"].chosen.system
     start = start_of(6, 200)

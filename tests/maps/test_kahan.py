@@ -7,7 +7,6 @@ Jacobi matrix, its symmetries, its passage from Q to GF(p) and to balls, and its
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 from typing import Any
@@ -136,46 +135,6 @@ def test_the_image_is_one_newton_like_step_of_length_two_eps(field, pair):
     assert agree(field, y, expected)
 
 
-@over_all_fields
-@some
-@given(pair=systems_with_points(entries=integers, homogeneous=True))
-def test_for_a_homogeneous_system_the_image_is_the_inverse_denominator_times_the_point(field, pair):
-    phi, x, y = mapped(field, *pair)
-    with field.working():
-        expected = solve(phi.denominator_matrix(x), field.column(x)).entries()
-    assert agree(field, y, expected)
-
-
-@over_all_fields
-@some
-@given(pair=systems_with_points(entries=integers, homogeneous=True))
-def test_for_a_homogeneous_system_the_image_is_explicit_in_its_own_jacobi_matrix(field, pair):
-    # x~ = (I + eps f'(x~)) x
-    phi, x, y = mapped(field, *pair)
-    with field.working():
-        expected = (field.column(x) + phi.vector_field_jacobian(y) * field.column(x) * phi.eps).entries()
-    assert agree(field, y, expected)
-
-
-def test_with_a_linear_term_the_homogeneous_form_fails():
-    phi, x = KahanMap(FORCED_PLANE, "1/3"), (fmpq(1, 2), fmpq(2))
-    assert phi.step(x) != tuple(solve(phi.denominator_matrix(x), QQ.column(x)).entries())
-
-
-@over_fields_with_a_half
-@some
-@given(pair=systems_with_points(entries=integers))
-def test_the_map_is_a_runge_kutta_method(field, pair):
-    # (x~ - x)/(2 eps) = -f(x)/2 + 2 f((x + x~)/2) - f(x~)/2
-    phi, x, y = mapped(field, *pair)
-    half = field.convert("1/2")
-    with field.working():
-        f, middle = phi.vector_field, combine((half, x), (half, y))
-        left = combine((1, y), (-1, x))
-        right = combine((-phi.eps, f(x)), (4 * phi.eps, f(middle)), (-phi.eps, f(y)))
-    assert agree(field, left, right)
-
-
 @some
 @given(pair=systems_with_points(entries=integers))
 def test_modulo_two_the_time_step_vanishes_and_nothing_moves(pair):
@@ -226,31 +185,6 @@ def test_the_image_is_the_one_computed_in_fractions(pair, eps):
     assert library == fractions
 
 
-@settings(max_examples=25)
-@given(pair=systems_with_points(dims=(1, 3), entries=rationals(10**40)), eps=rationals(10**40).filter(bool))
-def test_the_image_is_the_one_computed_in_fractions_for_numbers_of_forty_digits(pair, eps):
-    system, x = pair
-    assume(KahanMap(system, eps).determinant(x) != 0)
-    library, fractions = both_ways(system, eps, x)
-    assert library == fractions
-
-
-@over_named_systems
-def test_the_image_is_the_one_computed_in_fractions_for_points_of_a_thousand_digits(system):
-    x = tuple(fmpq(3 ** (2000 + i) + i, 7 ** (1200 + i)) for i in range(system.dim))
-    library, fractions = both_ways(system, fmpq(22, 7), x)
-    assert library == fractions
-
-
-@settings(max_examples=10)
-@given(pair=systems_with_points(dims=(5, 7), entries=st.integers(-2, 2)))
-def test_the_image_is_the_one_computed_in_fractions_in_dimension_five_and_seven(pair):
-    system, x = pair
-    assume(KahanMap(system, "1/3").determinant(x) != 0)
-    library, fractions = both_ways(system, fmpq(1, 3), x)
-    assert library == fractions
-
-
 # The inverse.
 
 
@@ -294,52 +228,6 @@ def test_over_balls_the_inverse_has_the_full_precision_of_the_field():
 
 
 # The Jacobi matrix.
-
-
-@dataclass(frozen=True)
-class Dual:
-    """a + b d with d^2 = 0: put into a rational formula, b is the derivative of the value a."""
-
-    a: Fraction
-    b: Fraction
-
-    @staticmethod
-    def of(number: Any) -> Dual:
-        return number if isinstance(number, Dual) else Dual(Fraction(number), Fraction(0))
-
-    def __add__(self, other: Any) -> Dual:
-        other = Dual.of(other)
-        return Dual(self.a + other.a, self.b + other.b)
-
-    def __sub__(self, other: Any) -> Dual:
-        other = Dual.of(other)
-        return Dual(self.a - other.a, self.b - other.b)
-
-    def __mul__(self, other: Any) -> Dual:
-        other = Dual.of(other)
-        return Dual(self.a * other.a, self.a * other.b + self.b * other.a)
-
-    def __truediv__(self, other: Any) -> Dual:
-        other = Dual.of(other)
-        return Dual(self.a / other.a, (self.b * other.a - self.a * other.b) / other.a**2)
-
-    def __rsub__(self, other: Any) -> Dual:
-        return Dual.of(other) - self
-
-    def __bool__(self) -> bool:
-        return self.a != 0
-
-    __radd__, __rmul__ = __add__, __mul__
-
-
-@given(triple=systems_with_points(count=2), eps=steps)
-def test_the_jacobi_matrix_is_the_derivative_along_every_direction(triple, eps):
-    system, x, v = triple
-    phi = KahanMap(system, eps)
-    assume(phi.determinant(x) != 0)
-    moving = [Dual(fraction(a), fraction(b)) for a, b in zip(x, v, strict=True)]
-    slopes = [entry.b for entry in step_in_fractions(system, fraction(eps), moving)]
-    assert [fraction(entry) for entry in (phi.jacobian(x) * QQ.column(v)).entries()] == slopes
 
 
 @settings(max_examples=25)
@@ -390,26 +278,6 @@ def test_the_jacobi_determinant_is_the_quotient_of_the_two_denominators(pair, ep
 def test_the_jacobi_matrix_has_no_value_at_a_singular_point():
     with pytest.raises(SingularStep):
         KahanMap(RICCATI, "1/2").jacobian([1])
-
-
-@given(x=st.tuples(*[rationals()] * 4), eps=steps)
-def test_a_hamiltonian_map_preserves_the_volume_over_its_denominator(x, eps):
-    # dx / det(I - eps f'(x)): the Jacobi determinant is the quotient of the denominators
-    phi = KahanMap(HENON_HEILES, eps)
-    y = step_or_none(phi, x)
-    assume(y is not None)
-    assert det(phi.jacobian(x)) * phi.determinant(x) == phi.determinant(y)
-
-
-def test_a_map_that_is_not_hamiltonian_does_not_preserve_that_volume():
-    phi, x = KahanMap(LOTKA_VOLTERRA, "1/3"), (fmpq(1, 2), fmpq(2))
-    assert det(phi.jacobian(x)) * phi.determinant(x) != phi.determinant(phi.step(x))
-
-
-def test_lotka_volterra_preserves_the_area_over_x_times_y():
-    phi, x = KahanMap(LOTKA_VOLTERRA, "1/3"), (fmpq(1, 2), fmpq(2))
-    y = phi.step(x)
-    assert det(phi.jacobian(x)) * x[0] * x[1] == y[0] * y[1]
 
 
 # Symmetries and what is kept.
@@ -479,31 +347,6 @@ def test_a_point_stays_put_exactly_when_it_is_an_equilibrium(pair, eps):
         y = step_or_none(KahanMap(here, eps), x)
         assume(y is not None)
         assert (y == x) is (not any(here.over(QQ).value(x)))
-
-
-VOLTERRA = QuadraticSystem.from_text(["x", "y", "z"], ["x*(y - z)", "y*(z - x)", "z*(x - y)"])
-
-
-@given(x=st.tuples(*[rationals()] * 3), eps=steps)
-def test_a_linear_integral_of_the_flow_is_kept_exactly(x, eps):
-    y = step_or_none(KahanMap(VOLTERRA, eps), x)
-    assume(y is not None)
-    assert sum(y) == sum(x)
-
-
-def test_another_integral_of_the_flow_is_not_kept():
-    x = (fmpq(1), fmpq(2), fmpq(1, 3))
-    a, b, c = KahanMap(VOLTERRA, "1/10").step(x)
-    assert a * b * c != x[0] * x[1] * x[2]
-
-
-def test_the_integral_is_kept_after_division_by_its_denominator():
-    # x y z / (1 - eps^2 (x^2 + y^2 + z^2 - 2xy - 2yz - 2zx)); Petrera, Pfadler, Suris 2011
-    def integral(x, y, z):
-        return x * y * z / (1 - (x**2 + y**2 + z**2 - 2 * x * y - 2 * y * z - 2 * z * x) / 100)
-
-    x = (fmpq(1), fmpq(2), fmpq(1, 3))
-    assert integral(*KahanMap(VOLTERRA, "1/10").step(x)) == integral(*x)
 
 
 # From Q to GF(p) and to balls.
@@ -592,16 +435,6 @@ def test_a_singular_step_names_the_point_and_eps():
     with pytest.raises(SingularStep, match=r"at the point 1,2 for eps = 1/2") as caught:
         KahanMap(QuadraticSystem.from_text(["x", "y"], ["x^2", "0"]), "1/2").step([1, 2])
     assert (caught.value.point, caught.value.eps) == ((1, 2), fmpq(1, 2))
-
-
-def test_a_singular_inverse_step_names_the_point_and_minus_eps():
-    with pytest.raises(SingularStep, match="-1 for eps = -1/2"):
-        KahanMap(RICCATI, "1/2").inverse_step([-1])
-
-
-def test_a_singular_step_is_a_division_by_zero():
-    with pytest.raises(ZeroDivisionError):
-        KahanMap(RICCATI, "1/2").step([1])
 
 
 def test_a_singular_point_of_many_digits_is_shortened():

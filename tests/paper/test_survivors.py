@@ -28,6 +28,8 @@ def report():
 
 
 @pytest.mark.timeout(300)
+@pytest.mark.thorough
+@pytest.mark.slow
 def test_every_cell_is_proved_or_refuted_and_the_page_shows_the_table():
     answers = {
         (formula, name): sign
@@ -40,6 +42,8 @@ def test_every_cell_is_proved_or_refuted_and_the_page_shows_the_table():
     assert table(report()) in PAGE.read_text(encoding="utf-8")
 
 
+@pytest.mark.thorough
+@pytest.mark.slow
 def test_every_refuted_cell_has_a_counterexample():
     for one in report().findings:
         assert (one.verdict is Verdict.REFUTED) is one.control is (one.witness is not None)
@@ -72,6 +76,8 @@ def test_the_counterexample_for_a_derogatory_A_by_hand():
     assert slope * Pi(x) * slope.transpose() != Pi(y)
 
 
+@pytest.mark.thorough
+@pytest.mark.slow
 def test_no_counterexample_is_larger_than_its_search():
     for one in report().findings:
         if one.control:
