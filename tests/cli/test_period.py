@@ -148,3 +148,9 @@ def test_the_levels_of_a_system_are_those_of_its_planes(kahanmaps):
     text = "--vars u,v --rhs 2*u^2-2*u*v+6*v^2 --rhs -4*u*v+v^2"
     assert "(h/(1 + eps^2*D))^2 = 1/324" in kahanmaps(f"period {text} --eps 1/2 --levels 5").out
     assert "no real level" in kahanmaps(f"period {text} --eps 1/2 --levels 9").out
+    assert "gamma = 1" not in kahanmaps(f"period {text} --eps 1/2 --levels 5").out
+
+
+def test_a_plane_whose_cubic_has_a_square_has_no_level_with_a_period(kahanmaps):
+    said = "none but perhaps 0: disc(h) = 0, so that gamma = 1 on every level"
+    assert said in kahanmaps("period --vars u,v --rhs u^2 --rhs -2*u*v --eps 1/2 --levels 5").out

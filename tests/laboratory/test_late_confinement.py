@@ -532,22 +532,3 @@ def test_series_are_taken_again_with_as_many_terms_as_seem_to_be_needed_up_to_a_
     monkeypatch.setattr("kahanmaps.laboratory.singular.following.walk_along", walk)
     run, whole = walked((), (), (), (), steps, **{"end": math.inf, **options})
     assert ([step.name for step in run], whole, tried) == found
-
-
-def power(name, k):
-    return parse_system(f'[composition]\nof = [{{ system = "{name}", power = {k} }}]').map
-
-
-def test_the_singularities_of_a_composition_that_is_not_multiplied_out_tell_no_degrees():
-    """Of points alone it is not known when what a step in between contracts is met again."""
-    found = degree_growth(power("euler_top", 2))
-    assert found.degrees[:5] == degree_growth(load("euler_top").map, max_terms=8).degrees[::2] == (1, 9, 33, 73, 129)
-    assert (found.growth, found.patterns.running, found.patterns.series) == (GrowthClass.QUADRATIC, "", ())
-
-
-def test_compositions_too_long_to_be_followed_are_measured():
-    found = degree_growth(power("mcmillan", 7), max_terms=3)
-    assert found.degrees == tuple(2 * (7 * n) ** 2 + 1 for n in range(4))
-    assert found.patterns.running == "the composition is too long for its singularities to be followed"
-    with pytest.raises(InputError, match="found a composition whose forms on projective space are too large"):
-        singularities(power("mcmillan", 7), 1)

@@ -81,7 +81,7 @@ def test_hypersurfaces_of_one_form_are_told_apart_and_explain_degrees(name):
     for k in range(len(sizes)):
         wrong = [(size + (j == k), orders) for j, (size, orders) in enumerate(zip(sizes, every, strict=True))]
         costs = any(row[0] for row in every[k].rows)
-        assert (tuple(coefficients(degree_series(measured.degrees[1], wrong), 7)) != measured.degrees) == costs
+        assert (tuple(coefficients(degree_series([measured.degrees[1]], wrong), 7)) != measured.degrees) == costs
 
 
 def test_a_hypersurface_with_points_modulo_some_primes_only_is_met():
@@ -152,14 +152,14 @@ def test_orders_that_are_wrong_explain_nothing():
     sizes = [h.degree for h in found.contracted]
     every = [h.orders for h in found.contracted]
     true = degree_growth(load("euler_top").map, max_terms=8).degrees
-    assert tuple(coefficients(degree_series(3, list(zip(sizes, every, strict=True))), 9)) == true
+    assert tuple(coefficients(degree_series([3], list(zip(sizes, every, strict=True))), 9)) == true
     for k, orders in enumerate(every):
         for t, row in enumerate(orders.rows):
             for column, value in enumerate(row):
                 wrong = (*row[:column], value + 1, *row[column + 1 :])
                 other = replace(orders, rows=(*orders.rows[:t], wrong, *orders.rows[t + 1 :]))
                 changed = [other if j == k else one for j, one in enumerate(every)]
-                assert tuple(coefficients(degree_series(3, list(zip(sizes, changed, strict=True))), 9)) != true
+                assert tuple(coefficients(degree_series([3], list(zip(sizes, changed, strict=True))), 9)) != true
 
 
 def test_a_hypersurface_that_returns_goes_on_as_the_other():
@@ -169,13 +169,15 @@ def test_a_hypersurface_that_returns_goes_on_as_the_other():
     returning = settled(*rows, returns=(2, 0))
     recurring = Orders(rows, laws, 100, True)
     written = settled(*(rows * 10))
-    one, two, three = (coefficients(degree_series(2, [(1, orders)]), 20) for orders in (returning, recurring, written))
+    one, two, three = (
+        coefficients(degree_series([2], [(1, orders)]), 20) for orders in (returning, recurring, written)
+    )
     assert one == two == three
     first = settled((0, 0, 0), (0, 1, 0), returns=(2, 0))
-    assert coefficients(degree_series(3, [(1, replace(returning, rows=((0, 1, 0), (1, 0, 0)))), (2, first)]), 12) == (
+    assert coefficients(degree_series([3], [(1, replace(returning, rows=((0, 1, 0), (1, 0, 0)))), (2, first)]), 12) == (
         coefficients(
             degree_series(
-                3,
+                [3],
                 [
                     (1, settled(*((r[0], r[1], 0) for r in rows * 10))),
                     (2, settled((0, 0, 0), (0, 1, 0), *((r[0], r[1], 0) for r in rows * 10))),
@@ -195,7 +197,7 @@ def test_the_fraction_is_what_the_two_equations_give_step_by_step(degree, size, 
         s.append(size * d[k] - sum(n * other for n, other in zip(nu, s, strict=True)))
         mu = [rows[k - l][0] if k - l < len(rows) else 0 for l in range(k + 1)]
         d.append(degree * d[k] - sum(m * other for m, other in zip(mu, s, strict=True)))
-    assert coefficients(degree_series(degree, [(size, settled(*rows))]), 11) == d
+    assert coefficients(degree_series([degree], [(size, settled(*rows))]), 11) == d
 
 
 def test_patterns_of_two_eps_that_differ_explain_nothing():
@@ -249,8 +251,8 @@ def test_unknown_orders_that_are_needed_explain_nothing():
     assert needed(chain) == [0, 1, 2]
     assert needed([*chain[:2], replace(chain[2], beyond=(0,))]) is None
     with pytest.raises(ValueError, match="orders that are not known"):
-        degree_series(2, [(1, costly), (1, replace(attracted, beyond=(0,)))])
+        degree_series([2], [(1, costly), (1, replace(attracted, beyond=(0,)))])
     # What is not needed does not count.
-    assert degree_series(2, [(1, costly), (1, replace(attracted, rows=((0, 0, 2),)))]) == degree_series(
-        2, [(1, settled((1, 0)))]
+    assert degree_series([2], [(1, costly), (1, replace(attracted, rows=((0, 0, 2),)))]) == degree_series(
+        [2], [(1, settled((1, 0)))]
     )

@@ -197,7 +197,7 @@ def test_where_the_determinant_is_too_large_random_points_tell():
 def test_random_points_tell_what_polynomials_do(name, monkeypatch):
     system = load(name).system
     written = singularities(system, "4/13")
-    monkeypatch.setattr("kahanmaps.laboratory.singular.singularities._MAX_TERMS", 0)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.written._MAX_TERMS", 0)
     unwritten = singularities(system, "4/13")
     assert unwritten.verdict == written.verdict
 
@@ -217,7 +217,7 @@ def test_random_points_tell_what_polynomials_do(name, monkeypatch):
 
 
 def test_zeros_without_points_are_undecided(monkeypatch):
-    monkeypatch.setattr("kahanmaps.laboratory.singular.singularities._MAX_TERMS", 0)
+    monkeypatch.setattr("kahanmaps.laboratory.singular.written._MAX_TERMS", 0)
     monkeypatch.setattr(
         "kahanmaps.laboratory.singular.fates._fate_at", lambda *_, **__: (_ for _ in ()).throw(NotGeneric())
     )

@@ -56,10 +56,10 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     each. Without --eps: for generic eps, a random residue with each line. This is evidence, and no proof.
 
     The hypersurfaces that the map contracts are followed, and explain the degrees for all times: generating function,
-    recurrence, dynamical degree. A line for each of them says when it comes back, and what it costs. Where they explain
-    nothing, a recurrence is accepted that holds for at least 2 terms more than determine it, with terms enough beyond
-    the last confinement, and else there is an estimate only. "no confinement" is said with the number of steps that
-    were tried.
+    recurrence, dynamical degree; of long compositions, map by map. A line for each of them says when it comes
+    back, and what it costs. Where they explain nothing, a recurrence is accepted that holds for at least 2 terms more
+    than determine it, with terms enough beyond the last confinement, and else there is an estimate only. "no
+    confinement" is said with the number of steps that were tried.
 
     In the plane a dynamical degree above 1 is proved: its bounds are then exact.
 

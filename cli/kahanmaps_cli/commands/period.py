@@ -119,7 +119,7 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
         for part in structure.form.parts:
             disc = PlanarBlock(*(part.h[3 - k, k] for k in range(4))).discriminant
             squares = levels.squares(disc, eps) if disc != 0 else ()
-            plane = {"root": format_number(part.root), "h": part.text, "D": part.D_text}
+            plane = {"root": format_number(part.root), "h": part.text, "D": part.D_text, "disc": format_number(disc)}
             data["planes"].append({**plane, "squares": [format_number(square) for square in squares]})
     if as_json:
         print_json(data)
@@ -132,6 +132,8 @@ def _levels(system: str | None, as_json: bool, options: dict[str, Any]) -> int:
         for square in plane["squares"]:
             real = "" if square[0] != "-" else ", no real level"
             tell(f"level\t(h/(1 + eps^2*D))^2 = {square}{real}")
+        if plane["disc"] == "0":  # 1 is no root of any psi_N
+            tell("level\tnone but perhaps 0: disc(h) = 0, so that gamma = 1 on every level")
     return 0
 
 

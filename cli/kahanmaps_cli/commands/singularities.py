@@ -55,6 +55,10 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     steps that were tried. Where the map is not dominant, that is, where its image lies in a hypersurface, nothing is
     followed.
 
+    A composition too long to be multiplied out is followed map by map: then
+    steps are single maps, and each hypersurface is told with the map that
+    contracts it.
+
     Where the polynomials are too large, ? stands for all hypersurfaces that share their multiplicity and their fate,
     known by random points.
 
@@ -127,10 +131,13 @@ def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[st
     for run in runs:
         at = f"eps = {format_number(run.eps)}: " if file.map.has_eps else ""
         tell(f"\n# {at}map of degree {run.map_degree}, {run.text}")
+        if run.word is not None:
+            tell(f"# {run.word.text}")
         tell(f"{name}\t{cut(run.denominator)}")
         for found in run.hypersurfaces:
             kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
             kind += " in all" if found.polynomial == "?" else ""
+            kind += "" if found.stage is None else f", of map {found.stage + 1}"
             tell(f"{cut(found.polynomial)}\t{kind}\t{_told(found)}")
             if found.steps:
                 tell(f"  ranks {_ranks(found)}\tpoles {_poles(found)}")
@@ -171,6 +178,7 @@ def _record(
                 "dominant": run.is_dominant,
                 "followed": run.followed,
                 "text": run.text,
+                "maps_a_step": 1 if run.word is None else run.word.length,
                 "hypersurfaces": [
                     {
                         "polynomial": found.polynomial,
@@ -188,6 +196,7 @@ def _record(
                         "common": [step.common for step in found.steps],
                         "primes": [str(prime) for prime in found.primes],
                         "note": found.note,
+                        "stage": found.stage,
                     }
                     for found in run.hypersurfaces
                 ],

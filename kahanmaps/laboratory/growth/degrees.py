@@ -205,6 +205,7 @@ class DegreeGrowth(Displayed):
                 lines.append(("generating function", self.patterns.series_text))
             lines.append(("singularities", self.patterns.text))
             lines += [("contracted", told) for told in self.patterns.told]
+            lines += [("note", told) for told in (self.patterns.word_text,) if told]
         if self.enclosure is not None:
             lines.append(("proved", self.enclosure.text))
         lines += [("ended", self.message), *(("note", note) for note in self.notes)]

@@ -18,21 +18,27 @@ from collections.abc import Sequence
 
 from flint import fmpz_poly
 
-from kahanmaps.laboratory.growth.recurrences import Recurrence
+from kahanmaps.laboratory.growth.recurrences import Recurrence, find_recurrence, needed_checks
 from kahanmaps.laboratory.singular.orders import Fraction, Orders
 
 
-def degree_series(degree: int, hypersurfaces: Sequence[tuple[int, Orders]]) -> Fraction:
+def degree_series(
+    degrees: Sequence[int], hypersurfaces: Sequence[tuple[int, Orders]], stages: Sequence[int] = ()
+) -> Fraction:
     """The generating function of the degrees d_0 = 1, d_1, ... of the iterates, in lowest terms.
 
-    `degree` is d_1; of each contracted hypersurface its degree and its orders are given. These are settled ones, and
-    the columns nu follow the hypersurfaces; orders beyond what is known must not be `needed`. Exact. Source:
-    docs/mathematics.md.
+    `degrees` has d_1; of a word of maps, which are applied one after the other and from the beginning again, it has
+    those of the maps, `stages` say which of them, from 0, contracts each hypersurface, and the series has the degrees
+    after whole words only, with z for a single map. Of each contracted hypersurface its degree and its orders are
+    given. These are settled ones, and the columns nu follow the hypersurfaces; orders beyond what is known must not be
+    `needed`. Exact. Source: docs/mathematics.md.
 
     >>> free = Orders((), (), 0, True)
-    >>> degree_series(2, [(1, free)])
+    >>> degree_series([2], [(1, free)])
     (1, (-2)*x + 1)
-    >>> degree_series(3, [(2, Orders(((0, 0, 0), (0, 1, 2), (2, 0, 0)), (), 0, True)),
+    >>> degree_series([2, 3], [])
+    (1, (-6)*x^2 + 1)
+    >>> degree_series([3], [(2, Orders(((0, 0, 0), (0, 1, 2), (2, 0, 0)), (), 0, True)),
     ...                   (2, Orders(((0, 0, 0), (0, 2, 1), (2, 0, 0)), (), 0, True))])
     (3*x^2 + 1, (-1)*x^3 + 3*x^2 + (-3)*x + 1)
     """
@@ -41,14 +47,21 @@ def degree_series(degree: int, hypersurfaces: Sequence[tuple[int, Orders]]) -> F
     which = needed(every)
     if which is None:
         raise ValueError("found orders that are not known, expected those needed")
-    # The unknowns are S_i, i in `which`, D and 1.
-    rows = [[*(_through_returns(every, j, 0) for j in which), (one - z * degree, one), (-one, one)]]
+    # The unknowns are S_i, i in `which`, then the D of the stages 1, 2, ..., 0, and 1.
+    maps, rows = len(degrees), []
+    stages = stages or [0] * len(every)
     for i, k in enumerate(which):
-        nu = [_through_returns(every, j, k + 1) for j in which]
-        rows.append([*nu, (fmpz_poly([-hypersurfaces[k][0]]), one), (zero, one)])
-        above, below = rows[-1][i]
-        rows[-1][i] = above + below, below
-    below, above = _eliminated([_cleared(row) for row in [*rows[1:], rows[0]]])
+        row = [_through_returns(every, j, k + 1) for j in which] + [(zero, one)] * (maps + 1)
+        _add(row, i, one)
+        _add(row, len(which) + (stages[k] - 1) % maps, fmpz_poly([-hypersurfaces[k][0]]))
+        rows.append(row)
+    for stage, degree in enumerate(degrees, 1):
+        mu = [_every(_through_returns(every, j, 0), maps, (stage - stages[j]) % maps) for j in which]
+        row = [*mu, *[(zero, one)] * maps, (-one if stage == maps else zero, one)]
+        _add(row, len(which) + stage - 1, one)
+        _add(row, len(which) + (stage - 2) % maps, -degree * z)
+        rows.append(row)
+    below, above = _eliminated([_cleared(row) for row in rows])
     common = above.gcd(below)
     above, below = above // common, below // common
     sign = 1 if below[0] > 0 else -1
@@ -73,6 +86,26 @@ def needed(every: Sequence[Orders]) -> list[int] | None:
         met_by = (k for k, chain in enumerate(chains) if any(row[i + 1] for j in chain for row in every[j].rows))
         found += [k for k in met_by if k not in found]
     return sorted(found)
+
+
+def every_nth(series: Fraction, n: int, first: int = 0) -> Fraction:
+    """The generating function of the coefficients a_first, a_(first + n), a_(first + 2 n), ... of a fraction.
+
+    Its denominator has the roots to the power -n, so that it is no longer than the given one: exact. Raises
+    ArithmeticError where its coefficients have more than 520 bits.
+
+    >>> every_nth((fmpz_poly([1]), fmpz_poly([1, -1, -1])), 3)
+    ((-1)*x + 1, (-1)*x^2 + (-4)*x + 1)
+    """
+    above, below = series
+    order = max(int(below.degree()), int(above.degree()) + 1)
+    count = 2 * order + needed_checks(order)
+    values = coefficients(series, first + n * count)[first::n]
+    found = find_recurrence(values)
+    if found is None:
+        raise ArithmeticError("found a recurrence with coefficients that are too large")
+    below = fmpz_poly(found.characteristic.coeffs()[::-1])
+    return (below * fmpz_poly(values[: found.order])).truncate(found.order), below
 
 
 def recurrence_of(series: Fraction, measured: Sequence[int]) -> Recurrence:
@@ -124,6 +157,19 @@ def _through_returns(every: Sequence[Orders], start: int, column: int) -> Fracti
     begin, before = seen[k]
     around = 1 - z ** (shift - begin)
     return before * around + above - before, around
+
+
+def _every(series: Fraction, n: int, first: int) -> Fraction:
+    """The part of a fraction with the exponents first, first + n, ..."""
+    if n == 1:
+        return series
+    above, below = (part(fmpz_poly([0] * n + [1])) for part in every_nth(series, n, first))
+    return above * fmpz_poly([0] * first + [1]), below
+
+
+def _add(row: list[Fraction], k: int, term: fmpz_poly) -> None:
+    above, below = row[k]
+    row[k] = above + term * below, below
 
 
 def _cleared(row: Sequence[Fraction]) -> list[fmpz_poly]:

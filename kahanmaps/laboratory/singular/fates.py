@@ -21,6 +21,7 @@ from kahanmaps.errors import BadPrime, counted
 from kahanmaps.laboratory.singular.critical import critical_points, pole_points
 from kahanmaps.laboratory.singular.following import Range, orders_at, orders_until_return, walked, whole
 from kahanmaps.laboratory.singular.jets import (
+    Letters,
     NotGeneric,
     PrecisionTooLow,
     Step,
@@ -58,7 +59,8 @@ class Hypersurface:
 
     It was followed for `followed` steps in all, and what happened after the step `settled_at` followed from what had
     happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
-    cannot be said: its pattern is still running. `orders` are those of this pattern.
+    cannot be said: its pattern is still running. `orders` are those of this pattern. In a composition that is
+    followed map by map all steps are those of single maps, and that of number `stage`, from 0, contracts it; else None.
     """
 
     polynomial: str
@@ -74,6 +76,7 @@ class Hypersurface:
     followed: int = 0
     settled_at: int | None = None
     orders: Orders = field(default=NO_ORDERS, repr=False)
+    stage: int | None = None
 
     def told(self, at: str) -> str:
         """A sentence: what it is (`at` which eps), when it comes back, what it costs, which of C1, C2, ... it meets."""
@@ -88,13 +91,25 @@ class Hypersurface:
             fate = f"its orders repeat after {counted(self.orders.settled_at, 'step')}"
         else:
             fate = f"followed for {counted(self.followed, 'step')}"
-        parts = [f"{name}, degree {self.degree}{', a pole' if self.is_pole else ''}: contracted", fate]
+        by = "" if self.stage is None else f" by map {self.stage + 1}"
+        parts = [f"{name}, degree {self.degree}{', a pole' if self.is_pole else ''}: contracted{by}", fate]
         return "; ".join([", ".join(parts), *self.orders.told])
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: what is known of it beside its first steps."""
         names = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
-        return {**attributes(self, *names, "followed", "settled_at", "note"), "orders": self.orders.to_json()}
+        found = attributes(self, *names, "followed", "settled_at", "note", "stage")
+        return {**found, "orders": self.orders.to_json()}
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A form over Q whose orders are followed, its exponent in the factor by which the minors of an equation exceed the
+    map, and the number of that map in a word, from 0."""
+
+    form: Any
+    excess: int
+    stage: int
 
 
 @dataclass(frozen=True)
@@ -122,41 +137,51 @@ def fate_of(
     multiplicity: int | None,
     rng: random.Random,
     limits: Range,
-    forms: Sequence[tuple[Any, int]] = (),
-    critical: int = 0,
+    critical: Sequence[Followed] = (),
+    excess: Sequence[Followed] = (),
+    place: tuple[int, int] | None = None,
 ) -> Hypersurface:
     """The hypersurface on which a form over Q vanishes, with what becomes of it, at one exact eps (half the time step).
 
     `factor` is irreducible, in the variables (X : Z), and `text` stands for it; two points modulo two random primes are
-    followed. The orders of the first `critical` ones of `forms` are told along it; with each form stands its exponent
-    in the factor by which the minors of the equation exceed the map. Source: grammaticos-ramani-papageorgiou-1991.
+    followed. The orders of the `critical` forms are told along it. With a `place`, that is the number of a map
+    and the length of a word, this map contracts it, and steps are single maps.
+    Source: grammaticos-ramani-papageorgiou-1991.
     """
     fates: list[_Fate] = []
     primes: list[int] = []
+    forms = [*critical, *excess]
+    stage, period = place or (0, 1)
+    at = None if place is None else stage
 
     def told(fate: _Fate, note: str = "") -> Hypersurface:
         degree = int(factor.total_degree())
-        return Hypersurface(text, degree, is_pole, multiplicity, primes=tuple(primes), note=note, **vars(fate))
+        return Hypersurface(
+            text, degree, is_pole, multiplicity, primes=tuple(primes), note=note, stage=at, **vars(fate)
+        )
 
     for _ in range(_TRIES):
         if len(fates) == _POINTS or limits.is_over:
             break
         field = random_prime_field(rng)
         try:
-            equations = map_.at(eps, field).equations
-            place = _point_on(factor, field, rng)
+            equations: Sequence[Equation] = map_.at(eps, field).equations
+            if place is not None:
+                equations = Letters([*equations[stage:period], *equations[:stage]])
+                equations.places = tuple(one.stage - stage for one in forms)
+            start = _point_on(factor, field, rng)
             tracked = Tracked(
-                tuple(form_order(form, field) for form, _ in forms),
-                tuple(k for _, k in forms),
-                tuple(int(form == factor) for form, _ in forms),
-                critical,
+                tuple(form_order(one.form, field) for one in forms),
+                tuple(one.excess for one in forms),
+                tuple(int(one.form == factor and one.stage == stage) for one in forms),
+                len(critical),
             )
         except BadPrime:
             continue
-        if place is None or field.prime in primes:
+        if start is None or field.prime in primes:
             continue
         try:
-            fates.append(_fate_at(equations, *place, rng, limits, tracked=tracked))
+            fates.append(_fate_at(equations, *start, rng, limits, tracked=tracked))
             primes.append(field.prime)
         except NotGeneric:
             continue

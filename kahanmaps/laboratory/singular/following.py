@@ -10,7 +10,18 @@ from itertools import islice
 from flint import nmod_poly
 
 from kahanmaps.laboratory.growth.recurrences import find_recurrence
-from kahanmaps.laboratory.singular.jets import Function, NotGeneric, PrecisionTooLow, Step, image_of, walk, walk_along
+from kahanmaps.laboratory.singular.jets import (
+    Function,
+    Letters,
+    NotGeneric,
+    PrecisionTooLow,
+    Step,
+    equations_of,
+    image_of,
+    orders_of,
+    walk,
+    walk_along,
+)
 from kahanmaps.laboratory.singular.orders import AlongCurves, Orders, Tracked
 from kahanmaps.maps.equation import Equation
 
@@ -141,7 +152,7 @@ def _met_for_ever(
 
     Then no power of t is ever divided out again. None elsewhere. Lines in a random direction show the value of the map.
     """
-    if not isinstance(tracked, Tracked):
+    if not isinstance(tracked, Tracked) or isinstance(equations, Letters):
         return None
     p = equations[0].over.characteristic
     point, seen, met = _normal(point, p), set[tuple[int, ...]](), set[int]()
@@ -210,12 +221,12 @@ def _next_hit(
     p = equations[0].over.characteristic
     at: Sequence[int] = limit
     for step in range(steps + 1, reach + 1):
-        image = image_of(equations, at)
+        image = image_of(equations_of(equations, step), at)
         if image is None:
             return step, step
         at = image
         constants = [nmod_poly([x], p) for x in at]
-        if any(function(constants, 1) is None for function in functions):
+        if None in orders_of(equations, functions, step, constants, 1):
             return step, step
         if limits.is_over:
             return None, step

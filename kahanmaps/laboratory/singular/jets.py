@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any
 
 from flint import Ordering, nmod, nmod_mat, nmod_mpoly, nmod_mpoly_ctx, nmod_poly
@@ -28,6 +29,31 @@ class PrecisionTooLow(ArithmeticError):
 
 class NotGeneric(ArithmeticError):
     """The point lies in a special position on its hypersurface: take another."""
+
+
+class Letters(tuple[Equation, ...]):
+    """Equations each of which is a step of its own, one after the other and from the beginning again: a word of maps.
+
+    A function belongs to one place in the word: it is looked at after so many steps as `places` says for it, and after
+    whole words more.
+    """
+
+    places: tuple[int, ...] = ()
+
+
+def equations_of(equations: Sequence[Equation], step: int) -> Sequence[Equation]:
+    """Those that make the step 1, 2, ...: one letter of a word, else all."""
+    return (equations[(step - 1) % len(equations)],) if isinstance(equations, Letters) else equations
+
+
+def orders_of(
+    equations: Sequence[Equation], functions: Sequence[Function], step: int, X: Sequence[nmod_poly], precision: int
+) -> list[int | None]:
+    """The orders of functions along a curve after a step; 0 for those of another place in a word."""
+    if isinstance(equations, Letters):
+        here = [(step - place) % len(equations) == 0 for place in equations.places]
+        return [function(X, precision) if at else 0 for function, at in zip(functions, here, strict=True)]
+    return [function(X, precision) for function in functions]
 
 
 class Jet:
@@ -116,9 +142,9 @@ def walk(
         for k, (x, v) in enumerate(zip(point, direction, strict=True))
     ]
     zero = nmod_poly([], prime)
-    while True:
+    for number in count(1):
         divided, denominators = 0, list[int | None]()
-        for equation in equations:
+        for equation in equations_of(equations, number):
             nothing = Jet(zero, [zero] * len(tangents), X[0].precision)
             image = [nothing if jet is None else jet for jet in equation.image(X, None)]
             known = min(jet.precision for jet in image)
@@ -145,9 +171,9 @@ def walk_along(
     prime = equations[0].over.characteristic
     zero = nmod_poly([], prime)
     X = [nmod_poly([x, v], prime).truncate(precision) for x, v in zip(point, direction, strict=True)]
-    while True:
+    for number in count(1):
         divided, denominators = 0, list[int | None]()
-        for equation in equations:
+        for equation in equations_of(equations, number):
 
             def times(left: nmod_poly, right: nmod_poly, known: int = precision) -> nmod_poly:
                 return left.mul_low(right, known)
@@ -159,7 +185,7 @@ def walk_along(
             divided = divided * equation.image_degree + common
             denominators.append(denominator)
         pole = None if denominator is None else denominator - common
-        orders = [function(X, precision) for function in functions]
+        orders = orders_of(equations, functions, number, X, precision)
         if None in orders:
             raise PrecisionTooLow
         limit = tuple(int(entry[0]) for entry in X)

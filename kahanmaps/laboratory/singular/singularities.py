@@ -14,23 +14,21 @@ import random
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import comb
 from typing import Any
 
-from flint import fmpq, fmpq_mpoly, fmpz_poly
+from flint import fmpq, fmpz_poly
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.minors import kernel_minors
 from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.polynomials import ring
 from kahanmaps.algebra.residues import random_prime
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import BadPrime, InputError, SingularStep, counted
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
-from kahanmaps.laboratory.growth.renewal import degree_series, needed
+from kahanmaps.laboratory.growth.renewal import degree_series, every_nth, needed
 from kahanmaps.laboratory.singular.contracted import Untold, contracted
 from kahanmaps.laboratory.singular.fates import (
     CONFINED,
@@ -46,6 +44,15 @@ from kahanmaps.laboratory.singular.fates import (
 )
 from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.laboratory.singular.orders import Fraction
+from kahanmaps.laboratory.singular.written import (
+    Word,
+    affine,
+    followed_forms,
+    followed_map_by_map,
+    name_of,
+    period_of,
+    written,
+)
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.kahan import as_map
@@ -66,7 +73,10 @@ _DRAWS = 2  # of two values of eps, where the first ones are special
 WRITTEN_DIMENSION = 4  # up to which `patterns` is quick with polynomials
 _POINTS = 3  # random ones, where det dPhi is looked at
 _MAX_DEGREE = 20_000  # of a composition
-_MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
+
+
+class TooLong(InputError):
+    """Why the singularities of a composition are not followed."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +86,8 @@ class SingularityRun(Displayed):
     `denominator` is det(I - eps f'(x)) as text, "?" for a composition of which it is too large; `critical_degree` the
     degree of the Jacobian determinant of the homogeneous map (None where it was too large to expand: contracted
     hypersurfaces are then known by random points). The map is not dominant where that determinant vanishes identically:
-    its image lies in a hypersurface, and none is followed.
+    its image lies in a hypersurface, and none is followed. `word` are the maps of a composition that is followed map by
+    map: then steps of hypersurfaces are single maps.
     """
 
     eps: fmpq
@@ -87,6 +98,7 @@ class SingularityRun(Displayed):
     stopped: bool
     is_undefined: bool
     is_dominant: bool
+    word: Word | None = None
 
     @property
     def verdict(self) -> str:
@@ -168,49 +180,32 @@ def singularities(
     limits = _range(map_.dim, steps, time.monotonic() + seconds)
     over = map_.at(exact_eps)
     try:
-        forms, common, below = homogeneous_map(over)
+        map_form = homogeneous_map(over)
     except TooLarge:
-        return _without_forms(map_, exact_eps, seed, limits)
-    degree = max(0, *(int(form.total_degree()) for form in forms))
+        return _without_forms(map_, exact_eps, seed, limits, progress)
+    degree, below = map_form.degree, map_form.denominator
     # The minors have signs: the last one is (-1)^n det(I - eps f'(x)) at Z = 1.
-    denominator = _affine(below * (-1) ** (map_.dim * len(over.factors)), map_)
+    denominator = affine(below * (-1) ** (map_.dim * len(over.factors)), map_)
     is_undefined = bool(below.is_zero())  # det(I - eps f'(x)) = 0 for all x
     if is_undefined or not _is_dominant(map_, exact_eps):
         return SingularityRun(exact_eps, denominator, degree, None, (), False, is_undefined, False)
-    factors: dict[str, tuple[fmpq_mpoly, bool, int | None]] = {}
-    critical_ones: dict[str, tuple[fmpq_mpoly, int]] = {}  # with exponents in the common factor
-    excess: dict[str, tuple[fmpq_mpoly, int]] = {}
-    for factor, _ in below.factor()[1]:
-        if not _is_infinity(factor):
-            factors[str(factor)] = (factor, True, 0)
-    critical_degree: int | None = 0
-    if degree > 1:
+    if map_form.degree > 1:
         progress("the Jacobian determinant of the homogeneous map")
-        critical = _critical(forms, degree)
-        critical_degree = None if critical is None else int(critical.total_degree())
-        if critical is None:
-            factors = {text: (factor, pole, None) for text, (factor, pole, _) in factors.items()}
-            infinity = forms[0].context().gens()[-1]
-            factors[str(infinity)] = (infinity, False, None)
-        else:
-            for factor, multiplicity in critical.factor()[1]:
-                pole = factors.get(str(factor), (factor, False, 0))[1]
-                factors[str(factor)] = (factor, pole, int(multiplicity))
-            if not common.is_constant():
-                excess = {str(factor): (factor, int(k)) for factor, k in common.factor()[1]}
-            critical_ones = {text: (factor, 0) for text, (factor, _, multiplicity) in factors.items() if multiplicity}
+    every, critical_degree = written(map_form)
+    if critical_degree is None and len(over.factors) > 1:
+        run = _map_by_map(map_, exact_eps, degree, seed, limits, progress)
+        if run is not None:
+            return run
     rng = random.Random(f"singularities {seed_for(seed, map_.subject, exact_eps)}")
-    forms_followed = tuple((critical_ones | excess).values())
+    followed = followed_forms(map_form, every) if critical_degree else ((), ())
     found, stopped = [], False
-    for factor, pole, multiplicity in factors.values():
+    for one in every:
         if limits.is_over:
             stopped = True
             break
-        text = "Z" if _is_infinity(factor) else _affine(factor, map_)
+        text = name_of(one.form, map_)
         progress(f"following {text[:40]}")
-        found.append(
-            fate_of(map_, exact_eps, factor, text, pole, multiplicity, rng, limits, forms_followed, len(critical_ones))
-        )
+        found.append(fate_of(map_, exact_eps, one.form, text, one.is_pole, one.multiplicity, rng, limits, *followed))
     if critical_degree is None and not stopped:
         progress("following critical points")
         if over.is_bilinear:
@@ -221,17 +216,22 @@ def singularities(
     return SingularityRun(exact_eps, denominator, degree, critical_degree, tuple(found), stopped, False, True)
 
 
-class TooLong(InputError):
-    """Why the singularities of a composition are not followed."""
+def _map_by_map(
+    map_: BirationalMap, eps: fmpq, degree: int, seed: int, limits: Range, progress: Callable[[str], None]
+) -> SingularityRun | None:
+    """The same for a composition whose maps are followed one by one; None where one of them is too large."""
+    rng = random.Random(f"map by map {seed_for(seed, map_.subject, eps)}")
+    followed = followed_map_by_map(map_, eps, rng, limits, progress)
+    if followed is None:
+        return None
+    word, found = followed
+    return SingularityRun(eps, "?", degree, None, tuple(found), limits.is_over, False, True, word)
 
 
-def _without_forms(map_: BirationalMap, eps: fmpq, seed: int, limits: Range) -> SingularityRun:
-    """The same for a composition whose forms are too large: hypersurfaces are told by random points."""
-    if not map_.at(eps).is_bilinear:
-        raise TooLong(
-            "found a composition whose forms on projective space are too large, expected a shorter one, or one of maps "
-            "with equations that are linear in both points: of these the singularities are known by random points"
-        )
+def _without_forms(
+    map_: BirationalMap, eps: fmpq, seed: int, limits: Range, progress: Callable[[str], None]
+) -> SingularityRun:
+    """The same for a composition whose forms are too large: map by map, or hypersurfaces are told by random points."""
     rng = random.Random(f"singularities {seed_for(seed, map_.subject, eps)}")
     try:
         line = Line(reduced(map_, eps, rng), rng, limits.end, _MAX_DEGREE)
@@ -240,6 +240,14 @@ def _without_forms(map_: BirationalMap, eps: fmpq, seed: int, limits: Range) -> 
         raise InputError(f"found a composition that is too long here: {stopped.message}") from stopped
     if not _is_dominant(map_, eps):
         return SingularityRun(eps, "?", line.degree, None, (), False, False, False)
+    run = _map_by_map(map_, eps, line.degree, seed, limits, progress)
+    if run is not None:
+        return run
+    if not map_.at(eps).is_bilinear:
+        raise TooLong(
+            "found a composition of maps whose forms on projective space are too large, expected smaller maps, or such "
+            "with equations that are linear in both points: of these the singularities are known by random points"
+        )
     found = fates_at_random(map_, eps, rng, limits)
     return SingularityRun(eps, "?", line.degree, None, tuple(found), limits.is_over, False, True)
 
@@ -254,7 +262,8 @@ class Patterns:
     for that are not confined (None if all are), `some_confined` tells whether others are. `running` is empty, or says
     why the patterns are not known to the end. `series` are the coefficients above and below in the generating function
     of the degrees that follow from the patterns, empty where these do not tell it, and `contracted` are the
-    hypersurfaces `at` one of the eps that were tried.
+    hypersurfaces `at` one of the eps that were tried. Steps are those of the map, but for what is told of the
+    hypersurfaces of a `word` of maps that is followed map by map.
     """
 
     lengths: tuple[int, ...]
@@ -264,6 +273,7 @@ class Patterns:
     series: tuple[tuple[int, ...], ...] = ()
     contracted: tuple[Hypersurface, ...] = field(default=(), compare=False, repr=False)
     at: str = field(default="", compare=False)
+    word: Word | None = field(default=None, compare=False)
 
     def terms_needed(self, order: int) -> int:
         """The number of terms, d_0 included, from which a recurrence of this order can be told from all others.
@@ -291,6 +301,11 @@ class Patterns:
         return [f"C{k}: {h.told(at)}" for k, h in enumerate(self.contracted, 1) if self.series]
 
     @property
+    def word_text(self) -> str:
+        """What steps are in what is told, where these are not those of the map; else empty."""
+        return self.word.text if self.word is not None and self.word.length > 1 and self.series else ""
+
+    @property
     def limit(self) -> str:
         """What was not seen, and how far it was looked for; empty where everything is confined."""
         if self.searched is None:
@@ -312,7 +327,9 @@ class Patterns:
         names = ("numerator", "denominator")
         series = {name: [str(c) for c in part] for name, part in zip(names, self.series, strict=False)}
         contracted = [{"text": text, **h.to_json()} for text, h in zip(self.told, self.contracted, strict=False)]
-        return {**found, "generating_function": series or None, "contracted": contracted, "eps": self.at or None}
+        maps = self.word.length if self.word_text and self.word else 1
+        known = {"generating_function": series or None, "contracted": contracted, "eps": self.at or None}
+        return {**found, **known, "maps_a_step": maps}
 
 
 def _ascending(coefficients: Sequence[int]) -> str:
@@ -335,7 +352,7 @@ def patterns_of(runs: Sequence[SingularityRun], at: bool = True) -> Patterns:
     return _one_of(
         [
             _refused(run.eps, run.is_dominant, run.stopped)
-            or _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "")
+            or _patterns(run.map_degree, run.hypersurfaces, format_number(run.eps) if at else "", run.word)
             for run in runs
         ]
     )
@@ -378,11 +395,13 @@ def _at_random(map_: BirationalMap, eps: fmpq, steps: int | None, seed: int, sec
     if not _is_dominant(map_, eps):
         return _refused(eps, False, False) or _unknown("")
     rng = random.Random(f"patterns {seed_for(seed, map_.subject, eps)}")
-    if len(map_.at(eps).factors) > 1:
+    equations = map_.at(eps).equations
+    if period_of(equations) > 1:
         found = fates_at_random(map_, eps, rng, limits)
         return _refused(eps, True, limits.is_over) or _patterns(0, found)
     try:
-        return _patterns(*contracted(map_, eps, rng, limits))
+        degree, hypersurfaces = contracted(map_, eps, rng, limits)
+        return _patterns(degree, hypersurfaces, "", Word((degree,), len(equations)))
     except Untold as error:
         return _refused(eps, True, limits.is_over) or _unknown(str(error))
 
@@ -417,7 +436,10 @@ def _unknown(reason: str) -> Patterns:
     return Patterns((), None, False, reason)
 
 
-def _patterns(map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = "") -> Patterns:
+def _patterns(
+    map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = "", word: Word | None = None
+) -> Patterns:
+    maps = 1 if word is None else word.length
     # A pole of multiplicity 0 is no critical hypersurface: what it becomes lowers no degree.
     critical = [h for h in hypersurfaces if h.status != NOT_CONTRACTED and h.multiplicity != 0]
     for h in critical:
@@ -434,16 +456,23 @@ def _patterns(map_degree: int, hypersurfaces: Sequence[Hypersurface], at: str = 
             return _unknown(
                 "some images meet a hypersurface that lowers degrees for ever, to orders that are not known"
             )
-        fraction = degree_series(map_degree, [(h.degree, h.orders) for h in critical])
+        degrees = (map_degree,) if word is None else word.degrees
+        fraction = degree_series(degrees, [(h.degree, h.orders) for h in critical], [h.stage or 0 for h in critical])
+        if maps > 1:
+            try:
+                fraction = every_nth(fraction, maps)
+            except ArithmeticError as error:
+                return _unknown(f"{error}: those of the degrees of a composition")
         series = tuple(tuple(int(c) for c in polynomial.coeffs()) for polynomial in fraction)
     return Patterns(
-        tuple(sorted(lengths)),
-        min(open_ones, default=None),
+        tuple(sorted({-(-length // maps) for length in lengths})),
+        min((steps // maps for steps in open_ones), default=None),
         any(h.status == CONFINED for h in critical),
         "",
         series,
         tuple(critical),
         at,
+        word,
     )
 
 
@@ -496,22 +525,3 @@ def _is_dominant(map_: BirationalMap, eps: fmpq) -> bool:
         except (SingularStep, BadPrime):
             continue
     return False
-
-
-def _critical(forms: Sequence[Any], degree: int) -> Any:
-    """The Jacobian determinant of the homogeneous map, None where it is too large."""
-    size = len(forms)
-    if comb(size * (degree - 1) + size - 1, size - 1) > _MAX_TERMS:
-        return None
-    zero = forms[0].context().constant(0)
-    return kernel_minors([[*(form.derivative(j) for j in range(size)), zero] for form in forms])[-1]
-
-
-def _is_infinity(factor: Any) -> bool:
-    return len(factor) == 1 and all(exponent == 0 for exponent in factor.monoms()[0][:-1])
-
-
-def _affine(form: Any, map_: BirationalMap) -> str:
-    """The form at Z = 1 in the variables of the system, as text."""
-    context = ring(map_.variables)
-    return format_polynomial(context.from_dict({tuple(m)[:-1]: c for m, c in form.terms()}))

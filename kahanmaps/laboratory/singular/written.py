@@ -1,0 +1,152 @@
+"""The hypersurfaces that a map may contract, by their polynomials; of a composition those of each map by itself.
+
+A composition multiplied out has the hypersurfaces of all its maps, moved back by those before: long polynomials. Map by
+map they are as short as those of the maps. Curves through them are followed through the word of the maps, one map a
+step, and begin where the map stands that contracts them. Powers of a word repeat it.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import comb
+from typing import Any
+
+from flint import fmpq
+
+from kahanmaps.algebra.minors import kernel_minors
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.text import format_polynomial
+from kahanmaps.errors import counted
+from kahanmaps.laboratory.singular.fates import Followed, Hypersurface, fate_of
+from kahanmaps.laboratory.singular.following import Range
+from kahanmaps.maps.equation import Equation
+from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
+
+_MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
+
+
+@dataclass(frozen=True)
+class Word:
+    """A composition as a word of maps: the degrees of those that it begins with, and how often these are repeated."""
+
+    degrees: tuple[int, ...]
+    power: int
+
+    @property
+    def length(self) -> int:
+        """The number of maps that make a step."""
+        return len(self.degrees) * self.power
+
+    @property
+    def text(self) -> str:
+        """What a step is, and what is counted instead."""
+        return f"a step is {counted(self.length, 'map')}, which are followed one by one: steps are those of single maps"
+
+
+@dataclass(frozen=True)
+class Written:
+    """An irreducible form, whether it is a pole, and how often it divides the Jacobian determinant (None: unknown)."""
+
+    form: Any
+    is_pole: bool
+    multiplicity: int | None
+
+
+def written(map_: HomogeneousMap) -> tuple[list[Written], int | None]:
+    """The poles of a map and the factors of its Jacobian determinant, with the degree of that; exact.
+
+    Where the determinant is too large its degree is None, and only infinity is there beside the poles.
+    """
+    forms, _, below = map_
+    found: dict[str, Written] = {}
+    for factor, _ in below.factor()[1]:
+        if not is_infinity(factor):
+            found[str(factor)] = Written(factor, True, 0)
+    if map_.degree <= 1:
+        return list(found.values()), 0
+    critical = _critical(forms, map_.degree)
+    if critical is None:
+        infinity = forms[0].context().gens()[-1]
+        poles = [Written(one.form, one.is_pole, None) for one in found.values()]
+        return [*poles, Written(infinity, False, None)], None
+    for factor, multiplicity in critical.factor()[1]:
+        found[str(factor)] = Written(factor, str(factor) in found, int(multiplicity))
+    return list(found.values()), int(critical.total_degree())
+
+
+def followed_forms(map_: HomogeneousMap, among: list[Written], stage: int = 0) -> tuple[list[Followed], list[Followed]]:
+    """Of the forms of a map those that it contracts, and those in the common factor of the minors of its equation."""
+    contracted = [Followed(one.form, 0, stage) for one in among if one.multiplicity]
+    common = [] if map_.factor.is_constant() else map_.factor.factor()[1]
+    return contracted, [Followed(factor, int(k), stage) for factor, k in common]
+
+
+def followed_map_by_map(
+    map_: BirationalMap, eps: fmpq, rng: random.Random, limits: Range, progress: Callable[[str], None]
+) -> tuple[Word, list[Hypersurface]] | None:
+    """The hypersurfaces that the maps of a composition contract, at one exact eps, with the word of these maps.
+
+    Steps are those of single maps, and as many for each map of the word as the limits say. Without those that there was
+    no time for; None where those of a map are too large.
+    """
+    equations = map_.at(eps).equations
+    period = period_of(equations)
+    letters = [homogeneous_map(one) for one in map_.at(eps).factors[:period]]
+    several = [written(letter) for letter in letters]
+    if any(degree is None for _, degree in several):
+        return None
+    both = [
+        followed_forms(letter, found, k) for k, (letter, (found, _)) in enumerate(zip(letters, several, strict=True))
+    ]
+    critical = [form for part, _ in both for form in part]
+    excess = [form for _, part in both for form in part]
+    limits = replace(limits, shown=limits.shown * period, reach=limits.reach * period, along=limits.along * period)
+    found = []
+    for stage, (own, _) in enumerate(several):
+        for one in own:
+            if not one.multiplicity or limits.is_over:
+                continue
+            text = name_of(one.form, map_)
+            progress(f"following {text[:40]}")
+            found.append(
+                fate_of(
+                    map_, eps, one.form, text, one.is_pole, one.multiplicity, rng, limits, critical, excess,
+                    (stage, period),
+                )
+            )  # fmt: skip
+    return Word(tuple(letter.degree for letter in letters), len(equations) // period), found
+
+
+def period_of(equations: tuple[Equation, ...]) -> int:
+    """The number of maps after which a word repeats itself, a divisor of its length."""
+    known = [(one.exponents, one.terms) for one in equations]
+    size = len(known)
+    return next(k for k in range(1, size + 1) if size % k == 0 and known[k:] == known[: size - k])
+
+
+def _critical(forms: list[Any], degree: int) -> Any:
+    """The Jacobian determinant of the homogeneous map, None where it is too large."""
+    size = len(forms)
+    if comb(size * (degree - 1) + size - 1, size - 1) > _MAX_TERMS:
+        return None
+    zero = forms[0].context().constant(0)
+    return kernel_minors([[*(form.derivative(j) for j in range(size)), zero] for form in forms])[-1]
+
+
+def is_infinity(factor: Any) -> bool:
+    """Whether a form is Z."""
+    return len(factor) == 1 and all(exponent == 0 for exponent in factor.monoms()[0][:-1])
+
+
+def affine(form: Any, map_: BirationalMap) -> str:
+    """The form at Z = 1 in the variables of the system, as text."""
+    context = ring(map_.variables)
+    return format_polynomial(context.from_dict({tuple(m)[:-1]: c for m, c in form.terms()}))
+
+
+def name_of(form: Any, map_: BirationalMap) -> str:
+    """The same; Z for infinity."""
+    return "Z" if is_infinity(form) else affine(form, map_)

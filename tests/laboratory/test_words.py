@@ -1,0 +1,111 @@
+"""Compositions that are too long to be multiplied out are followed map by map, and their degrees explained."""
+
+import random
+import time
+
+import pytest
+from flint import fmpq, fmpz_poly
+
+from kahanmaps.documents.files import parse_system
+from kahanmaps.errors import InputError
+from kahanmaps.laboratory.growth.degrees import degree_growth
+from kahanmaps.laboratory.growth.renewal import coefficients, degree_series, every_nth
+from kahanmaps.laboratory.singular.following import Range
+from kahanmaps.laboratory.singular.singularities import Patterns, patterns, singularities
+from kahanmaps.laboratory.singular.written import Word, followed_map_by_map
+
+
+def word(*letters, power=1):
+    """The composition of systems of the catalogue, "-" for the inverse, or of inline maps of the plane."""
+    entries = []
+    for letter in letters:
+        if ";" in letter:
+            image = ", ".join(f'"{part}"' for part in letter.split(";"))
+            entries.append(f'{{ map = {{ variables = ["x", "y"], map = {{ image = [{image}] }} }} }}')
+        else:
+            entries.append(f'{{ system = "{letter.strip("-")}", inverse = {str(letter[0] == "-").lower()} }}')
+    return parse_system(f"[composition]\nof = [{', '.join(entries * power)}]").map
+
+
+def explained(map_, terms, eps=None):
+    """The word of a composition, and its degrees as its maps explain them, followed one by one."""
+    limits = Range(12, 60, 40, time.monotonic() + 60)
+    found, hypersurfaces = followed_map_by_map(map_, eps or fmpq(3, 11), random.Random(1), limits, lambda _: None)
+    pairs = [(h.degree, h.orders) for h in hypersurfaces]
+    series = degree_series(found.degrees, pairs, [h.stage for h in hypersurfaces])
+    return found, coefficients(every_nth(series, found.length), terms + 1)
+
+
+@pytest.mark.parametrize(
+    ("letters", "power", "terms", "expected"),
+    [
+        (["lotka_volterra", "-lyness"], 1, 6, Word((2, 2), 1)),
+        (["-zander_111", "-nahm_tetrahedral"], 1, 5, Word((2, 2), 1)),
+        (["weierstrass", "hietarinta_viallet"], 2, 2, Word((2, 3), 2)),
+        (["zander_120", "-zander_120", "nahm_tetrahedral"], 2, 5, Word((2,), 2)),  # the first two are no step
+        (["y;(2+y)/x", "y;-x+y+3/y^2"], 1, 6, Word((2, 3), 1)),  # meets what the other map contracts
+        (["x*y;y+1", "y;(y+1/3)/(x+2/5)"], 2, 3, Word((2, 2), 2)),
+        (["y;x+y^2-2", "y;2*x+3*y-1"], 1, 5, Word((2, 1), 1)),  # an affine map contracts nothing
+        (["y;(y+1/3)/(x+2/5)"], 5, 5, Word((2,), 5)),
+    ],
+)
+def test_words_explain_the_measured_degrees(letters, power, terms, expected):
+    map_ = word(*letters, power=power)
+    found, degrees = explained(map_, terms)
+    assert found == expected
+    measured = degree_growth(
+        map_, "3/11" if map_.has_eps else None, max_terms=terms, patterns=Patterns((), None, False)
+    )
+    assert tuple(degrees) == measured.degrees
+
+
+def test_a_hypersurface_of_another_map_explains_other_degrees():
+    """Negative control: with the maps in the other order the same hypersurfaces stand for another composition."""
+    map_ = word("y;(2+y)/x", "y;-x+y+3/y^2")
+    limits = Range(12, 60, 40, time.monotonic() + 60)
+    found, hypersurfaces = followed_map_by_map(map_, fmpq(1), random.Random(1), limits, lambda _: None)
+    pairs = [(h.degree, h.orders) for h in hypersurfaces]
+    right, wrong = (
+        coefficients(every_nth(degree_series(found.degrees, pairs, stages), 2), 6)
+        for stages in ([h.stage for h in hypersurfaces], [1 - h.stage for h in hypersurfaces])
+    )
+    assert right == [1, 4, 13, 43, 141, 463]
+    assert wrong != right
+
+
+@pytest.mark.parametrize(("name", "k", "square"), [("mcmillan", 7, 2), ("euler_top", 2, 2), ("euler_top", 4, 2)])
+def test_powers_have_every_kth_degree(name, k, square):
+    found = degree_growth(word(name, power=k))
+    assert (found.ended, found.explained.closed_form) == ("explained", f"{square * k * k}*n^2 + 1")
+    assert found.patterns.word == Word((3,), k)
+    assert f"a step is {k} maps" in found.text
+
+
+def test_powers_above_dimension_4_are_followed_as_points():
+    found = patterns(word("volterra_periodic_5", power=3), fmpq(3, 11), seconds=60)
+    base = patterns(word("volterra_periodic_5"), fmpq(3, 11), seconds=60)
+    assert coefficients(found.fraction, 5) == coefficients(base.fraction, 13)[::3]
+
+
+def test_the_singularities_of_a_long_composition_are_those_of_its_maps():
+    run = singularities(word("mcmillan", power=7), 1)
+    assert (run.map_degree, run.word, run.verdict) == (99, Word((3,), 7), "confined")
+    assert [(h.polynomial, h.stage, h.confined_at) for h in run.hypersurfaces] == [("y - 1", 0, 3), ("y + 1", 0, 3)]
+
+
+def test_maps_whose_own_forms_are_too_large_are_refused(monkeypatch):
+    monkeypatch.setattr("kahanmaps.laboratory.singular.written._MAX_TERMS", 1)
+    with pytest.raises(InputError, match="found a composition of maps whose forms on projective space are too large"):
+        singularities(word("mcmillan", power=7), 1)
+    found = degree_growth(word("mcmillan", power=7), max_terms=3)
+    assert found.degrees == tuple(2 * (7 * n) ** 2 + 1 for n in range(4))
+    assert found.patterns.running == "the composition is too long for its singularities to be followed"
+
+
+def test_every_nth_coefficient_of_a_fraction():
+    above, below = fmpz_poly([1, 2]), fmpz_poly([1, -3, 1, 5])
+    values = coefficients((above, below), 40)
+    for n, first in ((1, 0), (2, 0), (2, 1), (3, 2), (5, 7)):
+        assert coefficients(every_nth((above, below), n, first), 6) == values[first::n][:6]
+    with pytest.raises(ArithmeticError, match="coefficients that are too large"):
+        every_nth((fmpz_poly([1]), fmpz_poly([1, -2, -3])), 600)
