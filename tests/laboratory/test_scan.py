@@ -357,6 +357,25 @@ def test_points_over_number_fields_are_told_by_their_polynomials(condition):
     assert not any(found.left)
 
 
+@pytest.mark.parametrize(
+    ("condition", "other", "expected"),
+    [
+        ("a^3 - 2", "b - a^2", "a^3 - 2 = 0, a^2 - b = 0"),
+        ("a^3 - a - 1", "a*b - 5", "a^3 - a - 1 = 0, 5*a^2 - b - 5 = 0"),
+    ],
+)
+def test_points_of_a_plane_over_number_fields_are_found(condition, other, expected):
+    text = f"""variables = ["x", "y"]
+    parameters = {{ a = 0, b = 0 }}
+    [system]
+    rhs = ["y", "x^2 + ({condition})*y + ({other})*x*y"]"""
+    found = scan(parse_system(text), ["a", "b"], terms=5)
+    one = next(one for one in found.components if one.dimension == 0)
+    assert (one.text, one.is_confirmed, one.values) == (expected, True, None)
+    assert one.growth.growth is GrowthClass.QUADRATIC
+    assert not any(found.left)
+
+
 def test_a_part_that_was_interrupted_says_nothing_of_conditions(tmp_path):
     def stop(sentence):
         if "members" in sentence and int(sentence.split()[1]) > 101 + 107 + 113:

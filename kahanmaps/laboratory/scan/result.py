@@ -19,6 +19,7 @@ from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.conclusion import Conclusion
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.scan.conjugates import MAX_FIELD_DEGREE, SPARE_BITS
 from kahanmaps.laboratory.scan.lift import height_bound
 from kahanmaps.laboratory.scan.pieces import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
@@ -179,10 +180,18 @@ class Scan(Displayed):
         where = WORDS[self.by][1].format(len(self.generic))
         if not whole:
             kinds.append("nothing of smaller dimension, for which all members would have to be tried")
-        field = "a number field" if len(self.over) == 1 else "a quadratic field"
+        fields = []
+        if whole:
+            fields.append(
+                f"points over number fields of degree d up to {MAX_FIELD_DEGREE}, with coefficients up to H where "
+                f"2^{SPARE_BITS // len(self.over)} (2 H + 1)^(d + 1) is below the product of the primes modulo which "
+                "they have residues"
+            )
+        if len(self.over) > 1:
+            fields.append("hypersurfaces over a quadratic field that splits modulo three of the primes")
         return (
             f"{', and '.join(parts)}; found are {', and '.join(kinds)}, {where}, over Q with numerators and "
-            f"denominators up to {self.height}, or over {field} that splits modulo three of the primes"
+            f"denominators up to {self.height}; {', and '.join(fields)}"
         )
 
     @property

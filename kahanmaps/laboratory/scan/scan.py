@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import product, repeat
+from itertools import accumulate, islice, product, repeat
 from math import comb, inf
 from typing import Any
 
@@ -49,6 +49,8 @@ _PRIMES: dict[int, tuple[tuple[int, ...], ...]] = {
     2: ((53, 59, 61, 67), (29, 31, 37, 41)),
     3: ((19, 23, 29, 31), (11, 13, 17, 19)),
 }
+# More of these, as many as there is time for, where members are left that may be points over number fields.
+_FURTHER = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
 # Those for members on random lines of parameter space. Each of the fields of the roots of d, d up to 10 and down to
 # -10, splits modulo three of them: else hypersurfaces that split over such a field have no points to be found.
 _SPLIT = (107, 131, 139, 193, 241, 281)
@@ -214,6 +216,13 @@ def scan(
         sweeps[:] = [one for one in sweeps if one.complete]
         take([*again])
         known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
+    further: list[tuple[int, int | None]] = [(p, None) for p in _FURTHER.get(len(names), ()) if primes is None]
+    sizes = accumulate((_size(len(names), *one) for one in further), initial=total)
+    further = [one for one, size in zip(further, islice(sizes, 1, None), strict=True) if size <= most]
+    if further and not (missed or omitted) and any(map(_lacks_points, sweeps, repeat(known))):
+        total += sum(_size(len(names), *one) for one in further)
+        take(further)
+        known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
     omitted += [f"all conditions for {missed} sequences of degrees"] if missed else []
     for k, one in enumerate(known):
         try:
@@ -352,3 +361,8 @@ def _left(one: Sweep, components: Sequence[Component]) -> int:
 def _lacks_hypersurface(one: Sweep, components: Sequence[Component]) -> bool:
     """Whether members on random lines are left, as many as a hypersurface has."""
     return not one.complete and _left(one, components) >= 0.5 * one.seen / one.prime
+
+
+def _lacks_points(one: Sweep, components: Sequence[Component]) -> bool:
+    """Whether members are left, fewer than a curve has, or a hypersurface where they are on random lines."""
+    return 0 < _left(one, components) < 0.5 * (one.prime if one.complete else one.seen / one.prime)
