@@ -26,9 +26,9 @@ def test_blocks_say_degrees_growth_and_where(kahanmaps):
         "at c =\t-1",
         "growth\tthat of one member; singularities were followed for 40 steps",
         "tried\tall members with parameters modulo 101, 103, 107; found are single points, where one of the first 4 "
-        "degrees is smaller, over Q with numerators and denominators up to 72; points over number fields of degree d up "
-        "to 6, with coefficients up to H where 2^12 (2 H + 1)^(d + 1) is below the product of the primes modulo which "
-        "they have residues",
+        "degrees is smaller, over Q with numerators and denominators up to 72; points over number fields of degree d "
+        "up to 6, with coefficients up to H where 2^12 (2 H + 1)^(d + 1) is below the product of the primes modulo "
+        "which they have residues",
         "left\tnone: every slow member that was seen is on a component",
     ]
 

@@ -188,6 +188,19 @@ def test_more_parameters_than_can_be_tried_give_hypersurfaces():
     assert found.degree == 4
 
 
+def test_four_parameters_give_what_has_codimension_2_as_well():
+    text = LOTKA_VOLTERRA.replace("C = 1", "C = 1, D = 1").replace("x + A*z", "D*x + A*z")
+    found = scan(parse_system(text), ["A", "B", "C", "D"], terms=3)
+    conditions = {one.text: one for one in found.components}
+    assert conditions["A*B*C + D = 0"].dimension == 3
+    # at D = 1 these are the curves that are known
+    for one in ("A*B + D = 0, C - 1 = 0", "B*C + D = 0, A - 1 = 0", "A*C + 1 = 0, B - D = 0"):
+        assert (conditions[one].dimension, conditions[one].is_confirmed) == (2, True)
+        assert conditions[one].growth.growth is GrowthClass.QUADRATIC
+    assert "24 random planes of parameter space modulo 19, 23, 29, 31" in found.coverage
+    assert "codimension 2" in found.coverage
+
+
 def test_a_family_without_special_members_says_so():
     found = scan(parse_system('variables = ["x"]\nparameters.a = 1\n[system]\nrhs = ["x^2 + a^2 + 1"]'), ["a"])
     assert found.components == ()

@@ -24,7 +24,7 @@ def points_where(condition, p, count):
 
 
 def found_in(points, p, count, seed=0):
-    return pieces(points, p, p**count, True, random.Random(seed))
+    return pieces(points, p, p**count, 0, random.Random(seed))
 
 
 def test_two_lines_and_points_beside_them_are_told_apart():
@@ -70,12 +70,12 @@ def test_a_surface_and_a_line_of_space_are_found():
 def test_three_hyperplanes_of_a_space_of_dimension_6_are_told_apart():
     rng = random.Random(3)
     points = [tuple(0 if i == k else rng.randrange(1, 79) for i in range(6)) for k in range(3) for _ in range(150)]
-    found = pieces(points, 79, 79 * 150, False, random.Random(0))
+    found = pieces(points, 79, 79 * 150, 5, random.Random(0))
     assert sorted(found.flats[5]) == [(tuple(int(i == k) for i in range(7)),) for k in (2, 1, 0)]
 
 
 def test_single_points_are_not_looked_for_where_not_all_members_were_tried():
-    found = pieces([(1, 2, 3, 4)], 31, 31 * 40, False, random.Random(0))
+    found = pieces([(1, 2, 3, 4)], 31, 31 * 40, 3, random.Random(0))
     assert (found.flats, found.left) == ({}, 1)
 
 

@@ -35,16 +35,17 @@ def conditions(
 def _of_class(
     degrees: Degrees, sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random, check: Callable[[], None]
 ) -> list[Component]:
-    """Hypersurfaces first, from random lines, which hardly meet anything smaller; all else beside them."""
+    """Hypersurfaces first, from random lines, which hardly meet anything smaller; then what is smaller, beside them."""
     found: list[Component] = []
     count = len(names)
 
-    def parts_of(complete: bool) -> list[Pieces]:
+    def parts_of(on_lines: bool) -> list[Pieces]:
         parts = []
         for one in sweeps:
-            if one.complete is complete and degrees in one.classes:
+            if one.on_lines is on_lines and degrees in one.classes:
                 rest = beside(one.classes[degrees], found, one.prime)
-                parts += [pieces(rest, one.prime, one.seen, complete, rng, check)] if rest else []
+                smallest = 0 if one.complete else count - one.width
+                parts += [pieces(rest, one.prime, one.seen, smallest, rng, check)] if rest else []
         if count > 1:
             forms = {
                 part.prime: [*map(_as_form, part.flats.get(count - 1, [])), *part.forms.get((), [])] for part in parts
@@ -52,8 +53,8 @@ def _of_class(
             found.extend(Component((form,), count - 1, degrees, at) for form, at in lifted_forms(forms, names))
         return parts
 
-    parts_of(complete=False)
-    parts = parts_of(complete=True)
+    parts_of(on_lines=True)
+    parts = parts_of(on_lines=False)
     for dimension in range(max(1, count - 1)):
         flats = {part.prime: part.flats[dimension] for part in parts if part.flats.get(dimension)}
         if dimension == 0 and _is_a_curve({p: len(points) for p, points in flats.items()}):
