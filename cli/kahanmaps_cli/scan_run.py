@@ -52,13 +52,18 @@ scan_options: Callable[[F], F] = stack(
 )
 
 
+def names_of(options: dict[str, Any]) -> list[str]:
+    """The parameters of --over, each once."""
+    return list(dict.fromkeys(name.strip() for name in options["over"].split(",") if name.strip()))
+
+
 def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
     """The scan that a command line asks for."""
     from kahanmaps.laboratory.scan.kept import Kept
     from kahanmaps.laboratory.scan.scan import scan
     from kahanmaps.laboratory.scan.sweep import TimeOver
 
-    names = [name.strip() for name in options["over"].split(",") if name.strip()]
+    names = names_of(options)
     if is_inline(options):
         given = {"eps", *(name for name, _ in options["parameters"])}
         options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,11 +23,13 @@ from kahanmaps.plots.style import COLOURS, LINES, MARKS, Style
 from kahanmaps.plots.windows import Window, window_of
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _ASPECT = 0.8
-_MANY = f"{GrowthClass.EXPONENTIAL} growth"  # of the points with it none is named
-_WIDE, _HIGH = 0.14, 0.035  # of the picture, the room of a condition
+_MANY = f"{GrowthClass.EXPONENTIAL} growth"  # drawn thin, and none of it is named
+_LETTERS, _LETTER = 0.8, 0.5  # the size of conditions, of that of other text; the width of a letter, of its size
+_INNER = (0.85, 0.85)  # of the picture, the axes
 _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
 
@@ -64,8 +67,10 @@ def draw_scan(
             kind,
             points[kind],
             [piece for one in some if one.dimension == 1 for piece in _curve(one, window)],
-            [(one.text, _place(one)) for one in some if one.is_rational_point and kind != _MANY]
-            + [(one.text, _middle(pieces)) for one in some if one.dimension == 1 and (pieces := _curve(one, window))],
+            [(one.text, _place(one)) for one in some if one.is_rational_point]
+            + [(one.text, _middle(pieces)) for one in some if one.dimension == 1 and (pieces := _curve(one, window))]
+            if kind != _MANY
+            else [],
         )
         for kind, some in kinds.items()
     ]
@@ -93,7 +98,7 @@ def _modulo(sweep: Sweep, kinds: dict[str, list[Component]]) -> list[_Kind]:
             rest[one.degrees] = beside(before, [one], sweep.prime) if before else []
             on = sorted(set(before) - set(rest[one.degrees]))
             points += on
-            labels += [(one.text, on[len(on) // 2])] if on and (one.dimension or kind != _MANY) else []
+            labels += [(one.text, on[len(on) // 2])] if on and kind != _MANY else []
         drawn.append(_Kind(kind, points, [], labels))
     left = [point for points in rest.values() for point in points]
     return [*drawn, _Kind("on no component", left, [], [])] if left else drawn
@@ -109,27 +114,58 @@ def _draw(found: Scan, style: Style, kinds: list[_Kind], window: Window, beside_
         handles = []
         for k, kind in enumerate(kinds):
             colour, mark = COLOURS[k % len(COLOURS)], MARKS[k % len(MARKS)]
+            width = 0.5 if kind.name == _MANY else 1.2
             axes.add_collection(
-                LineCollection(kind.curves, colors=colour, linestyles=[LINES[k % len(LINES)]]), autolim=False
+                LineCollection(kind.curves, colors=colour, linestyles=[LINES[k % len(LINES)]], linewidths=width),
+                autolim=False,
             )
             columns = np.array(kind.points, dtype=float).reshape(-1, 2).T
-            size = style.font_size / (4 if beside_name else 2)
+            size = style.font_size / (4 if beside_name or kind.name == _MANY else 2)
             handles += axes.plot(*columns, mark, color=colour, markersize=size, zorder=10 - k)
-        labels = [(*one, COLOURS[k % len(COLOURS)]) for k, kind in enumerate(kinds) for one in kind.labels]
-        taken: list[tuple[float, float]] = []
-        for text, place, colour in labels:  # those of the slowest growth before others
-            x, y = ((c - low) / (high - low) for c, (low, high) in zip(place, window, strict=True))
-            if not (0 <= x <= 1 and 0 <= y <= 1) or any(abs(x - u) < _WIDE and abs(y - v) < _HIGH for u, v in taken):
-                continue
-            taken.append((x, y))
-            offset = (3.0, 3.0) if x < 1 - _WIDE else (-3.0, 3.0)
-            side = "left" if x < 1 - _WIDE else "right"
-            write(axes, text, place, offset, halo=1.5, size="x-small", color=colour, ha=side, clip_on=True, zorder=20)
+        _write(axes, kinds, window, style)
         axes.set(xlim=window[0], ylim=window[1])
         axes.set(xlabel=label_of(found.over[0]) + beside_name, ylabel=label_of(found.over[1]) + beside_name)
         if handles:
             legend_above(figure, handles, names, style)
     return figure
+
+
+def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None:
+    """Conditions beside what they describe, as far as there is room: curves first, which may cover points if need be.
+
+    Of points those with the fastest growth that is not exponential come first.
+    """
+    em = _LETTERS * style.font_size
+    room = [side * part for side, part in zip(style.inches(_ASPECT), _INNER, strict=True)]
+    across, high = (em / (72 * inches) for inches in room)
+    wanted = [(*one, COLOURS[k % len(COLOURS)]) for k, kind in enumerate(kinds) for one in kind.labels]
+    wanted.sort(key=lambda one: (" = " not in one[0], -COLOURS.index(one[2])))
+
+    def inside(place: Sequence[float]) -> tuple[float, ...]:
+        return tuple((c - low) / (end - low) for c, (low, end) in zip(place, window, strict=True))
+
+    places = [inside(place) for kind in kinds for place in kind.points]
+    u, v = 0.35 * across, 0.35 * high
+    marks = [(x - u, x + u, y - v, y + v) for x, y in places]
+    taken: list[tuple[float, ...]] = []
+    for text, place, colour in wanted:
+        x, y = inside(place)
+        wide = _LETTER * len(text) * across
+        is_curve = " = " in text
+        for covers, side, up in product((False, True)[: 1 + is_curve], (1, -1), (1, -1)):
+            low, bottom = x + (0.4 * across if side > 0 else -0.4 * across - wide), y + up * 0.7 * high - 0.5 * high
+            box = (low, low + wide, bottom, bottom + high)
+            if min(box) < 0 or max(box) > 1 or any(_overlap(box, one) for one in (*taken, *(() if covers else marks))):
+                continue
+            taken.append(box)
+            where = {"ha": "left" if side > 0 else "right", "va": "center"}
+            offset = (0.4 * em * side, 0.7 * em * up)
+            write(axes, text, place, offset, halo=1.5, size=em, color=colour, zorder=20, **where)
+            break
+
+
+def _overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    return one[0] < other[1] and other[0] < one[1] and one[2] < other[3] and other[2] < one[3]
 
 
 def _middle(pieces: list[np.ndarray]) -> tuple[float, float]:

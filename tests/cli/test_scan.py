@@ -25,8 +25,9 @@ def test_blocks_say_degrees_growth_and_where(kahanmaps):
         "at c =\t-1",
         "growth\tthat of one member; singularities were followed for 40 steps",
         "tried\tall members with parameters modulo 101, 103, 107; found are single points, where one of the first 4 "
-        "degrees is smaller, over Q with numerators and denominators up to 72, or over a number field that splits "
-        "modulo three of the primes",
+        "degrees is smaller, over Q with numerators and denominators up to 72; points over number fields of degree d "
+        "up to 6, with coefficients up to H where 2^12 (2 H + 1)^(d + 1) is below the product of the primes modulo "
+        "which they have residues",
         "left\tnone: every slow member that was seen is on a component",
     ]
 
@@ -174,3 +175,17 @@ def test_numbers_that_are_none_in_a_kept_file_are_refused(kahanmaps, tmp_path):
     outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept")
     assert (outcome.status, outcome.out) == (2, "")
     assert "expected a file that a scan has kept" in outcome.err
+
+
+def test_a_picture_needs_two_parameters_and_something_to_draw(kahanmaps, tmp_path):
+    began = time.monotonic()
+    outcome = kahanmaps(f"plot scan henon_heiles --over c --primes 8101,8111,8117 -o {tmp_path}/one.svg")
+    assert (outcome.status, outcome.out) == (2, "")
+    assert "expected two parameters: a plane is drawn" in outcome.err
+    assert time.monotonic() - began < 1  # before the scan
+    for more in ("", "--modulo 53"):
+        command = f"plot scan zhukovski_volterra_2 --over b1,b2 --seconds 1e-6 {more} -o {tmp_path}/none.svg"
+        outcome = kahanmaps(command)
+        assert outcome.status == 3
+        assert "there is no picture: nothing to be drawn was found" in outcome.err
+    assert not list(tmp_path.iterdir())

@@ -188,6 +188,19 @@ def test_more_parameters_than_can_be_tried_give_hypersurfaces():
     assert found.degree == 4
 
 
+def test_four_parameters_give_what_has_codimension_2_as_well():
+    text = LOTKA_VOLTERRA.replace("C = 1", "C = 1, D = 1").replace("x + A*z", "D*x + A*z")
+    found = scan(parse_system(text), ["A", "B", "C", "D"], terms=3)
+    conditions = {one.text: one for one in found.components}
+    assert conditions["A*B*C + D = 0"].dimension == 3
+    # at D = 1 these are the curves that are known
+    for one in ("A*B + D = 0, C - 1 = 0", "B*C + D = 0, A - 1 = 0", "A*C + 1 = 0, B - D = 0"):
+        assert (conditions[one].dimension, conditions[one].is_confirmed) == (2, True)
+        assert conditions[one].growth.growth is GrowthClass.QUADRATIC
+    assert "24 random planes of parameter space modulo 19, 23, 29, 31" in found.coverage
+    assert "codimension 2" in found.coverage
+
+
 def test_a_family_without_special_members_says_so():
     found = scan(parse_system('variables = ["x"]\nparameters.a = 1\n[system]\nrhs = ["x^2 + a^2 + 1"]'), ["a"])
     assert found.components == ()
@@ -354,6 +367,25 @@ def test_points_over_number_fields_are_told_by_their_polynomials(condition):
     found = scan(parse_system(text), ["a"])
     factors = {format_polynomial(one) for one, _ in parse_polynomial(condition, ["a"]).factor()[1]}
     assert {format_polynomial(equation) for one in found.components for equation in one.equations} == factors
+    assert not any(found.left)
+
+
+@pytest.mark.parametrize(
+    ("condition", "other", "expected"),
+    [
+        ("a^3 - 2", "b - a^2", "a^3 - 2 = 0, a^2 - b = 0"),
+        ("a^3 - a - 1", "a*b - 5", "a^3 - a - 1 = 0, 5*a^2 - b - 5 = 0"),
+    ],
+)
+def test_points_of_a_plane_over_number_fields_are_found(condition, other, expected):
+    text = f"""variables = ["x", "y"]
+    parameters = {{ a = 0, b = 0 }}
+    [system]
+    rhs = ["y", "x^2 + ({condition})*y + ({other})*x*y"]"""
+    found = scan(parse_system(text), ["a", "b"], terms=5)
+    one = next(one for one in found.components if one.dimension == 0)
+    assert (one.text, one.is_confirmed, one.values) == (expected, True, None)
+    assert one.growth.growth is GrowthClass.QUADRATIC
     assert not any(found.left)
 
 

@@ -10,10 +10,12 @@ from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, QQ
 from kahanmaps.algebra.polynomials import ring
-from kahanmaps.laboratory.scan.lift import height_bound, lifted_conjugates, lifted_flats, lifted_forms
+from kahanmaps.laboratory.scan.conjugates import lifted_conjugates
+from kahanmaps.laboratory.scan.lift import height_bound, lifted_flats, lifted_forms
 from kahanmaps.laboratory.scan.members import point_on
 from kahanmaps.laboratory.scan.pieces import pieces
 
+FIELD_PRIMES = (53, 59, 61, 67, 71, 73, 79, 83, 89, 97, 101, 103)
 PRIMES = (31, 37, 41)
 
 
@@ -22,7 +24,7 @@ def points_where(condition, p, count):
 
 
 def found_in(points, p, count, seed=0):
-    return pieces(points, p, p**count, True, random.Random(seed))
+    return pieces(points, p, p**count, 0, random.Random(seed))
 
 
 def test_two_lines_and_points_beside_them_are_told_apart():
@@ -68,12 +70,12 @@ def test_a_surface_and_a_line_of_space_are_found():
 def test_three_hyperplanes_of_a_space_of_dimension_6_are_told_apart():
     rng = random.Random(3)
     points = [tuple(0 if i == k else rng.randrange(1, 79) for i in range(6)) for k in range(3) for _ in range(150)]
-    found = pieces(points, 79, 79 * 150, False, random.Random(0))
+    found = pieces(points, 79, 79 * 150, 5, random.Random(0))
     assert sorted(found.flats[5]) == [(tuple(int(i == k) for i in range(7)),) for k in (2, 1, 0)]
 
 
 def test_single_points_are_not_looked_for_where_not_all_members_were_tried():
-    found = pieces([(1, 2, 3, 4)], 31, 31 * 40, False, random.Random(0))
+    found = pieces([(1, 2, 3, 4)], 31, 31 * 40, 3, random.Random(0))
     assert (found.flats, found.left) == ({}, 1)
 
 
@@ -90,25 +92,54 @@ def test_a_point_of_low_height_may_be_missing_modulo_one_of_four_primes():
     assert lifted_flats({**high, 43: [((1, 5),)]}) == {}
 
 
-def roots(p, c):
-    return [[t] for t in range(p) if (t * t - c) % p == 0]
+def zeros(condition, *others):
+    """The points (a, ...) modulo primes where a condition on a holds, the others by functions of a."""
+    return {p: [(a, *(f(a) % p for f in others)) for a in range(p) if condition(a) % p == 0] for p in FIELD_PRIMES}
 
 
-@pytest.mark.parametrize(("c", "expected"), [(5, {((0, -5),)}), (4, {}), (-1, {((0, 1),)})])
-def test_conjugate_points_are_told_from_rational_ones(c, expected):
-    primes = (11, 13, 17, 19, 29, 31, 37, 41)
-    assert set(lifted_conjugates({p: roots(p, c) for p in primes}, 1)) == set(expected)
+@pytest.mark.parametrize(
+    ("condition", "others", "names", "expected"),
+    [
+        (lambda a: a**2 - 5, [], "a", ["a^2 - 5"]),
+        (lambda a: a**5 - a - 1, [], "a", ["a^5 - a - 1"]),
+        (lambda a: 2 * a**3 - 3, [lambda a: a**2 - 7], "ab", ["2*a^3 - 3", "a^2 - b - 7"]),
+        (lambda a: a**2 - 5, [lambda a: 3, lambda a: 2 * a + 1], "abc", ["a^2 - 5", "b - 3", "2*a - c + 1"]),
+    ],
+)
+def test_points_over_number_fields_have_an_equation_for_each_parameter(condition, others, names, expected):
+    found = lifted_conjugates(zeros(condition, *others), names, random.Random(1))
+    assert [[*map(str, equations)] for equations, _ in found] == [expected]
 
 
-def test_conjugate_points_have_to_be_there_modulo_all_primes_that_split():
-    found = {p: roots(p, 5) for p in (11, 13, 17, 19, 29, 31, 37, 41)}
-    assert lifted_conjugates({**found, 29: [[7], [9]], 31: []}, 1) == {}  # one is let off
-    assert lifted_conjugates({**found, 13: [[7], [9]]}, 1) != {}  # 5 is no square modulo 13
+def test_a_coordinate_may_need_a_field_of_its_own():
+    primes = (71, 73, 97, 101, 103, 167, 191)  # both fields split modulo all of these but two
+    points = {
+        p: [(a, b) for a in range(p) if (a * a - 2) % p == 0 for b in range(p) if (b * b - 3) % p == 0] for p in primes
+    }
+    [(equations, at)] = lifted_conjugates(points, "ab", random.Random(1))
+    assert [*map(str, equations)] == ["a^2 - 2", "b^2 - 3"]
+    assert at == (71, 73, 97, 167, 191)
 
 
-def test_conjugate_points_of_a_plane_are_on_a_rational_line():
-    found = {p: [[t, (2 * t + 1) % p] for (t,) in roots(p, 5)] for p in (11, 19, 29, 31, 41)}
-    assert lifted_conjugates(found, 2) == {((fmpq(1), fmpq(-1, 2), fmpq(1, 2)), (-2, -19)): (11, 19, 29, 31, 41)}
+def test_points_that_are_not_conjugate_are_told_apart_also_among_others():
+    rng = random.Random(5)
+    both = [zeros(lambda a: a**2 - 5), zeros(lambda a: a**3 - a - 1)]
+    points = {p: [*{*both[0][p], *both[1][p], (rng.randrange(p),)}] for p in FIELD_PRIMES}
+    found = lifted_conjugates(points, "a", random.Random(1))
+    assert {str(equations[0]) for equations, _ in found} == {"a^2 - 5", "a^3 - a - 1"}
+
+
+def test_points_over_number_fields_have_to_be_there_modulo_all_primes_but_one():
+    found = zeros(lambda a: a**2 - 5)
+    there = [p for p in FIELD_PRIMES if found[p]]
+    assert lifted_conjugates({**found, there[0]: []}, "a", random.Random(1))  # one is let off
+    assert not lifted_conjugates({**found, there[0]: [], there[1]: []}, "a", random.Random(1))
+
+
+def test_points_by_chance_are_no_conjugates():
+    rng = random.Random(7)
+    points = {p: [(rng.randrange(p), rng.randrange(p)) for _ in range(3)] for p in FIELD_PRIMES}
+    assert lifted_conjugates(points, "ab", random.Random(1)) == []
 
 
 def test_the_height_bound_is_that_of_two_primes():

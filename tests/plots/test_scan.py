@@ -71,3 +71,14 @@ def test_the_plane_modulo_a_prime_has_every_slow_member(found):
     assert (2 * a * b - a - b) % 29 == 0
     with pytest.raises(InputError, match="expected one modulo which all members were tried: 23, 29, 31"):
         draw_scan(found, modulo=37)
+
+
+def test_conditions_do_not_overlap_and_none_is_of_exponential_growth(found):
+    figure = draw_scan(found, window=((-2.0, 2.0), (-2.0, 2.0)))
+    figure.canvas.draw()
+    [axes] = figure.axes
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert len(boxes) > 3
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+    named = {text.get_text() for text in axes.texts}
+    assert not named & {one.text for one in of_growth(found, "exponential")}

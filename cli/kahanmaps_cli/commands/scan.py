@@ -61,8 +61,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     no time for is told.
 
     Without --eps: conditions that hold for every eps; with eps among the parameters also those that contain it. With
-    more than three parameters members on random lines of parameter space are tried, which finds hypersurfaces only.
-    What can have been missed is told.
+    more than three parameters members on random lines and planes of parameter space are tried, which finds what has
+    codimension 1 and 2, as two linear conditions or a linear one and another. What can have been missed is told.
 
     --keep FILE writes what is measured modulo each prime as soon as it is known: a scan that was stopped or killed goes
     on from there, when the same command is given again. Parts (--shard) that several machines have kept are put

@@ -8,7 +8,8 @@ import click
 
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
-from kahanmaps_cli.scan_run import ending, scan_options, scanned
+from kahanmaps_cli.progress import say
+from kahanmaps_cli.scan_run import ending, names_of, scan_options, scanned
 
 
 @click.command("scan", cls=PictureCommand)
@@ -25,12 +26,13 @@ def command(system: str | None, **options: Any) -> int:
         --window=-2,2,-2,2 -o plane.pdf
       kahanmaps plot scan zhukovski_volterra_2 --over b1,b2 --modulo 53
 
-    A colour for each kind of growth; marks are points, lines are curves, and
-    the conditions of the first ones are written beside them. With --modulo P
+    A colour for each kind of growth; marks are points, lines are curves. The
+    conditions of those that do not grow exponentially are written beside them,
+    as far as there is room. With --modulo P
     the plane over GF(P): all slow members that were seen.
 
     Exit status: 0 done, 2 wrong use, 3 the time was over, 130 interrupted
-    (the picture is written).
+    (the picture is written if something was found).
     """
     from kahanmaps.maps.floats.fast import to_floats
     from kahanmaps.plots.scan import draw_scan
@@ -40,6 +42,14 @@ def command(system: str | None, **options: Any) -> int:
     window = None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), 2)
     if window is not None and options["modulo"] is not None:
         raise click.UsageError("give --window or --modulo, not both: modulo a prime the whole plane is shown")
+    names = names_of(options)
+    if len(names) != 2:
+        raise click.UsageError(f"found --over {','.join(names)}, expected two parameters: a plane is drawn")
     found = scanned(system, options["quiet"], options)
+    seen = found.components or any(one.prime == options["modulo"] for one in found.sweeps)
+    if found.ended != "complete" and not seen:
+        if not options["quiet"]:
+            say("there is no picture: nothing to be drawn was found before the scan ended")
+        return ending(found, options["quiet"])
     deliver(draw_scan(found, style_from(options), window=window, modulo=options["modulo"]), options, found.file)
     return ending(found, options["quiet"])

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from flint import fmpq_mpoly
 
-from kahanmaps.algebra.polynomials import primitive_part, ring
-from kahanmaps.laboratory.scan.lift import (
-    RationalRows,
-    flat_equations,
-    lifted_conjugates,
-    lifted_flats,
-    lifted_forms,
-    lifted_points,
-    residues,
-)
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.laboratory.scan.conjugates import lifted_conjugates
+from kahanmaps.laboratory.scan.lift import flat_equations, lifted_flats, lifted_forms, residues
 from kahanmaps.laboratory.scan.pieces import Pieces, Rows, pieces, pivots
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep, TimeOver
@@ -42,16 +35,17 @@ def conditions(
 def _of_class(
     degrees: Degrees, sweeps: Sequence[Sweep], names: tuple[str, ...], rng: random.Random, check: Callable[[], None]
 ) -> list[Component]:
-    """Hypersurfaces first, from random lines, which hardly meet anything smaller; all else beside them."""
+    """Hypersurfaces first, from random lines, which hardly meet anything smaller; then what is smaller, beside them."""
     found: list[Component] = []
     count = len(names)
 
-    def parts_of(complete: bool) -> list[Pieces]:
+    def parts_of(on_lines: bool) -> list[Pieces]:
         parts = []
         for one in sweeps:
-            if one.complete is complete and degrees in one.classes:
+            if one.on_lines is on_lines and degrees in one.classes:
                 rest = beside(one.classes[degrees], found, one.prime)
-                parts += [pieces(rest, one.prime, one.seen, complete, rng, check)] if rest else []
+                smallest = 0 if one.complete else count - one.width
+                parts += [pieces(rest, one.prime, one.seen, smallest, rng, check)] if rest else []
         if count > 1:
             forms = {
                 part.prime: [*map(_as_form, part.flats.get(count - 1, [])), *part.forms.get((), [])] for part in parts
@@ -59,8 +53,8 @@ def _of_class(
             found.extend(Component((form,), count - 1, degrees, at) for form, at in lifted_forms(forms, names))
         return parts
 
-    parts_of(complete=False)
-    parts = parts_of(complete=True)
+    parts_of(on_lines=True)
+    parts = parts_of(on_lines=False)
     for dimension in range(max(1, count - 1)):
         flats = {part.prime: part.flats[dimension] for part in parts if part.flats.get(dimension)}
         if dimension == 0 and _is_a_curve({p: len(points) for p, points in flats.items()}):
@@ -68,12 +62,11 @@ def _of_class(
         lifted = lifted_flats(flats)
         found += [Component(flat_equations(rows, names), dimension, degrees, at) for rows, at in lifted.items()]
         if dimension == 0:
-            found += _conjugates(flats, set(lifted), degrees, names)
-            if count == 1:
-                rest = {p: beside([(-rows[0][-1] % p,) for rows in some], found, p) for p, some in flats.items()}
-                lines = {p: [x for (x,) in points] for p, points in rest.items()}
-                split, primes = lifted_points(lines, names[0])
-                found += [Component((equation,), 0, degrees, primes) for equation in split]
+            points = {p: [tuple(-row[-1] % p for row in rows) for rows in some] for p, some in flats.items()}
+            rest = {p: beside(some, found, p) for p, some in points.items()}
+            rest.update((one.prime, []) for one in sweeps if one.complete and one.prime not in rest)
+            conjugate = lifted_conjugates(rest, names, rng, check)
+            found += [Component(equations, 0, degrees, at) for equations, at in conjugate]
     for size in {len(rows) for part in parts for rows in part.forms if rows}:
         inside = {part.prime: [rows for rows in part.forms if len(rows) == size] for part in parts}
         for rows in lifted_flats(inside):
@@ -117,19 +110,6 @@ def _as_form(rows: Rows) -> tuple[int, ...]:
     """The coefficients of the equation of a hyperplane in the order of those of other hypersurfaces."""
     (row,) = rows
     return (row[-1], *row[:-1])
-
-
-def _conjugates(
-    points: Mapping[int, Sequence[Rows]], rational: Iterable[RationalRows], degrees: Degrees, names: Sequence[str]
-) -> Iterator[Component]:
-    """The points over quadratic fields among those that are not rational."""
-    known = {p: {residues(rows, p) for rows in rational} for p in points}
-    rest = {p: [[-row[-1] % p for row in rows] for rows in some if rows not in known[p]] for p, some in points.items()}
-    for (*line, (s, q)), at in lifted_conjugates(rest, len(names)).items():
-        context = ring(names)
-        t = context.gen(next(k for k in range(len(names)) if k not in pivots(line)))
-        equation = primitive_part(t**2 + s * t + q)[1]
-        yield Component((equation, *flat_equations(tuple(line), names)), 0, degrees, at)
 
 
 def _is_a_curve(counts: dict[int, int]) -> bool:

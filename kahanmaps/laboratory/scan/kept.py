@@ -11,7 +11,7 @@ import os
 from typing import Any
 
 from kahanmaps.errors import InputError
-from kahanmaps.laboratory.scan.sweep import Sweep
+from kahanmaps.laboratory.scan.sweep import Choice, Sweep
 
 _SETTINGS = "settings"
 
@@ -27,7 +27,7 @@ class Kept:
             raise InputError(f"found the part {part} of {parts}, expected 1 to {parts}")
         self.part, self.parts = part, parts
         self._path = path
-        self._sweeps: dict[tuple[int, int | None], Sweep] = {}
+        self._sweeps: dict[Choice, Sweep] = {}
 
     def open(self, settings: dict[str, Any]) -> None:
         """Read what is there of the scan with these settings. Raises InputError for a file of anything else."""
@@ -54,9 +54,9 @@ class Kept:
             if not others:
                 _write(stream.fileno(), {_SETTINGS: settings})
 
-    def get(self, prime: int, lines: int | None) -> Sweep | None:
-        """The sweep over so many lines of parameter space, or over all members, if it was finished."""
-        return self._sweeps.get((prime, lines))
+    def get(self, choice: Choice) -> Sweep | None:
+        """The sweep over these members, if it was finished."""
+        return self._sweeps.get(choice)
 
     def add(self, one: Sweep, lines: int | None) -> None:
         """Write a finished sweep."""
@@ -71,8 +71,9 @@ def _write(file: int, record: dict[str, Any]) -> None:
     os.fsync(file)
 
 
-def _sweep(record: dict[str, Any]) -> tuple[tuple[int, int | None], Sweep]:
+def _sweep(record: dict[str, Any]) -> tuple[Choice, Sweep]:
     classes = {tuple(map(int, degrees)): [tuple(map(int, x)) for x in points] for degrees, points in record["classes"]}
     known = {**record, "classes": classes, "generic": tuple(map(int, record["generic"]))}
     lines = known.pop("lines")
-    return (record["prime"], lines), Sweep(**known)
+    one = Sweep(**known)
+    return (one.prime, lines, one.width), one

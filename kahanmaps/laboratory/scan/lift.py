@@ -7,7 +7,7 @@ family over Q: that is tried on members of it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import reduce
 from itertools import combinations, product
 from math import isqrt, prod
@@ -16,13 +16,13 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import primitive_part, ring
 from kahanmaps.algebra.residues import chinese, rational_reconstruction, rational_vector
-from kahanmaps.laboratory.modular_points import exponents_up_to, null_space, product_of
-from kahanmaps.laboratory.scan.pieces import Rows, pivots
+from kahanmaps.laboratory.modular_points import exponents_up_to, product_of
+from kahanmaps.laboratory.scan.pieces import Rows
 
 RationalRows = tuple[tuple[fmpq, ...], ...]
 
 _MOST_PAIRS = 100_000  # of flats modulo two primes that are tried
-_MOST_CONJUGATES = 24  # points modulo a prime of which pairs are taken
+_MOST_CONJUGATES = 24  # hypersurfaces modulo a prime of which pairs are taken
 _LOW = 12  # heights up to which one prime may be bad
 _AT_LEAST = 3  # primes
 
@@ -33,13 +33,10 @@ def height_bound(primes: Sequence[int]) -> int:
     return isqrt((prod(low) - 1) // 2)
 
 
-def lifted_flats(
-    found: Mapping[int, Sequence[Rows]],
-    is_there: Callable[[RationalRows, int], bool] = lambda rows, p: residues(rows, p) is not None,
-) -> dict[RationalRows, tuple[int, ...]]:
+def lifted_flats(found: Mapping[int, Sequence[Rows]], everywhere: bool = True) -> dict[RationalRows, tuple[int, ...]]:
     """Affine subspaces over Q whose residues are among those found modulo the primes: reduced rows, and these primes.
 
-    `is_there` says modulo which primes rows have to be found.
+    They have to be found modulo all primes, if not `everywhere` modulo three.
 
     >>> modulo = {p: [((1, 0, -pow(2, -1, p) % p), (0, 1, p - 3))] for p in (31, 37, 41)}
     >>> lifted_flats(modulo)
@@ -58,8 +55,8 @@ def lifted_flats(
                 continue
             at = tuple(r for r in sorted(sets) if residues(lifted, r) in sets[r])
             height = max((max(abs(int(x.p)), int(x.q)) for row in lifted for x in row), default=0)
-            missing = sum(r not in at and is_there(lifted, r) for r in sets)
-            if len(at) >= _AT_LEAST and missing <= (height <= _LOW):
+            missing = sum(r not in at and residues(lifted, r) is not None for r in sets)
+            if len(at) >= _AT_LEAST and (not everywhere or missing <= (height <= _LOW)):
                 done[lifted] = at
     return done
 
@@ -74,35 +71,6 @@ def flat_equations(rows: RationalRows, names: Sequence[str]) -> tuple[fmpq_mpoly
     variables = [*context.gens(), context.constant(1)]
     sums = (sum((c * x for c, x in zip(row, variables, strict=True)), context.constant(0)) for row in rows)
     return tuple(primitive_part(one)[1] for one in sums)
-
-
-def lifted_conjugates(found: Mapping[int, Sequence[Sequence[int]]], count: int) -> dict[RationalRows, tuple[int, ...]]:
-    """Pairs of points over quadratic fields that are among the points found modulo the primes where the field splits.
-
-    Rows of the line through both, and last (s, q) with t^2 + s t + q = 0 for its free variable.
-
-    >>> roots = {7: [[3], [4]], 17: [[6], [11]], 23: [[5], [18]], 29: []}
-    >>> lifted_conjugates(roots, 1)
-    {((0, -2),): (7, 17, 23)}
-    """
-    pairs: dict[int, list[Rows]] = {p: [] for p in found}
-    for p, points in found.items():
-        if len(points) <= _MOST_CONJUGATES:
-            for x, y in combinations(points, 2):
-                line = null_space([[*x, 1], [*y, 1]], count + 1, p)
-                free = next(k for k in range(count) if k not in pivots(line))
-                pairs[p].append((*map(tuple, line), ((-x[free] - y[free]) % p, x[free] * y[free] % p)))
-
-    def splits(rows: RationalRows, p: int) -> bool:
-        known = residues(rows, p)
-        return known is not None and pow(known[-1][0] ** 2 - 4 * known[-1][1], (p - 1) // 2, p) == 1
-
-    lifted = lifted_flats(pairs, splits)
-    return {rows: at for rows, at in lifted.items() if not _is_square(rows[-1][0] ** 2 - 4 * rows[-1][1])}
-
-
-def _is_square(x: fmpq) -> bool:
-    return x >= 0 and all(isqrt(int(part)) ** 2 == part for part in (x.p, x.q))
 
 
 def _lifted_rows(one: Rows, p: int, other: Rows, q: int) -> RationalRows | None:
@@ -151,26 +119,13 @@ def lifted_forms(
                 parts.setdefault(len(row), {}).setdefault(p, {})[(row,)] = group
         used: dict[int, set[tuple[int, ...]]] = {p: set() for p in rest}
         for by_prime in parts.values():
-            for rows, at in lifted_flats({p: list(some) for p, some in by_prime.items()}, lambda *_: False).items():
+            for rows, at in lifted_flats({p: list(some) for p, some in by_prime.items()}, False).items():
                 known += [(factor, at) for factor in _factors(rows[0], names)]
                 for p in at:
                     used[p].update(by_prime[p][residues(rows, p) or ()])
         rest = {p: [form for form in forms if form not in used[p]] for p, forms in rest.items()}
     factors, at = _lifted_product(rest, names)
     return known + [(factor, at) for factor in factors]
-
-
-def lifted_points(found: Mapping[int, Sequence[int]], name: str) -> tuple[list[fmpq_mpoly], tuple[int, ...]]:
-    """The polynomials whose zeros are points of a line, found modulo primes, and these primes.
-
-    Where a polynomial of degree d splits it has d zeros: that many are multiplied, for the largest d that fits.
-    """
-    for size in sorted({len(points) for points in found.values()} - {0}, reverse=True):
-        forms = {p: [(-x % p, 1) for x in points] for p, points in found.items() if len(points) == size}
-        equations, at = _lifted_product(forms, (name,))
-        if equations:
-            return equations, at
-    return [], ()
 
 
 def _lifted_product(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from flint import fmpq, fmpq_mpoly, fmpq_poly, nmod_poly
@@ -25,8 +25,9 @@ _HEIGHTS = (12, 120)  # of values at random, for roots of higher degree and othe
 def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: random.Random) -> tuple[Any, ...] | None:
     """A random solution over Q, of small height, or over GF(p); None where none is found.
 
-    `equations` are those of an affine subspace, reduced so that the first variable of each is in no other, or that of a
-    hypersurface. Raises BadPrime where the prime divides a denominator.
+    `equations` are those of an affine subspace, reduced so that the first variable of each is in no other, that of a
+    hypersurface, or those of a point over a number field, each with one variable more. Raises BadPrime where the prime
+    divides a denominator.
 
     >>> from kahanmaps.algebra.polynomials import ring
     >>> a, b = ring(["a", "b"]).gens()
@@ -34,32 +35,45 @@ def point_on(equations: Sequence[fmpq_mpoly], count: int, field: Field, rng: ran
     >>> found[0]**2 + found[1]**2
     1
     """
-    pivots = [_pivot(equation) for equation in equations]
+    pivots: list[int] = []
+    for equation in equations:
+        pivots.append(_pivot(equation, pivots))
     height = _HEIGHTS[all(int(equation.degrees()[k]) == 1 for equation, k in zip(equations, pivots, strict=True))]
     for _ in range(_TRIES if len(equations) < count else 1):
-        values = [field.random(rng, height) for _ in range(count)]
-        for equation, pivot in zip(equations, pivots, strict=True):
-            coefficients = [field.zero] * (1 + max(int(m[pivot]) for m in equation.monoms()))
-            for monomial, coefficient in equation.terms():
-                term = field.convert(coefficient)
-                for k, exponent in enumerate(monomial):
-                    if k != pivot:
-                        term = term * values[k] ** int(exponent)
-                coefficients[int(monomial[pivot])] += term
-            polynomial = _univariate(coefficients, field)
-            roots = [] if polynomial.is_zero() else polynomial.roots()
-            if not roots:
-                break
-            values[pivot] = field.convert(int(rng.choice(roots)[0])) if field is not QQ else rng.choice(roots)[0]
-        else:
-            return tuple(values)
+        found = list(solutions(equations, pivots, [field.random(rng, height) for _ in range(count)], field))
+        if found:
+            return rng.choice(found)
     return None
 
 
-def _pivot(equation: fmpq_mpoly) -> int:
-    """The first of the variables in which the degree is smallest, but not 0."""
+def solutions(
+    equations: Sequence[fmpq_mpoly], pivots: Sequence[int], values: Sequence[Any], field: Field
+) -> Iterator[tuple[Any, ...]]:
+    """All solutions over a field with given values of the variables that are no pivots.
+
+    Each equation has its pivot, those of later ones are not in it.
+    """
+    if not equations:
+        yield tuple(values)
+        return
+    pivot = pivots[0]
+    coefficients = [field.zero] * (1 + int(equations[0].degrees()[pivot]))
+    for monomial, coefficient in equations[0].terms():
+        term = field.convert(coefficient)
+        for k, exponent in enumerate(monomial):
+            if k != pivot:
+                term = term * values[k] ** int(exponent)
+        coefficients[int(monomial[pivot])] += term
+    polynomial = _univariate(coefficients, field)
+    for root, _ in [] if polynomial.is_zero() else polynomial.roots():
+        x = root if field is QQ else field.convert(int(root))
+        yield from solutions(equations[1:], pivots[1:], [*values[:pivot], x, *values[pivot + 1 :]], field)
+
+
+def _pivot(equation: fmpq_mpoly, others: Sequence[int]) -> int:
+    """The first of the variables in which the degree is smallest, but not 0, and that is no pivot of another."""
     degrees = [int(d) for d in equation.degrees()]
-    return min((k for k, d in enumerate(degrees) if d), key=lambda k: degrees[k])
+    return min((k for k, d in enumerate(degrees) if d and k not in others), key=lambda k: degrees[k])
 
 
 def _univariate(coefficients: Sequence[Any], field: Field) -> Any:

@@ -49,16 +49,17 @@ def pieces(
     points: Sequence[Point],
     prime: int,
     seen: int,
-    complete: bool,
+    smallest: int,
     rng: random.Random,
     check: Callable[[], None] = lambda: None,
 ) -> Pieces:
-    """The pieces of a set of points, of `seen` that were tried; single points where all of GF(p)^k was tried.
+    """The pieces of a set of points, of `seen` that were tried, from the dimension `smallest` on.
 
-    `check` is called now and then, and may raise.
+    That is 0 where all of GF(p)^k was tried, and k - 1 for points on random lines. `check` is called now and then, and
+    may raise.
 
     >>> line = [(a, (2 * a + 3) % 31) for a in range(31)]
-    >>> found = pieces([*line, (5, 5)], 31, 31**2, True, random.Random(0))
+    >>> found = pieces([*line, (5, 5)], 31, 31**2, 0, random.Random(0))
     >>> found.flats
     {1: [((1, 15, 17),)], 0: [((1, 0, 26), (0, 1, 26))]}
     """
@@ -105,7 +106,7 @@ def pieces(
                         yield factor, inside
                         here, table = here[~inside], table[~inside]
 
-    for dimension in range(count - 1, 0, -1):
+    for dimension in range(count - 1, max(smallest, 1) - 1, -1):
         # Of the dimension that is looked for: affine ones, then others in affine ones of one dimension more.
         needed = max(_SHARE * seen / prime ** (count - dimension), dimension + 3)
         for rows, inside in flats(dimension, needed):
@@ -115,8 +116,6 @@ def pieces(
             for form, inside in forms(rest, needed):
                 found.forms.setdefault((), []).append(form)
                 rest = rest[~inside]
-            if not complete:
-                break
             continue
         for rows, inside in flats(dimension + 1, needed):
             free = [k for k in range(count) if k not in pivots(rows)]
@@ -126,7 +125,7 @@ def pieces(
                 kept[places[some]] = False
                 places = places[~some]
             rest = rest[kept]
-    if complete and len(rest) <= _MOST_POINTS:
+    if not smallest and len(rest) <= _MOST_POINTS:
         single = [tuple(map(tuple, echelon(_equations(x), prime))) for x in rest.tolist()]
         found.flats.setdefault(0, []).extend(single)
         rest = rest[:0]

@@ -19,6 +19,7 @@ from kahanmaps.documents.symbols import member_of
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.conclusion import Conclusion
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.scan.conjugates import MAX_FIELD_DEGREE, SPARE_BITS
 from kahanmaps.laboratory.scan.lift import height_bound
 from kahanmaps.laboratory.scan.pieces import degree_reached
 from kahanmaps.laboratory.scan.sweep import Degrees, Sweep
@@ -136,9 +137,12 @@ class Scan(Displayed):
         return min(bounds, default=0)
 
     @property
-    def _kinds(self) -> tuple[list[Sweep], list[Sweep]]:
-        """The sweeps over all members, and those over members on random lines of parameter space."""
-        return [one for one in self.sweeps if one.complete], [one for one in self.sweeps if not one.complete]
+    def _kinds(self) -> tuple[list[Sweep], ...]:
+        """The sweeps over all members, and those over members on random lines of parameter space, and planes."""
+        return (
+            [one for one in self.sweeps if one.complete],
+            *([one for one in self.sweeps if not one.complete and one.width == width] for width in (1, 2)),
+        )
 
     @property
     def degree(self) -> int:
@@ -165,11 +169,14 @@ class Scan(Displayed):
         """What was tried, and what can have been missed: a sentence or two."""
         if not self.height:
             return f"members modulo three primes are needed, those modulo {len(self.sweeps)} were tried"
-        whole, lines = (_listed([str(one.prime) for one in some]) for some in self._kinds)
+        whole, lines, planes = (_listed([str(one.prime) for one in some]) for some in self._kinds)
         parts = [f"all members with parameters modulo {whole}"] if whole else []
-        if lines:
-            count = round(min(one.seen / one.prime for one in self._kinds[1]))
-            parts.append(f"{'those' if parts else 'members'} on {count} random lines of parameter space modulo {lines}")
+        for width, what, some in ((1, "lines", lines), (2, "planes", planes)):
+            if some:
+                count = round(min(one.seen / one.prime**width for one in self._kinds[width]))
+                parts.append(
+                    f"{'those' if parts else 'members'} on {count} random {what} of parameter space modulo {some}"
+                )
         small = "single points" if len(self.over) == 1 else "single points, affine spaces, hypersurfaces of these"
         kinds = [small] if whole else []
         if len(self.over) > 1:
@@ -177,12 +184,22 @@ class Scan(Displayed):
                 f"hypersurfaces of a total degree up to {self.degree} for each sequence of {WORDS[self.by][0]}"
             )
         where = WORDS[self.by][1].format(len(self.generic))
+        if planes:
+            kinds.append("affine spaces of codimension 2 and hypersurfaces of affine spaces with it")
         if not whole:
             kinds.append("nothing of smaller dimension, for which all members would have to be tried")
-        field = "a number field" if len(self.over) == 1 else "a quadratic field"
+        fields = []
+        if whole:
+            fields.append(
+                f"points over number fields of degree d up to {MAX_FIELD_DEGREE}, with coefficients up to H where "
+                f"2^{SPARE_BITS // len(self.over)} (2 H + 1)^(d + 1) is below the product of the primes modulo which "
+                "they have residues"
+            )
+        if len(self.over) > 1:
+            fields.append("hypersurfaces over a quadratic field that splits modulo three of the primes")
         return (
             f"{', and '.join(parts)}; found are {', and '.join(kinds)}, {where}, over Q with numerators and "
-            f"denominators up to {self.height}, or over {field} that splits modulo three of the primes"
+            f"denominators up to {self.height}; {', and '.join(fields)}"
         )
 
     @property
@@ -264,7 +281,7 @@ class Scan(Displayed):
             "symmetric": [list(images) for images in self.symmetric],
             "sweeps": [
                 {
-                    **attributes(one, "prime", "seen", "complete", "accidents"),
+                    **attributes(one, "prime", "seen", "complete", "width", "accidents"),
                     "slow": sum(map(len, one.classes.values())),
                     "left": left,
                 }

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import product, repeat
+from itertools import accumulate, islice, product, repeat
 from math import comb, inf
 from typing import Any
 
@@ -31,7 +31,7 @@ from kahanmaps.laboratory.scan.growth import Progress, with_growth, with_verdict
 from kahanmaps.laboratory.scan.kept import Kept
 from kahanmaps.laboratory.scan.members import degrees_on, point_on, ranks_on
 from kahanmaps.laboratory.scan.result import WORDS, Component, Scan
-from kahanmaps.laboratory.scan.sweep import Sweep, TimeOver, sweep
+from kahanmaps.laboratory.scan.sweep import Choice, Sweep, TimeOver, sweep
 from kahanmaps.laboratory.scan.symmetric import symmetries
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kernels import processors
@@ -49,12 +49,15 @@ _PRIMES: dict[int, tuple[tuple[int, ...], ...]] = {
     2: ((53, 59, 61, 67), (29, 31, 37, 41)),
     3: ((19, 23, 29, 31), (11, 13, 17, 19)),
 }
+# More of these, as many as there is time for, where members are left that may be points over number fields.
+_FURTHER = {2: (71, 73, 79, 83, 89, 97, 101, 103), 3: (37, 41, 43)}
 # Those for members on random lines of parameter space. Each of the fields of the roots of d, d up to 10 and down to
 # -10, splits modulo three of them: else hypersurfaces that split over such a field have no points to be found.
 _SPLIT = (107, 131, 139, 193, 241, 281)
 _LINES = {2: (24, 12), 3: (32, 16)}  # how many are wished, and fewer, by the number of parameters
 _MORE = 4  # times as many, where hypersurfaces were missed
 _MANY_LINES = (150, 60)
+_PLANES, _OF_PLANES = 24, (19, 23, 29, 31)  # random ones, for what lines do not meet, and the primes
 _PART = 0.3  # of the time, for all members on their first line
 _UNTIL = (0.6, 0.75, 0.85, 0.9)  # of the time: when members, conditions, their confirmation and growth have to be done
 _ROOM, _ROOM_OF_MANY = 260, 220  # for degrees before common factors are removed: up to 2 parameters, and more
@@ -179,20 +182,20 @@ def scan(
 
     limits: dict[str, Any] = {"jobs": jobs, "by": by, "check": until(_UNTIL[0]), "progress": told}
 
-    def take(plan: list[tuple[int, int | None]]) -> None:
-        for k, (p, lines) in enumerate(plan):
+    def take(plan: list[Choice]) -> None:
+        for k, (p, lines, width) in enumerate(plan):
             try:
-                one = None if kept is None else kept.get(p, lines)
+                one = None if kept is None else kept.get((p, lines, width))
                 if one is None:
-                    name = f"{start} {p} {lines}"
-                    one = sweep(map_, len(names), p, exact, terms, room, lines=lines, seed=name, **limits)
+                    limits.update(lines=lines, width=width, seed=f"{start} {p} {lines} {width}")
+                    one = sweep(map_, len(names), p, exact, terms, room, **limits)
                     if kept is not None:
                         kept.add(one, lines)
                 sweeps.append(one)
             except BadPrime:
                 continue
             except TimeOver:
-                omitted.append(f"members modulo {', '.join(str(p) for p, _ in plan[k:])}")
+                omitted.append(f"members modulo {', '.join(str(p) for p, *_ in plan[k:])}")
                 break
         generic = max((one.generic for one in sweeps), default=())
         sweeps[:] = [one for one in sweeps if one.generic == generic]
@@ -207,12 +210,19 @@ def scan(
         return part if by == "degrees" else part.with_dimensions(map_.dim)
     take(plan)
     known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
-    again = [(one.prime, _MORE * round(one.seen / one.prime)) for one in sweeps if not one.complete]
+    again: list[Choice] = [(one.prime, _MORE * round(one.seen / one.prime), 1) for one in sweeps if one.on_lines]
     more = sum(_size(len(names), *one) for one in again)
     if not (missed or omitted) and more <= most and any(map(_lacks_hypersurface, sweeps, repeat(known))):
         total += more
-        sweeps[:] = [one for one in sweeps if one.complete]
-        take([*again])
+        sweeps[:] = [one for one in sweeps if not one.on_lines]
+        take(again)
+        known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
+    further: list[Choice] = [(p, None, 1) for p in _FURTHER.get(len(names), ()) if primes is None]
+    sizes = accumulate((_size(len(names), *one) for one in further), initial=total)
+    further = [one for one, size in zip(further, islice(sizes, 1, None), strict=True) if size <= most]
+    if further and not (missed or omitted) and any(map(_lacks_points, sweeps, repeat(known))):
+        total += sum(_size(len(names), *one) for one in further)
+        take(further)
         known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
     omitted += [f"all conditions for {missed} sequences of degrees"] if missed else []
     for k, one in enumerate(known):
@@ -238,23 +248,28 @@ def scan(
     return found if by == "degrees" else found.with_dimensions(map_.dim)
 
 
-def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[tuple[int, int | None]]:
-    """Primes, each with the number of random lines of parameter space, None for all members.
+def _plan(count: int, primes: Sequence[int] | None, most: float) -> list[Choice]:
+    """Primes, each with the number of random lines of parameter space, or planes, None for all members.
 
     As many as are wished where these are not more than `most` members, else fewer.
     """
-    lines = [[(p, n) for p in _SPLIT] for n in _LINES.get(count, _MANY_LINES)]
+    plans: list[list[Choice]]
+    lines: list[list[Choice]] = [[(p, n, 1) for p in _SPLIT] for n in _LINES.get(count, _MANY_LINES)]
     if count in _PRIMES:
-        complete = [[(p, None) for p in some] for some in (_PRIMES[count] if primes is None else (primes,))]
+        complete: list[list[Choice]] = [
+            [(p, None, 1) for p in some] for some in (_PRIMES[count] if primes is None else (primes,))
+        ]
         plans = [[*some, *(more if count > 1 else ())] for some, more in product(complete, [*lines, []])]
     else:
-        plans = lines if primes is None else [[(p, n) for p in primes] for n in _MANY_LINES[:1]]
+        planes: list[Choice] = [(p, _PLANES, 2) for p in _OF_PLANES]
+        plans = [[*some, *planes] for some in lines] + lines
+        plans = plans if primes is None else [[(p, n, 1) for p in primes] for n in _MANY_LINES[:1]]
     return next((plan for plan in plans if sum(_size(count, *one) for one in plan) <= most), plans[-1])
 
 
-def _size(count: int, prime: int, lines: int | None) -> int:
+def _size(count: int, prime: int, lines: int | None, width: int) -> int:
     """The number of members."""
-    return prime**count if lines is None else prime * lines
+    return int(prime**count if lines is None else prime**width * lines)
 
 
 def _terms(
@@ -351,4 +366,9 @@ def _left(one: Sweep, components: Sequence[Component]) -> int:
 
 def _lacks_hypersurface(one: Sweep, components: Sequence[Component]) -> bool:
     """Whether members on random lines are left, as many as a hypersurface has."""
-    return not one.complete and _left(one, components) >= 0.5 * one.seen / one.prime
+    return one.on_lines and _left(one, components) >= 0.5 * one.seen / one.prime
+
+
+def _lacks_points(one: Sweep, components: Sequence[Component]) -> bool:
+    """Whether members are left, fewer than a curve has, or a hypersurface where they are on random lines."""
+    return 0 < _left(one, components) < 0.5 * (one.prime if one.complete else one.seen / one.prime)

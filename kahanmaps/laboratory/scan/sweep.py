@@ -20,6 +20,7 @@ from kahanmaps.maps.implicit import BirationalMap
 
 Point = tuple[int, ...]
 Degrees = tuple[int, ...]
+Choice = tuple[int, int | None, int]  # of members: a prime, how many random subspaces of a dimension, None for all
 
 _SLICE = 512
 _LINES = (3, 12)  # of a slow member: at least, at most
@@ -33,7 +34,8 @@ class TimeOver(Exception):
 class Sweep:
     """The slow members modulo one prime: `classes` has their points by degrees, `seen` members were tried.
 
-    `generic` are the degrees of the others. Where not `complete`, the members were on random lines of parameter space.
+    `generic` are the degrees of the others. Where not `complete`, the members were on random affine subspaces of this
+    `width`: on lines of parameter space, or on planes.
     """
 
     prime: int
@@ -42,6 +44,12 @@ class Sweep:
     seen: int
     complete: bool
     accidents: int
+    width: int = 1
+
+    @property
+    def on_lines(self) -> bool:
+        """Whether the members were on random lines, which hardly meet anything but hypersurfaces."""
+        return not self.complete and self.width == 1
 
     @property
     def slow(self) -> dict[Point, Degrees]:
@@ -49,15 +57,18 @@ class Sweep:
         return {point: degrees for degrees, points in self.classes.items() for point in points}
 
 
-def members_of(prime: int, count: int, lines: int | None, rng: random.Random) -> Iterator[Point]:
-    """All points of GF(p)^count, or those on so many random lines of it."""
+def members_of(prime: int, count: int, lines: int | None, rng: random.Random, width: int = 1) -> Iterator[Point]:
+    """All points of GF(p)^count, or those on so many random lines of it, or planes."""
     if lines is None:
         yield from product(range(prime), repeat=count)
         return
     for _ in range(lines):
-        base, way = ([rng.randrange(prime) for _ in range(count)] for _ in range(2))
-        for s in range(prime):
-            yield tuple((b + s * w) % prime for b, w in zip(base, way, strict=True))
+        base, *ways = ([rng.randrange(prime) for _ in range(count)] for _ in range(1 + width))
+        for slopes in product(range(prime), repeat=width):
+            yield tuple(
+                (b + sum(s * w for s, w in zip(slopes, way, strict=True))) % prime
+                for b, *way in zip(base, *ways, strict=True)
+            )
 
 
 def sweep(
@@ -69,6 +80,7 @@ def sweep(
     room: int,
     *,
     lines: int | None = None,
+    width: int = 1,
     seed: str = "",
     jobs: int = 1,
     by: str = "degrees",
@@ -84,7 +96,8 @@ def sweep(
         eps: an exact number, or None for generic eps, in GF(p^2).
         terms, room: see `Family.degrees`.
         by: what is measured: "degrees", or "integrals" or "density" for what `ranks` counts.
-        lines: None for all members, else so many random lines of parameter space.
+        lines: None for all members, else so many random lines of parameter space,
+        width: or affine subspaces of this dimension.
         seed: of everything random.
         jobs: threads.
         check: is called now and then, and may raise TimeOver.
@@ -116,7 +129,7 @@ def sweep(
             told(low + len(some), len(points))
         return np.concatenate(parts)
 
-    points = list(members_of(prime, count, lines, rng))
+    points = list(members_of(prime, count, lines, rng, width))
     if count > len(map_.symbols):
         points = [point for point in points if point[-1]]
     found = measure(points, progress)
@@ -138,4 +151,4 @@ def sweep(
     classes: dict[Degrees, list[Point]] = {}
     for i in slow:
         classes.setdefault(tuple(int(d) for d in found[i]), []).append(points[i])
-    return Sweep(prime, tuple(int(d) for d in generic), classes, len(points), lines is None, accidents)
+    return Sweep(prime, tuple(int(d) for d in generic), classes, len(points), lines is None, accidents, width)
