@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.plots.trajectories import VectorField, ensemble_for
+from kahanmaps.plots.equilibria import equilibria
+from kahanmaps.plots.trajectories import ensemble_for
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 COUNT = 16
-_TRIED = 60  # starts of Newton's method
-_LARGE = 20  # variables, from which on only the origin and (1, ..., 1) are
 _CENTRES = 4  # equilibria tried
 _SIZES = 24
 _SHRINK = 0.8
@@ -87,30 +86,6 @@ def _staying(system: QuadraticSystem, eps: Any, starts: FloatArray, centre: Floa
 
 def _centres(system: QuadraticSystem) -> list[FloatArray]:
     """Equilibria, those first at which the field expands least, then those without negative coordinates; the origin."""
-    n = system.dim
-    f = VectorField(system)
-    drawn = np.random.default_rng(0).uniform(-3, 3, (_TRIED if n <= _LARGE else 0, n))
-    found: list[tuple[float, bool, FloatArray]] = []
-    for x in (np.zeros(n), np.ones(n), *drawn):
-        centre = _newton(f, x)
-        # where an equilibrium is degenerate, Newton's method ends somewhat beside it: once is enough
-        if centre is None or any(np.allclose(centre, other, atol=1e-3) for _, _, other in found):
-            continue
-        expansion = round(float(np.linalg.eigvals(f.jacobian(centre)).real.max()), 6)
-        found.append((expansion, bool((centre < 0).any()), centre))
-    found.sort(key=lambda entry: entry[:2])
-    centres = [centre for _, _, centre in found[:_CENTRES]]
-    return centres if any(not centre.any() for centre in centres) else [*centres, np.zeros(n)]
-
-
-def _newton(f: VectorField, x: FloatArray) -> FloatArray | None:
-    for _ in range(40):
-        value = f(x[None])[0]
-        scale = 1 + float(np.abs(x).max())
-        if np.abs(value).max() <= 1e-12 * scale:
-            nearest = np.round(x, 9)
-            return nearest if np.abs(f(nearest[None])[0]).max() <= 1e-12 * scale else x
-        x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria need not be isolated
-        if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
-            return None
-    return None
+    order = sorted(equilibria(system), key=lambda one: (one.expansion, bool((one.point < 0).any())))
+    centres = [one.point for one in order[:_CENTRES]]
+    return centres if any(not centre.any() for centre in centres) else [*centres, np.zeros(system.dim)]

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.maps.floats.doubles import FloatArray
+from kahanmaps.plots.flow import Flow
 from kahanmaps.plots.level_sets import LevelCurves
+from kahanmaps.plots.neighbours import neighbours
 from kahanmaps.plots.point_functions import PointFunction
 from kahanmaps.plots.trajectories import Trajectories
 from kahanmaps.plots.windows import Window, outside, window_of
@@ -29,7 +32,9 @@ class Portrait:
     `points` (records, orbits, 2 or 3) are the coordinates along the axes, NaN where there is no point; `labels` and
     `window` are one for each axis. `values` (records, orbits) colour the points by `value_label`; None is by orbit.
     `left_out` counts the points outside the window, `undefined` those of living orbits where an axis or the colour has
-    a pole. `euler` are points (records, orbits, 2 or 3) of explicit Euler, `levels` curves below the points.
+    a pole. `euler` are points (records, orbits, 2 or 3) of explicit Euler, `levels` curves and `flow` what is drawn of
+    the differential equation, below the points. `joined` are, for each orbit, pairs (count, 2) of records that are
+    neighbours on its curve; successive ones where it is None.
     """
 
     points: FloatArray
@@ -41,6 +46,15 @@ class Portrait:
     undefined: int = 0
     euler: FloatArray | None = None
     levels: LevelCurves | None = None
+    flow: Flow | None = None
+    joined: tuple[NDArray[np.int64] | None, ...] = ()
+
+    def pairs(self, orbit: int) -> NDArray[np.int64]:
+        """The pairs (count, 2) of records of an orbit that a line joins."""
+        found = self.joined[orbit] if self.joined else None
+        return (
+            np.stack([np.arange(len(self.points) - 1), np.arange(1, len(self.points))], 1) if found is None else found
+        )
 
 
 def portrait_of(
@@ -50,11 +64,13 @@ def portrait_of(
     colour: PointFunction | WatchedFunction | str = ORBIT,
     window: Window | None = None,
     euler: Trajectories | None = None,
+    join: bool = False,
 ) -> Portrait:
     """Project orbits to two or three axes: functions of the point, or the word "step".
 
-    `colour` is "orbit", "step" or a function of the point; the window is chosen if none is given. Raises InputError for
-    another number of axes.
+    `colour` is "orbit", "step" or a function of the point; the window is chosen if none is given. `join` looks for the
+    neighbours of each point on the curve of its orbit, unless an axis is the step. Raises InputError for another number
+    of axes.
 
     >>> from kahanmaps.plots.point_functions import point_function
     >>> found = Trajectories(("x",), np.array([[[1.0]], [[3.0]]]), np.arange(2))
@@ -88,6 +104,7 @@ def portrait_of(
         left_out=outside(flat, chosen),
         undefined=int(there.sum() - shown.sum()),
         euler=None if euler is None else _projected(euler, axes),
+        joined=tuple(map(neighbours, found.points.swapaxes(0, 1))) if join and STEP not in axes else (),
     )
 
 

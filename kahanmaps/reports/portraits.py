@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from kahanmaps.maps.floats.ensemble import starts_in_box
 from kahanmaps.plots.automatic_starts import automatic_starts
 from kahanmaps.plots.draw_invariant_curves import draw_invariant_curves
 from kahanmaps.plots.draw_portrait import draw_portrait
+from kahanmaps.plots.flow import plane_flow
 from kahanmaps.plots.invariant_curves import find_invariant_curves
 from kahanmaps.plots.point_functions import point_function
 from kahanmaps.plots.portrait import portrait_of
@@ -48,6 +50,8 @@ def portrait_figure(file: SystemFile, eps: Any, pictures: Pictures) -> str:
         found = walked(ensemble_for(file.map, at, starts, _STEPS), _STEPS)
         functions = [axis if axis == "step" else point_function(axis, file.variables) for axis in axes]
         shown = portrait_of(found, functions)
+        if file.is_quadratic:
+            shown = replace(shown, flow=plane_flow(file.system, range(file.dim), shown.window))
         remarks.extend(
             f"{count} of {counted(found.orbits, 'orbit')} ended early: {r}." for r, count in found.ended.items()
         )

@@ -66,11 +66,15 @@ _WALKING = ("start", "starts", "count", "box", "seed", "steps", "backward", "eul
     metavar="F",
     help="orbit, step, an integral (or H) by its name, or an expression.",
 )
-@click.option("--lines", is_flag=True, help="Join the points of each orbit.")
+@click.option(
+    "--lines", is_flag=True, help="Join the points of each orbit: neighbours on a curve, or one step and the next."
+)
 @click.option("--levels", metavar="F", help="Level curves of an integral or expression in the plane of the axes.")
 @click.option("--levels-at", type=PointText(), metavar="C1,C2,...", help="... at these values, not through the starts.")
 @click.option("--density", is_flag=True, help="Count the points in cells: for 10^5 to 10^10 of them.")
 @click.option("--euler", is_flag=True, help="Explicit Euler from the same starts too, in grey below.")
+@click.option("--flow", is_flag=True, help="The solutions of the differential equation through the starts, as lines.")
+@click.option("--no-field", is_flag=True, help="No arrows, equilibria and separatrices of a planar system.")
 @click.option("--window", type=PointText(), metavar="X0,X1,Y0,Y1", help="The part that is shown.")
 @click.option("--equal", is_flag=True, help="The same unit of length along both axes.")
 @picture_options
@@ -81,7 +85,12 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps plot portrait lotka_volterra --eps 1/20
       kahanmaps plot portrait euler_top --eps 1/10 --3d --lines -o top.pdf
       kahanmaps plot portrait weierstrass --eps 1/20 --levels modified_H -o w.svg
+      kahanmaps plot portrait lotka_volterra --eps 1/10 --flow -o flow.pdf
       kahanmaps plot portrait henon_heiles --eps 1/10 --density -o heat.png
+
+    In the plane of a planar system grey arrows show the direction of the flow,
+    marks its equilibria, and dashes the separatrices of saddles; rings or marks
+    are starts. With --levels there are no arrows.
 
     Without starts sixteen are chosen around an equilibrium. Without --axes the
     plane is drawn that the points fill most. Standard error says what was chosen,
@@ -126,7 +135,7 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
     if options["levels_at"] is not None and options["levels"] is None:
         raise click.UsageError("--levels-at says where: add --levels F, of which function")
     if options["density"]:
-        for name in ("space", "lines", "levels", "euler"):
+        for name in ("space", "lines", "levels", "euler", "flow"):
             if options[name]:
                 raise click.UsageError(f"--density counts points in a plane: it does not go with --{_word(name)}")
         if options["colour"] != "orbit":
@@ -205,7 +214,9 @@ def _portrait(orbits: Orbits, options: dict[str, Any], progress: Progress) -> Fi
     found = orbits.walk(progress)
     axes = orbits.axes_from(options["axes"], 3 if options["space"] else 2)
     window = _window(options, len(axes))
-    shown = portrait_of(found, axes, colour=colour, window=window, euler=orbits.euler() if options["euler"] else None)
+    euler = orbits.euler() if options["euler"] else None
+    shown = portrait_of(found, axes, colour=colour, window=window, euler=euler, join=options["lines"])
+    shown = replace(shown, flow=orbits.flow(axes, shown.window, options))
     if levels is not None:
         shown = replace(shown, levels=_levels(orbits, levels, axes, options["levels_at"], shown.window))
     count = found.points.shape[0] * found.points.shape[1]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from kahanmaps.maps.floats.doubles import FloatArray
     from kahanmaps.plots.density import Density
     from kahanmaps.plots.drift_functions import WatchedFunction
+    from kahanmaps.plots.flow import Flow
     from kahanmaps.plots.point_functions import PointFunction
     from kahanmaps.plots.trajectories import Trajectories
     from kahanmaps.plots.windows import Window
@@ -233,6 +234,33 @@ class Orbits:
             yield portion
             if self.interrupted:
                 return
+
+    def flow(self, axes: Sequence[PointFunction | str], window: Window, options: Mapping[str, Any]) -> Flow | None:
+        """What is drawn of the differential equation; None where the map has none or it is not wanted."""
+        from dataclasses import replace
+
+        import numpy as np
+
+        from kahanmaps.plots.flow import plane_flow, solutions
+        from kahanmaps.plots.windows import window_of
+
+        if self.file is None or not self.file.is_quadratic:
+            if options["flow"]:
+                raise InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
+            return None
+        functions = [axis for axis in axes if not isinstance(axis, str)]
+        variables = [axis.variable for axis in functions if axis.variable is not None]
+        found = plane_flow(self.file.system, [] if options["no_field"] else variables, window)
+        if options["levels"]:
+            found = replace(found, places=found.places[:0], arrows=found.arrows[:0])
+        if options["flow"]:
+            if len(functions) < len(axes):
+                raise InputError("--flow draws curves in phase space: it does not go with the axis step")
+            box = window_of(self._points.reshape(-1, len(self.variables)), self.starts)
+            time = float(2 * self.eps * self.steps) * (-1 if self.backward else 1) if self.steps else None
+            curves = solutions(self.file.system, self.starts, box, time)
+            found = replace(found, solutions=tuple(np.stack([axis(x) for axis in functions], axis=-1) for x in curves))
+        return found
 
     def note_outside(self, left_out: int, count: int) -> None:
         """Say that points lie outside the window."""
