@@ -178,7 +178,7 @@ def _record(
                 "dominant": run.is_dominant,
                 "followed": run.followed,
                 "text": run.text,
-                "maps_a_step": 1 if run.word is None else run.word.length,
+                "maps_a_step": None if run.word is None else run.word.length,
                 "hypersurfaces": [
                     {
                         "polynomial": found.polynomial,

@@ -37,6 +37,7 @@ from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.enclosure import Enclosure, enclose
 from kahanmaps.laboratory.growth.recurrences import GrowthClass, GrowthRate, Recurrence, find_recurrence
 from kahanmaps.laboratory.growth.renewal import coefficients, recurrence_of
+from kahanmaps.laboratory.singular.generic import with_eps
 from kahanmaps.laboratory.singular.singularities import MAX_STEPS, WRITTEN_DIMENSION, Patterns
 from kahanmaps.laboratory.singular.singularities import patterns as patterns_of_map
 from kahanmaps.maps.implicit import BirationalMap
@@ -313,6 +314,7 @@ class _Search:
         found = replace(
             self._so_far(), ended=ended, message=message, primes=primes, residues=residues, notes=tuple(self.notes)
         )
+        found = replace(found, patterns=self._named())
         if not enclosed or (found.growth is not GrowthClass.EXPONENTIAL and not found.looks_exponential):
             return found
         left = max(1.0, self._deadline - time.monotonic())
@@ -356,6 +358,13 @@ class _Search:
             self._patterns = patterns_of_map(
                 self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
             )
+
+    def _named(self) -> Patterns | None:
+        """The patterns with polynomials over Q[eps] where eps is not given."""
+        known = self._patterns
+        if known is None or self._eps is not None or not known.at or time.monotonic() > self._deadline:
+            return known
+        return replace(known, contracted=with_eps(self._map, rational(known.at), known.contracted))
 
     def _line(self) -> Line:
         while True:

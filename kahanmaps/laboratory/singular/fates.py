@@ -61,6 +61,7 @@ class Hypersurface:
     happened before: nothing at all, the same again and again, or more and more by a linear recurrence. None where that
     cannot be said: its pattern is still running. `orders` are those of this pattern. In a composition that is
     followed map by map all steps are those of single maps, and that of number `stage`, from 0, contracts it; else None.
+    `generic` is its polynomial over Q[eps], empty where it is not known.
     """
 
     polynomial: str
@@ -77,11 +78,13 @@ class Hypersurface:
     settled_at: int | None = None
     orders: Orders = field(default=NO_ORDERS, repr=False)
     stage: int | None = None
+    generic: str = ""
 
     def told(self, at: str) -> str:
         """A sentence: what it is (`at` which eps), when it comes back, what it costs, which of C1, C2, ... it meets."""
-        cut = self.polynomial if len(self.polynomial) <= _LONGEST else f"{self.polynomial[:_LONGEST]} ..."
-        name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{at}")
+        text, most = (self.generic, 2 * _LONGEST) if self.generic else (self.polynomial, _LONGEST)
+        cut = text if len(text) <= most else f"{text[:most]} ..."
+        name = {"Z": "infinity", "?": "a hypersurface"}.get(self.polynomial, f"{cut} = 0{'' if self.generic else at}")
         if self.orders.returns:
             after, other = self.orders.returns
             fate = f"comes back as C{other + 1} after {counted(after, 'step')}"
@@ -98,7 +101,7 @@ class Hypersurface:
     def to_json(self) -> dict[str, Any]:
         """Plain data: what is known of it beside its first steps."""
         names = ("polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at")
-        found = attributes(self, *names, "followed", "settled_at", "note", "stage")
+        found = attributes(self, *names, "followed", "settled_at", "note", "stage", "generic")
         return {**found, "orders": self.orders.to_json()}
 
 

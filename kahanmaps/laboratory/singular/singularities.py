@@ -327,7 +327,7 @@ class Patterns:
         names = ("numerator", "denominator")
         series = {name: [str(c) for c in part] for name, part in zip(names, self.series, strict=False)}
         contracted = [{"text": text, **h.to_json()} for text, h in zip(self.told, self.contracted, strict=False)]
-        maps = self.word.length if self.word_text and self.word else 1
+        maps = self.word.length if self.word_text and self.word else None
         known = {"generating_function": series or None, "contracted": contracted, "eps": self.at or None}
         return {**found, **known, "maps_a_step": maps}
 
