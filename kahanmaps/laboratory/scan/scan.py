@@ -22,7 +22,6 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
-from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError, quoted
@@ -239,7 +238,7 @@ def scan(
         known, missed = with_verdicts(known, file, exact, analysis, began + seconds, until(1), seed, tell)
         omitted += [f"{missed} verdicts"] if missed else []
     left = tuple(_left(one, known) for one in sweeps)
-    symmetric = tuple(tuple(map(format_polynomial, images)) for images in symmetries(sweeps, known, names))
+    symmetric = tuple(symmetries(sweeps, known, names))
     ended = "interrupted" if interrupted else "time" if omitted else "complete"
     generic = sweeps[0].generic if sweeps else ()
     found = Scan(
