@@ -186,7 +186,7 @@ def scan(
             try:
                 one = None if kept is None else kept.get((p, lines, width))
                 if one is None:
-                    limits.update(lines=lines, width=width, seed=f"{start} {p} {lines} {width}")
+                    limits.update(on=None if lines is None else (lines, width), seed=f"{start} {p} {lines} {width}")
                     one = sweep(map_, len(names), p, exact, terms, room, **limits)
                     if kept is not None:
                         kept.add(one, lines)
