@@ -305,6 +305,7 @@ def test_an_analysis_of_members_gives_verdicts():
         ('["y", "x^2 + (a^2 + b - 1)*y"]', (("-a", "b"),)),
         ('["y", "x^2 + a*y + b*(b - 1)"]', ()),  # a = 0 alone, and affine
         ('["y", "x^2 + (2*a*b - b)*y"]', ()),
+        ('["y", "x^2 + (a - 1)*y + (b - 1)*x*y"]', ()),  # (1, 1) stays where it is when a, b and 1 are permuted
         ('["a", "b"]', ()),  # no member is slower than others
         ('["y", "x^2 + (a^2 - 2*b^2)*y"]', (("a", "-b"), ("-a", "b"))),  # (0, 0) alone is seen in the whole plane
     ],

@@ -7,6 +7,7 @@ coordinates (a : b : ... : 1), which families have whose parameters are ratios.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import permutations, product
 
 from flint import fmpq, fmpq_mpoly
@@ -104,7 +105,11 @@ def _matters(change: Change, components: Sequence[Component], names: Sequence[st
         if len(moved) == 1 and (str(moved[0]), one.degrees) not in known:
             return False
         is_affine = all(equation.total_degree() == 1 for equation in one.equations)
-        matters = matters or not is_affine or set(map(str, moved)) != set(map(str, one.equations))
+        if one.values is None:
+            stays = set(map(str, moved)) == set(map(str, one.equations))
+        else:  # a random member, or the point itself
+            stays = replace(one, equations=tuple(moved)).contains([*one.values.values()])
+        matters = matters or not (is_affine and stays)
     return matters
 
 
