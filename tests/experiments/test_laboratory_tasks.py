@@ -303,6 +303,13 @@ def test_a_scan_has_the_conditions_whose_growth_is_not_exponential():
     assert found["generic"] == [3, 7, 17]
 
 
+def test_a_scan_may_be_by_densities_and_modulo_given_primes():
+    asked = {"over": "b1", "by": "density", "terms": 4, "primes": "101,103,107", "report": True}
+    found = perform("scan", of_catalogue("zhukovski_volterra_2"), **asked)
+    assert (found["integrable"], found["generic"]) == (["0"], [0, 0, 0, 1])
+    assert [one["prime"] for one in found["report"]["sweeps"]] == [101, 103, 107]
+
+
 # What cannot be done
 
 
@@ -311,6 +318,8 @@ def test_a_scan_has_the_conditions_whose_growth_is_not_exponential():
     [
         ("find-integrals", TOP, {"symbolic": "b"}, "b"),
         ("scan", TOP, {"over": "b"}, "found the symbol 'b'"),
+        ("scan", TOP, {"over": "a1", "by": "luck"}, "expected one of degrees, integrals, density"),
+        ("scan", TOP, {"over": "a1", "primes": "11,13"}, "expected at least three"),
         ("find-integrals", TOP, {"max_degree": 0}, "found the largest degree 0, expected at least 1"),
         ("find-integrals", member(), {"symbolic": "a"}, "found"),
         ("degrees", TOP, {"max_degree": 0}, "found the largest degree 0, expected at least 1"),

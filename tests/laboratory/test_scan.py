@@ -76,7 +76,8 @@ def test_special_points_of_a_curve_are_found_on_it(three_lines):
 def test_everything_is_confirmed_and_nothing_is_left(three_lines):
     assert all(one.is_confirmed and one.tried == 3 for one in three_lines.components)
     assert not any(three_lines.left)
-    assert three_lines.symmetric == (("g2", "g1"),)
+    # all permutations of the exponents (g1 : g2 : 1), which exchanges and one cycle generate
+    assert three_lines.symmetric == (("g2", "g1"), ("g1/g2", "1/g2"))
     assert three_lines.height == 31
     assert "up to 31" in three_lines.coverage
 
@@ -304,6 +305,7 @@ def test_an_analysis_of_members_gives_verdicts():
         ('["y", "x^2 + (a^2 + b - 1)*y"]', (("-a", "b"),)),
         ('["y", "x^2 + a*y + b*(b - 1)"]', ()),  # a = 0 alone, and affine
         ('["y", "x^2 + (2*a*b - b)*y"]', ()),
+        ('["y", "x^2 + (a - 1)*y + (b - 1)*x*y"]', ()),  # (1, 1) stays where it is when a, b and 1 are permuted
         ('["a", "b"]', ()),  # no member is slower than others
         ('["y", "x^2 + (a^2 - 2*b^2)*y"]', (("a", "-b"), ("-a", "b"))),  # (0, 0) alone is seen in the whole plane
     ],
@@ -350,6 +352,17 @@ def test_a_cycle_of_three_parameters_is_found_and_no_exchange():
     found = scan(parse_system(LOTKA_VOLTERRA), ["A", "B", "C"], primes=(17, 19, 23), terms=3)
     assert ("C", "A", "B") in found.symmetric or ("B", "C", "A") in found.symmetric
     assert ("A", "C", "B") not in found.symmetric
+
+
+def test_factors_that_exchange_points_are_found():
+    text = """variables = ["x", "y"]
+    parameters = { a = 1, b = 1 }
+    [system]
+    rhs = ["y", "x^2 + (a - 1)*(a - 3)*y + (2*a + b - 8)*x*y"]"""
+    found = scan(parse_system(text), ["a", "b"], primes=(31, 37, 41), terms=5)
+    assert {"(1, 6)", "(3, 2)"} <= {one.text for one in found.components}
+    assert ("b/2", "2*a") in found.symmetric
+    assert ("b", "a") not in found.symmetric
 
 
 def test_a_reflection_that_moves_points_is_found():

@@ -22,7 +22,6 @@ from flint import fmpq, fmpz
 
 from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
-from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import BadPrime, InputError, quoted
@@ -187,7 +186,7 @@ def scan(
             try:
                 one = None if kept is None else kept.get((p, lines, width))
                 if one is None:
-                    limits.update(lines=lines, width=width, seed=f"{start} {p} {lines} {width}")
+                    limits.update(on=None if lines is None else (lines, width), seed=f"{start} {p} {lines} {width}")
                     one = sweep(map_, len(names), p, exact, terms, room, **limits)
                     if kept is not None:
                         kept.add(one, lines)
@@ -239,7 +238,7 @@ def scan(
         known, missed = with_verdicts(known, file, exact, analysis, began + seconds, until(1), seed, tell)
         omitted += [f"{missed} verdicts"] if missed else []
     left = tuple(_left(one, known) for one in sweeps)
-    symmetric = tuple(tuple(map(format_polynomial, images)) for images in symmetries(sweeps, known, names))
+    symmetric = tuple(symmetries(sweeps, known, names))
     ended = "interrupted" if interrupted else "time" if omitted else "complete"
     generic = sweeps[0].generic if sweeps else ()
     found = Scan(

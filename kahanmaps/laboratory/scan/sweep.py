@@ -57,12 +57,13 @@ class Sweep:
         return {point: degrees for degrees, points in self.classes.items() for point in points}
 
 
-def members_of(prime: int, count: int, lines: int | None, rng: random.Random, width: int = 1) -> Iterator[Point]:
-    """All points of GF(p)^count, or those on so many random lines of it, or planes."""
-    if lines is None:
+def members_of(prime: int, count: int, on: tuple[int, int] | None, rng: random.Random) -> Iterator[Point]:
+    """All points of GF(p)^count, or those on so many random affine subspaces of a dimension."""
+    if on is None:
         yield from product(range(prime), repeat=count)
         return
-    for _ in range(lines):
+    subspaces, width = on
+    for _ in range(subspaces):
         base, *ways = ([rng.randrange(prime) for _ in range(count)] for _ in range(1 + width))
         for slopes in product(range(prime), repeat=width):
             yield tuple(
@@ -79,8 +80,7 @@ def sweep(
     terms: int,
     room: int,
     *,
-    lines: int | None = None,
-    width: int = 1,
+    on: tuple[int, int] | None = None,
     seed: str = "",
     jobs: int = 1,
     by: str = "degrees",
@@ -96,8 +96,7 @@ def sweep(
         eps: an exact number, or None for generic eps, in GF(p^2).
         terms, room: see `Family.degrees`.
         by: what is measured: "degrees", or "integrals" or "density" for what `ranks` counts.
-        lines: None for all members, else so many random lines of parameter space,
-        width: or affine subspaces of this dimension.
+        on: None for all members, else how many random affine subspaces of parameter space, and their dimension.
         seed: of everything random.
         jobs: threads.
         check: is called now and then, and may raise TimeOver.
@@ -129,7 +128,7 @@ def sweep(
             told(low + len(some), len(points))
         return np.concatenate(parts)
 
-    points = list(members_of(prime, count, lines, rng, width))
+    points = list(members_of(prime, count, on, rng))
     if count > len(map_.symbols):
         points = [point for point in points if point[-1]]
     found = measure(points, progress)
@@ -151,4 +150,6 @@ def sweep(
     classes: dict[Degrees, list[Point]] = {}
     for i in slow:
         classes.setdefault(tuple(int(d) for d in found[i]), []).append(points[i])
-    return Sweep(prime, tuple(int(d) for d in generic), classes, len(points), lines is None, accidents, width)
+    return Sweep(
+        prime, tuple(int(d) for d in generic), classes, len(points), on is None, accidents, 1 if on is None else on[1]
+    )

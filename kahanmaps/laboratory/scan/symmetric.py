@@ -1,36 +1,40 @@
-"""Changes of parameters that permute the slow members of a family: exchanges, cycles, signs, and these with a shift."""
+"""Changes of parameters that permute the slow members of a family: projective ones of a few kinds.
+
+Exchanges, cycles and signs, these with a shift or a factor for each parameter, and permutations of the homogeneous
+coordinates (a : b : ... : 1), which families have whose parameters are ratios.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import permutations, product
-from typing import Any
 
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import primitive_part, ring
+from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.laboratory.scan.lift import residues
 from kahanmaps.laboratory.scan.result import Component
 from kahanmaps.laboratory.scan.sweep import Degrees, Point, Sweep
 
-Change = tuple[tuple[int, int, fmpq], ...]  # a_k becomes sign * a_place + shift: place, sign and shift for each k
+Row = tuple[fmpq, ...]
+Change = tuple[Row, ...]  # a matrix that acts on (a, b, ..., 1), up to a factor: the first entry in its last row is 1
 
-_MOST_SHIFTS = 24
+_MOST_POINTS = 24
 
 
-def symmetries(
-    sweeps: Sequence[Sweep], components: Sequence[Component], names: Sequence[str]
-) -> list[tuple[fmpq_mpoly, ...]]:
+def symmetries(sweeps: Sequence[Sweep], components: Sequence[Component], names: Sequence[str]) -> list[tuple[str, ...]]:
     """Changes of parameters that generate all which were found; the images of the parameters.
 
-    Each keeps the degrees of slow members modulo each prime modulo which all were tried, and the hypersurfaces over Q.
-    Named are those that move a component, or keep one that is not affine.
+    Each keeps the degrees of slow members modulo each prime modulo which all were tried, and the hypersurfaces over Q,
+    as far as they do not go to infinity. Named are those that move a component, or keep one that is not affine.
 
     >>> a, b = ring(["a", "b"]).gens()
     >>> lines = [Component((line,), 1, (1,), ()) for line in (a - 3 * b, a + 3 * b, 3 * a - b, 3 * a + b)]
     >>> points = [(x, y) for x in range(7) for y in range(7) if (x * x - 9 * y * y) * (y * y - 9 * x * x) % 7 == 0]
     >>> symmetries([Sweep(7, (2,), {(1,): points}, 49, True, 0)], lines, ["a", "b"])
-    [(b, a), (a, -b)]
+    [('b', 'a'), ('a', '-b')]
     """
     complete = [(one.prime, one.slow) for one in sweeps if one.complete]
     if not complete or not components:
@@ -43,62 +47,93 @@ def symmetries(
         if _matters(change, components, names):
             found.append(change)
             known = _generated(found, len(names))
-    return [_images(change, names) for change in found]
+    return [_texts(change, names) for change in found]
 
 
 def _changes(count: int, components: Sequence[Component]) -> Iterator[Change]:
-    """Those that are tried, plain ones first; shifts are those that move one rational point to another."""
-    plain = [
-        tuple((place, sign, fmpq(0)) for place, sign in zip(places, signs, strict=True))
+    """Those that are tried, plain ones first; shifts and factors take one rational point to another."""
+    signed = [
+        tuple(
+            tuple(fmpq(sign * (k == place)) for k in range(count + 1))
+            for place, sign in zip(places, (*signs, 1), strict=True)
+        )
         for signs in sorted(product((1, -1), repeat=count), key=lambda signs: signs.count(-1))
-        for places in permutations(range(count))
+        for places in permutations(range(count + 1))
     ]
+    plain = [change for change in signed if change[-1][-1] != 0]
     yield from plain
-    points = [[*(one.values or {}).values()] for one in components if one.is_rational_point]
-    for change in plain if points else ():
-        start = _applied(change, points[0])
-        for point in points[:_MOST_SHIFTS]:
-            shifts = [y - x for x, y in zip(start, point, strict=True)]
-            if any(shifts):
-                yield tuple((place, sign, s) for (place, sign, _), s in zip(change, shifts, strict=True))
+    points = [(*(one.values or {}).values(), fmpq(1)) for one in components if one.is_rational_point][:_MOST_POINTS]
+    for change, point in product(plain, points):
+        start = _times(change, points[0])
+        yield tuple((*row[:-1], row[-1] + y - x) for row, x, y in zip(change, start, point, strict=True))
+        if all(start) and all(point):
+            yield tuple(tuple(y / x * c for c in row) for row, x, y in zip(change, start, point, strict=True))
+    if count > 1:
+        yield from signed
 
 
 def _identity(count: int) -> Change:
-    return tuple((k, 1, fmpq(0)) for k in range(count))
+    return tuple(tuple(fmpq(int(i == k)) for k in range(count + 1)) for i in range(count + 1))
 
 
-def _applied(change: Change, values: Sequence[Any]) -> list[Any]:
-    return [sign * values[place] + shift for place, sign, shift in change]
+def _times(change: Change, vector: Sequence[fmpq]) -> Row:
+    return tuple(sum((c * x for c, x in zip(row, vector, strict=True)), fmpq(0)) for row in change)
 
 
-def _images(change: Change, names: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
-    return tuple(_applied(change, ring(names).gens()))
+def _images(change: Change, names: Sequence[str]) -> list[fmpq_mpoly]:
+    """The images of the parameters times the last one, which is a denominator."""
+    context = ring(names)
+    vector = [*context.gens(), context.constant(1)]
+    return [sum((c * x for c, x in zip(row, vector, strict=True)), context.constant(0)) for row in change]
+
+
+def _texts(change: Change, names: Sequence[str]) -> tuple[str, ...]:
+    """The images; denominators are constants or one parameter, as those of `_changes` are."""
+    *images, below = map(format_polynomial, _images(change, names))
+    return tuple(images if below == "1" else [f"{image}/{below}" if image != below else "1" for image in images])
 
 
 def _matters(change: Change, components: Sequence[Component], names: Sequence[str]) -> bool:
     """Whether hypersurfaces go to such with the same degrees, and something is moved or not affine."""
-    images = _images(change, names)
+    *images, below = _images(change, names)
     known = {(str(one.equations[0]), one.degrees) for one in components if len(one.equations) == 1}
     matters = False
     for one in components:
-        moved = [str(primitive_part(equation.compose(*images))[1]) for equation in one.equations]
-        if len(moved) == 1 and (moved[0], one.degrees) not in known:
+        moved = [_moved(equation, images, below) for equation in one.equations]
+        if any(equation.total_degree() == 0 for equation in moved):
+            continue
+        if len(moved) == 1 and (str(moved[0]), one.degrees) not in known:
             return False
         is_affine = all(equation.total_degree() == 1 for equation in one.equations)
-        matters = matters or not is_affine or set(moved) != set(map(str, one.equations))
+        if one.values is None:
+            stays = set(map(str, moved)) == set(map(str, one.equations))
+        else:  # a random member, or the point itself
+            stays = replace(one, equations=tuple(moved)).contains([*one.values.values()])
+        matters = matters or not (is_affine and stays)
     return matters
 
 
+def _moved(equation: fmpq_mpoly, images: Sequence[fmpq_mpoly], below: fmpq_mpoly) -> fmpq_mpoly:
+    """What holds where the image of a point satisfies an equation; a constant where only points at infinity do."""
+    degree, total = equation.total_degree(), 0 * below
+    for exponents, coefficient in equation.terms():
+        term = coefficient * below ** (degree - sum(map(int, exponents)))
+        for image, exponent in zip(images, exponents, strict=True):
+            term *= image ** int(exponent)
+        total += term
+    return primitive_part(total)[1]
+
+
 def _permutes(change: Change, p: int, slow: Mapping[Point, Degrees]) -> bool:
-    """Whether all slow members modulo a prime go to such with the same degrees."""
-    shifts = residues([[shift for _, _, shift in change]], p)
-    if shifts is None:
+    """Whether all slow members modulo a prime go to such with the same degrees, or to infinity."""
+    rows = residues(change, p)
+    if rows is None:
         return True
-    pairs = [(place, sign, shift) for (place, sign, _), shift in zip(change, shifts[0], strict=True)]
-    return all(
-        slow.get(tuple((sign * point[place] + shift) % p for place, sign, shift in pairs)) == degrees
-        for point, degrees in slow.items()
-    )
+    for point, degrees in slow.items():
+        *image, below = (sum(c * x for c, x in zip(row, (*point, 1), strict=True)) % p for row in rows)
+        if below and slow.get(tuple(x * pow(below, -1, p) % p for x in image)) != degrees:
+            return False
+    return True
 
 
 def _generated(found: Sequence[Change], count: int) -> set[Change]:
@@ -112,4 +147,7 @@ def _generated(found: Sequence[Change], count: int) -> set[Change]:
 
 def _composed(one: Change, other: Change) -> Change:
     """First `one`, then `other`."""
-    return tuple((one[place][0], sign * one[place][1], sign * one[place][2] + shift) for place, sign, shift in other)
+    columns = [_times(other, column) for column in zip(*one, strict=True)]
+    rows = tuple(zip(*columns, strict=True))
+    scale = next(c for c in rows[-1] if c != 0)
+    return tuple(tuple(c / scale for c in row) for row in rows)
