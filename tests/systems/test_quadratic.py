@@ -21,7 +21,6 @@ from helpers import (
     encloses,
     matrices,
     over_all_fields,
-    over_named_systems,
     rationals,
     some,
     systems,
@@ -107,11 +106,6 @@ def test_the_divergence_is_the_one_found_by_hand(system, expected):
 def test_the_divergence_is_the_trace_of_the_jacobi_matrix(pair):
     system, x = pair
     assert evaluate(system.divergence, QQ, x) == trace(system.over(QQ).jacobian(x))
-
-
-@over_named_systems
-def test_a_system_is_divergence_free_exactly_when_its_divergence_is_zero(system):
-    assert system.is_divergence_free is (str(system.divergence) == "0")
 
 
 # Values.
