@@ -122,11 +122,6 @@ class QuadraticSystem(PolynomialField, DisplayedAsFormula):
             if sum(monomial) == of_degree
         ]
 
-    @property
-    def is_divergence_free(self) -> bool:
-        """Whether the flow preserves the volume."""
-        return bool(self.divergence.is_zero())
-
     def scaled(self, factor: Any) -> QuadraticSystem:
         """The system x' = factor f(x). Its Kahan map at eps is that of f at factor eps."""
         by = rational(factor)

@@ -7,7 +7,6 @@ from cli_helpers import shell
 
 from kahanmaps.documents.catalog import load
 from kahanmaps.laboratory.finite.cycles import cycle_census
-from kahanmaps.version import __version__
 
 
 def test_counts_are_printed_for_two_eps_by_default(kahanmaps):
@@ -19,27 +18,6 @@ def test_counts_are_printed_for_two_eps_by_default(kahanmaps):
     assert f"periodic\t{census.periodic}\ncycles\t{census.cycles}, longest {census.longest}" in outcome.out
     assert "reversing symmetry\t1,0;0,-1\n" in outcome.out
     assert "\n# compatible in all 2 runs with: integrable bound\n" in outcome.out
-
-
-def test_the_json_is_enough_to_redo_the_run(kahanmaps):
-    found = kahanmaps("cycles lotka_volterra --prime 101 --prime 199 --eps 1/7 --eps 3/13 --json").json
-    assert (found["command"], found["version"], found["primes"]) == ("cycles", __version__, [101, 199])
-    assert (found["samples"], found["steps_asked"], found["seconds"]) == (None, None, 60.0)
-    assert [(run["prime"], run["eps"]) for run in found["runs"]] == [
-        (101, "1/7"),
-        (101, "3/13"),
-        (199, "1/7"),
-        (199, "3/13"),
-    ]
-    assert found["reversor"] == [["0", "1"], ["1", "0"]]
-    for run in found["runs"]:
-        census = cycle_census(load("lotka_volterra").system, run["eps"], run["prime"])
-        assert dict(run["lengths"]) == census.lengths
-        assert run["lost"] + run["falling"] + run["transient"] + run["periodic"] == int(run["points"])
-        assert "random reversible" in run["compatible"]
-        assert "random permutation" in run["not_compatible"]
-    assert found["compatible_in_all_runs"] == ["random reversible"]
-    assert found["document"]["system"]
 
 
 def test_samples(kahanmaps):

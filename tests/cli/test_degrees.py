@@ -5,8 +5,6 @@ from __future__ import annotations
 import pytest
 from schema_helpers import mistakes
 
-from kahanmaps.version import __version__
-
 
 def test_the_degrees_of_the_euler_top(kahanmaps):
     outcome = kahanmaps("degrees euler_top")
@@ -31,20 +29,6 @@ def test_the_degrees_of_the_euler_top(kahanmaps):
         ),
         "ended\tthe singularities explain the degrees, and those measured agree",
     ]
-
-
-def test_the_json_has_what_is_needed_to_run_it_again(kahanmaps):
-    found = kahanmaps("degrees lotka_volterra --time-step 2/7 --terms 4 --seed 3 --json").json
-    assert found["document"]["name"] == found["system"] == "lotka_volterra"
-    assert (found["version"], found["command"], found["seed"]) == (__version__, "degrees", 3)
-    assert (found["eps"], found["time_step"]) == ("1/7", "2/7")
-    assert [set(line) for line in found["lines"]] == [{"prime", "eps_residue"}] * 2
-    assert found["degrees"] == [1, 2, 4, 8, 16]
-    assert (found["ended"], found["growth"], found["dynamical_degree"]["value"]) == ("terms", "exponential", "2")
-    assert found["recurrence"]["checked"] == 5
-    assert found["basis"] == "explained: no confinement within 400 steps"
-    assert found["singularities"]["generating_function"] == {"numerator": ["1"], "denominator": ["1", "-2"]}
-    assert (found["enclosure"]["upper"], float(found["enclosure"]["lower"]) > 1.5) == ("2", True)
 
 
 def test_generic_eps_is_told_as_such(kahanmaps):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from kahanmaps.version import __version__
-
 NESTED = "--vars x,y,z --rhs x*(y+z) --rhs y*(z-x) --rhs=-z*(x+y)"
 
 
@@ -27,17 +25,6 @@ def test_what_toml_prints_is_accepted_by_check_poisson(kahanmaps, tmp_path, opti
     report = kahanmaps("check-poisson lotka_volterra --json --tensor", path, eps)
     assert (section.status, report.status, report.json["verdict"]) == (0, 0, "proved")
     assert kahanmaps("check-poisson weierstrass --json --tensor", path, eps).status == 1
-
-
-def test_json_is_one_object_with_all_that_is_needed_to_redo_it(kahanmaps):
-    found = kahanmaps("find-poisson lotka_volterra --eps 1/7 --seed 2 --json -q").json
-    assert [found[key] for key in ("command", "version", "eps", "seed", "degree_tried", "pencil", "reason")] == [
-        "find-poisson", __version__, "1/7", 2, 2, None, "",
-    ]  # fmt: skip
-    [one] = found["tensors"]
-    assert one["brackets"] == [{"of": ["x", "y"], "is": "x*y"}]
-    assert (one["rank"], one["verdict"], one["jacobi"]["verdict"], one["casimirs"]) == (2, "proved", "proved", [])
-    assert kahanmaps("find-poisson lotka_volterra --eps 1/7 --seed 2 --json -q").json == found
 
 
 def test_latex_is_the_matrix(kahanmaps):

@@ -10,7 +10,6 @@ from kahanmaps.documents.catalog import load
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.heights import Growth, height_growth
 from kahanmaps.laboratory.growth.height_survey import height_survey
-from kahanmaps.version import __version__
 
 OSCILLATOR = "--vars q,p --rhs p --rhs '2*q^2-q'"  # q'' = -q + 2 q^2; the fourth iterate at eps = 1 is the identity
 
@@ -27,15 +26,6 @@ def test_the_kinds_of_growth(kahanmaps, name, kind):
         f"bit lengths grow {kind} on all 4 exact orbits tried, at 2 values of eps",
     ]
     assert outcome.out.startswith(f"# {name}, eps = 1/10 (time step 2 eps = 1/5), 3/11 (time step 2 eps = 6/11), exact")
-
-
-def test_the_json_has_what_is_needed_to_run_it_again(kahanmaps):
-    found = kahanmaps("heights weierstrass --time-step 1/5 --start 1,1/2 --start 1/3,2 --steps 30 --json").json
-    assert (found["version"], found["eps"], found["time_step"]) == (__version__, ["1/10"], ["1/5"])
-    assert [orbit["start"] for orbit in found["orbits"]] == [["1", "1/2"], ["1/3", "2"]]
-    assert (found["kind"], found["kinds"], found["whole"]) == ("quadratic", ["quadratic"], True)
-    assert found["text"] == "bit lengths grow quadratically on all 2 exact orbits tried, at 1 value of eps"
-    assert found["document"]["name"] == "weierstrass"
 
 
 def test_starts_that_disagree_are_told(kahanmaps):

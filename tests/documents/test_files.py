@@ -186,7 +186,7 @@ def test_an_override_is_kept_when_the_file_is_written():
 def test_an_override_of_zero_may_change_the_degree():
     text = 'variables = ["x"]\n[parameters]\na = 1\n[system]\nrhs = ["a*x^3 + x"]'
     assert keys(text) == ["system.rhs[1]"]
-    assert parse_system(text, parameters={"a": 0}).system.is_divergence_free is False
+    assert parse_system(text, parameters={"a": 0}).system.divergence == 1
 
 
 def test_a_file_without_a_name_is_called_after_its_path(tmp_path):

@@ -20,7 +20,6 @@ from hypothesis import strategies as st
 from kahanmaps.errors import InputError
 from kahanmaps.experiments.export import NUMBER, cell, flatten, write_csv, write_jsonl, write_parquet
 from kahanmaps.experiments.records import Outcome, Record, Row, Task
-from kahanmaps.version import __version__
 
 FAMILY = Task("check-commute", {"family": {"m": 3, "seed": 7}}, {"eps": "1/10", "steps": 5})
 FILE = Task("check-commute", {"document": "d1", "parameters": {"a": "1/2"}}, {"eps": None, "steps": 5})
@@ -94,37 +93,6 @@ def many_rows(draw):
 
 
 # JSON lines
-
-
-def test_a_line_has_the_documented_shape():
-    lines = jsonl([row(result={"claims": 3}, verdict="proved")]).splitlines()
-    assert [json.loads(line) for line in lines] == [
-        {
-            "record": "header",
-            "version": __version__,
-            "convention": "eps is the paper's epsilon, the time step is 2 eps",
-        },
-        {
-            "record": "result",
-            "experiment": "e",
-            "number": 0,
-            "key": FAMILY.key,
-            "task": "check-commute",
-            "system": {"family": {"m": 3, "seed": 7}},
-            "options": {"eps": "1/10", "steps": 5},
-            "outcome": "ok",
-            "verdict": "proved",
-            "result": {"claims": 3},
-            "message": "",
-            "stderr": "a warning",
-            "seconds": 1.5,
-            "peak_memory": 4096,
-            "host": "hilbert",
-            "versions": {"python": "3.11.7"},
-            "finished": "2025-01-01T00:00:00Z",
-        },
-        {"record": "end", "results": 1},
-    ]
 
 
 @given(many_rows())

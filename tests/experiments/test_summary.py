@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import random
 from fractions import Fraction
 from math import ceil
@@ -236,37 +235,6 @@ EXAMPLE = [
     row({"height": "5/3", "done": False}, of=task(m=10), verdict="refuted", seconds=0.1),
     row({"height": 4, "done": True}, of=task(m=9), verdict="proved", seconds=3.0),
 ]
-
-
-def test_the_json_has_the_documented_shape():
-    found = summarise(EXAMPLE[:2], ["m"], ["height", "done"]).to_json()
-    assert found == json.loads(json.dumps(found))
-    assert found == {
-        "by": ["m"],
-        "groups": [
-            {
-                "group": {"m": 10},
-                "tasks": 2,
-                "missing": 0,
-                "outcomes": {"ok": 2, "failed": 0, "crashed": 0, "timeout": 0, "out-of-memory": 0},
-                "verdicts": {"proved": 1, "supported": 0, "refuted": 1, "undecided": 0},
-                "numbers": {
-                    "height": {
-                        "n": 2,
-                        "same": False,
-                        "min": "5/3",
-                        "p5": "5/3",
-                        "p25": "5/3",
-                        "median": "5/3",
-                        "p75": "7/3",
-                        "p95": "7/3",
-                        "max": "7/3",
-                    }
-                },
-                "flags": {"done": {"true": 1, "false": 1}},
-            }
-        ],
-    }
 
 
 def test_the_lines_are_tables_with_tabs():

@@ -12,12 +12,11 @@ from math import comb
 
 import pytest
 from flint import fmpq, fmpq_mat, fmpq_poly
-from helpers import matrices, random_point, rationals
+from helpers import matrices, rationals
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
-from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import gradient, linear_combinations, monomials, ring
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import HypothesisError
@@ -32,7 +31,6 @@ from kahanmaps.family.cubics import (
 )
 from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
 from kahanmaps.family.skew_hamiltonian import diagnosis, is_generic, minimal_degree, random_skew_hamiltonian
-from kahanmaps.systems.hamiltonian import standard_structure
 
 t = fmpq_poly([0, 1])
 DIAGONAL = fmpq_mat([[1, 0, 0, 0], [0, 2, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]])
@@ -65,12 +63,6 @@ def fulfils_the_condition(A, H) -> bool:
     )
 
 
-def bracket(F, G):
-    """{F, G} = grad F^T J grad G, with {x_i, x_{m+i}} = 1."""
-    rotated = linear_combinations(standard_structure(len(gradient(G))), gradient(G))
-    return sum((a * b for a, b in zip(gradient(F), rotated, strict=True)), 0 * F)
-
-
 def generic(m: int, seed: int) -> fmpq_mat:
     """The first generic matrix from a seed on."""
     rng = random.Random(seed)
@@ -80,25 +72,6 @@ def generic(m: int, seed: int) -> fmpq_mat:
 
 
 # The space.
-
-DIMENSIONS = [  # m, unknowns C(2m+2, 3), rank, dimension 4m; the ranks are those of the paper for m = 3
-    (1, 4, 0, 4),
-    (2, 20, 12, 8),
-    (3, 56, 44, 12),
-    (4, 120, 104, 16),
-]
-
-
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize(("m", "unknowns", "expected_rank", "dimension"), DIMENSIONS)
-def test_for_a_generic_matrix_the_dimension_is_4m(m, unknowns, expected_rank, dimension, seed):
-    space = cubic_space(generic(m, seed))
-    assert (space.unknowns, space.rank, space.dimension) == (unknowns, expected_rank, dimension)
-
-
-@pytest.mark.parametrize("m", [5, 6])
-def test_the_dimension_is_4m_also_for_larger_matrices(m):
-    assert cubic_space(generic(m, 1)).dimension == 4 * m
 
 
 # A diagonalisable A is a scalar on the 2k variables of a root of multiplicity k: all their cubics belong, C(2k+2, 3).
@@ -251,37 +224,6 @@ def test_a_chain_can_be_asked_for_longer_and_then_obeys_chi():
 
 def test_the_chain_of_a_sum_of_planar_cubics_multiplies_each_by_its_root():
     assert chain(DIAGONAL, x1**3 + x2**2 * x4) == (x1**3 + x2**2 * x4, x1**3 + 2 * x2**2 * x4)
-
-
-def test_the_transpose_of_a_does_not_make_a_chain():
-    member = MEMBERS["m = 2, split"]
-    with pytest.raises(HypothesisError):
-        chain(member.A.transpose(), member.H)
-
-
-@over_members
-def test_the_members_of_a_chain_are_in_involution_pairwise(member):
-    hamiltonians = chain(member.A, member.H)
-    assert all(bracket(F, G) == 0 for F in hamiltonians for G in hamiltonians)
-
-
-def test_two_cubics_of_the_same_space_need_not_be_in_involution():
-    assert (belongs(DIAGONAL, x1**3), belongs(DIAGONAL, x3**3)) == (True, True)
-    assert bracket(x1**3, x3**3) == 9 * x1**2 * x3**2
-
-
-@pytest.mark.parametrize("name", [name for name in MEMBERS if "twice" not in name])
-def test_the_members_of_a_chain_are_independent_for_a_minimal_polynomial_of_degree_m(name):
-    member = MEMBERS[name]
-    point = random_point(member.dim, seed=3)
-    gradients = fmpq_mat([[g(*point) for g in gradient(H)] for H in chain(member.A, member.H)])
-    assert rank(QQ, gradients) == member.m
-
-
-def test_a_root_that_is_repeated_without_need_makes_the_chain_dependent():
-    member = MEMBERS["m = 3, a root twice"]  # (A - 1)(A - 2) = 0
-    H0, H1, H2 = chain(member.A, member.H)
-    assert H2 == 3 * H1 - 2 * H0
 
 
 def test_a_cubic_outside_starts_no_chain():

@@ -12,8 +12,6 @@ import pytest
 from check_helpers import (
     Dual,
     claim,
-    combined_rows,
-    determinant,
     dot,
     exact,
     function_value,
@@ -21,14 +19,9 @@ from check_helpers import (
     hamiltonians,
     kahan_step,
     modified_value,
-    polynomial_value,
-    rank_by_elimination,
     rows_of,
-    slope,
-    solve_by_elimination,
     times,
     transposed,
-    unit,
 )
 from flint import fmpq, fmpq_poly
 from helpers import fraction, over_exact_fields, points, rationals
@@ -40,7 +33,7 @@ from kahanmaps.errors import BadPrime, InputError, SingularStep
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.invariants.integrals import ClaimedIntegral, CommutantIntegral, ModifiedHamiltonian, PaperIntegral
-from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
+from kahanmaps.systems.hamiltonian import standard_structure
 
 some = settings(max_examples=40)
 nonzero = rationals(6).filter(lambda eps: eps != 0)
@@ -89,55 +82,6 @@ def test_modified_h_is_even_in_eps(drawn, eps):
     except SingularStep:
         assume(False)
     assert forward == backward
-
-
-def coefficients_in_eps(hamiltonian: CubicHamiltonian, x: tuple[Fraction, ...], weight: Fraction) -> list[Fraction]:
-    """det(I - eps f') (H + weight (modified H - H) - H) as a polynomial in eps, interpolated at n + 2 values of eps.
-
-    The determinant clears the denominator, so the degree is at most n + 1; a last value of eps puts that to the test.
-    """
-    system, degree = hamiltonian.system, hamiltonian.dim + 1
-    steps = [Fraction(k, 97) for k in range(1, degree + 3)]
-
-    def value(eps: Fraction) -> Fraction:
-        clear = determinant(combined_rows(unit(system.dim), -eps, slope(system, x)))
-        modified = ModifiedHamiltonian(hamiltonian).value(QQ, fmpq(eps.numerator, eps.denominator), to_flint(x))
-        return clear * weight * (fraction(modified) - polynomial_value(hamiltonian.H, x))
-
-    *used, last = steps
-    powers = [[eps**k for k in range(degree + 1)] for eps in used]
-    found = solve_by_elimination(powers, [value(eps) for eps in used])
-    assert found is not None
-    assert sum(c * last**k for k, c in enumerate(found)) == value(last)
-    return found
-
-
-def to_flint(x):
-    return tuple(fmpq(entry.numerator, entry.denominator) for entry in x)
-
-
-@pytest.mark.parametrize(
-    ("hamiltonian", "x"),
-    [
-        (HENON, exact("1/2", "-1/3", 1, 2)),
-        (PLANE_CUBIC, exact("2/3", "-1/5")),
-        (
-            hamiltonian_of("x y z", "x^3 - x*y*z + z^2 - y", [[0, 1, 2], [-1, 0, "1/2"], [-2, "-1/2", 0]]),
-            exact(1, 2, 3),
-        ),
-    ],
-)
-def test_modified_h_differs_from_h_by_order_eps_squared_and_no_less(hamiltonian, x):
-    constant, linear, quadratic, *_ = coefficients_in_eps(hamiltonian, x, Fraction(1))
-    assert (constant, linear) == (0, 0)
-    assert quadratic != 0
-
-
-@given(points(4, rationals(9)))
-@settings(max_examples=15)
-def test_modified_h_has_no_term_of_first_order_in_eps(x):
-    constant, linear, *_ = coefficients_in_eps(HENON, exact(*x), Fraction(1))
-    assert (constant, linear) == (0, 0)
 
 
 # The paper's H~
@@ -193,21 +137,6 @@ def gradients(member: FamilyMember, x: tuple[Fraction, ...], eps: Fraction) -> l
             row.append(dot(moved, [dot(line, image) for line in matrix]).b)
             matrix = times(matrix, transposed(rows_of(member.A)))
     return rows
-
-
-@pytest.mark.parametrize(
-    ("member", "rank"),
-    [
-        (draw_with_eigenvalues([1, -2, 3], seed=3), 3),
-        (draw_with_chi(fmpq_poly([1, 1, 0, 1]), seed=3), 3),  # irreducible
-        (draw_with_chi(fmpq_poly([2, -2, -1, 1]), seed=3), 3),  # (t - 1)(t^2 - 2)
-        (draw_with_eigenvalues([1, 1, 3], seed=3), 2),  # A satisfies an equation of degree 2
-    ],
-    ids=["split", "irreducible", "partly split", "eigenvalue twice"],
-)
-def test_a_generic_member_has_m_independent_integrals_from_the_commutant(member, rank):
-    x = exact("1/2", "-1/3", 1, 2, "2/5", -1)
-    assert rank_by_elimination(gradients(member, x, Fraction(1, 7))) == rank
 
 
 @pytest.mark.parametrize("power", [1, 2])

@@ -148,13 +148,6 @@ def test_dots_stand_where_more_degrees_are_known_than_shown():
     assert told(13) == told(12) + ", ..."
 
 
-def test_henon_heiles_closes_after_four_steps_at_eps_1_only():
-    special = analyze(load("henon_heiles"), eps=1)
-    assert (special.conclusion.kind, special.conclusion.integrals) == ("linearisable", 4)
-    assert "at eps = 1 only" in special.conclusion.sentence
-    assert special.commuting is None  # which is a question for every eps
-
-
 @pytest.mark.slow
 def test_henon_heiles_is_not_integrable_at_other_eps():
     generic = analyze(load("henon_heiles"), seconds=4)
@@ -424,50 +417,6 @@ def test_what_is_said_of_integrals(profile, others, expected):
     )
     lines = report._integral_lines(SimpleNamespace(integrals=found, relations=(), structure=None))
     assert [(str(line.status), line.text) for line in lines] == expected
-
-
-@pytest.mark.parametrize(
-    ("integrals", "functions", "notes"),
-    [
-        (((), ()), ((), ()), []),
-        (
-            (("c1",), ("c2",)),
-            ((), ()),
-            ["c1, c2 are constant on each orbit and differ between orbits, so they are integrals"],
-        ),
-        (
-            (tuple(f"c{k}" for k in range(1, 8)), ("c2",)),
-            (("e1", "e2"), ()),
-            [
-                "c1, ..., c7 are constant on each orbit and differ between orbits, so they are integrals",
-                "e1, e2 depend on eps only",
-            ],
-        ),
-        (
-            ((), ("k12",)),
-            (("d3",), ()),
-            [
-                "k12 is constant on each orbit and differs between orbits, so it is an integral",
-                "d3 depends on eps only",
-            ],
-        ),
-    ],
-)
-def test_what_is_said_of_the_numbers_in_relations(integrals, functions, notes):
-    relations = [
-        SimpleNamespace(text=f"R{k}", integrals=ours, functions_of_eps=theirs)
-        for k, (ours, theirs) in enumerate(zip(integrals, functions, strict=True))
-    ]
-    search = SimpleNamespace(
-        integrals=(),
-        in_time=(),
-        in_iterates=(),
-        by_theorems=0,
-        profile=SimpleNamespace(nullities=(1,), period=2, agree=True),
-        reason="",
-    )
-    _, *lines = report._integral_lines(SimpleNamespace(integrals=search, relations=relations, structure=None))
-    assert [line.text for line in lines] == ["along orbits R0", "along orbits R1", *notes]
 
 
 @pytest.mark.parametrize(

@@ -246,21 +246,6 @@ def test_no_time():
     ]
 
 
-def test_the_json_has_the_documented_shape():
-    found = linear_symmetries(load("lorenz", {}).system).to_json()
-    assert found["status"] == "complete"
-    assert found["group"]["generators"] == [
-        {
-            "kind": "symmetry",
-            "S": [["-1", "0", "0"], ["0", "-1", "0"], ["0", "0", "1"]],
-            "r": ["0", "0", "0"],
-            "text": "(x, y, z) -> (-x, -y, z)",
-            "obvious": False,
-            "verdict": "proved",
-        }
-    ]
-
-
 @pytest.mark.parametrize("seconds", [0, -1, float("nan")])
 def test_wrong_use(seconds):
     with pytest.raises(InputError, match="expected a positive number"):

@@ -33,19 +33,6 @@ def test_the_order_is_that_of_the_method(method, order):
     assert math.log2(error(20) / error(40)) == pytest.approx(order, abs=0.1)
 
 
-def test_midpoint_of_a_linear_equation_is_its_cayley_transform():
-    x, _ = walk(GROWTH, "1/10", [1], 3, "midpoint")
-    assert x[:, 0] == pytest.approx([(1.1 / 0.9) ** k for k in range(4)], rel=1e-14)
-
-
-def test_midpoint_solves_its_equation():
-    system = load("lotka_volterra").system
-    x, _ = walk(system, "1/5", [1, "1/2"], 50, "midpoint")
-    y = (x[1:] + x[:-1]) / 2
-    field = np.array([[to_float(form(*map(exact, point.tolist()))) for form in system.rhs] for point in y])
-    assert np.abs(x[1:] - x[:-1] - 0.4 * field).max() < 1e-14
-
-
 def test_midpoint_conserves_quadratic_integrals_and_rk4_does_not():
     drift = {}
     for method in METHODS:

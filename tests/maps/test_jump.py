@@ -208,24 +208,6 @@ def test_over_q_every_kind_of_plane_has_its_iterates(names):
     assert [coordinates(found.value(start, n)) for n in range(20, 41)] == points[20:]
 
 
-@pytest.mark.parametrize("names", KINDS[:4], ids=" | ".join)
-def test_the_same_modulo_a_large_prime(names):
-    system, structure, start = side_by_side(*names)
-    points, _ = walked(system, "1/2", GF(2**61 - 1), start, 40)
-    found = Jump(structure, "1/2", GF(2**61 - 1))
-    assert [coordinates(found.value(start, n)) for n in range(41)] == points
-
-
-@pytest.mark.parametrize("n", quick([60, 100], [60]))
-def test_far_iterates_over_q_are_those_modulo_a_prime(n):
-    structure, system = structure_and_system("m = 3")
-    start, field = random_point(system.dim, 2), GF(2**89 - 1)
-    exact = coordinates(Jump(structure, "1/10", QQ).value(start, n))
-    modular = Jump(structure, "1/10", field).value(start, n)
-    assert tuple(map(field.convert, exact)) == coordinates(modular)
-    assert KahanMap(system, "1/10").step(exact) == coordinates(Jump(structure, "1/10", QQ).value(start, n + 1))
-
-
 # Singular orbits.
 
 

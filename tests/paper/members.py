@@ -63,11 +63,6 @@ def file(name: str) -> SystemFile:
     return SystemFile.from_member(member(name), name)
 
 
-def of_half_dimension(m: int) -> list[str]:
-    """The names of the members with this m."""
-    return [name for name in {**SPECTRA, **LARGE_SPECTRA} if name.startswith(f"m={m}")]
-
-
 @cache
 def point(name: str, number: int = 0) -> PaperObjects:
     """A random point of a member over a field GF(p) in which chi splits; the same one for all tests."""

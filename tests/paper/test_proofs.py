@@ -246,12 +246,6 @@ def test_where_the_roots_are_not_rational_the_witness_is_over_a_prime_field(exam
     assert finding.witness.field.startswith("GF(")
 
 
-def test_a_claim_that_is_nowhere_defined_is_undecided(examine):
-    finding = examine(fabricated(lambda o: [(o.inverse(o.x * o.x.transpose()), o.I)]))
-    assert finding.verdict is Verdict.UNDECIDED
-    assert "not defined" in finding.evidence.summary
-
-
 def test_a_claim_of_a_degree_that_primes_cannot_decide_is_undecided(examine):
     def function(o):
         value = o.x[0, 0]

@@ -19,9 +19,7 @@ from helpers import (
     agree,
     combine,
     encloses,
-    matrices,
     over_all_fields,
-    over_named_systems,
     rationals,
     some,
     systems,
@@ -109,11 +107,6 @@ def test_the_divergence_is_the_trace_of_the_jacobi_matrix(pair):
     assert evaluate(system.divergence, QQ, x) == trace(system.over(QQ).jacobian(x))
 
 
-@over_named_systems
-def test_a_system_is_divergence_free_exactly_when_its_divergence_is_zero(system):
-    assert system.is_divergence_free is (str(system.divergence) == "0")
-
-
 # Values.
 
 
@@ -141,41 +134,12 @@ def test_the_value_follows_from_the_coefficients(field, pair):
     assert agree(field, value, [field.convert(entry) for entry in by_hand])
 
 
-@given(triple=systems_with_points(count=2))
-def test_taylors_formula_of_second_order_is_exact(triple):
-    system, x, v = triple
-    local, column = system.over(QQ), QQ.column(v)
-    shifted = local.value([a + b for a, b in zip(x, v, strict=True)])
-    second = (local.hessian_times(v) * column).entries()
-    taylor = combine((1, local.value(x)), (1, (local.jacobian(x) * column).entries()), (fmpq(1, 2), second))
-    assert shifted == taylor
-
-
-@over_all_fields
-@some
-@given(triple=systems_with_points(entries=integers, count=2))
-def test_the_jacobi_matrix_changes_by_the_hessian_along_the_way(field, triple):
-    system, *pair = triple
-    local = system.over(field)
-    x, v = ([field.convert(entry) for entry in point] for point in pair)
-    with field.working():
-        end = [a + b for a, b in zip(x, v, strict=True)]
-        moved = local.jacobian(x) + local.hessian_times(v)
-    assert agree(field, local.jacobian(end).entries(), moved.entries())
-
-
 def test_the_jacobi_matrix_of_the_lorenz_system_is_the_one_found_by_hand():
     expected = fmpq_mat(3, 3, [fmpq(e) for e in (-10, 10, 0, 25, -1, -1, 2, 1)] + [fmpq(-8, 3)])
     assert LORENZ.over(QQ).jacobian((1, 2, 3)) == expected
 
 
 # The polarisation in Kahan's equation.
-
-
-@given(pair=systems_with_points())
-def test_the_polarisation_of_a_point_with_itself_is_the_value(pair):
-    system, x = pair
-    assert system.over(QQ).polarised(x, x) == system.over(QQ).value(x)
 
 
 @given(triple=systems_with_points(count=2))
@@ -274,13 +238,6 @@ def test_a_system_remembers_the_right_field_among_many():
 def test_a_scaled_system_has_scaled_values(pair, factor):
     system, x = pair
     assert system.scaled(factor).over(QQ).value(x) == combine((factor, system.over(QQ).value(x)))
-
-
-@given(pair=systems_with_points(dims=(2,)), matrix=matrices(2, 2))
-def test_a_transformed_system_has_transformed_values(pair, matrix):
-    system, x = pair
-    expected = (matrix * QQ.column(system.over(QQ).value(x))).entries()
-    assert list(system.transformed(matrix).over(QQ).value(x)) == list(expected)
 
 
 @given(system=systems())
