@@ -15,6 +15,7 @@ from kahanmaps.plots.recipe import Recipe
 from kahanmaps.reports.analysis_page import analysis_page
 from kahanmaps.reports.batch_page import batch_page
 from kahanmaps.reports.claims_page import claims_page
+from kahanmaps.reports.explore_page import explore_page
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.whole_files import write_whole
 
@@ -29,8 +30,9 @@ def report_html(
     left_out: Sequence[str] = (),
     by: Sequence[str] = (),
     values: Sequence[str] = (),
+    explore: bool = False,
 ) -> str:
-    """A page about what was found: one HTML text that needs no network and no JavaScript.
+    """A page about what was found: one HTML text that needs no network, and no JavaScript unless it is to `explore`.
 
     Args:
         found: an `Analysis`, the `Report` of `verify` or of a check, several of checks of one system, or a `Store`.
@@ -41,6 +43,7 @@ def report_html(
         left_out: sentences on what does not apply, to be told as notes.
         by: for a Store, the names to group its results by (default: the experiment).
         values: for a Store, the numbers to summarise, with a picture of their distributions (default: all, without).
+        explore: for an Analysis, a page on which eps and the start of an orbit are moved by sliders.
 
     Returns:
         The page, the same text for the same input (and the same version of matplotlib). Formulas are exact; those of
@@ -58,6 +61,10 @@ def report_html(
     """
     drawn = Pictures(pictures)
     title = (title or "").strip()
+    if explore:
+        if not isinstance(found, Analysis):
+            raise InputError(f"found {type(found).__name__}, expected an Analysis: it is what can be explored")
+        return explore_page(found, title or _title(found.file), Recipe(command, found.file.to_toml()))
     if isinstance(found, Analysis):
         return analysis_page(found, title or _title(found.file), Recipe(command, found.file.to_toml()), drawn)
     if isinstance(found, Store):
