@@ -6,7 +6,6 @@ All but json and npz are valid after every record, so that whatever ends an orbi
 from __future__ import annotations
 
 import json
-import re
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -95,20 +94,42 @@ def _record(step: int, x: Sequence[str], integrals: Sequence[str], values: Seque
 
 
 class Csv(Writer):
-    """Comma-separated values below a row of names; header and end are comment lines that start with #."""
+    """Comma-separated values below a row of names, and nothing else: header and end are in a file beside them.
+
+    `beside` is its path, None where the table goes to standard output; it is there from the beginning.
+    """
+
+    def __init__(
+        self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str], beside: str | None = None
+    ) -> None:
+        super().__init__(stream, columns, integrals)
+        self._beside = beside
 
     def header(self, header: dict[str, Any]) -> None:
         from kahanmaps.experiments.export import cell
 
-        self._line(_comment(header))
+        self._header = header
+        self._tell(None)
         self._line(",".join(["step", *self.columns, *(_quoted(cell(name)) for name in self.integrals)]))
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line(",".join([str(step), *x, *("" if value is None else value for value in values)]))
 
     def end(self, end: dict[str, Any]) -> None:
-        self._line(_comment(end))
         self.stream.flush()
+        self._tell(end)
+
+    def _tell(self, end: dict[str, Any] | None) -> None:
+        from kahanmaps.whole_files import write_whole
+
+        if self._beside is not None:
+            told = {**envelope("orbit"), "header": self._header, "end": end}
+            write_whole(self._beside, (json.dumps(told, indent=1) + "\n").encode())
+
+
+def meta_of(path: str) -> str:
+    """The file beside a .csv file that says what its table is of."""
+    return f"{path}.meta.json"
 
 
 def _eps(header: dict[str, Any]) -> str:
@@ -225,13 +246,6 @@ class Npz(Writer):
 
 def _bytes(value: Any) -> bytes:
     return b"" if value is None else value if isinstance(value, bytes) else str(value).encode()
-
-
-def _comment(data: dict[str, Any]) -> str:
-    """JSON behind a #. To a spreadsheet a comma in its texts begins a cell, and what it would run there is no formula
-    when that comma is spelt out; commas between the entries have a blank behind them.
-    """
-    return "# " + re.sub(r"([,;])(?=[=+\-@])", lambda mark: f"\\u{ord(mark[0]):04x}", json.dumps(data))
 
 
 def _quoted(name: str) -> str:
