@@ -26,7 +26,7 @@ from kahanmaps_cli.orbit_formats import Csv, Json, JsonLines, Npz, OutputFull, T
 from kahanmaps_cli.orbit_run import OrbitRun
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic, PointText, Steps
-from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.progress import Progress, TimeLeft, say
 from kahanmaps_cli.render import ending
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.streams import is_read
@@ -147,9 +147,10 @@ def command(
     ):
         writer = _writer(form, stream, run, output)
         writer.header(run.header())
+        left = TimeLeft(run.steps)
         try:
             for step, texts, values in run.points():
-                progress(f"step {step} of {run.steps}")
+                progress(f"step {step} of {run.steps}{left(step) if run.kind == 'exact' else ''}")
                 if texts is not None:
                     writer.point(step, texts, values)
                 if output is None and not is_read():
