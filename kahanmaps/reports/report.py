@@ -88,7 +88,7 @@ def write_report(path: str | Path, found: Any, **options: Any) -> None:
 
 
 def _title(file: SystemFile) -> str:
-    """What the catalogue calls it; for equations from the command line, which have no name, these, if they are short."""
+    """What the catalogue calls it; equations from the command line have no name and stand for themselves, if short."""
     if file.name == "inline" and file.is_quadratic:
         shown = ", ".join(
             f"{name}' = {format_polynomial(f)}" for name, f in zip(file.variables, file.system.rhs, strict=True)
