@@ -6,6 +6,7 @@ All but json and npz are valid after every record, so that whatever ends an orbi
 from __future__ import annotations
 
 import json
+import re
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -252,11 +253,34 @@ def _quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\n') else name
 
 
+def _approximated(text: str) -> str | None:
+    """A long exact number as a decimal and its digits, those above and those below; None for anything else.
+
+    >>> _approximated("-133567234372186342562607635605/125821231910581795318152718151")
+    '-1.06156 (30/30 digits)'
+    """
+    exact = re.fullmatch(r"(-?)([0-9]+)(?:/([0-9]+))?", text)
+    if exact is None:
+        return None
+    sign, above, below = exact[1], exact[2], exact[3] or "1"
+    # of numbers with thousands of digits Python would make no integer, nor a double
+    value = int(above[:18]) / int(below[:18])
+    power = len(above[18:]) - len(below[18:])
+    mantissa, exponent = f"{value:.5e}".split("e")
+    power += int(exponent)
+    shown = f"{float(mantissa) * 10**power:.6g}" if abs(power) < 5 else f"{float(mantissa):.6g}e{power:+03d}"
+    digits = f"{len(above)}/{len(below)}" if exact[3] else f"{len(above)}"
+    return f"{sign}{shown} ({digits} digits)"
+
+
 def _elided(text: str, width: int) -> str:
     if len(text) <= width:
         return text
     middle, plus_minus, radius = text.partition(" +/- ")
     if plus_minus:
         return f"{middle[: max(3, width - len(radius) - 6)]}.. +/-{radius}"
+    shown = _approximated(text)
+    if shown is not None and len(shown) <= width:
+        return shown
     keep = max(2, (width - 3) // 2)
     return f"{text[:keep]}...{text[-(width - 3 - keep) :]}"
