@@ -70,6 +70,37 @@ def test_nothing_is_fetched_and_nothing_complained_of(tmp_path, html):
     assert (asked, console) == ([], [])
 
 
+MOVING = """<script>document.addEventListener("DOMContentLoaded", () => {
+  const slider = document.getElementById("explore-NAME");
+  slider.value = VALUE;
+  slider.dispatchEvent(new Event("input"));
+});</script></body>"""
+
+
+def moved(html, name, value):
+    """The page, on which a slider is moved once it has loaded."""
+    return html.replace("</body>", MOVING.replace("NAME", name).replace("VALUE", str(value)))
+
+
+def cell(dom, name):
+    """What an element of the page says."""
+    return re.search(f'id="explore-{name}"[^>]*>(.*?)<', dom)[1]
+
+
+def test_sliders_move_eps_and_the_start_and_integrals_stay(tmp_path):
+    html = report_html(km.analyze(km.load("euler_top"), seconds=5), explore=True)
+    dom, asked, console = dumped(tmp_path, html)
+    assert (asked, console) == ([], [])
+    assert cell(dom, "status").startswith("800 steps, 0 points outside")
+    assert float(cell(dom, "change0")) < 1e-12
+    at_large_eps = dumped(tmp_path, moved(html, "eps", 0.25))[0]
+    assert cell(at_large_eps, "eps-value") == "0.25"
+    assert cell(at_large_eps, "first0") == cell(at_large_eps, "last0") != cell(dom, "first0")
+    elsewhere = dumped(tmp_path, moved(html, "x1", 0.5))[0]
+    assert cell(elsewhere, "x1-value") == "0.5"
+    assert cell(elsewhere, "first0") != cell(dom, "first0")
+
+
 @pytest.mark.slow
 def test_a_page_that_fetches_or_complains_is_seen(tmp_path):
     assert dumped(tmp_path, FETCHING)[1] == ["http://localhost:9/x.png"]

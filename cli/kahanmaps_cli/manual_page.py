@@ -33,6 +33,7 @@ _FILES = {
     "or the spec of a batch.",
     "*.db": "The results of a batch.",
     "*.jsonl, *.csv, *.npz, *.npy": "Orbits.",
+    "*.csv.meta.json": "What the orbit in the .csv file beside it is of, and how it ended.",
 }
 _WIDTH = 72
 

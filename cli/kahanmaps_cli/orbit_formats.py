@@ -95,20 +95,42 @@ def _record(step: int, x: Sequence[str], integrals: Sequence[str], values: Seque
 
 
 class Csv(Writer):
-    """Comma-separated values below a row of names; header and end are comment lines that start with #."""
+    """Comma-separated values below a row of names, and nothing else: header and end are in a file beside them.
+
+    `beside` is its path, None where the table goes to standard output; it is there from the beginning.
+    """
+
+    def __init__(
+        self, stream: IO[Any], columns: Sequence[str], integrals: Sequence[str], beside: str | None = None
+    ) -> None:
+        super().__init__(stream, columns, integrals)
+        self._beside = beside
 
     def header(self, header: dict[str, Any]) -> None:
         from kahanmaps.experiments.export import cell
 
-        self._line(_comment(header))
+        self._header = header
+        self._tell(None)
         self._line(",".join(["step", *self.columns, *(_quoted(cell(name)) for name in self.integrals)]))
 
     def point(self, step: int, x: Sequence[str], values: Sequence[str | None]) -> None:
         self._line(",".join([str(step), *x, *("" if value is None else value for value in values)]))
 
     def end(self, end: dict[str, Any]) -> None:
-        self._line(_comment(end))
         self.stream.flush()
+        self._tell(end)
+
+    def _tell(self, end: dict[str, Any] | None) -> None:
+        from kahanmaps.whole_files import write_whole
+
+        if self._beside is not None:
+            told = {**envelope("orbit"), "header": self._header, "end": end}
+            write_whole(self._beside, (json.dumps(told, indent=1) + "\n").encode())
+
+
+def meta_of(path: str) -> str:
+    """The file beside a .csv file that says what its table is of."""
+    return f"{path}.meta.json"
 
 
 def _eps(header: dict[str, Any]) -> str:
@@ -227,15 +249,28 @@ def _bytes(value: Any) -> bytes:
     return b"" if value is None else value if isinstance(value, bytes) else str(value).encode()
 
 
-def _comment(data: dict[str, Any]) -> str:
-    """JSON behind a #. To a spreadsheet a comma in its texts begins a cell, and what it would run there is no formula
-    when that comma is spelt out; commas between the entries have a blank behind them.
-    """
-    return "# " + re.sub(r"([,;])(?=[=+\-@])", lambda mark: f"\\u{ord(mark[0]):04x}", json.dumps(data))
-
-
 def _quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\n') else name
+
+
+def _approximated(text: str) -> str | None:
+    """A long exact number as a decimal and its digits, those above and those below; None for anything else.
+
+    >>> _approximated("-133567234372186342562607635605/125821231910581795318152718151")
+    '-1.06156 (30/30 digits)'
+    """
+    exact = re.fullmatch(r"(-?)([0-9]+)(?:/([0-9]+))?", text)
+    if exact is None:
+        return None
+    sign, above, below = exact[1], exact[2], exact[3] or "1"
+    # of numbers with thousands of digits Python would make no integer, nor a double
+    value = int(above[:18]) / int(below[:18])
+    power = len(above[18:]) - len(below[18:])
+    mantissa, exponent = f"{value:.5e}".split("e")
+    power += int(exponent)
+    shown = f"{float(mantissa) * 10**power:.6g}" if abs(power) < 5 else f"{float(mantissa):.6g}e{power:+03d}"
+    digits = f"{len(above)}/{len(below)}" if exact[3] else f"{len(above)}"
+    return f"{sign}{shown} ({digits} digits)"
 
 
 def _elided(text: str, width: int) -> str:
@@ -244,5 +279,8 @@ def _elided(text: str, width: int) -> str:
     middle, plus_minus, radius = text.partition(" +/- ")
     if plus_minus:
         return f"{middle[: max(3, width - len(radius) - 6)]}.. +/-{radius}"
+    shown = _approximated(text)
+    if shown is not None and len(shown) <= width:
+        return shown
     keep = max(2, (width - 3) // 2)
     return f"{text[:keep]}...{text[-(width - 3 - keep) :]}"

@@ -6,17 +6,20 @@ has to listen: a standard error that cannot be written to changes neither the wo
 
 from __future__ import annotations
 
+import math
 import os
 import shlex
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from types import TracebackType
 
 import click
 
 from kahanmaps.errors import printable
+
+_FIRST_TOLD = 16  # step; what the first ones take says nothing
 
 
 def say(message: str) -> None:
@@ -74,6 +77,36 @@ class Progress:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.clear()
+
+
+class TimeLeft:
+    """How long steps still take that become dearer: what n of them took grew like a power of n, from n/2 to n.
+
+    Heights that grow like n^2 make it a power between 3 and 4; where they grow faster the time is a lower bound.
+
+    >>> clock = iter([0.0, 1.0, 8.0])
+    >>> left = TimeLeft(64, lambda: next(clock))
+    >>> left(16), left(32)
+    ('', ', at least 56 s left')
+    """
+
+    def __init__(self, steps: int, clock: Callable[[], float] = time.monotonic) -> None:
+        self._steps, self._clock = steps, clock
+        self._start = clock()
+        self._before, self._last = (0, 0.0), (0, 0.0)
+
+    def __call__(self, step: int) -> str:
+        """Words for behind the sentence of progress; empty where it is too early to tell."""
+        if step < _FIRST_TOLD or step >= self._steps:
+            return ""
+        spent = self._clock() - self._start
+        if step >= 2 * self._last[0]:
+            self._before, self._last = self._last, (step, spent)
+        n, t = self._before
+        if t <= 0 or spent <= t:
+            return ""
+        power = max(1.0, math.log(spent / t) / math.log(step / n))
+        return f", at least {spent * ((self._steps / step) ** power - 1):.0f} s left"
 
 
 def _width() -> int:

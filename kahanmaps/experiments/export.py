@@ -26,6 +26,7 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from fractions import Fraction
 from importlib import import_module
 from io import StringIO
 from typing import IO, Any, NamedTuple
@@ -192,7 +193,8 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
     it is complete.
 
     A column is int64, bool or float64 if all of its values are, and text otherwise. Integers next to floats count as
-    floats up to 2^53, so that no digit is lost. "Same bytes" takes the same version of pyarrow too.
+    floats up to 2^53, so that no digit is lost. Beside a column NAME of text whose values are all exact numbers such as
+    7/3 there is NAME.number with the nearest doubles. "Same bytes" takes the same version of pyarrow too.
     """
     try:
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
@@ -204,9 +206,12 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
     types = {"int64": arrow.int64(), "bool": arrow.bool_(), "float64": arrow.float64(), "string": arrow.string()}
     metadata = {"convention": CONVENTION} if stable else {"convention": CONVENTION, "version": __version__}
     fields = [arrow.field(plain(name), types[kind]) for name, kind in zip(layout.names, layout.types, strict=True)]
+    beside = [place for place, is_number in enumerate(layout.numbers) if is_number]
+    fields += [arrow.field(f"{plain(layout.names[place])}.number", types["float64"]) for place in beside]
     schema = arrow.schema(fields, metadata=metadata)
     with whole_file(path) as stream, parquet.ParquetWriter(stream, schema) as writer:
         for columns in _row_groups(layout, rows()):
+            columns += [list(map(_double, columns[place])) for place in beside]
             arrays = [arrow.array(values, field.type) for values, field in zip(columns, fields, strict=True)]
             writer.write_table(arrow.Table.from_arrays(arrays, schema=schema), row_group_size=_ROW_GROUP)
 
@@ -230,6 +235,12 @@ class _Layout:
         self.types = [
             _type(kinds[column]) if isinstance(column, Entry) else _FIXED.get(column, "string") for column in columns
         ]
+        self.numbers = [
+            isinstance(column, Entry)
+            and {"number"} <= kinds[column] <= {*_NUMBERS, "none"}
+            and f"{name}.number" not in self.names
+            for column, name in zip(columns, self.names, strict=True)
+        ]
         self._place = {entry: place for place, entry in enumerate(columns) if isinstance(entry, Entry)}
         self._fixed = [(place, name) for place, name in enumerate(columns) if isinstance(name, str)]
 
@@ -251,8 +262,10 @@ _HOLDS = {
     "bool": {"bool", "none"},
     "int64": {"small", "int64", "none"},
     "float64": {"small", "float64", "none"},
-    "string": {"bool", "small", "int64", "float64", "text", "none"},
+    "string": {"bool", "small", "int64", "float64", "number", "text", "none"},
 }
+_LONGEST_NUMBER = 2_000  # characters of a text that gets a double beside it
+_NUMBERS = {"small", "int64", "float64", "number"}
 _FIXED = {"number": "int64", "seconds": "float64", "peak_memory": "int64"}
 
 
@@ -263,7 +276,17 @@ def _kind(value: Any) -> str:
         return "small" if abs(value) <= 2**53 else "int64" if -(2**63) <= value < 2**63 else "text"
     if isinstance(value, float):
         return "float64"
+    if isinstance(value, str) and len(value) <= _LONGEST_NUMBER and NUMBER.fullmatch(value):
+        return "number"
     return "none" if value is None else "text"
+
+
+def _double(text: str | None) -> float | None:
+    """The double nearest to an exact number; None where it is beyond their range."""
+    try:
+        return None if not text else float(Fraction(text))
+    except OverflowError:
+        return None
 
 
 def _type(kinds: Set[str]) -> str:

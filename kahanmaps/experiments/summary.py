@@ -150,8 +150,8 @@ class Summary(Displayed):
         return [self.counts(digits), *(table for table in (self.numbers(digits), self.flags(digits)) if table.rows)]
 
     def lines(self) -> Iterator[str]:
-        """The tables, tabs between the cells and an empty line between the tables; nothing is shortened."""
-        for place, table in enumerate(self.tables()):
+        """The tables, tabs between the cells and an empty line between the tables; floats have six digits."""
+        for place, table in enumerate(self.tables(6)):
             if place:
                 yield ""
             yield from table.lines()

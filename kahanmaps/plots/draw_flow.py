@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ARROWS = "#C4C4C4"
-_SEPARATRIX = {"color": "#666666", "linewidth": 0.7, "linestyle": (0, (6, 2))}
+_SEPARATRIX = {"color": "#666666", "linewidth": 0.7, "linestyle": (0, (6, 2, 1, 2))}
 _SOLUTION = {"color": "#888888", "linewidth": 0.5}
 _FILLED: dict[str, Any] = {"color": "black", "markeredgecolor": "white", "markeredgewidth": 0.5}
 _OPEN: dict[str, Any] = {"markeredgecolor": "black", "markerfacecolor": "white", "markeredgewidth": 0.8}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,7 +47,10 @@ def draw_portrait(found: Portrait, style: Style, *, lines: bool = False, equal: 
         axes: Any = figure.subplots(subplot_kw={"projection": "3d"} if space else {})
         inside = _inside(found.points, found.window) if space else found.points
         if found.flow is not None:
-            draw_flow(figure, axes, found.flow, style)
+            flow = found.flow
+            if space:
+                flow = replace(flow, solutions=tuple(_inside(x[:, None], found.window)[:, 0] for x in flow.solutions))
+            draw_flow(figure, axes, flow, style)
         if found.levels is not None:
             _draw_levels(axes, found)
         if found.euler is not None:

@@ -17,7 +17,7 @@ from kahanmaps.plots.trajectories import VectorField
 from kahanmaps.plots.windows import Window
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-_ARROWS = 21  # along the longer side
+_ARROWS = 21  # along each side
 _FINE = 400  # steps of a curve across the window
 _LONGEST = 6000  # steps: fifteen times across
 _SLOW = 1e-4  # of the largest speed in the window: near an equilibrium curves stop

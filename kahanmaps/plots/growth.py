@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 SCALES = ("linear", "log", "loglog")
 _MOST_SYSTEMS = len(COLOURS)
 _LONGEST_FORMULA = 24
+_MARKS = 30  # of one orbit
 _ASPECT = 0.62  # of the axes
 
 
@@ -201,7 +202,7 @@ def _draw_heights_of(axes: Axes, curves: Sequence[HeightCurve], k: int, from_one
     first = 1 if from_one else 0
     size = 3.2 if len(curves) <= 3 and max(len(curve.steps) for curve in curves) <= 80 else 2
     for curve in curves:
-        chosen = curve.steps >= first
+        chosen = _spaced(curve.steps, first, from_one)
         axes.plot(
             curve.steps[chosen],
             curve.bits[chosen],
@@ -216,6 +217,16 @@ def _draw_heights_of(axes: Axes, curves: Sequence[HeightCurve], k: int, from_one
             axes.plot(n, fit(n), color=COLOURS[k], linestyle=LINES[k], linewidth=0.7, zorder=1.5)
     key = {"color": COLOURS[k], "marker": MARKS[k], "linestyle": LINES[k], "linewidth": 0.7, **_hollow(3.2)}
     axes.plot([], [], label=_height_label(curves), **key)
+
+
+def _spaced(steps: Any, first: int, logarithmic: bool) -> Any:
+    """Which of the steps get a mark: as many as stand apart along the axis, the first and the last among them."""
+    rows = np.flatnonzero(steps >= first)
+    if len(rows) <= _MARKS:
+        return rows
+    held = steps[rows].astype(np.float64)
+    wanted = np.geomspace(held[0], held[-1], _MARKS) if logarithmic else np.linspace(held[0], held[-1], _MARKS)
+    return rows[np.unique(np.abs(held[:, None] - wanted).argmin(axis=0))]
 
 
 def _hollow(size: float) -> dict[str, Any]:

@@ -15,7 +15,9 @@ from kahanmaps.maps.floats.doubles import FloatArray
 MOST = 2000  # points: distances are taken pair by pair, and a curve through so many looks smooth
 _FEWEST = 8
 _OF_DEGREE_2 = 0.9  # of the points on a curve; of those of a cloud it is half
-_LONG = 8.0  # a gap, in lengths of a usual line: an orbit that has not filled its curve
+# A gap in an orbit that has not filled its curve: in lengths of a usual line, and in diameters of the orbit. Points
+# that come in bunches, where the rotation is nearly rational, have long lines as well, but not so long ones.
+_LONG, _WIDE = 8.0, 0.2
 
 
 def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
@@ -51,4 +53,5 @@ def neighbours(points: FloatArray) -> NDArray[np.int64] | None:
     if (degrees == 2).mean() < _OF_DEGREE_2:
         return None
     lengths = np.linalg.norm(held[pairs[:, 0]] - held[pairs[:, 1]], axis=1)
-    return np.asarray(rows[pairs[lengths <= _LONG * np.median(lengths)]], dtype=np.int64)
+    longest = max(_LONG * float(np.median(lengths)), _WIDE * float(np.linalg.norm(np.ptp(held, axis=0))))
+    return np.asarray(rows[pairs[lengths <= longest]], dtype=np.int64)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from kahanmaps.display import markup
 from kahanmaps.display.experiments import status_table, table_html
 from kahanmaps.errors import counted
+from kahanmaps.experiments.records import Outcome
 from kahanmaps.experiments.summary import summarise
 from kahanmaps.plots.batch import draw_batch
 from kahanmaps.reports.page import Section, page, text, wide
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
     from kahanmaps.plots.recipe import Recipe
 
 _ROWS = 400
+_EXCEPTIONS = 100
+_KEY = 12  # letters of a key, enough to find its task
+_USUAL = ("proved", "supported", None)
 
 
 def batch_page(
@@ -50,9 +55,34 @@ def batch_page(
             "Distributions",
             _figure("distributions-figure", spread, summary, values, about, pictures) if values else "",
         ),
+        Section("exceptions", "Exceptional tasks", _exceptions(store)),
         Section("experiments", "The experiments", definitions),
     ]
     return page(title, lead, sections, pictures, recipe)
+
+
+def _exceptions(store: Store) -> str:
+    """The tasks that failed, were refuted or stayed undecided, the first hundred of them; empty where there is none."""
+    found = (
+        (row.experiment, row.number, row.task, row.record)
+        for row in store.rows()
+        if row.record is not None and (row.record.outcome != Outcome.OK or row.record.verdict not in _USUAL)
+    )
+    rows = [
+        (
+            text(experiment),
+            str(number),
+            f"<code>{text(task.key[:_KEY])}</code>",
+            markup.verdict(record.verdict or record.outcome),
+            text(record.message.splitlines()[0] if record.message else ""),
+        )
+        for experiment, number, task, record in islice(found, _EXCEPTIONS)
+    ]
+    if not rows:
+        return ""
+    more = f"<p>… and {rest} more</p>" if (rest := sum(1 for _ in found)) else ""
+    about = "<p>What <code>kahanmaps batch show KEY --db FILE</code> tells all about.</p>"
+    return about + wide(markup.table(["experiment", "number", "key", "what became of it", "message"], rows)) + more
 
 
 def _figure(name: str, what: str, summary: Summary, values: Sequence[str], tables: str, pictures: Pictures) -> str:

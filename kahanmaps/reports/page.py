@@ -1,6 +1,7 @@
 """A page: a title, what it is about, sections with ids that stay the same, and how to make it again.
 
-The page is one file. It asks nothing of a network, it has no JavaScript, and the same input gives the same bytes.
+The page is one file. It asks nothing of a network, it has no JavaScript (but explore_page.py), and the same input gives
+the same bytes.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Report
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
@@ -15,8 +16,11 @@ from kahanmaps.plots.recipe import Recipe
 from kahanmaps.reports.analysis_page import analysis_page
 from kahanmaps.reports.batch_page import batch_page
 from kahanmaps.reports.claims_page import claims_page
+from kahanmaps.reports.explore_page import explore_page
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.whole_files import write_whole
+
+_LONGEST_TITLE = 120
 
 
 def report_html(
@@ -29,8 +33,9 @@ def report_html(
     left_out: Sequence[str] = (),
     by: Sequence[str] = (),
     values: Sequence[str] = (),
+    explore: bool = False,
 ) -> str:
-    """A page about what was found: one HTML text that needs no network and no JavaScript.
+    """A page about what was found: one HTML text that needs no network, and no JavaScript unless it is to `explore`.
 
     Args:
         found: an `Analysis`, the `Report` of `verify` or of a check, several of checks of one system, or a `Store`.
@@ -41,6 +46,7 @@ def report_html(
         left_out: sentences on what does not apply, to be told as notes.
         by: for a Store, the names to group its results by (default: the experiment).
         values: for a Store, the numbers to summarise, with a picture of their distributions (default: all, without).
+        explore: for an Analysis, a page on which eps and the start of an orbit are moved by sliders.
 
     Returns:
         The page, the same text for the same input (and the same version of matplotlib). Formulas are exact; those of
@@ -58,6 +64,10 @@ def report_html(
     """
     drawn = Pictures(pictures)
     title = (title or "").strip()
+    if explore:
+        if not isinstance(found, Analysis):
+            raise InputError(f"found {type(found).__name__}, expected an Analysis: it is what can be explored")
+        return explore_page(found, title or _title(found.file), Recipe(command, found.file.to_toml()))
     if isinstance(found, Analysis):
         return analysis_page(found, title or _title(found.file), Recipe(command, found.file.to_toml()), drawn)
     if isinstance(found, Store):
@@ -78,4 +88,10 @@ def write_report(path: str | Path, found: Any, **options: Any) -> None:
 
 
 def _title(file: SystemFile) -> str:
+    """What the catalogue calls it; equations from the command line have no name and stand for themselves, if short."""
+    if file.name == "inline" and file.is_quadratic:
+        shown = ", ".join(
+            f"{name}' = {format_polynomial(f)}" for name, f in zip(file.variables, file.system.rhs, strict=True)
+        )
+        return shown if len(shown) <= _LONGEST_TITLE else file.name
     return str(file.catalog.get("title", "")) or file.name

@@ -201,7 +201,7 @@ def test_csv_is_read_by_the_csv_module(kahanmaps):
     command = f"{TOP} --steps 2 --integral 'a, \"b\"=x1*x2' --integral p=1/(x1-1)"
     lines = kahanmaps(f"{command} --format csv").out.splitlines()
     records = kahanmaps(f"{command} --format jsonl").records
-    table = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    table = list(csv.DictReader(lines))
     for row, record in zip(table, records[1:-1], strict=True):
         assert [row["step"], row["x1"], row["x2"], row["x3"]] == [str(record["step"]), *record["x"]]
         assert row['a, "b"'] == record["integrals"]['a, "b"']
@@ -281,6 +281,17 @@ def test_the_name_of_the_file_says_the_format(kahanmaps, tmp_path, form):
     assert (tmp_path / f"orbit.{form}").read_text() == kahanmaps(f"{TOP} --steps 2 --format {form}").out
 
 
+def test_what_a_csv_file_is_of_stands_beside_it(kahanmaps, tmp_path):
+    path = tmp_path / "orbit.CSV"
+    kahanmaps(f"{TOP} --steps 2 -o", path)
+    header, *points, end = kahanmaps(f"{TOP} --steps 2 --format jsonl").records
+    told = json.loads((tmp_path / "orbit.CSV.meta.json").read_text())
+    assert {"record": "header", **told["header"]} == header
+    assert {"record": "end", **told["end"]} == end
+    assert len(path.read_text().splitlines()) == 1 + len(points)
+    assert kahanmaps("plot portrait --format text --from", path).status == 0
+
+
 # Talk
 
 
@@ -312,7 +323,7 @@ def on_terminal():
 
 
 def test_long_numbers_are_shortened_on_a_terminal(on_terminal):
-    assert "..." in on_terminal.out
+    assert "(72/72 digits)" in on_terminal.out
     assert max(len(line) for line in on_terminal.out.splitlines()) <= 100
 
 

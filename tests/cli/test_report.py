@@ -26,6 +26,10 @@ def test_a_file_is_written_and_told(kahanmaps, tmp_path):
     require_sound(path.read_text())
 
 
+def test_the_title_of_an_inline_system_are_its_equations(kahanmaps):
+    assert require_sound(kahanmaps(SMALL).out).headings[0] == (1, "x' = x*y, y' = -x^2")
+
+
 def test_a_title_parameters_and_eps_are_taken_over(kahanmaps):
     page = require_sound(kahanmaps("report lotka_volterra -p a=2 --eps 1/10 --no-pictures --title 'My map'").out)
     assert page.headings[0] == (1, "My map")

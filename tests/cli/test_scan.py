@@ -103,10 +103,14 @@ def test_the_time_is_shared_by_everything_and_what_is_left_out_is_said(kahanmaps
     assert "stopped early" in outcome.err
 
 
-def test_ctrl_c_ends_it_with_what_was_seen():
+def test_ctrl_c_ends_it_with_what_was_seen(tmp_path):
+    kept = tmp_path / "kept.jsonl"
     line = [*COMMAND, "scan", "henon_heiles", "--over", "c", "--primes", "7,8101,8111,8117", "--terms", "7"]
+    line += ["--keep", str(kept)]
     process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ})
-    time.sleep(6)
+    while not kept.exists() or kept.read_bytes().count(b"\n") < 2:  # the head, and the members modulo 7
+        time.sleep(0.01)
+        assert process.poll() is None
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130

@@ -309,10 +309,25 @@ def test_parquet_has_the_columns_of_the_csv_file(parquet):
     rows = [row(0, result={"seed": 1, "a": {"b": 2}}), row(1, FILE), Row("e", 2, FAMILY, None)]
     for stable in (False, True):
         found = parquet(rows, stable=stable).read()
+        beside = [name for name in found.column_names if name.endswith(".number")]
+        assert beside == ["parameters.a.number", "eps.number"]
+        assert found["parameters.a.number"].to_pylist() == [None, 0.5, None]
+        found = found.drop_columns(beside)
         assert found.column_names == columns(rows, stable=stable)
         assert [{name: cell(value) for name, value in line.items()} for line in found.to_pylist()] == table(
             rows, stable=stable
         )
+
+
+def test_numbers_of_parquet_stand_beside_the_exact_text(parquet):
+    values = ["7/3", None, 2, f"1{'0' * 400}", "-1e5"]
+    found = parquet([row(number, result={"x": value}) for number, value in enumerate(values)]).read()
+    assert found["x"].to_pylist() == ["7/3", None, "2", f"1{'0' * 400}", "-1e5"]
+    assert found["x.number"].to_pylist() == [7 / 3, None, 2.0, None, -1e5]
+    found = parquet([row(0, result={"x": "7/3"}), row(1, result={"x": "more"})]).read()
+    assert "x.number" not in found.column_names
+    found = parquet([row(0, result={"x": "7/3", "x.number": 5})]).read()
+    assert found["x.number"].to_pylist() == [5]
 
 
 def test_without_pyarrow_the_error_says_what_to_install(tmp_path, monkeypatch):

@@ -78,6 +78,12 @@ def test_an_orbit_that_has_not_come_round_has_two_ends():
     assert len(neighbours(np.stack([np.cos(turn), np.sin(turn)], axis=1))) == 49
 
 
+def test_bunches_of_a_nearly_rational_rotation_are_joined_to_one_curve():
+    turn = (2 * np.pi / 20 + 1e-4) * np.arange(200)
+    pairs = neighbours(np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    assert np.bincount(pairs.ravel()).tolist() == [2] * 200
+
+
 def test_a_cloud_has_no_curve():
     assert neighbours(np.random.default_rng(1).uniform(size=(300, 2))) is None
     assert neighbours(np.full((50, 2), np.nan)) is None

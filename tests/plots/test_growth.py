@@ -115,8 +115,11 @@ def survey():
 
 def test_marks_are_the_heights(survey):
     axes = draw_heights(survey).axes[0]
-    drawn = [line.get_ydata().tolist() for line in marks(axes)]
-    assert drawn == [list(orbit.growth.heights[1:]) for orbit in survey.orbits]  # from step 1 on: loglog
+    for line, orbit in zip(marks(axes), survey.orbits, strict=True):  # from step 1 on: loglog
+        steps = line.get_xdata().tolist()
+        assert line.get_ydata().tolist() == [orbit.growth.heights[step] for step in steps]
+        assert (steps[0], steps[-1]) == (1, 40)
+        assert steps[-1] - steps[-2] > 2, "they stand apart"
 
 
 def test_the_fit_has_the_constant_of_the_library(survey):

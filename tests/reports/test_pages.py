@@ -240,6 +240,19 @@ def test_numbers_of_a_batch_that_are_asked_for_are_drawn(tmp_path):
             report_html(store, values=["nothing"])
 
 
+def test_the_tasks_of_a_batch_that_failed_or_were_refuted_are_listed(tmp_path):
+    path = planned(tmp_path / "a.db", 1, 2, 3, records=[ok(1, 7, "proved"), ok(2, 8, "refuted")])
+    with km.Store.open(path, readonly=True) as store:
+        keys = {row.record.verdict: row.task.key[:12] for row in store.rows()}
+        page = require_sound(report_html(store, pictures=False))
+    assert "exceptions" in page.ids
+    assert keys["refuted"] in page.text
+    assert keys["proved"] not in page.text
+    path = planned(tmp_path / "b.db", 1, records=[ok(1, 7, "proved")])
+    with km.Store.open(path, readonly=True) as store:
+        assert "exceptions" not in require_sound(report_html(store, pictures=False)).ids
+
+
 @pytest.mark.parametrize("wrong", [[], "text", [1], 7.0])
 def test_other_things_are_refused(wrong):
     with pytest.raises((InputError, TypeError), match=r"expected an Analysis|not iterable"):

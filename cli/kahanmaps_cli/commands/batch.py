@@ -190,7 +190,7 @@ def export(db: str, form: str | None, output: str | None, stable: bool, only: tu
 
     if form is None:
         endings = {".csv": "csv", ".jsonl": "jsonl", ".parquet": "parquet"}
-        form = endings.get(Path(output).suffix) if output else None
+        form = endings.get(Path(output).suffix.lower()) if output else None
     if form is None:
         raise click.UsageError("missing --csv, --jsonl or --parquet")
     if form == "parquet" and output in (None, "-"):

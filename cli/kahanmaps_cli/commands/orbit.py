@@ -22,11 +22,11 @@ from kahanmaps_cli.options import (
     quiet_option,
     system_options,
 )
-from kahanmaps_cli.orbit_formats import Csv, Json, JsonLines, Npz, OutputFull, Text, Writer
+from kahanmaps_cli.orbit_formats import Csv, Json, JsonLines, Npz, OutputFull, Text, Writer, meta_of
 from kahanmaps_cli.orbit_run import OrbitRun
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic, PointText, Steps
-from kahanmaps_cli.progress import Progress, say
+from kahanmaps_cli.progress import Progress, TimeLeft, say
 from kahanmaps_cli.render import ending
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.streams import is_read
@@ -145,11 +145,12 @@ def command(
         interruptible(run.walk.interrupt),
         Progress(hidden) as progress,
     ):
-        writer = _writer(form, stream, run, to_file=output is not None)
+        writer = _writer(form, stream, run, output)
         writer.header(run.header())
+        left = TimeLeft(run.steps)
         try:
             for step, texts, values in run.points():
-                progress(f"step {step} of {run.steps}")
+                progress(f"step {step} of {run.steps}{left(step) if run.kind == 'exact' else ''}")
                 if texts is not None:
                     writer.point(step, texts, values)
                 if output is None and not is_read():
@@ -212,22 +213,22 @@ def _end_record(end: OrbitEnd, run: OrbitRun) -> dict[str, Any]:
     return record
 
 
-def _writer(form: str, stream: IO[Any], run: OrbitRun, to_file: bool) -> Writer:
+def _writer(form: str, stream: IO[Any], run: OrbitRun, output: str | None) -> Writer:
     columns, integrals = run.file.variables, [name for name, _ in run.columns]
     if form == "jsonl":
         return JsonLines(stream, columns, integrals)
     if form == "json":
         return Json(stream, columns, integrals)
     if form == "csv":
-        return Csv(stream, columns, integrals)
+        return Csv(stream, columns, integrals, None if output is None else meta_of(output))
     if form == "npz":
         return Npz(stream, columns, integrals, run.storage)
-    on_terminal = not to_file and sys.stdout.isatty()
+    on_terminal = output is None and sys.stdout.isatty()
     return Text(stream, columns, integrals, get_terminal_size().columns if on_terminal else None)
 
 
 def _form_from_name(output: str | None) -> str:
-    suffix = "" if output is None else Path(output).suffix
+    suffix = "" if output is None else Path(output).suffix.lower()
     if suffix in _TEXT:
         return "text"
     if suffix[1:] not in _FORMATS:

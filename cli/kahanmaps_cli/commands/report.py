@@ -33,6 +33,7 @@ _DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
 _ONLY_FOR = {
     "symbolic": ("analyze",),
     "seconds": ("analyze",),
+    "explore": ("analyze",),
     "sections": ("verify",),
     **dict.fromkeys(_DRAWN, ("verify", "checks")),
 }
@@ -48,6 +49,7 @@ _ONLY_FOR = {
     show_default=True,
     help="What the page is made of.",
 )
+@click.option("--explore", is_flag=True, help="A page with sliders: eps and the start of an orbit move.")
 @click.option("--db", metavar="BATCH.db", help="Instead: the results of a batch.")
 @click.option("--by", metavar="NAME,...", help="With --db: group results by these (default: experiment).")
 @click.option("--value", "values", multiple=True, metavar="NAME", help="With --db: only this number, with a picture.")
@@ -75,12 +77,14 @@ def command(system: str | None, **options: Any) -> int:
     \b
       kahanmaps report euler_top -o top.html
       kahanmaps report henon_heiles -p c=-6 --seconds 30 -o hh.html
+      kahanmaps report euler_top --explore -o explore.html
       kahanmaps report --from verify --m 2 -o paper.html
       kahanmaps report --db first.db --by m -o batch.html
 
     analyze: what the map preserves and how it grows, the verdict first. verify: the paper's claims for a member of the
     family, section by section. checks: the four checks, those that apply. The page is one file with its pictures
-    inside; it needs no network and no JavaScript, and says how it was made.
+    inside; it needs no network and no JavaScript, and says how it was made. Only --explore has JavaScript in it: eps
+    and the start move by sliders, and the exact verdict stands beside the picture of the orbit.
 
     Exit status: as the command that the page is made of, and 0 for a batch.
     """
@@ -183,7 +187,7 @@ def _analysis(system: str | None, options: dict[str, Any], progress: Progress, h
     file = load_system(system, options)
     found = analyze(file, symbols=symbols, eps=eps, seconds=options["seconds"], seed=options["seed"], progress=progress)
     progress("the page")
-    return report_html(found, **how), 3 if found.conclusion.kind == "undecided" else 0
+    return report_html(found, explore=options["explore"], **how), 3 if found.conclusion.kind == "undecided" else 0
 
 
 def _settings(options: dict[str, Any], progress: Progress) -> Settings:

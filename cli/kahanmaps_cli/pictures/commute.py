@@ -8,7 +8,14 @@ import click
 
 from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_system
 from kahanmaps_cli.params import ExactNumber, PointText
-from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
+from kahanmaps_cli.pictures.output import (
+    PictureCommand,
+    deliver,
+    goes_to_terminal,
+    picture_options,
+    require_output,
+    style_from,
+)
 from kahanmaps_cli.pictures.variables import two_variables
 from kahanmaps_cli.progress import Progress, say
 
@@ -68,7 +75,8 @@ def command(system: str | None, other: str | None, **options: Any) -> int:
             captions = [f"f = {file.name}, g = {second.name}"]
             pairs = [pair_of_systems(file, second, eps, options["eps2"])]
         found = [squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
-        figure = draw_squares(found, style_from(options), chosen, captions)
+        below = goes_to_terminal(options)  # side by side, two panels of it are too coarse
+        figure = draw_squares(found, style_from(options), chosen, captions, below=below)
     if not options["quiet"]:
         for square in found:
             names = captions[0] if captions else " and ".join(square.pair.names)

@@ -96,6 +96,11 @@ def require_output(options: dict[str, Any]) -> None:
         format_of(options["output"], options["kind"])
 
 
+def goes_to_terminal(options: dict[str, Any]) -> bool:
+    """Whether the picture is made of characters."""
+    return options["kind"] == "text" or (options["kind"] is None and options["output"] == "-")
+
+
 def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = None) -> None:
     """Write the figure to its file, or draw it in the terminal; the options are those of `picture_options`."""
     from kahanmaps.plots.figures import drawing, format_of, picture_bytes, plain, wrapped
@@ -110,7 +115,7 @@ def deliver(figure: Figure, options: dict[str, Any], file: SystemFile | None = N
             figure.suptitle(
                 plain(wrapped(printable(options["title"]), 72 * figure.get_size_inches()[0], size)), fontsize=size
             )
-    if kind == "text" or (kind is None and path == "-"):
+    if goes_to_terminal(options):
         _draw_in_terminal(figure, style, path)
         return
     kind = format_of(path, kind)

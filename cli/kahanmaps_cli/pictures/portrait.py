@@ -90,7 +90,7 @@ def command(system: str | None, **options: Any) -> int:
 
     In the plane of a planar system grey arrows show the direction of the flow,
     marks its equilibria, and dashes the separatrices of saddles; rings or marks
-    are starts. With --levels there are no arrows.
+    are starts. With --levels or --euler there are no arrows.
 
     Without starts sixteen are chosen around an equilibrium. Without --axes the
     plane is drawn that the points fill most. Standard error says what was chosen,

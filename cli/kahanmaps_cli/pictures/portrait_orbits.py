@@ -251,7 +251,7 @@ class Orbits:
         functions = [axis for axis in axes if not isinstance(axis, str)]
         variables = [axis.variable for axis in functions if axis.variable is not None]
         found = plane_flow(self.file.system, [] if options["no_field"] else variables, window)
-        if options["levels"]:
+        if options["levels"] or options["euler"]:  # arrows among many grey lines tell nothing
             found = replace(found, places=found.places[:0], arrows=found.arrows[:0])
         if options["flow"]:
             if len(functions) < len(axes):

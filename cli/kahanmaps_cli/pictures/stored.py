@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps.errors import InputError
+from kahanmaps_cli.orbit_formats import meta_of
 
 if TYPE_CHECKING:
     from kahanmaps.maps.floats.doubles import FloatArray
@@ -54,17 +55,17 @@ def read_orbits(path: str, variables: Sequence[str] | None) -> Stored:
 
     Raises InputError with what is wrong with the file.
     """
-    ending = Path(path).suffix
+    ending = Path(path).suffix.lower()
     if ending not in _ENDINGS:
         raise InputError(
             f"{path}: found {ending or 'no ending'}, expected a file of kahanmaps orbit or ensemble: "
             f"{', '.join(_ENDINGS)}"
         )
     try:
-        if ending == ".npy":
-            found = _from_npy(path, variables)
+        if ending in (".npy", ".csv"):
+            found = (_from_npy if ending == ".npy" else _from_csv)(path, variables)
         else:
-            found = {".npz": _from_npz, ".jsonl": _from_jsonl, ".csv": _from_csv}[ending](path)
+            found = (_from_npz if ending == ".npz" else _from_jsonl)(path)
     except click.ClickException:
         raise
     except Exception as error:  # zip archives, headers of arrays and numbers that are damaged may go wrong in any way
@@ -132,20 +133,18 @@ def _from_jsonl(path: str) -> Stored:
     return _stored(steps, rows, header, end)
 
 
-def _from_csv(path: str) -> Stored:
-    told: list[dict[str, Any]] = []
-    table: list[str] = []
-    for line in _lines(path):
-        if line.startswith("#"):
-            told.append(dict(json.loads(line[1:])))
-        else:
-            table.append(line)
-    header = told[0]
+def _from_csv(path: str, variables: Sequence[str] | None) -> Stored:
+    """A table with the file beside it, or alone: then all columns, or as many as the system has, are variables."""
+    names, *cells = csv.reader(_lines(path))
+    if names[0] != "step":
+        raise ValueError("its first column is not step")
+    told: dict[str, Any] = {"header": {"variables": names[1 : None if variables is None else 1 + len(variables)]}}
+    if Path(meta_of(path)).exists():
+        told = json.loads(Path(meta_of(path)).read_text(encoding="utf-8"))
+    header = dict(told["header"])
     width = len(header["variables"])
-    cells = list(csv.reader(table))[1:]
-    end = told[-1] if len(told) > 1 else {}
     rows = [[_number(cell) for cell in row[1 : 1 + width]] for row in cells]
-    return _stored([row[0] for row in cells], rows, header, end)
+    return _stored([row[0] for row in cells], rows, header, dict(told.get("end") or {}))
 
 
 def _lines(path: str) -> Iterator[str]:

@@ -1,0 +1,177 @@
+"use strict";
+// A map M(x, eps) x~ = r(x, eps) in machine numbers, and the page that draws its orbits.
+// A polynomial is a list of terms [coefficient, power of each variable ..., power of eps].
+
+function valueOf(terms, at) {
+  let total = 0;
+  for (const [coefficient, ...powers] of terms) {
+    let term = coefficient;
+    powers.forEach((power, k) => { for (let i = 0; i < power; i++) term *= at[k]; });
+    total += term;
+  }
+  return total;
+}
+
+// The solution of (A | -b): null where a pivot is zero or no number.
+function solve(rows) {
+  const n = rows.length;
+  for (let k = 0; k < n; k++) {
+    let best = k;
+    for (let i = k + 1; i < n; i++) if (Math.abs(rows[i][k]) > Math.abs(rows[best][k])) best = i;
+    [rows[k], rows[best]] = [rows[best], rows[k]];
+    if (!(Math.abs(rows[k][k]) > 0)) return null;
+    for (let i = k + 1; i < n; i++) {
+      const factor = rows[i][k] / rows[k][k];
+      for (let j = k; j <= n; j++) rows[i][j] -= factor * rows[k][j];
+    }
+  }
+  const x = new Array(n);
+  for (let k = n - 1; k >= 0; k--) {
+    let right = -rows[k][n];
+    for (let j = k + 1; j < n; j++) right -= rows[k][j] * x[j];
+    x[k] = right / rows[k][k];
+  }
+  return x;
+}
+
+function step(rows, x, eps) {
+  const at = [...x, eps];
+  return solve(rows.map((row) => row.map((terms) => valueOf(terms, at))));
+}
+
+// The points from the start on; fewer where the map has no value or numbers are too large.
+function orbit(rows, start, eps, steps) {
+  const points = [start];
+  while (points.length <= steps) {
+    const next = step(rows, points[points.length - 1], eps);
+    if (next === null || !next.every((entry) => Math.abs(entry) < 1e100)) break;
+    points.push(next);
+  }
+  return points;
+}
+
+function functionAt(f, x, eps) {
+  const at = [...x, eps];
+  return valueOf(f.above, at) / valueOf(f.below, at);
+}
+
+// The range of most of the values, as in other pictures: a few that are far away do not spoil it.
+function rangeOf(values) {
+  const sorted = values.slice().sort((a, b) => a - b);
+  const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
+  const spread = at(0.9) - at(0.1) || Math.abs(at(0.5)) || 1;
+  const low = Math.max(sorted[0], at(0.1) - spread), high = Math.min(at(1), at(0.9) + spread);
+  const margin = 0.06 * (high - low) || spread;
+  return [low - margin, high + margin];
+}
+
+function ticksIn([low, high]) {
+  const raw = (high - low) / 5, unit = 10 ** Math.floor(Math.log10(raw));
+  const gap = [1, 2, 5, 10].map((m) => m * unit).find((m) => m >= raw);
+  const found = [];
+  for (let k = Math.ceil(low / gap); k * gap <= high; k++) found.push(k * gap);
+  return found;
+}
+
+function show(data) {
+  const element = (id) => document.getElementById("explore-" + id);
+  const canvas = element("canvas"), pen = canvas.getContext("2d");
+  const n = data.variables.length;
+  const sliders = data.variables.map((_, k) => element("x" + k));
+  const epsSlider = data.has_eps ? element("eps") : null;
+  const axes = [element("horizontal"), element("vertical")];
+  const left = 62, bottom = 40, top = 10, right = 12;
+  let windows = null, points = [];
+  const number = (value) => String(Number(value.toPrecision(6)));
+  const coordinate = (k, axis) => (axis < n ? points[k][axis] : k);
+  const chosen = () => axes.map((axis) => Number(axis.value));
+  const eps = () => (epsSlider ? Number(epsSlider.value) : 0);
+  const place = (value, side) => {
+    const [low, high] = windows[side], share = (value - low) / (high - low);
+    return side === 0 ? left + share * (canvas.width - left - right)
+      : canvas.height - bottom - share * (canvas.height - bottom - top);
+  };
+
+  function fit() {
+    windows = chosen().map((axis) => rangeOf(points.map((_, k) => coordinate(k, axis))));
+  }
+
+  function drawFrame() {
+    const names = [...data.variables, "step"], [a, b] = chosen();
+    pen.fillStyle = "#ffffff";
+    pen.fillRect(0, 0, canvas.width, canvas.height);
+    pen.strokeStyle = "#888888";
+    pen.strokeRect(left, top, canvas.width - left - right, canvas.height - bottom - top);
+    pen.fillStyle = "#222222";
+    pen.font = "14px sans-serif";
+    pen.textBaseline = "middle";
+    pen.textAlign = "center";
+    for (const t of ticksIn(windows[0])) pen.fillText(number(t), place(t, 0), canvas.height - bottom + 14);
+    pen.fillText(names[a], (left + canvas.width) / 2, canvas.height - 9);
+    pen.textAlign = "right";
+    for (const t of ticksIn(windows[1])) pen.fillText(number(t), left - 6, place(t, 1));
+    pen.textAlign = "left";
+    pen.fillText(names[b], 4, top + 8);
+  }
+
+  function draw() {
+    points = orbit(data.rows, sliders.map((slider) => Number(slider.value)), eps(), Number(element("steps").value));
+    if (windows === null) fit();
+    drawFrame();
+    const [a, b] = chosen();
+    pen.save();
+    pen.beginPath();
+    pen.rect(left, top, canvas.width - left - right, canvas.height - bottom - top);
+    pen.clip();
+    const size = points.length > 1500 ? 1.6 : 2.4;
+    pen.fillStyle = "#0b57d0";
+    let outside = 0;
+    points.forEach((_, k) => {
+      const at = [coordinate(k, a), coordinate(k, b)];
+      if (at.some((value, side) => value < windows[side][0] || value > windows[side][1])) outside++;
+      else pen.fillRect(place(at[0], 0) - size / 2, place(at[1], 1) - size / 2, size, size);
+    });
+    pen.strokeStyle = "#d55e00";
+    pen.lineWidth = 2;
+    pen.beginPath();
+    pen.arc(place(coordinate(0, a), 0), place(coordinate(0, b), 1), 5, 0, 7);
+    pen.stroke();
+    pen.restore();
+    sliders.forEach((slider, k) => { element("x" + k + "-value").textContent = number(Number(slider.value)); });
+    if (epsSlider) element("eps-value").textContent = number(eps());
+    const asked = Number(element("steps").value), taken = points.length - 1;
+    element("steps-value").textContent = String(asked);
+    element("status").textContent = `${taken} steps, ${outside} points outside the window`
+      + (taken < asked ? `: the orbit ends after step ${taken}, where the map has no value or leaves the range` : "");
+    data.functions.forEach((f, row) => {
+      const values = points.map((x) => functionAt(f, x, eps()));
+      const most = Math.max(...values.map((value) => Math.abs(value - values[0])));
+      element("first" + row).textContent = number(values[0]);
+      element("last" + row).textContent = number(values[taken]);
+      element("change" + row).textContent = most.toExponential(1);
+    });
+  }
+
+  const refit = () => { windows = null; draw(); };
+  for (const slider of [...sliders, epsSlider, element("steps")]) if (slider) slider.addEventListener("input", draw);
+  for (const axis of axes) axis.addEventListener("change", refit);
+  element("fit").addEventListener("click", refit);
+  // a click or a drag in the picture moves the start, where both axes are variables
+  const moved = (event) => {
+    if (event.buttons !== 1) return;
+    const box = canvas.getBoundingClientRect();
+    const at = [(event.clientX - box.left) / box.width * canvas.width, (event.clientY - box.top) / box.height * canvas.height];
+    const shares = [(at[0] - left) / (canvas.width - left - right),
+      (canvas.height - bottom - at[1]) / (canvas.height - bottom - top)];
+    chosen().forEach((axis, side) => {
+      if (axis < n) sliders[axis].value = windows[side][0] + shares[side] * (windows[side][1] - windows[side][0]);
+    });
+    draw();
+  };
+  canvas.addEventListener("pointerdown", moved);
+  canvas.addEventListener("pointermove", moved);
+  draw();
+}
+
+if (typeof document === "undefined") module.exports = { orbit, solve, functionAt, rangeOf };
+else document.addEventListener("DOMContentLoaded", () => show(JSON.parse(document.getElementById("explore-data").textContent)));

@@ -1,0 +1,98 @@
+"""The page with sliders: its orbits are those of the library, what it says is what analyze found."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from importlib import resources
+
+import numpy as np
+import pytest
+from flint import fmpq
+from page_helpers import Page
+
+import kahanmaps as km
+from kahanmaps.errors import InputError
+from kahanmaps.maps.floats.doubles import to_float, to_floats
+from kahanmaps.reports.explore_page import explore_data
+from kahanmaps.reports.report import report_html
+
+NODE = shutil.which("node")
+SCRIPT = resources.files("kahanmaps.reports") / "explore.js"
+FILES = {
+    "plane": km.load("lotka_volterra"),
+    "space": km.load("euler_top"),
+    "hamiltonian": km.load("henon_heiles"),
+    "no eps": km.load("mcmillan"),
+    "hostile": km.SystemFile.from_system(km.QuadraticSystem.from_text(["x"], ["x"]), "</script><script>alert(1)"),
+}
+
+
+def found(name):
+    return km.analyze(FILES[name], seconds=3)
+
+
+def in_node(data, eps, steps):
+    """The points that explore.js computes, and its first function along them."""
+    program = (
+        f"const it = require({json.dumps(str(SCRIPT))}), data = {json.dumps(data)};"
+        f"const points = it.orbit(data.rows, data.start, {eps}, {steps});"
+        f"const f = data.functions[0];"
+        f"console.log(JSON.stringify([points, f ? points.map((x) => it.functionAt(f, x, {eps})) : []]));"
+    )
+    return json.loads(subprocess.run([NODE, "-e", program], capture_output=True, check=True, timeout=60).stdout)
+
+
+@pytest.mark.skipif(NODE is None, reason="needs node")
+@pytest.mark.parametrize("name", list(FILES))
+def test_orbits_in_javascript_are_those_of_the_library(name):
+    analysis = found(name)
+    data = explore_data(analysis)
+    start = [fmpq(*value.as_integer_ratio()) for value in data["start"]]
+    map_ = FILES[name].map.at("1/8")
+    points, values = in_node(data, 0.125, 12)
+    x = tuple(start)
+    for point in points:
+        assert point == pytest.approx(to_floats(x).tolist(), rel=1e-9, abs=1e-9)
+        x = map_.step(x)
+    integrals = analysis.integrals.integrals
+    if integrals:
+        first = integrals[0].function.value(km.QQ, [*start, fmpq(1, 8)])
+        assert np.allclose(values, to_float(first), rtol=1e-9)
+
+
+@pytest.mark.skipif(NODE is None, reason="needs node")
+def test_another_eps_gives_another_orbit_and_a_singular_step_ends_it():
+    data = explore_data(found("plane"))
+    assert in_node(data, 0.1, 3)[0][1] != in_node(data, 0.2, 3)[0][1]
+    one = {**explore_data(found("hostile")), "start": [1.0]}  # x~ = (1 + eps) x/(1 - eps)
+    assert len(in_node(one, 1, 5)[0]) == 1
+    assert len(in_node(one, 0.5, 5)[0]) == 6
+
+
+@pytest.mark.parametrize("name", list(FILES))
+def test_the_page_has_the_verdict_and_nothing_of_the_network(name):
+    analysis = found(name)
+    html = report_html(analysis, explore=True, command="kahanmaps report")
+    page = Page(html)
+    assert analysis.conclusion.sentence in page.text
+    assert [one for one in page.fetched if not one.startswith(("#", "data:"))] == []
+    assert page.tags.count("script") == 2, "data and program; names of users do not begin one"
+    assert len(page.ids) == len(set(page.ids))
+    assert ("explore-eps" in page.ids) == FILES[name].map.has_eps
+    assert page.ids.count(f"explore-x{FILES[name].dim - 1}") == 1
+    if page.alttexts:
+        assert all(page.alttexts)
+
+
+def test_a_verdict_for_one_eps_says_so():
+    page = Page(report_html(km.analyze(FILES["plane"], eps="1/7", seconds=3), explore=True))
+    assert "at eps = 1/7 only" in page.text
+    assert "for every eps" in Page(report_html(found("plane"), explore=True)).text
+
+
+def test_only_an_analysis_can_be_explored():
+    file = FILES["space"]
+    with pytest.raises(InputError, match="expected an Analysis"):
+        report_html(km.check_integrals(file), file=file, explore=True)
