@@ -86,11 +86,14 @@ class IntegerSteps:
                     entries[(i * (n + 1) + j) * len(exponents) + k] = sign * coefficient.p * (below // coefficient.q)
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
         self._trials = _TRIALS  # of the elimination that are left; none is counted where it is right
+        self._is_diagonal = all(i == j or not terms[i][j] for i in range(n) for j in range(n))
         self._constant = self._constant_rows()
 
     def step(self, point: IntegerPoint) -> IntegerPoint | None:
         """The image, or None where the map has no value."""
         matrix, right = self._equation(point)
+        if self._is_diagonal:
+            return _quotients(matrix, right)
         if self._constant is None:
             return self._solution(matrix, right, point.denominator)
         scale = point.denominator**self._degree
@@ -114,7 +117,7 @@ class IntegerSteps:
         alone = [k for k, exponent in enumerate(self._exponents) if not any(exponent[:-1])]
         others = [k for k in range(len(self._exponents)) if k not in alone]
         rows = [i for i in range(n) if not any(forms[i * (n + 1) + j][k] for j in range(n) for k in others)]
-        if not rows or not alone or len(rows) < n <= _CRAMER_DIMENSION:
+        if not rows or not alone or n <= _CRAMER_DIMENSION:
             return None
         A = fmpq_mat([[fmpq(forms[i * (n + 1) + j][alone[0]]) for j in range(n)] for i in rows])
         return ConstantRows(rows, A) if A.rank() == len(rows) else None
@@ -166,6 +169,14 @@ def _eliminated(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint
         return None
     column = fmpz_mat(right.nrows(), 1, found.numerators)
     return found if matrix * column == right * found.denominator else None
+
+
+def _quotients(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
+    """The solution for a diagonal matrix: gcds of two entries each are shorter than those with the determinant."""
+    n = matrix.nrows()
+    if any(matrix[i, i] == 0 for i in range(n)):
+        return None
+    return IntegerPoint.from_rationals([fmpq(right[i, 0], matrix[i, i]) for i in range(n)])
 
 
 def _solved(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
