@@ -12,10 +12,10 @@ from flint import fmpq_mat, fmpz, fmpz_mat
 
 
 class ConstantRows:
-    """Rows A x~ = r of a system with integers, `rows` their places in it; A has rational entries and full rank.
+    """Rows A x~ = r of a system with integers, `rows` their places in it; A has rational entries and independent rows.
 
     With A = (A_1 | A_2) up to the order of columns, A_1 invertible, x~_1 = A_1^{-1} r - A_1^{-1} A_2 x~_2 goes into the
-    other rows. Raises ZeroDivisionError where the rank is less: the system is singular.
+    other rows.
     """
 
     def __init__(self, rows: Sequence[int], A: fmpq_mat) -> None:
