@@ -19,7 +19,7 @@ def _scripts(monkeypatch):
     """The scripts import each other by name, as they do when they are run."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     yield
-    for name in ("work", "run", "bench_exact", "bench_iterate", "bench_degrees"):
+    for name in ("work", "run", "bench_exact", "bench_catalogue", "bench_iterate", "bench_degrees"):
         sys.modules.pop(name, None)
 
 
@@ -59,6 +59,15 @@ def test_formulations_of_pari_that_lost_arrive_there_too():
         pytest.skip(str(reason))
     for name, _, last in found:
         assert last == stepped(work.work(), STEPS), name
+
+
+@pytest.mark.parametrize("name", ["henon_heiles", "euler_top", "qrt_asymmetric"])
+def test_contestants_on_the_catalogue_arrive_at_one_point(name):
+    import bench_catalogue
+
+    map_over = load(name).map.at(bench_catalogue.EPS)
+    assert bench_catalogue.ours(map_over, STEPS) == bench_catalogue.plain(map_over, STEPS)
+    assert bench_catalogue.ours(map_over, STEPS) != bench_catalogue.plain(map_over, STEPS + 1)
 
 
 def test_a_contestant_with_another_result_stops_the_run():

@@ -34,8 +34,8 @@ _SHOW_EVERY = 0.1  # the same for the bar on a terminal
 
 def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
     """Read the spec, and say what it would do."""
-    from kahanmaps.checks.settings import CONVENTION
     from kahanmaps.experiments.spec import MAX_TASKS, read_spec
+    from kahanmaps.maps.convention import CONVENTION
 
     spec = read_spec(path, max_tasks=options["max_tasks"] or MAX_TASKS)
     missing = _missing(db, spec, options)

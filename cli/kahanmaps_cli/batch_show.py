@@ -66,7 +66,7 @@ def print_status(data: Mapping[str, Any]) -> None:
 
 def found_data(store: Store, found: Found) -> dict[str, Any]:
     """A task and its record as plain data."""
-    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.maps.convention import CONVENTION
 
     task, record, places, attempts = found
     return {
@@ -123,8 +123,8 @@ def print_summary(
     only: Sequence[str],
 ) -> None:
     """The tables of a summary."""
-    from kahanmaps.checks.settings import CONVENTION
     from kahanmaps.experiments.summary import summarise
+    from kahanmaps.maps.convention import CONVENTION
 
     found = summarise(store.rows(list(only) or None, missing=True), by, list(values) or None, stable=stable)
     if as_json:

@@ -62,7 +62,7 @@ class OrbitRun:
     def header(self) -> dict[str, Any]:
         """What a result can be redone from."""
         from kahanmaps.algebra.text import format_number
-        from kahanmaps.checks.settings import convention
+        from kahanmaps.maps.convention import convention
         from kahanmaps.version import __version__
 
         header = {

@@ -8,7 +8,6 @@ the hash stands for a random function (bellare-rogaway-1993), which is an assump
 
 from __future__ import annotations
 
-import hashlib
 import random
 from collections.abc import Sequence
 from typing import Any
@@ -42,7 +41,9 @@ def seed_for(seed: int, *subject: Any) -> int:
     >>> seed_for(0, ["x", "y"]) == seed_for(0, ["xy"])
     False
     """
-    return int.from_bytes(hashlib.sha256(_written((seed, *subject)).encode()).digest(), "big")
+    from hashlib import sha256  # its library takes milliseconds to load, which a single orbit can do without
+
+    return int.from_bytes(sha256(_written((seed, *subject)).encode()).digest(), "big")
 
 
 def _written(part: Any) -> str:

@@ -16,6 +16,7 @@ from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
+from kahanmaps.maps.convention import CONVENTION, NO_EPS, convention
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.orbits import Orbit, OrbitEnd, require_short
@@ -23,9 +24,6 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 from kahanmaps.version import __version__
 
 MAX_STEPS = 10_000  # of the exact orbit, all of whose points are kept
-CONVENTION = "eps is the paper's epsilon, the time step is 2 eps"
-NO_TIME_STEP = "eps stands in the map as its file says; there is no time step"
-NO_EPS = "the map does not depend on eps"
 
 
 def _silent(_: str) -> None:
@@ -81,14 +79,6 @@ class Settings:
             "document": files[0].document,
             **({"other_document": files[1].document} if len(files) > 1 else {}),
         }
-
-
-def convention(*maps: BirationalMap) -> str:
-    """What eps is, in a sentence that every record carries: for the maps of which it speaks together."""
-    with_eps = [map_ for map_ in maps if map_.has_eps]
-    if not with_eps:
-        return NO_EPS
-    return CONVENTION if any(map_.has_time_step for map_ in with_eps) else NO_TIME_STEP
 
 
 def eps_record(eps: fmpq | None, *maps: BirationalMap) -> dict[str, str | None]:

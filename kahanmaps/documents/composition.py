@@ -15,7 +15,6 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import format_number, parse_rational_function
 from kahanmaps.documents.reader import EXPECTED, KEYS, KINDS, PartReader, json_like, show
 from kahanmaps.errors import InputError, quoted
-from kahanmaps.maps.composed import composed_map, is_involution
 from kahanmaps.maps.implicit import BirationalMap
 
 _MOST_FACTORS = 64  # of a composition, those of its parts counted too
@@ -59,6 +58,8 @@ class CompositionReader(PartReader, ABC):
             self._mistake("composition.of", f"found more than {_MOST_FACTORS} steps, expected at most so many")
             return None
         self.document = {**self.document, "composition": {"of": [part.plain for part in known]}}
+        from kahanmaps.maps.composed import composed_map
+
         try:
             return composed_map(
                 *((part.map, part.power) for part in known),
@@ -74,6 +75,8 @@ class CompositionReader(PartReader, ABC):
         if not isinstance(entry, dict):
             self._mistake(path, f'found {show(entry)}, expected a table, e.g. {{ file = "f.toml", power = 2 }}')
             return None
+        from kahanmaps.maps.composed import is_involution
+
         before = len(self.mistakes)
         for key in entry:
             if key not in KEYS["composition.of"]:

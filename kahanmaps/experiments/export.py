@@ -159,7 +159,7 @@ def write_jsonl(rows: Iterable[Row], stream: IO[str], *, stable: bool = False) -
 
     What is not known of a missing task is null. Dicts inside a line are sorted by their keys.
     """
-    from kahanmaps.checks.settings import CONVENTION  # loads FLINT: not before something is written
+    from kahanmaps.maps.convention import CONVENTION  # loads FLINT: not before something is written
 
     header = {"record": "header"} if stable else {"record": "header", "version": __version__}
     stream.write(_line({**header, "convention": CONVENTION}))
@@ -200,7 +200,7 @@ def write_parquet(rows: Callable[[], Iterable[Row]], path: str | os.PathLike[str
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
     except ModuleNotFoundError as error:
         raise InputError("Parquet files need pyarrow, which is not installed: pip install pyarrow") from error
-    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.maps.convention import CONVENTION
 
     layout = _Layout(rows(), stable)
     types = {"int64": arrow.int64(), "bool": arrow.bool_(), "float64": arrow.float64(), "string": arrow.string()}

@@ -127,12 +127,22 @@ def monomial_tables(dim: int, degree: int) -> list[list[tuple[int, int, int]]]:
     ]
 
 
+@cache
+def _last_factors(dim: int, degree: int) -> list[list[tuple[int, int]]]:
+    """(variable, place of the monomial without it) for all monomials, those of each degree from 1 on together."""
+    layers: list[list[tuple[int, int]]] = [[] for _ in range(degree)]
+    for exponent, slopes in zip(exponents_up_to(dim, degree), monomial_tables(dim, degree), strict=True):
+        if slopes:
+            variable, _, place = slopes[-1]
+            layers[sum(exponent) - 1].append((variable, place))
+    return layers
+
+
 def monomial_values(point: Point, degree: int, prime: int) -> list[int]:
     """The values of all monomials of degree at most `degree` at a point modulo a prime, one product each."""
     table = [1]
-    for slopes in monomial_tables(len(point), degree)[1:]:
-        variable, _, place = slopes[-1]
-        table.append(table[place] * point[variable] % prime)
+    for layer in _last_factors(len(point), degree):
+        table += [table[place] * point[variable] % prime for variable, place in layer]
     return table
 
 
@@ -177,7 +187,8 @@ def null_space(rows: Sequence[Sequence[int]], columns: int, prime: int) -> list[
     if not rows:
         return [[int(i == j) for j in range(columns)] for i in range(columns)]
     basis, nullity = nmod_mat(rows, prime).nullspace()
-    return echelon(integers(basis.transpose())[:nullity], prime)
+    # The matrix is a square one, nearly all of it zeros that need not become integers of Python.
+    return echelon([[int(basis[i, k]) for i in range(columns)] for k in range(nullity)], prime)
 
 
 def echelon(vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:

@@ -13,6 +13,8 @@ from functools import lru_cache, partial
 
 from flint import fmpq, fmpq_mat, fmpz, fmpz_mat, nmod_mat
 
+from kahanmaps.maps.constant_rows import ConstantRows
+
 Exponents = tuple[int, ...]
 Terms = tuple[tuple[int, fmpq], ...]
 
@@ -84,16 +86,41 @@ class IntegerSteps:
                     entries[(i * (n + 1) + j) * len(exponents) + k] = sign * coefficient.p * (below // coefficient.q)
         self._forms = fmpz_mat(n * (n + 1), len(exponents), entries)
         self._trials = _TRIALS  # of the elimination that are left; none is counted where it is right
+        self._is_diagonal = all(i == j or not terms[i][j] for i in range(n) for j in range(n))
+        self._constant = self._constant_rows()
 
     def step(self, point: IntegerPoint) -> IntegerPoint | None:
         """The image, or None where the map has no value."""
         matrix, right = self._equation(point)
-        if self._trials and _worth_eliminating(matrix, point.denominator):
-            found = _eliminated(matrix, right, point.denominator)
+        if self._is_diagonal:
+            return _quotients(matrix, right)
+        if self._constant is None:
+            return self._solution(matrix, right, point.denominator)
+        scale = point.denominator**self._degree
+        rest, side = self._constant.without(matrix, right, scale)
+        found = self._solution(rest, side, point.denominator) if rest.nrows() else IntegerPoint((), fmpz(1))
+        if found is None:
+            return None
+        return _lowest(*self._constant.whole(right, scale, found.numerators, found.denominator))
+
+    def _solution(self, matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
+        if self._trials and _worth_eliminating(matrix, likely):
+            found = _eliminated(matrix, right, likely)
             if found is not None:
                 return found
             self._trials -= 1
         return _solved(matrix, right)
+
+    def _constant_rows(self) -> ConstantRows | None:
+        """The rows without x to the left; None where there are none or they do not pay, and for a singular equation."""
+        n, forms = self._dim, self._forms.tolist()
+        alone = [k for k, exponent in enumerate(self._exponents) if not any(exponent[:-1])]
+        others = [k for k in range(len(self._exponents)) if k not in alone]
+        rows = [i for i in range(n) if not any(forms[i * (n + 1) + j][k] for j in range(n) for k in others)]
+        if not rows or not alone or n <= _CRAMER_DIMENSION:
+            return None
+        A = fmpq_mat([[fmpq(forms[i * (n + 1) + j][alone[0]]) for j in range(n)] for i in rows])
+        return ConstantRows(rows, A) if A.rank() == len(rows) else None
 
     def determinant(self, point: IntegerPoint) -> fmpq:
         """det M(x)."""
@@ -119,6 +146,7 @@ def _monomial(X: Sequence[fmpz], exponents: Exponents) -> fmpz:
 
 # Below this size FLINT's own solver, free of Python's overhead, is faster (benchmarks/bench_exact.py).
 _ELIMINATION_BITS = 4000
+_CRAMER_DIMENSION = 3
 _ELIMINATION_DIMENSION = 16  # and above this dimension as well
 # A common divisor shorter than this is not worth a division of every entry.
 _USEFUL_BITS = 64
@@ -127,7 +155,7 @@ _TRIALS = 2  # where minors share nothing with W for good, elimination and what 
 
 
 def _worth_eliminating(matrix: fmpz_mat, likely: fmpz) -> bool:
-    return 3 < matrix.nrows() <= _ELIMINATION_DIMENSION and likely.bit_length() >= _ELIMINATION_BITS
+    return _CRAMER_DIMENSION < matrix.nrows() <= _ELIMINATION_DIMENSION and likely.bit_length() >= _ELIMINATION_BITS
 
 
 def _eliminated(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
@@ -143,9 +171,17 @@ def _eliminated(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint
     return found if matrix * column == right * found.denominator else None
 
 
+def _quotients(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
+    """The solution for a diagonal matrix: gcds of two entries each are shorter than those with the determinant."""
+    n = matrix.nrows()
+    if any(matrix[i, i] == 0 for i in range(n)):
+        return None
+    return IntegerPoint.from_rationals([fmpq(right[i, 0], matrix[i, i]) for i in range(n)])
+
+
 def _solved(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
     """The solution of matrix x = right in lowest terms; None where the matrix is singular."""
-    if matrix.nrows() <= 3:
+    if matrix.nrows() <= _CRAMER_DIMENSION:
         return _cramer(matrix, right)
     try:
         solution: fmpq_mat = matrix.solve(right)  # type: ignore[assignment]  # the stub promises less
@@ -174,6 +210,11 @@ def _cramer(matrix: fmpz_mat, right: fmpz_mat) -> IntegerPoint | None:
             r * cofactors[1] + s * (a * i - c * g) + t * (c * d - a * f),
             r * cofactors[2] + s * (b * g - a * h) + t * (a * e - b * d),
         ]
+    return _lowest(numerators, denominator)
+
+
+def _lowest(numerators: Sequence[fmpz], denominator: fmpz) -> IntegerPoint | None:
+    """The point in lowest terms; None where the denominator is 0."""
     if denominator == 0:
         return None
     common = denominator  # of any sign: a gcd is positive

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from math import gcd
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.errors import InputError
-from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.accuracy import NotAccurate, bits_for
 from kahanmaps.maps.arithmetic import Arithmetic
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan, as_map
 from kahanmaps.maps.methods import JUMP_FROM, choose_method, why_no_reduction
-from kahanmaps.maps.normal_form.iterate import special_start
 from kahanmaps.maps.orbits import (
     DEFAULT_MAX_DIGITS,
     Iterates,
@@ -29,6 +27,9 @@ from kahanmaps.maps.orbits import (
 )
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
+
+if TYPE_CHECKING:
+    from kahanmaps.family.associated import FamilyMember
 
 _TOO_FAR = 10**13  # years
 _FEW_STEPS = 3  # for which looking for a structure does not pay
@@ -194,6 +195,8 @@ def _structure(
         return NoStructure("in machine numbers only J = [[0, I], [-I, 0]] has one")
     reason = ""
     if arithmetic.kind == "ball":
+        from kahanmaps.maps.normal_form.iterate import special_start
+
         reason = special_start(structure, eps, start)
     if arithmetic.kind == "mod":
         reason = why_no_reduction(structure, GF(arithmetic.number), eps)

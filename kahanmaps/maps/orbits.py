@@ -21,11 +21,11 @@ from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
 from kahanmaps.maps.implicit import MapOver, det_of
 from kahanmaps.maps.integer_steps import IntegerPoint
-from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 
 # Normal forms are loaded where they are used: an orbit by single steps, which most are, starts in half the time.
 if TYPE_CHECKING:
     from kahanmaps.family.structure import Structure
+    from kahanmaps.maps.normal_form.planes_point import PlanesPoint
 
 DEFAULT_MAX_DIGITS = 200_000
 LONGEST_INPUT = 10_000  # digits of eps and of the start, unless --max-digits says more

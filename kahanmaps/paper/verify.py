@@ -31,13 +31,14 @@ from kahanmaps.algebra.functions import BudgetExceeded
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.claims import Evidence, Report
 from kahanmaps.checks.judge import Contradiction
-from kahanmaps.checks.settings import CONVENTION, Settings
+from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import BadPrime, InputError, PrecisionLost
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.planar import normal_form
 from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.family.skew_hamiltonian import diagnosis, format_univariate
+from kahanmaps.maps.convention import CONVENTION
 from kahanmaps.paper import realise
 from kahanmaps.paper.evaluate import UNDEFINED, entries, evaluate, same, witness_of
 from kahanmaps.paper.examiner import Examiner, VerifyOptions

@@ -17,10 +17,11 @@ from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness,
 from kahanmaps.checks.commute import check_commute
 from kahanmaps.checks.conserve import check_integrals
 from kahanmaps.checks.preserve import check_measure, check_poisson
-from kahanmaps.checks.settings import CONVENTION, Settings
+from kahanmaps.checks.settings import Settings
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InexactNumber, InputError
 from kahanmaps.family.draw import draw_with_eigenvalues
+from kahanmaps.maps.convention import CONVENTION
 from kahanmaps.version import __version__
 
 P, R, S, U = Verdict.PROVED, Verdict.REFUTED, Verdict.SUPPORTED, Verdict.UNDECIDED

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from schema_helpers import mistakes
 
-from kahanmaps.checks.settings import NO_EPS
 from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import read_system
 from kahanmaps.laboratory.analysis import analyze
+from kahanmaps.maps.convention import NO_EPS
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "maps").glob("*.toml"))
 NAMES = [path.stem for path in EXAMPLES]

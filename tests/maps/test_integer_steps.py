@@ -18,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kahanmaps.algebra.fields import QQ
+from kahanmaps.documents.catalog import load
 from kahanmaps.family.draw import draw_with_chi, draw_with_eigenvalues
 from kahanmaps.maps import integer_steps
 from kahanmaps.maps.integer_steps import IntegerPoint
@@ -379,3 +380,21 @@ def test_an_orbit_from_another_start_agrees_too(always_eliminate):
 def test_cramers_rule_gives_lowest_terms_over_a_positive_denominator(matrix, right, numerators, denominator):
     found = integer_steps._cramer(fmpz_mat(matrix), fmpz_mat([[entry] for entry in right]))
     assert (found.numerators, found.denominator) == (numerators, denominator)
+
+
+# Explicit maps, whose matrices are diagonal.
+
+
+@pytest.mark.parametrize("name", ["hietarinta_viallet", "fibonacci", "lyness", "todd", "somos_5"])
+def test_steps_of_explicit_maps_are_those_of_fractions(name):
+    over = load(name).map.at("3/11")
+    assert over.integer_steps._is_diagonal
+    x = start(over.dim)
+    for _ in range(6):
+        image = over.generic_step(x)
+        assert over.integer_steps.step(IntegerPoint.from_rationals(x)) == IntegerPoint.from_rationals(image)
+        x = image
+
+
+def test_an_explicit_map_has_no_value_where_one_denominator_vanishes():
+    assert load("lyness").map.at(1).integer_steps.step(IntegerPoint.from_rationals((fmpq(0), fmpq(2)))) is None

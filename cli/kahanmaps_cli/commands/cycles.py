@@ -211,7 +211,7 @@ def _record(
     common: list[str],
 ) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import convention
+    from kahanmaps.maps.convention import convention
 
     return {
         **envelope("cycles"),

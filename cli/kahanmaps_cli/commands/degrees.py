@@ -130,7 +130,7 @@ def _time_step(file: SystemFile, found: DegreeGrowth) -> str | None:
 
 
 def _record(file: SystemFile, options: dict[str, Any], found: DegreeGrowth) -> dict[str, Any]:
-    from kahanmaps.checks.settings import convention
+    from kahanmaps.maps.convention import convention
 
     return {
         **envelope("degrees"),

@@ -138,7 +138,7 @@ def _print(file: SystemFile, found: HeightSurvey) -> None:
 
 def _record(file: SystemFile, options: dict[str, Any], found: HeightSurvey) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import convention
+    from kahanmaps.maps.convention import convention
 
     values = dict.fromkeys(orbit.eps for orbit in found.orbits)
     return {

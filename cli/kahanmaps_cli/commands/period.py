@@ -185,7 +185,7 @@ def _record(
 ) -> dict[str, Any]:
     """Numbers are text: periods exceed what readers of JSON hold exactly."""
     from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import CONVENTION
+    from kahanmaps.maps.convention import CONVENTION
 
     return {
         **envelope("period"),

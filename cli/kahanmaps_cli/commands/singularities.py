@@ -152,8 +152,8 @@ def _record(
     verdict: str,
 ) -> dict[str, Any]:
     from kahanmaps.algebra.text import format_number
-    from kahanmaps.checks.settings import convention
     from kahanmaps.laboratory.singular.singularities import steps_by_default
+    from kahanmaps.maps.convention import convention
 
     return {
         **envelope("singularities"),
