@@ -76,14 +76,17 @@ class KahanMapOver(StepOver):
         with field.working():
             tensor = (self.local.tensor * -eps).entries()
             B, c = (self.local.B * eps).entries(), (self.local.c * (-2 * eps)).entries()
-            one, minus = field.one, -field.one
+            one, zero = field.one, field.zero
             terms = []
             for i in range(n):
                 left = [
-                    [*enumerate(tensor[(i * n + j) * n : (i * n + j + 1) * n]), (n, -B[i * n + j] + (i == j) * one)]
+                    [
+                        *enumerate(tensor[(i * n + j) * n : (i * n + j + 1) * n]),
+                        (n, -B[i * n + j] + (one if i == j else zero)),
+                    ]
                     for j in range(n)
                 ]
-                right = [*((j, -B[i * n + j] + (i == j) * minus) for j in range(n)), (n, c[i])]
+                right = [*((j, -B[i * n + j] - (one if i == j else zero)) for j in range(n)), (n, c[i])]
                 terms.append(tuple(tuple((k, e) for k, e in form if not field.is_zero(e)) for form in (*left, right)))
         return Equation(field, exponents, tuple(terms))
 

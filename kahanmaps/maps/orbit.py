@@ -115,7 +115,9 @@ def orbit(
             from kahanmaps.maps.floats.fast import FloatOrbit
 
             form = None if used is None else used.form
-            return FloatOrbit(map_, exact_eps, start, far, backward=backward, form=form, kernel=kernel, every=interval)
+            return FloatOrbit(
+                map_.rounded, exact_eps, start, far, backward=backward, form=form, kernel=kernel, every=interval
+            )
         over, budget = map_.at(exact_eps, numbers.field), max_digits or DEFAULT_MAX_DIGITS
         if chosen.name == "jump" and used is not None:
             return Iterates(over, start, at or [], structure=used, backward=backward, max_digits=budget)

@@ -353,7 +353,7 @@ class _Search:
 
     def _follow(self) -> None:
         """What the singularities say, if that was not asked before and the map is not affine."""
-        if self._patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
+        if self._map.root is None and self._patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
             left = max(0.0, self._deadline - time.monotonic())
             self._patterns = patterns_of_map(
                 self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left
