@@ -23,6 +23,7 @@ from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
+from kahanmaps.errors import InputError
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver, nonzero_eps
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
@@ -121,6 +122,10 @@ class KahanMap(DisplayedAsFormula, KahanMapOver):
         self, system: QuadraticSystem, eps: Any, field: Field = QQ, values: Sequence[Any] = (), inside: Any = None
     ) -> None:
         """`inside` is put in for eps in the coefficients where that is not the step: for inverse maps."""
+        if not isinstance(system, QuadraticSystem):
+            raise InputError(
+                f"found a {type(system).__name__}, expected a quadratic system: km.load(...).system is one"
+            )
         self.system, self.values = system, tuple(values)
         self.variables = system.variables
         element = nonzero_eps(eps, field)

@@ -9,6 +9,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.text import parse_point
 from kahanmaps.errors import InputError
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
@@ -60,7 +61,7 @@ def orbit(
 
     Args:
         given: the map; a quadratic system stands for its Kahan map.
-        start: exact numbers.
+        start: exact numbers, or text such as "1/2,-1/3".
         eps: an exact number, for Kahan maps half the time step; none for a map without it.
         steps: how many steps to take, or
         at: which iterates alone are wanted.
@@ -92,6 +93,8 @@ def orbit(
     if isinstance(arithmetic, str):
         arithmetic = Arithmetic.parse(arithmetic)
     map_ = as_map(given)
+    if isinstance(start, str):
+        start = parse_point(start)
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
     exact_eps = fmpq(1) if eps is None else rational(eps)
