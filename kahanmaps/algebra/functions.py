@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from flint import fmpq_mpoly
+from flint import fmpq, fmpq_mpoly
 from flint.utils.flint_exceptions import DomainError
 
 from kahanmaps.algebra.fields import Element, Field, rational
