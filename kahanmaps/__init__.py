@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from kahanmaps.door import opened
+from kahanmaps.errors import suggestion
 from kahanmaps.version import __version__ as __version__
 
 # The one list of public names is what type checkers read: __init__.pyi.
@@ -37,7 +38,7 @@ def __getattr__(name: str) -> Any:
         value = opened(getattr(import_module(_MODULE_OF[known]), known))
         globals()[name] = value
         return value
-    raise AttributeError(f"module 'kahanmaps' has no attribute {name!r}")
+    raise AttributeError(f"module 'kahanmaps' has no attribute {name!r}{suggestion(name, __all__)}")
 
 
 def __dir__() -> list[str]:

@@ -118,6 +118,7 @@ from kahanmaps.maps.residues.ensemble import ModularEnsemble as ModularEnsemble
 from kahanmaps.paper.examiner import VerifyOptions as VerifyOptions
 from kahanmaps.paper.verify import verify as verify
 from kahanmaps.paper.verify import verify_universal as verify_universal
+from kahanmaps.plots.plot import plot as plot
 from kahanmaps.reports.report import report_html as report_html
 from kahanmaps.reports.report import write_report as write_report
 from kahanmaps.systems.hamiltonian import CubicHamiltonian as CubicHamiltonian

@@ -20,6 +20,16 @@ class Displayed:
         return html_form(self)
 
 
+class Printed(Displayed):
+    """A result that `print` shows as the lines of its command too."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        _load(self)
+        return text_form(self)
+
+
 class DisplayedAsFormula:
     """A value that notebooks show as a formula."""
 
@@ -35,10 +45,24 @@ def latex(value: object) -> str:
     return latex_form(value)
 
 
+def shorten(text: str, width: int) -> str:
+    """A long number with its middle left out and its length told: 12345...67890 (1234 characters)."""
+    if len(text) <= width:
+        return text
+    keep = max(4, (width - 18) // 2)
+    return f"{text[:keep]}...{text[-keep:]} ({len(text)} chars)"
+
+
 @singledispatch
 def html_form(value: object) -> str:
     """The value as HTML: the files of kahanmaps.display register what they know."""
     raise TypeError(f"no file of kahanmaps.display says how a {type(value).__name__} looks as HTML")
+
+
+@singledispatch
+def text_form(value: object) -> str:
+    """The value as `print` shows it: the files of kahanmaps.display register what a command prints."""
+    return repr(value)
 
 
 @singledispatch

@@ -109,3 +109,95 @@ def test_maps_are_called_and_composed():
         phi @ km.KahanMap(km.load("weierstrass").system, "1/10")
     with pytest.raises(TypeError):
         phi @ 3
+
+
+# What a user of Python writes without having read much, one expression a line.
+EXPRESSIONS = """
+km.degrees("euler_top", max_terms=4)
+km.degrees("euler_top", "1/10", max_terms=4)
+km.degrees("euler_top", eps="1/10", max_terms=4)
+km.degrees("euler_top", time_step="1/5", max_terms=4)
+km.degrees(km.load("euler_top"), max_terms=4).degrees
+km.degrees("x' = y; y' = 6*x^2 - 2", max_terms=4)
+km.degrees("euler_top", max_terms=4).to_json()
+km.degrees("euler_top", max_terms=4).rows()
+str(km.degrees("euler_top", max_terms=4))
+km.names()
+km.load("euler_top")
+km.load("euler_top", a1=2)
+km.load("euler_top", a1="2/3")
+km.load("euler_top", a1=Fraction(2, 3))
+km.load("euler_top", a1="root of t^2 - 2")
+km.load("lv(5,1)")
+km.load("euler_top").system
+km.load("euler_top").map
+km.load("euler_top").integrals
+km.load("euler_top").to_toml()
+print(km.load("euler_top").map)
+km.System("x' = y; y' = a*x^2", a=Fraction(1, 2))
+km.System("x' = y; y' = a*x^2", a=np.int64(3))
+km.System("x' = y; y' = a*x^2", a="1/2")
+km.System(["y", "x^2"], ["x", "y"])
+km.System({"x": "y", "y": "x^2"})
+km.orbit("euler_top", [1, 2, 3], "1/10", 3)
+km.orbit("euler_top", (1, 2, 3), eps="1/10", steps=3)
+km.orbit("euler_top", "1,2,3", "1/10", 3)
+km.orbit("euler_top", np.array([1, 2, 3]), "1/10", 3)
+list(km.orbit("euler_top", [1, 2, 3], "1/10", 3))
+[p.x for p in km.orbit("euler_top", [1, 2, 3], Fraction(1, 10), 3)]
+[p.text for p in km.orbit("euler_top", [1, 2, 3], time_step="1/5", steps=3)]
+km.orbit("euler_top", [1, 2, 3], "1/10", 3, arithmetic="float")
+km.orbit("euler_top", [1, 2, 3], "1/10", 3, arithmetic="mod:101")
+km.check_integrals("euler_top")
+km.check_integrals("euler_top", eps="1/10").verdict
+km.check_integrals("euler_top").holds
+km.check_integrals("euler_top").rows()
+str(km.check_integrals("euler_top"))
+km.check_measure("euler_top")
+km.check_poisson("henon_heiles")
+km.check_commute("euler_top", "euler_top")
+km.check_commute("x' = y; y' = x^2", "x' = 2*y; y' = 2*x^2")
+km.find_integrals("weierstrass").integrals[0].text
+km.find_integrals("weierstrass").rows()
+str(km.find_integrals("weierstrass"))
+km.find_density("euler_top").densities[0].text
+str(km.find_density("weierstrass"))
+km.find_symmetry("euler_top")
+km.find_commuting("euler_top")
+km.cycles("weierstrass", eps="1/10", prime=11)
+km.heights("weierstrass", "1/10", seconds=2)
+km.singularities("weierstrass", "1/10")
+km.convert("euler_top", "sage")
+km.Kahan(km.load("euler_top").system)
+km.KahanMap(km.load("euler_top").system, "1/10")([1, 2, 3])
+km.KahanMap(km.load("euler_top").system, "1/10") ** -2
+km.latex_polynomial(km.load("euler_top").system.rhs[0])
+km.parse_point("1/2,3")
+""".strip().splitlines()
+
+
+@pytest.mark.parametrize("expression", EXPRESSIONS)
+def test_what_one_writes_works(expression):
+    eval(expression, {"km": km, "np": np, "Fraction": Fraction})
+
+
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [
+        ('km.orbit("euler_top", [1, 2, 3], 0.1, 5)', 'e.g. "0.1"'),
+        ('km.KahanMap("euler_top", "1/10")', r"km.load\(...\).system is one"),
+        ('km.plot.degrees("euler_top")', r"km.plot.degrees\(km.degrees"),
+        ('km.find_integral("euler_top")', "did you mean find_integrals"),
+    ],
+)
+def test_what_does_not_work_says_what_does(expression, words):
+    with pytest.raises((InputError, AttributeError), match=words):
+        eval(expression, {"km": km})
+
+
+def test_degrees_are_drawn_on_axes_and_refuted_claims_are_rows():
+    axes = km.plot.degrees(km.degrees("euler_top", max_terms=5))
+    assert axes.get_xlabel() == "iterate $n$"
+    wrong = km.parse_rational_function("x1", ["x1", "x2", "x3", "eps"])
+    rows = km.check_integrals("euler_top", extra={"I": wrong}).rows()
+    assert [row["verdict"] for row in rows] == ["proved", "proved", "refuted"]

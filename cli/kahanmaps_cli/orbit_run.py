@@ -103,7 +103,7 @@ class OrbitRun:
                 name, function = name or text, self.file.integrals[text]
             else:
                 name = name or (" ".join(text.split()) if len(text) <= 30 else f"I{k}")
-                function = parse_rational_function(text, (*self.file.variables, "eps"), self.file.parameters)
+                function = parse_rational_function(text, self.file.claim_names, self.file.parameters)
             self._add_function(name, function)
 
     def _add_known(self) -> None:
@@ -128,27 +128,33 @@ class OrbitRun:
         if self.kind == "float":
             from kahanmaps.maps.floats.fast import float_function, to_float
 
+            root = self.file.map.root
+            values = [] if root is None else [to_float(root.rounded())]
             # eps itself, also where the orbit steps by -eps: integrals are those of the map.
-            self.columns.append((name, _float_column(float_function(function), to_float(self.eps))))
+            self.columns.append((name, _float_column(float_function(function), [*values, to_float(self.eps)])))
         else:
-            self.columns.append((name, self._exact_column(ClaimedIntegral(name, function))))
+            self.columns.append((name, self._exact_column(ClaimedIntegral(name, function, root=self.file.map.root))))
 
     def _exact_column(self, integral: Any) -> Callable[[Sequence[Any]], str | None]:
         from kahanmaps.errors import KahanmapsError
 
+        field, root = self.walk.arithmetic.field, self.file.map.root
+        if root is not None and self.kind == "exact":
+            field = root.number_field
+
         def value(x: Sequence[Any]) -> str | None:
             try:
-                found = integral.value(self.walk.arithmetic.field, self.eps, x)
+                found = integral.value(field, self.eps, x)
             except KahanmapsError:  # the integral is not defined where the map is not
                 return None
-            return None if found is None else self.walk.arithmetic.field.format(found)
+            return None if found is None else field.format(found)
 
         return value
 
 
-def _float_column(function: Callable[..., float | None], eps: float) -> Callable[[Sequence[Any]], str | None]:
+def _float_column(function: Callable[..., float | None], others: list[float]) -> Callable[[Sequence[Any]], str | None]:
     def value(x: Sequence[Any]) -> str | None:
-        found = function([*map(float, x), eps])
+        found = function([*map(float, x), *others])
         return None if found is None else repr(found)
 
     return value

@@ -12,7 +12,7 @@ from kahanmaps_cli.progress import say
 from kahanmaps_cli.terminal import COLOURS, NUMBER_WIDTH, console, on_terminal, shorten, styled, tell
 
 if TYPE_CHECKING:
-    from kahanmaps.checks.claims import Evidence, Finding, Report, Witness
+    from kahanmaps.checks.claims import Evidence, Finding, Report
 
 # On a terminal long lists of claims are cut to this many.
 CLAIMS_SHOWN = 40
@@ -37,7 +37,7 @@ def print_report(report: Report, as_json: bool, verbose: bool = False, quiet: bo
     elif on_terminal():
         _print_terminal(report, verbose)
     else:
-        _print_plain(report)
+        tell(str(report))
     status = exit_status(report)
     if status == 3 and report.ended_early and not quiet:
         say(f"the orbit that was asked for ended early: {report.context['orbit']['message']}")
@@ -60,23 +60,6 @@ def exit_status(report: Report) -> int:
     return 0
 
 
-def headline(report: Report) -> str:
-    """The first line: what was checked, of which systems, for which eps."""
-    from kahanmaps.checks.settings import eps_words
-
-    context = report.context
-    names = context["system"] + (f", {context['other']}" if "other" in context else "")
-    eps = eps_words(context)
-    if "eps2" in context:
-        eps += f", second map at eps2 = {context['eps2']}"
-    return f"{report.check}: {names}{eps}"
-
-
-def _verdict_text(finding: Finding) -> str:
-    verdict = str(finding.verdict)
-    return f"{verdict} (as expected)" if finding.control and finding.is_as_expected else verdict
-
-
 def verdict_style(finding: Finding) -> str:
     """Red is for what nobody expected: a control that is refuted, as it should be, stays without a colour."""
     if not finding.is_as_expected:
@@ -84,19 +67,9 @@ def verdict_style(finding: Finding) -> str:
     return "" if finding.control else COLOURS[str(finding.verdict)]
 
 
-def _print_plain(report: Report) -> None:
-    tell(headline(report))
-    told: set[str] = set()
-    for finding in report.findings:
-        tell(f"{_verdict_text(finding)}\t{finding.claim}")
-        for line in _details(finding, told):
-            tell(f"\t{line}")
-    for note in report.notes:
-        tell(f"note\t{note}")
-    tell(f"verdict\t{report.verdict}")
-
-
 def _print_terminal(report: Report, verbose: bool) -> None:
+    from kahanmaps.display.report_text import headline
+
     tell(headline(report), style="bold")
     shown = _selection(report.findings)
     _print_table(report, shown, verbose)
@@ -113,6 +86,8 @@ def _print_terminal(report: Report, verbose: bool) -> None:
 def _print_table(report: Report, shown: list[Finding], verbose: bool) -> None:
     from rich.table import Table
 
+    from kahanmaps.display.report_text import details, verdict_text
+
     table = Table(header_style="bold", show_lines=verbose)
     table.add_column("verdict", no_wrap=True)
     table.add_column("claim", overflow="fold")
@@ -121,9 +96,9 @@ def _print_table(report: Report, shown: list[Finding], verbose: bool) -> None:
     told: set[str] = set()
     for finding in shown:
         claim = finding.claim
-        verdict = styled(_verdict_text(finding).replace(" (", "\n("), verdict_style(finding))
+        verdict = styled(verdict_text(finding).replace(" (", "\n("), verdict_style(finding))
         if verbose:
-            for line in _details(finding, told, NUMBER_WIDTH):
+            for line in details(finding, told, NUMBER_WIDTH):
                 claim += "\n  " + line
             table.add_row(verdict, styled(claim))
         else:
@@ -143,6 +118,8 @@ def _short(evidence: Evidence) -> str:
 
 def _below(findings: list[Finding]) -> list[str]:
     """What a reader of the short table wants to know next: hypotheses, further evidence, witnesses."""
+    from kahanmaps.display.report_text import verdict_text, witness_lines
+
     lines = []
     hypotheses = list(dict.fromkeys(text for f in findings for text in f.evidence.data.get("hypotheses", ())))
     if hypotheses:
@@ -152,7 +129,7 @@ def _below(findings: list[Finding]) -> list[str]:
     lines += [f"also: {summary}" for summary in also[:4]]
     for finding in findings:
         if finding.witness is not None:
-            lines.append(f"{_verdict_text(finding)}: {finding.claim}")
+            lines.append(f"{verdict_text(finding)}: {finding.claim}")
             lines += [f"  {line}" for line in witness_lines(finding.witness, NUMBER_WIDTH)]
     return lines
 
@@ -162,43 +139,3 @@ def _selection(findings: tuple[Finding, ...]) -> list[Finding]:
     if len(findings) <= CLAIMS_SHOWN:
         return list(findings)
     return [f for k, f in enumerate(findings) if k < CLAIMS_SHOWN or str(f.verdict) != "proved" or f.control]
-
-
-def _details(finding: Finding, told: set[str], width: int | None = None) -> list[str]:
-    """What stands below a claim; `told` are the hypotheses that the reader has seen already."""
-    lines = [finding.formula] if finding.formula and finding.formula not in finding.claim else []
-    lines.append(_summary(finding.evidence, told))
-    lines += [f"also: {evidence.summary}" for evidence in finding.also]
-    if finding.witness is not None:
-        lines += witness_lines(finding.witness, width)
-    if finding.source:
-        lines.append(f"source: {finding.source}")
-    return [line if width is None else shorten(line, 1200) for line in lines]
-
-
-def _summary(evidence: Evidence, told: set[str]) -> str:
-    """The sentence of the evidence; a hypothesis is spelt out once in a report."""
-    hypotheses = evidence.data.get("hypotheses")
-    if not hypotheses:
-        return evidence.summary
-    new = [text for text in hypotheses if text not in told]
-    told.update(new)
-    rest = len(hypotheses) - len(new)
-    above = f"{rest} hypotheses as above" if rest > 1 else "1 hypothesis as above" if rest else ""
-    return f"{evidence.data['theorem']} applies: {'; '.join(new + [above] * bool(above))}"
-
-
-def witness_lines(witness: Witness, width: int | None) -> list[str]:
-    """A witness, the numbers shortened to `width`."""
-
-    def numbers(values: tuple[str, ...]) -> str:
-        return ", ".join(value if width is None else shorten(value, width) for value in values)
-
-    where = "" if witness.field == "QQ" else f" over {witness.field}"
-    more = [f"  {name} = ({numbers(vector)})" for name, vector in witness.vectors.items()]
-    return [
-        f"witness: x = ({numbers(witness.point)}){f', eps = {witness.eps}' if witness.eps else ''}{where}",
-        *more,
-        f"  {witness.left_label} = {numbers(witness.left)}",
-        f"  {witness.right_label} = {numbers(witness.right)}",
-    ]

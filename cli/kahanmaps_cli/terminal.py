@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
+from kahanmaps.displayed import shorten as shorten
 from kahanmaps.errors import printable
 
 if TYPE_CHECKING:
@@ -78,14 +79,6 @@ def console() -> Console:
         color_system="standard" if coloured else None,
         width=columns(),
     )
-
-
-def shorten(text: str, width: int = NUMBER_WIDTH) -> str:
-    """A long number with its middle left out and its length told: 12345...67890 (1234 characters)."""
-    if len(text) <= width:
-        return text
-    keep = max(4, (width - 18) // 2)
-    return f"{text[:keep]}...{text[-keep:]} ({len(text)} chars)"
 
 
 def tell(text: str, hang: int = _LABEL, style: str = "") -> None:
@@ -190,7 +183,7 @@ def wrapped(text: str, width: int, first: str = "", rest: str = "") -> list[str]
     A number that is longer than a line is shortened, another word folded, after * / , ; if that is possible.
     """
     room = max(8, width - len(rest))
-    text = re.sub(rf"\d{{{room + 1},}}", lambda number: shorten(number[0]), text)
+    text = re.sub(rf"\d{{{room + 1},}}", lambda number: shorten(number[0], NUMBER_WIDTH), text)
     words = re.sub(r" ([-+]) (?=\S)", r" \1" + "\0", text).split(" ")
     lines = [first]
     empty = True  # nothing but the margin on the last line

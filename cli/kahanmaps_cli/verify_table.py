@@ -6,7 +6,8 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from kahanmaps.display import markup
-from kahanmaps_cli.render import exit_status, headline, print_report, verdict_style, witness_lines
+from kahanmaps.display.report_text import headline, witness_lines
+from kahanmaps_cli.render import exit_status, print_report, verdict_style
 from kahanmaps_cli.terminal import NUMBER_WIDTH, console, echo, on_terminal, shorten, styled, tell
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from flint import fmpq_mpoly
+from flint import fmpq, fmpq_mpoly
 from flint.utils.flint_exceptions import DomainError
 
 from kahanmaps.algebra.fields import Element, Field, rational
@@ -30,7 +30,9 @@ class BudgetExceeded(KahanmapsError):
 class FunctionField(Field):
     """Q(names). Elements are `Function`, matrices `FunctionMatrix`; `budget` bounds the products of terms in all.
 
-    `reduces` says whether quotients are reduced to lowest terms.
+    `reduces` says whether quotients are reduced to lowest terms. With `modulus`, the coefficients of an irreducible
+    polynomial in the last name, that name is a root of it: what the polynomial divides is then zero, and nothing may be
+    divided by it.
 
     >>> K = FunctionField(["x", "y"])
     >>> x, y = K.variables
@@ -40,13 +42,23 @@ class FunctionField(Field):
 
     characteristic = 0
 
-    def __init__(self, names: Sequence[str], budget: int = DEFAULT_BUDGET, reduces: bool = False) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        budget: int = DEFAULT_BUDGET,
+        reduces: bool = False,
+        modulus: Sequence[fmpq] | None = None,
+    ) -> None:
         self.reduces = reduces
         self.name = f"QQ({', '.join(names)})"
         self.context = ring(names)
         self.budget = budget
         self._one = self.context.constant(1)
         self.variables = tuple(Function(self, generator, self._one) for generator in self.context.gens())
+        self.modulus: fmpq_mpoly | None = None
+        if modulus is not None:
+            root = self.context.gens()[-1]
+            self.modulus = sum((root**k * c for k, c in enumerate(modulus)), self.context.constant(0))
 
     @property
     def zero(self) -> Function:
@@ -68,10 +80,14 @@ class FunctionField(Field):
         return FunctionMatrix(self, rows, columns, [self.convert(entry) for entry in entries])
 
     def is_zero(self, element: Function) -> bool:
-        return bool(element.above.is_zero())
+        return self.vanishes(element.above)
+
+    def vanishes(self, polynomial: fmpq_mpoly) -> bool:
+        """Whether a polynomial is zero here."""
+        return bool(polynomial.is_zero() or (self.modulus is not None and (polynomial % self.modulus).is_zero()))
 
     def equal(self, left: Function, right: Function) -> bool:
-        return bool(self.times(left.above, right.below) == self.times(right.above, left.below))
+        return self.vanishes(self.times(left.above, right.below) - self.times(right.above, left.below))
 
     def times(self, left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
         """A product of polynomials, paid from the budget before it is computed. Raises BudgetExceeded."""
@@ -143,14 +159,14 @@ class Function(Element):
         return self.field.fraction(times(self.above, other.above), times(self.below, other.below))
 
     def _over(self, other: Function) -> Function:
-        if other.above.is_zero():
+        if self.field.vanishes(other.above):
             raise ZeroDivisionError("division by the zero function")
         return self._times(Function(self.field, other.below, other.above))
 
     def _same(self, other: Function) -> bool:
         if other.above.is_zero():
-            return bool(self.above.is_zero())
-        return bool(self.field.equal(self, other))
+            return self.field.is_zero(self)
+        return self.field.equal(self, other)
 
 
 class FunctionMatrix(EntryMatrix):
@@ -187,7 +203,7 @@ class FunctionMatrix(EntryMatrix):
         wide = [entry for mine, its in zip(self.tolist(), right.tolist(), strict=True) for entry in (*mine, *its)]
         rows, _ = FunctionMatrix(self.field, n, n + columns, wide)._polynomial_rows()
         below = _bareiss(self.field, [row[:n] for row in rows])
-        if below.is_zero():
+        if self.field.vanishes(below):
             raise ZeroDivisionError("singular matrix in solve()")
         solution = []
         for k in range(n):

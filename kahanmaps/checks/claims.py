@@ -13,7 +13,7 @@ from dataclasses import field as field_of
 from enum import StrEnum
 from typing import Any
 
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Displayed, Printed
 
 
 class Verdict(Displayed, StrEnum):
@@ -113,7 +113,7 @@ class Finding(Displayed):
 
 
 @dataclass(frozen=True)
-class Report(Displayed):
+class Report(Printed):
     """The findings of one check, and what is needed to do it again (`context`)."""
 
     check: str
@@ -131,6 +131,13 @@ class Report(Displayed):
     def holds(self) -> bool | None:
         """Whether everything claimed holds; None where that is undecided."""
         return self.verdict.holds
+
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each claim, for `pandas.DataFrame(report.rows())` and the like."""
+        return [
+            {"claim": one.claim, "verdict": str(one.verdict), "formula": one.formula, "evidence": one.evidence.summary}
+            for one in self.findings
+        ]
 
     def to_json(self) -> dict[str, Any]:
         """The report as plain data, the shape that scripts rely on."""

@@ -52,7 +52,9 @@ def commutativity(
     labels = (f"Phi_{second}(Phi_{first}(x))", f"Phi_{first}(Phi_{second}(x))")
     subject = (first_map.subject, second_map.subject, *([] if ratio == 1 else [ratio]))
     has_eps = first_map.has_eps or second_map.has_eps
-    return Identity(f.dim, sides, eps, *labels, has_eps=has_eps, subject=subject)
+    return Identity(
+        f.dim, sides, eps, *labels, has_eps=has_eps, root=first_map.root or second_map.root, subject=subject
+    )
 
 
 def check_commute(

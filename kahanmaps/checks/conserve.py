@@ -57,7 +57,7 @@ def conservation(system: QuadraticSystem | BirationalMap, integral: PhaseFunctio
         return None if after is None or before is None else ([after], [before])
 
     subject = (map_.subject, integral.subject)
-    return Identity(map_.dim, sides, eps, "I(x~)", "I(x)", has_eps=map_.has_eps, subject=subject)
+    return Identity(map_.dim, sides, eps, "I(x~)", "I(x)", has_eps=map_.has_eps, root=map_.root, subject=subject)
 
 
 def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | None, str]]:
@@ -85,7 +85,7 @@ def check_integrals(
     for name, function in (extra or {}).items():
         file.require_claim(f"the integral {name}", function)
     for name, function in {**file.integrals, **(extra or {})}.items():
-        candidates.append((ClaimedIntegral(name, function, settings.eps), None, ""))
+        candidates.append((ClaimedIntegral(name, function, settings.eps, file.map.root), None, ""))
     if not candidates:
         raise InputError(
             f"no integral of {file.name} is known or claimed: add a section [integrals] to the file, "

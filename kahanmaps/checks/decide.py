@@ -28,6 +28,7 @@ from flint import fmpq
 from kahanmaps.algebra.bounds import BoundField, Size, bound_of
 from kahanmaps.algebra.chance import PRIME_BITS, random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, PrimeField
+from kahanmaps.algebra.roots import Root
 from kahanmaps.checks.claims import Evidence, Verdict, Witness
 from kahanmaps.errors import BadPrime, SingularMatrix, SingularStep, counted
 
@@ -61,6 +62,7 @@ class Identity:
     scope: str = ""  # for what it is stated, in words, where there is more to say than eps
     has_eps: bool = True  # whether the sides depend on it
     no_value: str = "a denominator seems to vanish identically"  # where it is defined nowhere
+    root: Root | None = None  # the algebraic number in the coefficients, where there is one
     subject: tuple[Any, ...] = dataclass_field(kw_only=True)
 
     def seed(self, seed: int) -> int:
@@ -90,7 +92,16 @@ class Identity:
 
     name = "identity"
     patience = _MAX_POLES
-    conjugates = 1
+
+    @property
+    def conjugates(self) -> int:
+        """The degree of the number field that the coefficients lie in."""
+        return 1 if self.root is None else self.root.degree
+
+    @property
+    def ground(self) -> Field:
+        """The field of the coefficients."""
+        return QQ if self.root is None else self.root.number_field
 
     @property
     def where(self) -> str:
@@ -106,6 +117,11 @@ class Identity:
         while True:
             field = random_prime_field(rng)
             sides = None
+            if self.root is not None:
+                try:
+                    self.root.over(field)
+                except BadPrime:  # it has no root there: the primes that count are the others
+                    continue
             with suppress(BadPrime):
                 point = tuple(field.random(rng) for _ in range(self.dim))
                 eps = _draw_eps(self, field, rng)
@@ -266,10 +282,12 @@ def fails_over_Q(identity: Identity, seed: int) -> Decision | None:
     rng = random.Random(f"witness {identity.seed(seed)}")
     points = small_points(identity.dim, rng, _WITNESS_TRIES)
     points += [tuple(fmpq(rng.getrandbits(_HIGH_BITS)) for _ in range(identity.dim)) for _ in range(_HIGH_TRIES)]
+    ground = identity.ground
     for k, candidate in enumerate(points):
-        at_eps = identity.eps if identity.eps is not None else fmpq(1, 1 + k % 5)
-        found = identity.at(QQ, candidate, at_eps)
-        witness = witness_of(identity, QQ, candidate, at_eps, found) if found is not None else None
+        at_eps = ground.convert(identity.eps if identity.eps is not None else fmpq(1, 1 + k % 5))
+        point = tuple(ground.convert(entry) for entry in candidate)
+        found = identity.at(ground, point, at_eps)
+        witness = witness_of(identity, ground, point, at_eps, found) if found is not None else None
         if witness is not None:
             where = f"fails at a rational point of height at most {_height(candidate)}, exactly"
             return Decision(Verdict.REFUTED, Evidence("exact rational point", where, {}), witness)

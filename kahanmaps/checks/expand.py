@@ -32,10 +32,13 @@ def expansion(identity: Identity, budget: int | None = None) -> Evidence | None:
         bits = identity.bound[0].bits
         budget = int(DEFAULT_BUDGET / max(1.0, bits / 256) / max(1.0, bits / 10_000))
     names = [f"x{i + 1}" for i in range(identity.dim)] + ["eps"]
-    field = FunctionField(names, budget)
-    eps = field.variables[-1] if identity.eps is None else field.convert(identity.eps)
+    modulus = None if identity.root is None else identity.root.polynomial.coeffs()
+    if modulus is not None:
+        names.append("root")
+    field = FunctionField(names, budget, modulus=modulus)
+    eps = field.variables[identity.dim] if identity.eps is None else field.convert(identity.eps)
     try:
-        sides = identity.at(field, field.variables[:-1], eps)
+        sides = identity.at(field, field.variables[: identity.dim], eps)
         if sides is None:
             return None
         left, right = sides

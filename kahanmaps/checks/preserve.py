@@ -56,7 +56,9 @@ def density_identity(system: QuadraticSystem | BirationalMap, density: PhaseFunc
         labels = ("phi(x~) det M(x)", "phi(x) det N(x, x~)")
     subject = (map_.subject, density.subject)
     no_value = "the map seems to have no inverse, or no value, or a denominator to vanish identically"
-    return Identity(map_.dim, sides, eps, *labels, no_value=no_value, has_eps=map_.has_eps, subject=subject)
+    return Identity(
+        map_.dim, sides, eps, *labels, no_value=no_value, has_eps=map_.has_eps, root=map_.root, subject=subject
+    )
 
 
 def _image(kahan: MapOver, point: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -92,7 +94,7 @@ def check_measure(file: SystemFile, settings: Settings | None = None, extra: Rat
     for function in (file.density, extra):
         if function is not None:
             proof = theorems.product_density_invariant(file.system, function) if file.is_quadratic else None
-            candidates.append((ClaimedDensity(function, settings.eps), proof, ""))
+            candidates.append((ClaimedDensity(function, settings.eps, file.map.root), proof, ""))
     if not candidates:
         raise InputError(
             f"no density of {file.name} is known or claimed: add a section [density] with phi to the file, "

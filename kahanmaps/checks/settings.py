@@ -10,7 +10,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.chance import seed_for
-from kahanmaps.algebra.fields import QQ, rational
+from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.text import format_number
 from kahanmaps.checks.claims import Evidence, Witness
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS, Identity, witness_of
@@ -120,7 +120,7 @@ class OrbitRun:
 
     def to_json(self) -> dict[str, Any]:
         return {
-            "start": [format_number(entry) for entry in self.start],
+            "start": [str(entry) for entry in self.start],
             "eps": format_number(self.eps),
             "steps": self.end.steps,
             "status": self.end.status,
@@ -181,12 +181,13 @@ def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
     """Try an identity at every point of an exact orbit."""
     tried = poles = 0
     for point in run.points:
-        sides = identity.at(QQ, point, run.eps)
+        eps = identity.ground.convert(run.eps)
+        sides = identity.at(identity.ground, point, eps)
         if sides is None:
             poles += 1
             continue
         tried += 1
-        witness = witness_of(identity, QQ, point, run.eps, sides)
+        witness = witness_of(identity, identity.ground, point, eps, sides)
         if witness is not None:
             text = f"fails at step {tried + poles - 1} of an exact orbit"
             return Evidence("exact orbit", text, _orbit_data(run, tried, poles)), witness

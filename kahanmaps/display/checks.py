@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from kahanmaps.checks.claims import Evidence, Finding, Report, Verdict, Witness
 from kahanmaps.checks.settings import eps_words
 from kahanmaps.display import markup
+from kahanmaps.display import report_text as report_text  # which registers the text of reports
 from kahanmaps.displayed import html_form
 from kahanmaps.errors import counted
 

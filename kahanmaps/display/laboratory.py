@@ -10,7 +10,7 @@ from kahanmaps.algebra.text import format_number
 from kahanmaps.display import markup
 from kahanmaps.display.mathml import formula
 from kahanmaps.display.systems import CHARACTERS, equations_html, map_html
-from kahanmaps.displayed import html_form
+from kahanmaps.displayed import html_form, text_form
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.laboratory.analysis import Analysis
 from kahanmaps.laboratory.finite.cycles import Census
@@ -270,3 +270,18 @@ def _code(text: str) -> str:
 
 def _text(text: str, width: int = _TEXT) -> str:
     return markup.escape(markup.shortened(text, width))
+
+
+@text_form.register
+def degrees_text(found: DegreeGrowth) -> str:
+    """The lines of the command below its heading."""
+    return found.text
+
+
+@text_form.register
+def formulas_text(found: IntegralSearch | DensitySearch) -> str:
+    """Every formula with its verdict and what that rests on, then why there are no more."""
+    densities = getattr(found, "densities", ())
+    named = [("phi", one) for one in densities] or [(one.name, one) for one in getattr(found, "integrals", ())]
+    lines = [f"{name}\t{one.verdict}\t{one.text}\n\t{one.evidence.summary}" for name, one in named]
+    return "\n".join([*lines, *(f"note\t{text}" for text in (found.note, found.reason) if text)])

@@ -14,12 +14,14 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.numerals import check_names
 from kahanmaps.algebra.polynomials import RationalFunction, names_of, substitute
+from kahanmaps.algebra.roots import Root, parse_root
 from kahanmaps.algebra.text import format_number, parse_polynomial
 from kahanmaps.documents.composition import CompositionReader
 from kahanmaps.documents.equations import without_left_sides
 from kahanmaps.documents.reader import KINDS, json_like, plain_number, show
 from kahanmaps.documents.structured_facts import read_structured_facts
 from kahanmaps.errors import InputError, SystemFileError, quoted, suggestion
+from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.explicit import explicit_map
 from kahanmaps.maps.implicit import BirationalMap, ImplicitMap, why_no_map
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 _LONGEST_NAME = 1000
+_STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where a rational one shows mistakes as well
 
 
 def _kahan(rhs: Sequence[fmpq_mpoly], degree: int) -> Kahan:
@@ -96,7 +99,16 @@ class DocumentReader(CompositionReader):
         section = self._table(kind) if kind else None
         if section is not None:
             self._unknown_keys(kind, section)
-            if kind == "hamiltonian":
+            if self.root is not None and kind in ("family", "composition"):
+                self._mistake(
+                    f"parameters.{self.root[0]}", f"found an algebraic number in a [{kind}], expected rational ones"
+                )
+            elif self.root is not None and kind == "hamiltonian":
+                self.parameters[self.root[0]] = _STAND_IN
+                is_good = self._read_hamiltonian(section) is not None
+                del self.parameters[self.root[0]]
+                map_ = self._read_field(section) if is_good else None
+            elif kind == "hamiltonian":
                 hamiltonian = self._read_hamiltonian(section)
             elif kind == "family":
                 member = self._read_member(section)
@@ -106,6 +118,7 @@ class DocumentReader(CompositionReader):
             if hamiltonian is not None:
                 map_ = Kahan(hamiltonian.system)
             elif map_ is not None:
+                map_ = self._algebraic(kind, map_)
                 self.variables = map_.variables  # a polarised map has more of them
                 for clash in set(self.variables) & set(self.parameters):
                     self._mistake(f"parameters.{clash}", "is a variable of the map as well, expected distinct names")
@@ -156,17 +169,43 @@ class DocumentReader(CompositionReader):
                 self._mistake(path, str(error))
                 continue
             try:
-                self.parameters[name] = rational(plain_number(self.overrides.get(name, value)))
+                given = self.overrides.get(name, value)
+                root = parse_root(given) if isinstance(given, str) else given if isinstance(given, Root) else None
+                if root is not None:
+                    self._read_root(name, root)
+                    continue
+                self.parameters[name] = rational(plain_number(given))
             except InputError as error:
                 self._mistake(path, str(error))
                 self.parameters[name] = fmpq(1)  # or every use of it would be a mistake of its own
                 self.unsure = True
+        if self.root is not None:
+            self.symbols = (self.root[0],)
         declared = self.document.get("parameters", {})
         for name in self.overrides:
             if not isinstance(declared, dict) or name not in declared:
                 known = ", ".join(self.parameters) or "none"
                 hint = suggestion(name, list(self.parameters))
                 self._mistake("parameters", f"unknown parameter {quoted(name)}, this system has: {known}{hint}")
+
+    def _read_root(self, name: str, root: Root) -> None:
+        if self.root is not None:
+            raise InputError("found a second algebraic parameter, expected at most one")
+        if root.degree == 1:
+            self.parameters[name] = -root.polynomial[0]
+        else:
+            self.root = name, root
+
+    def _algebraic(self, kind: str, map_: BirationalMap) -> BirationalMap:
+        """The map with the algebraic parameter in it, if there is one; its value is put in anew for floats."""
+        if self.root is None:
+            return map_
+        name, root = self.root
+
+        def at_number(value: fmpq) -> BirationalMap:
+            return DocumentReader(self.document, self.where, {**self.overrides, name: value}, self.other).read().map
+
+        return AlgebraicMap(map_, root, at_number)
 
     def _read_variables(self, kind: str) -> None:
         given = self.document.get("variables")
@@ -393,4 +432,6 @@ class DocumentReader(CompositionReader):
         document = {"name": self.document.get("name", self._default_name()), **document}
         if self.parameters:
             document["parameters"] = {name: format_number(value) for name, value in self.parameters.items()}
+        if self.root is not None:
+            document.setdefault("parameters", {})[self.root[0]] = str(self.root[1])
         return document

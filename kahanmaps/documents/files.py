@@ -27,6 +27,7 @@ from kahanmaps.documents.reader import KINDS
 from kahanmaps.documents.toml_text import to_toml
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
+from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
@@ -69,6 +70,11 @@ class SystemFile(Displayed):
         return self.map.dim
 
     @property
+    def claim_names(self) -> tuple[str, ...]:
+        """What claims are functions of: the variables, an algebraic parameter where there is one, eps."""
+        return (*self.variables, *(self.map.given.symbols if isinstance(self.map, AlgebraicMap) else ()), "eps")
+
+    @property
     def is_quadratic(self) -> bool:
         """Whether the map is the Kahan map of a quadratic system without eps in its coefficients."""
         return isinstance(self.map, Kahan) and not self.map.system.symbols
@@ -78,6 +84,8 @@ class SystemFile(Displayed):
         """The quadratic system whose Kahan map is meant. Raises InputError where it is another map."""
         if self.is_quadratic and isinstance(self.map, Kahan):
             return self.map.system
+        if self.map.refusal:
+            raise InputError(self.map.refusal)
         what = "has eps in its coefficients" if isinstance(self.map, Kahan) else f"is of kind [{self.kind}]"
         if self.kind == "system" and not isinstance(self.map, Kahan):
             what = f"stands for a {self.map.title}"
@@ -94,7 +102,7 @@ class SystemFile(Displayed):
 
     def require_claim(self, what: str, function: RationalFunction) -> None:
         """Raises InputError unless the function is one of the system's variables and eps, in this order."""
-        expected = (*self.variables, "eps")
+        expected = self.claim_names
         if function.names != expected:
             raise InputError(
                 f"found {what} in the variables {', '.join(function.names)}, expected a rational function of "
@@ -235,6 +243,8 @@ def matched(file: SystemFile, other: SystemFile) -> tuple[BirationalMap, str]:
     f, g = file.map, other.map
     if f.dim != g.dim:
         raise InputError(f"{file.name} has dimension {f.dim} and {other.name} {g.dim}, expected the same dimension")
+    if f.root is not None and g.root is not None and f.root != g.root:
+        raise InputError(f"found a {f.root} and a {g.root}, expected the same algebraic number in both systems")
     if f.variables == g.variables:
         return g, ""
     pair = f"{', '.join(f.variables)} with {', '.join(g.variables)}"

@@ -11,6 +11,7 @@ from typing import Any
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomial, parse_rational_function
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
 from kahanmaps.errors import InputError, counted, quoted
@@ -69,6 +70,7 @@ class PartReader:
         self.unsure = False  # some parameter has no value: what depends on values is not judged
         self.variables: tuple[str, ...] | None = None
         self.symbols: tuple[str, ...] = ()  # parameters that the map is to contain as symbols
+        self.root: tuple[str, Root] | None = None  # the parameter that is an algebraic number, which is such a symbol
 
     def _mistake(self, key: str, sentence: str) -> None:
         # Keys come from the file: nothing in them may reach a terminal as an escape sequence.

@@ -26,6 +26,8 @@ def map_with_symbols(file: SystemFile, symbols: Sequence[str] = ()) -> Birationa
     x~ = y
     y~ = (y + a)/x
     """
+    if file.map.refusal:
+        raise InputError(file.map.refusal)
     symbols = _parameters(file, symbols)
     if not symbols:
         return file.map

@@ -17,6 +17,7 @@ from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.polynomials import RationalFunction, evaluate
+from kahanmaps.algebra.roots import Root
 from kahanmaps.errors import InputError
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
 from kahanmaps.maps.kahan import KahanMap
@@ -102,9 +103,11 @@ class ClaimedIntegral(ClaimedFunction):
     `condition` says for which eps it has values, and that it is a constant where it is one.
     """
 
-    def __init__(self, name: str, function: RationalFunction, eps: fmpq | None = None) -> None:
-        super().__init__(name, function)
-        self.condition = integral_condition(function, len(function.names) - 1, eps)
+    def __init__(
+        self, name: str, function: RationalFunction, eps: fmpq | None = None, root: Root | None = None
+    ) -> None:
+        super().__init__(name, function, root)
+        self.condition = integral_condition(function, len(function.names) - 1 - (root is not None), eps)
 
 
 def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None) -> str:

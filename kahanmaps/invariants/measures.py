@@ -16,6 +16,7 @@ from flint import fmpq
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.text import format_rational_function
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.invariants.phase_functions import ClaimedFunction, PhaseFunction, at_eps, where
@@ -48,9 +49,9 @@ class ClaimedDensity(ClaimedFunction):
     `condition` says for which eps that means something, as `density_condition`. Raises InputError as it does.
     """
 
-    def __init__(self, function: RationalFunction, eps: fmpq | None = None) -> None:
-        super().__init__("phi", function)
-        self.condition = density_condition(function, len(function.names) - 1, eps)
+    def __init__(self, function: RationalFunction, eps: fmpq | None = None, root: Root | None = None) -> None:
+        super().__init__("phi", function, root)
+        self.condition = density_condition(function, len(function.names) - 1 - (root is not None), eps)
         self.formula = f"phi = {self.formula}"
 
 

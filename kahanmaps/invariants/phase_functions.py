@@ -17,6 +17,7 @@ from kahanmaps.algebra.polynomials import (
     primitive_part,
     substitute,
 )
+from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.text import format_polynomial, format_rational_function
 
 _LONGEST_CONDITION = 200  # characters
@@ -40,10 +41,14 @@ class PhaseFunction(ABC):
 
 
 class ClaimedFunction(PhaseFunction):
-    """A rational function of the variables and eps (its last variable) that somebody makes a claim about."""
+    """A rational function of the variables and eps (its last variable) that somebody makes a claim about.
 
-    def __init__(self, name: str, function: RationalFunction) -> None:
+    Where there is a `root`, the variable before eps stands for it.
+    """
+
+    def __init__(self, name: str, function: RationalFunction, root: Root | None = None) -> None:
         self.name = name
+        self.root = root
         self.function = function
         self.formula = format_rational_function(function)
 
@@ -53,7 +58,8 @@ class ClaimedFunction(PhaseFunction):
 
     def value(self, field: Field, eps: Any, point: Sequence[Any]) -> Any:
         with field.working():
-            return self.function.value(field, (*point, field.convert(eps)))
+            values = () if self.root is None else (self.root.over(field),)
+            return self.function.value(field, (*point, *values, field.convert(eps)))
 
 
 def at_eps(function: RationalFunction, eps: fmpq | None) -> tuple[fmpq_mpoly, fmpq_mpoly]:

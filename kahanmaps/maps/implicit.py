@@ -31,6 +31,7 @@ from kahanmaps.algebra.chance import random_prime_field, seed_for
 from kahanmaps.algebra.fields import QQ, Field, rational
 from kahanmaps.algebra.matrices import det, solve
 from kahanmaps.algebra.polynomials import RationalFunction, digits_of, names_of, ring
+from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.text import format_polynomial, format_rational_function
 from kahanmaps.displayed import DisplayedAsFormula
 from kahanmaps.errors import BadPrime, InputError, SingularMatrix, SingularStep
@@ -322,6 +323,7 @@ class BirationalMap(DisplayedAsFormula, ABC):
     title: str  # what kind of map it is, in a word or two
     has_time_step: bool = True  # which is 2 eps
     denominator_name = "det M"
+    root: Root | None = None  # the algebraic number in the coefficients, where there is one
 
     @property
     def dim(self) -> int:
@@ -347,6 +349,21 @@ class BirationalMap(DisplayedAsFormula, ABC):
     def image(self) -> tuple[RationalFunction, ...] | None:
         """The coordinates of x~ as functions of the `names`, where the map is given by them; else None."""
         return None
+
+    @property
+    def rounded(self) -> BirationalMap:
+        """The map with rational coefficients from which floats start. Raises InputError where it is not real."""
+        return self
+
+    @property
+    def refusal(self) -> str:
+        """Empty, or why what needs rational coefficients is not to be had."""
+        if self.root is None:
+            return ""
+        return (
+            f"found a parameter that is a {self.root}, expected rational ones: algebraic numbers are for orbit, "
+            "check-commute, check-integrals, check-measure, degrees and cycles, and rounded for what is drawn in floats"
+        )
 
     @property
     def kind(self) -> str:

@@ -23,6 +23,7 @@ from kahanmaps.algebra.fields import QQ, Field
 from kahanmaps.algebra.polynomials import names_of, ring
 from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.displayed import DisplayedAsFormula
+from kahanmaps.errors import InputError
 from kahanmaps.maps.equation import Equation
 from kahanmaps.maps.implicit import BirationalMap, StepOver, nonzero_eps
 from kahanmaps.systems.quadratic import QuadraticSystem, SystemOver
@@ -76,14 +77,17 @@ class KahanMapOver(StepOver):
         with field.working():
             tensor = (self.local.tensor * -eps).entries()
             B, c = (self.local.B * eps).entries(), (self.local.c * (-2 * eps)).entries()
-            one, minus = field.one, -field.one
+            one, zero = field.one, field.zero
             terms = []
             for i in range(n):
                 left = [
-                    [*enumerate(tensor[(i * n + j) * n : (i * n + j + 1) * n]), (n, -B[i * n + j] + (i == j) * one)]
+                    [
+                        *enumerate(tensor[(i * n + j) * n : (i * n + j + 1) * n]),
+                        (n, -B[i * n + j] + (one if i == j else zero)),
+                    ]
                     for j in range(n)
                 ]
-                right = [*((j, -B[i * n + j] + (i == j) * minus) for j in range(n)), (n, c[i])]
+                right = [*((j, -B[i * n + j] - (one if i == j else zero)) for j in range(n)), (n, c[i])]
                 terms.append(tuple(tuple((k, e) for k, e in form if not field.is_zero(e)) for form in (*left, right)))
         return Equation(field, exponents, tuple(terms))
 
@@ -118,6 +122,10 @@ class KahanMap(DisplayedAsFormula, KahanMapOver):
         self, system: QuadraticSystem, eps: Any, field: Field = QQ, values: Sequence[Any] = (), inside: Any = None
     ) -> None:
         """`inside` is put in for eps in the coefficients where that is not the step: for inverse maps."""
+        if not isinstance(system, QuadraticSystem):
+            raise InputError(
+                f"found a {type(system).__name__}, expected a quadratic system: km.load(...).system is one"
+            )
         self.system, self.values = system, tuple(values)
         self.variables = system.variables
         element = nonzero_eps(eps, field)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, rational
+from kahanmaps.algebra.text import parse_point
 from kahanmaps.errors import InputError
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.accuracy import NotAccurate, bits_for
@@ -61,7 +62,7 @@ def orbit(
 
     Args:
         given: the map; a quadratic system stands for its Kahan map.
-        start: exact numbers.
+        start: exact numbers, or text such as "1/2,-1/3".
         eps: an exact number, for Kahan maps half the time step; none for a map without it.
         steps: how many steps to take, or
         at: which iterates alone are wanted.
@@ -93,6 +94,8 @@ def orbit(
     if isinstance(arithmetic, str):
         arithmetic = Arithmetic.parse(arithmetic)
     map_ = as_map(given)
+    if isinstance(start, str):
+        start = parse_point(start)
     if eps is None and map_.has_eps:
         raise InputError("found no eps, expected an exact number: the map depends on it")
     exact_eps = fmpq(1) if eps is None else rational(eps)
@@ -116,7 +119,9 @@ def orbit(
             from kahanmaps.maps.floats.fast import FloatOrbit
 
             form = None if used is None else used.form
-            return FloatOrbit(map_, exact_eps, start, far, backward=backward, form=form, kernel=kernel, every=interval)
+            return FloatOrbit(
+                map_.rounded, exact_eps, start, far, backward=backward, form=form, kernel=kernel, every=interval
+            )
         over, budget = map_.at(exact_eps, numbers.field), max_digits or DEFAULT_MAX_DIGITS
         if chosen.name == "jump" and used is not None:
             return Iterates(over, start, at or [], structure=used, backward=backward, max_digits=budget)

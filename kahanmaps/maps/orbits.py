@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq
 
+from kahanmaps.algebra.etale import EtaleAlgebra
 from kahanmaps.algebra.fields import QQ, BallField, Field
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, PrecisionLost, SingularStep, counted
@@ -203,7 +204,10 @@ class Orbit(Displayed):
     def _excess(self, value: Any) -> int:
         """The bits of a value that is beyond the budget, otherwise 0."""
         limit = _bits(self.max_digits)
-        return 0 if limit is None or isinstance(value, tuple) else value.exceeding(limit)
+        if isinstance(value, tuple):
+            bits = _bits_of(value) if isinstance(self.map.field, EtaleAlgebra) else 0
+            return bits if limit is not None and bits > limit else 0
+        return 0 if limit is None else value.exceeding(limit)
 
     def _singular_message(self, step: int) -> str:
         return f"{det_of(self.map.denominator_name(self.backward))} = 0 at step {step}: the map has no value there"
@@ -313,6 +317,12 @@ def require_short(eps: fmpq | None, start: Sequence[fmpq], max_digits: int | Non
 def _bits(max_digits: int | None) -> int | None:
     """A budget of digits in bits."""
     return None if max_digits is None else max_digits * 100_000 // 30103
+
+
+def _bits_of(point: tuple[Any, ...]) -> int:
+    """Those of the longest integer in the coordinates of a point over a number field."""
+    numbers = [number for entry in point for number in entry.coefficients]
+    return max((max(x.p.bit_length(), x.q.bit_length()) for x in numbers), default=0)
 
 
 def _budget_text(step: int, bits: int | None, max_digits: int | None, wanted: int | None = None) -> str:

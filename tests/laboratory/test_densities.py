@@ -271,3 +271,9 @@ def test_a_density_without_a_closed_form_is_told():
         [],
         "there is a density of degree 3 modulo primes, but no closed form: too long",
     )
+
+
+def test_a_proved_density_comes_before_supported_ones_of_less_degree():
+    found = find_densities(load("lv(5,1)")).densities
+    assert [(one.text, str(one.verdict)) for one in found[:1]] == [("x1*x2*x3*x4*x5", "proved")]
+    assert [str(one.verdict) for one in find_densities(load("lv(5,1)"), max_degree=4).densities] == ["supported"]

@@ -44,7 +44,7 @@ def command(system: str | None, integrals: tuple[tuple[str, str], ...], **option
     with Progress(options["quiet"]) as progress:
         settings = settings_from(options, progress)
         file = load_system(system, options)
-        names = (*file.variables, "eps")
+        names = file.claim_names
         extra = {name: parse_rational_function(text, names, file.parameters) for name, text in _named(integrals, file)}
         report = check_integrals(file, settings, extra)
     return print_report(report, options["as_json"], options["verbose"], options["quiet"])

@@ -37,6 +37,6 @@ def command(system: str | None, density: str | None, **options: Any) -> int:
         file = load_system(system, options)
         extra = None
         if density is not None:
-            extra = parse_rational_function(density, (*file.variables, "eps"), file.parameters)
+            extra = parse_rational_function(density, file.claim_names, file.parameters)
         report = check_measure(file, settings, extra)
     return print_report(report, options["as_json"], options["verbose"], options["quiet"])

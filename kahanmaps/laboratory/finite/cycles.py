@@ -201,6 +201,8 @@ def _require_reduction(map_: BirationalMap, eps: fmpq, prime: int) -> None:
     try:
         map_.at(eps, field)
     except BadPrime as error:
+        if map_.root is not None:
+            raise
         what = "system" if isinstance(map_, Kahan) else "map"
         raise BadPrime(f"the prime {prime} divides a denominator of the {what}: take another prime", prime) from error
 

@@ -31,7 +31,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.text import format_number
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Printed
 from kahanmaps.errors import BadPrime, InputError, counted
 from kahanmaps.laboratory.growth.curves import Line, Stopped, reduced
 from kahanmaps.laboratory.growth.enclosure import Enclosure, enclose
@@ -56,7 +56,7 @@ _REPLACEMENTS = 6  # lines taken instead of others; one in 2^40 is expected to n
 
 
 @dataclass(frozen=True)
-class DegreeGrowth(Displayed):
+class DegreeGrowth(Printed):
     """The degrees d_0 = 1, d_1, d_2, ... of the iterates of a map, and what they say of its complexity.
 
     `eps` is None for generic eps (a random residue for each line). `ended` is "recurrence" (one was found, with terms
@@ -191,6 +191,10 @@ class DegreeGrowth(Displayed):
         """The kind of growth with its power or rate, and how far confinement was looked for: one phrase."""
         limited = self.recurrence is not None and self.basis not in ("measured", "explained")
         return self.kind_text + (f" ({self.basis})" if limited else "")
+
+    def rows(self) -> list[dict[str, int]]:
+        """A row for each iterate, for `pandas.DataFrame(found.rows())` and the like."""
+        return [{"n": n, "degree": degree} for n, degree in enumerate(self.degrees)]
 
     @property
     def text(self) -> str:
@@ -353,7 +357,7 @@ class _Search:
 
     def _follow(self) -> None:
         """What the singularities say, if that was not asked before and the map is not affine."""
-        if self._patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
+        if self._map.root is None and self._patterns is None and len(self.degrees) > 1 and self.degrees[1] > 1:
             left = max(0.0, self._deadline - time.monotonic())
             self._patterns = patterns_of_map(
                 self._map, self._eps, steps=self._steps, seed=self._seed, seconds=0.7 * left

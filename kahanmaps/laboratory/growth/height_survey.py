@@ -147,6 +147,8 @@ def height_survey(
     deadline = time.monotonic() + seconds
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(given)
+    if map_.refusal:
+        raise InputError(map_.refusal)
     for value in (fmpq(1),) if not map_.has_eps else DEFAULT_EPS if eps is None else (rational(eps),):
         over = map_.at(value)
         draws = _generic_starts(map_.dim, seed_for(seed, map_.subject, value))

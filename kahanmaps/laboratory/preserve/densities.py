@@ -11,17 +11,17 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from math import comb
+from math import comb, prod
 from typing import Any
 
 from flint import fmpq, fmpz
 
 from kahanmaps.algebra.plain import attributes
-from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part
+from kahanmaps.algebra.polynomials import RationalFunction, coefficients_in, degree_in, primitive_part, ring
 from kahanmaps.algebra.text import format_factored
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.theorems import product_density_invariant
-from kahanmaps.displayed import Displayed, latex
+from kahanmaps.displayed import Printed, latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -69,13 +69,14 @@ class FoundDensity:
 
 
 @dataclass(frozen=True)
-class DensitySearch(Displayed):
+class DensitySearch(Printed):
     """What `find_densities` found.
 
-    `densities` span all phi of the least degree that has some, or are det(I - eps f') of a Hamiltonian system, which
-    need not be of least degree; `degree` is the largest that was tried, and `reason` says why the search ended without
-    a density. `eps` is None for every eps; `period` is the number of points of orbits that close. `turning` is a phi
-    with phi(x~) = -det dPhi(x) phi(x): the map turns dx/phi into -dx/phi, and |dx/phi| is invariant.
+    `densities` span all phi of the least degree that has some, after a proved one where these are not, or are
+    det(I - eps f') of a Hamiltonian system, which need not be of least degree; `degree` is the largest that was tried,
+    and `reason` says why the search ended without a density. `eps` is None for every eps; `period` is the number of
+    points of orbits that close. `turning` is a phi with phi(x~) = -det dPhi(x) phi(x): the map turns dx/phi into
+    -dx/phi, and |dx/phi| is invariant.
     """
 
     file: SystemFile
@@ -98,6 +99,10 @@ class DensitySearch(Displayed):
             return closes
         turns = f"|dx/phi| is invariant for phi = {self.turning.text}: phi(x~) = -det dPhi(x) phi(x)"
         return "; ".join(filter(None, (f"{turns} ({self.turning.verdict})", closes)))
+
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each formula, for `pandas.DataFrame(found.rows())` and the like."""
+        return [{"name": "phi", "formula": one.text, "verdict": str(one.verdict)} for one in self.densities]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -171,6 +176,8 @@ def find_densities(
             progress("densities that are products")
             product, turning = _products(laboratory, max_degree)
             densities, tried, reason = _search(laboratory, product, max_degree, deadline, progress)
+            if densities and all(one.verdict is not Verdict.PROVED for one in densities):
+                densities = [*_product_of_variables(laboratory, max_degree), *densities]
     return DensitySearch(
         file,
         laboratory.symbols,
@@ -216,6 +223,17 @@ def _search(
     if product is not None:
         return [product], product.degree(dim), ""
     return [], top, f"no polynomial of degree at most {top}, and no product of powers of known ones, is a density"
+
+
+def _product_of_variables(laboratory: Laboratory, max_degree: int | None) -> list[FoundDensity]:
+    """x_1 ... x_n where the lemma on Lotka-Volterra systems proves it, whatever its degree: proved ones come first."""
+    system = laboratory.system
+    if system is None or laboratory.flow or (max_degree is not None and system.dim > max_degree):
+        return []
+    x = ring(laboratory.map.names).gens()
+    phi = RationalFunction(prod(x[: system.dim], start=x[0] ** 0), x[0] ** 0)
+    proof = product_density_invariant(system, phi)
+    return [] if proof is None else [FoundDensity(phi, Verdict.PROVED, proof)]
 
 
 def _products(laboratory: Laboratory, max_degree: int | None) -> tuple[FoundDensity | None, FoundDensity | None]:

@@ -22,7 +22,7 @@ from kahanmaps.algebra.plain import attributes
 from kahanmaps.algebra.polynomials import RationalFunction, degree, evaluate, ring
 from kahanmaps.algebra.text import format_factored, format_polynomial, format_rational_function
 from kahanmaps.checks.claims import Evidence, Verdict
-from kahanmaps.displayed import Displayed, latex
+from kahanmaps.displayed import Printed, latex
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.laboratory import Laboratory
@@ -112,7 +112,7 @@ class TimedIntegral:
 
 
 @dataclass(frozen=True)
-class IntegralSearch(Displayed):
+class IntegralSearch(Printed):
     """What `find_integrals` found.
 
     `integrals` are functionally independent, also together with those that depend on time, `in_time`, or those whose
@@ -188,6 +188,10 @@ class IntegralSearch(Displayed):
     def is_complete(self) -> bool:
         """Whether there is a closed form for every integral that is known."""
         return self.found >= self.codimension
+
+    def rows(self) -> list[dict[str, str]]:
+        """A row for each formula, for `pandas.DataFrame(found.rows())` and the like."""
+        return [{"name": one.name, "formula": one.text, "verdict": str(one.verdict)} for one in self.integrals]
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -167,6 +167,8 @@ def singularities(
     ('-9/100*x + 11/100*y + 99/100', 'not confined')
     """
     map_, exact_eps = as_map(system), rational(eps)
+    if map_.refusal:
+        raise InputError(map_.refusal)
     if map_.dim > MAX_DIMENSION:
         raise InputError(f"found a system of dimension {map_.dim}, expected at most {MAX_DIMENSION}")
     most = _most_digits(map_.dim, seconds)
@@ -507,6 +509,8 @@ def symbolic_denominator(system: QuadraticSystem | BirationalMap) -> list[tuple[
 
 def default_eps(system: QuadraticSystem | BirationalMap, seed: int) -> tuple[fmpq, ...]:
     """Two rational numbers of small height, the same ones for the same map and seed; one for a map without eps."""
+    if refusal := as_map(system).refusal:
+        raise InputError(refusal)
     if not as_map(system).has_eps:
         return (fmpq(1),)
     rng = random.Random(f"singularities eps {seed_for(seed, as_map(system).subject)}")

@@ -113,7 +113,7 @@ class Stepping:
         compiled = choose_kernel(kernel, long=True) == "numba"
         if threads is not None and threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
-        map_ = as_map(system)
+        map_ = as_map(system).rounded
         map_over = map_.at(eps)
         self._map = map_over.inverse if backward else map_over
         self.matrix_name = map_over.denominator_name(backward)

@@ -1,0 +1,130 @@
+"""A root of an irreducible polynomial over Q, the value of a parameter: `root of t^2 - 2`, `root of t^2 - 2 near 1.4`.
+
+Conjugate roots can not be told apart by identities over Q: what is exact holds in Q[t]/g for the class of t, and so for
+every root of g. Modulo a prime any root there stands for it; real numbers need the embedding that `near` chooses.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cached_property
+from typing import Any
+
+import flint
+from flint import arb, fmpq, fmpq_poly, fmpz, nmod_poly
+
+from kahanmaps.algebra.bounds import Bound, BoundField, Size, log2
+from kahanmaps.algebra.etale import EtaleAlgebra
+from kahanmaps.algebra.fields import QQ, BallField, ComplexBallField, Field, PrimeField
+from kahanmaps.algebra.functions import FunctionField
+from kahanmaps.algebra.text import format_univariate, parse_number, parse_polynomial
+from kahanmaps.errors import BadPrime, InputError, quoted
+
+MAX_DEGREE = 12
+_FORM = re.compile(r"\s*root\s+of\s+(?P<g>.+?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
+_GUARD_BITS = 64
+
+
+class Root:
+    """A root of the irreducible `polynomial`, monic; of several real ones that next to `near`, where it is given.
+
+    >>> root = parse_root("root of 2*t^2 - 4 near 1.4")
+    >>> root, root.number_field
+    (root of t^2 - 2 near 7/5, QQ[t]/(t^2 - 2))
+    """
+
+    def __init__(self, polynomial: fmpq_poly, near: fmpq | None = None) -> None:
+        if polynomial.degree() < 1 or polynomial.degree() > MAX_DEGREE:
+            raise InputError(
+                f"found a root of {format_univariate(polynomial)}, expected a degree from 1 to {MAX_DEGREE}"
+            )
+        factors = polynomial.factor()[1]
+        if len(factors) != 1 or factors[0][1] != 1:
+            parts = ", ".join(format_univariate(factor) for factor, _ in factors)
+            g = format_univariate(polynomial)
+            raise InputError(f"found a root of {g}, expected an irreducible polynomial: its factors are {parts}")
+        self.polynomial = polynomial / polynomial.leading_coefficient()
+        self.near = near
+
+    @property
+    def degree(self) -> int:
+        """That of the number field."""
+        return int(self.polynomial.degree())
+
+    @cached_property
+    def number_field(self) -> EtaleAlgebra:
+        """Q[t]/g, where the class of t is the root."""
+        return EtaleAlgebra(self.polynomial)
+
+    def over(self, field: Field) -> Any:
+        """The root as an element of the field. Raises BadPrime where GF(p) has none, InputError for other fields."""
+        if isinstance(field, EtaleAlgebra) and field == self.number_field:
+            return field.generator
+        if isinstance(field, PrimeField):
+            return self._modulo(field)
+        if isinstance(field, BallField | ComplexBallField):
+            return field.convert(self._real(field.bits))
+        if isinstance(field, BoundField):
+            return self._bound(field)
+        if isinstance(field, FunctionField) and field.modulus is not None:
+            return field.variables[-1]
+        raise InputError(f"a {self} is no element of {field}")
+
+    def rounded(self, bits: int = 256) -> fmpq:
+        """A rational number as close to the real root as so many bits allow."""
+        middle = self._real(bits).mid()
+        mantissa, exponent = middle.man_exp()
+        return fmpq(mantissa) * fmpq(2) ** int(exponent)
+
+    def _modulo(self, field: PrimeField) -> Any:
+        p = field.prime
+        if p >= 2**63:
+            raise InputError(f"found a prime of {p.bit_length()} bits, expected at most 63 with a {self}")
+        residues = [int(field.convert(c)) for c in self.polynomial.coeffs()]
+        roots = sorted(int(root) for root, _ in nmod_poly(residues, p).roots())
+        if not roots:
+            raise BadPrime(f"{format_univariate(self.polynomial)} has no root modulo {p}: take another prime", p)
+        return field.convert(roots[0])
+
+    def _real(self, bits: int) -> arb:
+        with flint.ctx.workprec(bits + _GUARD_BITS):
+            roots: Any = self.polynomial.numer().complex_roots()  # FLINT's stubs say less
+            found: list[arb] = [root.real for root, _ in roots if root.imag.is_zero()]
+            if not found:
+                raise InputError(f"a {self} is not real: take exact or mod:P arithmetic")
+            if self.near is None and len(found) > 1:
+                texts = ", ".join(root.str(6, radius=False) for root in found)
+                raise InputError(
+                    f"a {self} may be {texts}: say which, e.g. {self} near {found[-1].str(4, radius=False)}"
+                )
+            near = arb(0 if self.near is None else self.near)
+            return min(found, key=lambda root: float(abs(root - near)))
+
+    def _bound(self, field: BoundField) -> Bound:
+        """A bound for all conjugates: the root is b/q for a b that is integral, and of Cauchy's size at most."""
+        q = fmpz(self.polynomial.denom())
+        size = 1 + max(abs(self.polynomial[k] * q ** (self.degree - k)) for k in range(self.degree))
+        return Bound(field, Size(0, log2(fmpz(size.p // size.q + 1))), int(q), {})
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Root) and bool(self.polynomial == other.polynomial) and self.near == other.near
+
+    def __hash__(self) -> int:
+        return hash(str(self))
+
+    def __repr__(self) -> str:
+        near = "" if self.near is None else f" near {QQ.format(self.near)}"
+        return f"root of {format_univariate(self.polynomial)}{near}"
+
+
+def parse_root(text: str) -> Root | None:
+    """The root that a text `root of g` or `root of g near r` names; None for other text. Raises InputError."""
+    found = _FORM.fullmatch(text)
+    if found is None:
+        return None
+    names = sorted(set(re.findall(r"[A-Za-z_]\w*", found["g"])))
+    if len(names) != 1:
+        raise InputError(f"found {quoted(text)}, expected a polynomial in one variable, e.g. root of t^2 - 2")
+    terms = {int(e): c for (e,), c in parse_polynomial(found["g"], names).terms()}
+    coefficients = [terms.get(k, fmpq(0)) for k in range(max(terms, default=0) + 1)]
+    return Root(fmpq_poly(coefficients), None if found["near"] is None else parse_number(found["near"]))

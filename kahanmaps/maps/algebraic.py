@@ -1,0 +1,73 @@
+"""A map with an algebraic number in its coefficients: a map with a symbol, and the root that stands for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from kahanmaps.algebra.fields import QQ, Field
+from kahanmaps.algebra.roots import Root
+from kahanmaps.errors import InputError
+from kahanmaps.maps.implicit import BirationalMap, MapOver
+
+
+class AlgebraicMap(BirationalMap):
+    """The map `given`, whose only symbol has the value `root`; over Q it is one over the number field Q[t]/g.
+
+    `at_number` gives the map with a rational number for the symbol: for floats, where the root is rounded first.
+
+    >>> from kahanmaps.algebra.roots import parse_root
+    >>> from kahanmaps.algebra.text import parse_polynomial
+    >>> from kahanmaps.maps.kahan import Kahan
+    >>> from kahanmaps.systems.quadratic import QuadraticSystem
+    >>> riccati = QuadraticSystem((parse_polynomial("a*x^2", ["x", "a"]),), ("a",))
+    >>> map_ = AlgebraicMap(Kahan(riccati), parse_root("root of t^2 - 2"), lambda a: Kahan(riccati.at([a])))
+    >>> map_.at("1/2").step([1])
+    (-t - 1,)
+    """
+
+    root: Root
+
+    def __init__(self, given: BirationalMap, root: Root, at_number: Callable[[Any], BirationalMap]) -> None:
+        self.given, self.root = given, root
+        self.variables, self.title, self.has_time_step = given.variables, given.title, given.has_time_step
+        self.denominator_name = given.denominator_name
+        self._at_number = at_number
+        self._last: tuple[Field, Any] | None = None
+
+    @property
+    def has_eps(self) -> bool:
+        return self.given.has_eps
+
+    @property
+    def subject(self) -> tuple[Any, ...]:
+        return (*self.given.subject, str(self.root))
+
+    @property
+    def digits(self) -> int:
+        return self.given.digits
+
+    @property
+    def rounded(self) -> BirationalMap:
+        """The map with a rational number next to the root. Raises InputError where the root is not real."""
+        return self._at_number(self.root.rounded())
+
+    @property
+    def rows(self) -> Any:  # type: ignore[override]  # nobody writes it
+        raise InputError(self.refusal)
+
+    def at(self, eps: Any, over: Field = QQ, values: Sequence[Any] = ()) -> MapOver:
+        """The map over a field in which the polynomial of the root has a root. Raises BadPrime where it has none."""
+        over = self.root.number_field if over is QQ else over
+        if self._last is None or self._last[0] is not over:
+            self._last = over, self.root.over(over)
+        return self.given.at(eps, over, [*values, self._last[1]])
+
+    def written(self) -> dict[str, Any]:
+        return {**self.given.written(), "algebraic": {self.given.symbols[0]: str(self.root)}}
+
+    def __str__(self) -> str:
+        return f"{self.given}\nwhere {self.given.symbols[0]} is a {self.root}"
+
+    def __repr__(self) -> str:
+        return f"AlgebraicMap({self.given!r}, {self.given.symbols[0]} = {self.root})"

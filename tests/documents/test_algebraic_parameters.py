@@ -1,0 +1,157 @@
+"""Parameters that are algebraic numbers: exact over Q[t]/g, modulo primes where g has a root, rounded for floats."""
+
+from __future__ import annotations
+
+import pytest
+from flint import fmpq_poly
+
+import kahanmaps as km
+from kahanmaps.algebra.etale import EtaleAlgebra
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.functions import FunctionField
+from kahanmaps.algebra.roots import parse_root
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.errors import BadPrime, InputError
+
+TOP = "x' = a*y*z; y' = -x*z; z' = x*y"
+ROOT = "root of t^2 - 2 near 1.4"
+
+
+def verdict(integral: str, a: str = ROOT) -> Verdict:
+    file = km.System(TOP, a=a)
+    return km.check_integrals(
+        file, extra={"I": km.parse_rational_function(integral, file.claim_names, file.parameters)}
+    ).verdict
+
+
+@pytest.mark.parametrize(
+    ("integral", "expected"),
+    [
+        ("(y^2 + z^2)/(1 + eps^2*x^2)", Verdict.PROVED),
+        ("(1 + eps^2*x^2)/(1 - a*eps^2*y^2)", Verdict.PROVED),
+        ("(1 + eps^2*x^2)/(1 - 2/a*eps^2*y^2)", Verdict.PROVED),  # for a^2 = 2 only
+        ("(1 + eps^2*x^2)/(1 + a*eps^2*y^2)", Verdict.REFUTED),  # that of the conjugate system
+        ("(1 + eps^2*x^2)/(1 - 2*eps^2*y^2)", Verdict.REFUTED),
+    ],
+)
+def test_claims_are_proved_or_refuted_over_the_number_field(integral, expected):
+    assert verdict(integral) is expected
+
+
+def test_what_holds_for_this_root_fails_for_another_number():
+    integral = "(1 + eps^2*x^2)/(1 - 2/a*eps^2*y^2)"
+    assert verdict(integral, "root of t^2 - 3") is verdict(integral, "3/2") is Verdict.REFUTED
+
+
+def test_a_refutation_has_a_witness_over_the_number_field():
+    report = km.check_commute(km.System(TOP, a=ROOT), km.System("x' = 2*y*z; y' = -x*z; z' = x*y"))
+    witness = report.findings[0].witness
+    assert report.verdict is Verdict.REFUTED
+    assert witness is not None
+    assert witness.field == "QQ[t]/(t^2 - 2)"
+    assert witness.left != witness.right
+
+
+def test_maps_with_the_root_commute_with_their_own_multiples_only_where_they_should():
+    linear = "x' = a*y; y' = -x"
+    assert km.check_commute(km.System(linear, a=ROOT), km.System("x' = 3*a*y; y' = -3*x", a=ROOT)).verdict is (
+        Verdict.PROVED
+    )
+    assert km.check_commute(km.System(linear, a=ROOT), km.System("x' = 3*y; y' = -3*x")).verdict is Verdict.REFUTED
+    with pytest.raises(InputError, match="the same algebraic number"):
+        km.check_commute(km.System(linear, a=ROOT), km.System(linear, a="root of t^2 - 3"))
+
+
+def test_the_points_of_an_orbit_agree_in_all_arithmetics():
+    file = km.load("euler_top", {"a1": ROOT})
+    exact = [point.x for point in km.orbit(file, [1, 2, 3], "1/10", steps=3)][-1]
+    near = float(parse_root(ROOT).rounded())
+    values = [sum(float(c) * near**k for k, c in enumerate(entry.coefficients)) for entry in exact]
+    floats = [point.x for point in km.orbit(file, [1, 2, 3], "1/10", steps=3, arithmetic="float")][-1]
+    assert list(floats) == pytest.approx(values, rel=1e-13)  # a few roundings of numbers of size 1
+    p = 17
+    residues = [point.x for point in km.orbit(file, [1, 2, 3], "1/10", steps=3, arithmetic="mod:17")][-1]
+    t = parse_root(ROOT).over(GF(p))
+    assert t * t == 2
+    field = GF(p)
+    assert list(residues) == [
+        field.convert(entry.coefficients[0]) + field.convert(entry.coefficients[1]) * t for entry in exact
+    ]
+
+
+def test_the_digit_budget_ends_orbits_over_a_number_field_too():
+    walk = km.orbit(km.System("x' = a*x^2 + y; y' = x*y", a=ROOT), [1, 2], "1/10", steps=30, max_digits=50)
+    assert len(list(walk)) < 12
+    assert walk.end.status == "budget"
+
+
+def test_degrees_are_those_of_another_value():
+    assert (
+        km.degrees(km.System(TOP, a=ROOT), max_terms=8).degrees == km.degrees(km.System(TOP, a=2), max_terms=8).degrees
+    )
+
+
+def test_a_file_reads_back_equal():
+    file = km.load("euler_top", {"a1": "root of 2*t^2 - 4"})
+    assert 'a1 = "root of t^2 - 2"' in file.to_toml()
+    assert km.parse_system(file.to_toml()) == file != km.load("euler_top", {"a1": "root of t^2 - 3"})
+
+
+def test_a_root_of_degree_one_is_a_rational_number():
+    assert km.load("euler_top", {"a1": "root of 2*t - 3"}) == km.load("euler_top", {"a1": "3/2"})
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("root of t^2 - 4", "expected an irreducible polynomial: its factors are t - 2, t [+] 2"),
+        ("root of t^2 - s", "expected a polynomial in one variable"),
+        ("root of 3", "one variable"),
+        ("root of t^13 - 2", "expected a degree from 1 to 12"),
+        ("root of t^2 - 2 near x", "found 'x'"),
+        ("root of t^2 - ", "t"),
+    ],
+)
+def test_what_names_no_root_is_refused(value, words):
+    with pytest.raises(InputError, match=words):
+        km.System(TOP, a=value)
+
+
+def test_what_needs_rational_numbers_refuses_in_a_sentence():
+    file = km.System(TOP, a=ROOT)
+    for function in (km.analyze, km.find_density, km.find_integrals, km.find_symmetry, km.heights, km.find_commuting):
+        with pytest.raises(InputError, match="found a parameter that is a root of"):
+            function(file)
+    with pytest.raises(InputError, match=r"found an algebraic number in a \[family\]"):
+        km.parse_system('parameters.a = "root of t^2 - 2"\n[family]\nA = [["a","0"],["0","a"]]\nH = "x1^3"')
+    with pytest.raises(InputError, match="a second algebraic parameter"):
+        km.load("euler_top", {"a1": ROOT, "a2": "root of t^2 - 3"})
+    with pytest.raises(InputError, match="say which"):
+        km.orbit(km.System(TOP, a="root of t^2 - 2"), [1, 2, 3], "1/10", steps=1, arithmetic="float")
+    with pytest.raises(InputError, match="is not real"):
+        km.orbit(km.System(TOP, a="root of t^2 + 1"), [1, 2, 3], "1/10", steps=1, arithmetic="float")
+    with pytest.raises(BadPrime, match="no root modulo 13"):
+        km.orbit(km.System(TOP, a=ROOT), [1, 2, 3], "1/10", steps=1, arithmetic="mod:13")
+
+
+def test_functions_of_a_root_vanish_where_its_polynomial_divides():
+    K = FunctionField(["x", "r"], modulus=fmpq_poly([-2, 0, 1]).coeffs())
+    x, r = K.variables
+    assert K.equal(r * r * x, 2 * x)
+    assert not K.equal(r * x, x)
+    assert K.matrix(2, 2, [r, 2, 1, r]).det() == 0 != FunctionField(["x", "r"]).variables[1] ** 2 - 2
+    with pytest.raises(ZeroDivisionError):
+        x / (r * r - 2)
+    with pytest.raises(ZeroDivisionError):
+        K.matrix(2, 2, [r, 2, 1, r]).solve(K.matrix(2, 1, [x, x]))
+
+
+def test_the_bound_is_one_for_all_conjugates():
+    from kahanmaps.algebra.bounds import BoundField
+
+    root = parse_root("root of 3*t^2 - t - 7")
+    field = BoundField()
+    bound = root.over(field)
+    sizes = [abs(complex(z)) for z, _ in root.polynomial.complex_roots()]
+    assert all(bound.scale * size <= 2**bound.above.bits for size in sizes)
+    assert root.number_field == EtaleAlgebra(root.polynomial)
