@@ -210,7 +210,7 @@ def _singularity_lines(found: Findings) -> list[Statement]:
     lines = [Statement(UNDECIDED if first.verdict == "undecided" else MEASURED, f"{first.text}{at}")]
     ends = [h.confined_at for run in found.singularities for h in run.hypersurfaces if h.confined_at is not None]
     if ends:
-        lines.append(Statement(MEASURED, f"the last confinement comes after {counted(max(ends), 'step')}"))
+        lines.append(Statement(MEASURED, f"the last confinement comes after {counted(max(ends), first.unit)}"))
     return lines
 
 

@@ -109,3 +109,8 @@ def test_every_nth_coefficient_of_a_fraction():
         assert coefficients(every_nth((above, below), n, first), 6) == values[first::n][:6]
     with pytest.raises(ArithmeticError, match="coefficients that are too large"):
         every_nth((fmpz_poly([1]), fmpz_poly([1, -2, -3])), 600)
+
+
+def test_limits_of_a_long_composition_count_single_maps():
+    run = singularities(word("lotka_volterra", power=9), "1/7", steps=30)
+    assert (run.verdict, run.text) == ("not confined", "not confined within 30 single maps")

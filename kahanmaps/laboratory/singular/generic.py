@@ -63,6 +63,8 @@ def _named(map_: BirationalMap, eps: fmpq, stage: int | None) -> dict[str, str]:
     critical = kernel_minors([[*(form.derivative(j) for j in range(n + 1)), zero] for form in forms])[-1]
     affine, found = ring((*variables, "eps")), {}
     for factor, _ in critical.factor()[1]:
+        if all(sum(m[:n]) == 0 for m in factor.monoms()):  # infinity, and powers of eps
+            continue
         value = factor.compose(*at_eps.gens(), at_eps.constant(eps), ctx=at_eps)
         parts = value.factor()[1]
         if len(parts) == 1 and parts[0][1] == 1:

@@ -49,6 +49,7 @@ from kahanmaps.laboratory.singular.written import (
     affine,
     followed_forms,
     followed_map_by_map,
+    is_long,
     name_of,
     period_of,
     written,
@@ -132,7 +133,12 @@ class SingularityRun(Displayed):
         if self.followed is None or self.verdict not in (NOT_CONFINED, "some confined"):
             return self.verdict
         others = ", others not" if self.verdict == "some confined" else ""
-        return f"{self.verdict}{others} within {counted(self.followed, 'step')}"
+        return f"{self.verdict}{others} within {counted(self.followed, self.unit)}"
+
+    @property
+    def unit(self) -> str:
+        """What steps of hypersurfaces are."""
+        return "step" if self.word is None else "single map"
 
     @property
     def shape(self) -> tuple[Any, ...]:
@@ -182,6 +188,8 @@ def singularities(
     limits = _range(map_.dim, steps, time.monotonic() + seconds)
     over = map_.at(exact_eps)
     try:
+        if is_long(over):
+            raise TooLarge("forms that would take long to be multiplied out, with no determinant in the end")
         map_form = homogeneous_map(over)
     except TooLarge:
         return _without_forms(map_, exact_eps, seed, limits, progress)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import comb
+from math import comb, prod
 from typing import Any
 
 from flint import fmpq
@@ -22,7 +22,7 @@ from kahanmaps.errors import counted
 from kahanmaps.laboratory.singular.fates import Followed, Hypersurface, fate_of
 from kahanmaps.laboratory.singular.following import Range
 from kahanmaps.maps.equation import Equation
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
 
 _MAX_TERMS = 6_000  # of the Jacobian determinant, above which it is not expanded
@@ -89,8 +89,8 @@ def followed_map_by_map(
 ) -> tuple[Word, list[Hypersurface]] | None:
     """The hypersurfaces that the maps of a composition contract, at one exact eps, with the word of these maps.
 
-    Steps are those of single maps, and as many for each map of the word as the limits say. Without those that there was
-    no time for; None where those of a map are too large.
+    Steps and limits are those of single maps, but the first steps those of the word. Without those that there was no
+    time for; None where those of a map are too large.
     """
     equations = map_.at(eps).equations
     period = period_of(equations)
@@ -103,7 +103,7 @@ def followed_map_by_map(
     ]
     critical = [form for part, _ in both for form in part]
     excess = [form for _, part in both for form in part]
-    limits = replace(limits, shown=limits.shown * period, reach=limits.reach * period, along=limits.along * period)
+    limits = replace(limits, shown=min(limits.shown * period, limits.reach))
     found = []
     for stage, (own, _) in enumerate(several):
         for one in own:
@@ -120,6 +120,12 @@ def followed_map_by_map(
     return Word(tuple(letter.degree for letter in letters), len(equations) // period), found
 
 
+def is_long(map_: MapOver) -> bool:
+    """Whether a composition is too long for the Jacobian determinant of its forms, unless degrees drop."""
+    degree = prod(equation.image_degree for equation in map_.equations)
+    return len(map_.equations) > 1 and _size(map_.dim + 1, degree) > _MAX_TERMS
+
+
 def period_of(equations: tuple[Equation, ...]) -> int:
     """The number of maps after which a word repeats itself, a divisor of its length."""
     known = [(one.exponents, one.terms) for one in equations]
@@ -130,10 +136,15 @@ def period_of(equations: tuple[Equation, ...]) -> int:
 def _critical(forms: list[Any], degree: int) -> Any:
     """The Jacobian determinant of the homogeneous map, None where it is too large."""
     size = len(forms)
-    if comb(size * (degree - 1) + size - 1, size - 1) > _MAX_TERMS:
+    if _size(size, degree) > _MAX_TERMS:
         return None
     zero = forms[0].context().constant(0)
     return kernel_minors([[*(form.derivative(j) for j in range(size)), zero] for form in forms])[-1]
+
+
+def _size(size: int, degree: int) -> int:
+    """The number of terms of the determinant of so many forms of a degree, at most."""
+    return comb(size * (degree - 1) + size - 1, size - 1)
 
 
 def is_infinity(factor: Any) -> bool:
