@@ -201,13 +201,18 @@ def eps_of(file: SystemFile, options: Mapping[str, Any]) -> Any:
     return eps if file.map.has_eps else None
 
 
-def is_inline(options: Mapping[str, Any]) -> bool:
+def are_equations(reference: str | None) -> bool:
+    """Whether what stands in the place of a SYSTEM are equations, and not the name of one."""
+    return reference is not None and "=" in reference and not os.path.lexists(reference)
+
+
+def is_inline(options: Mapping[str, Any], reference: str | None = None) -> bool:
     """Whether a system or map stands on the line itself."""
-    return any(options.get(name) for name in ("variables", "rhs", "image", "inverse"))
+    return are_equations(reference) or any(options.get(name) for name in ("variables", "rhs", "image", "inverse"))
 
 
 def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile:
-    """The system that a command line names: a path, a catalogue name, `-` for standard input, or an inline system.
+    """The system that a command line names: a path, a catalogue name, `-` for standard input, equations, or options.
 
     Of the options those of `inline_options` are looked at, as far as they are there.
     """
@@ -219,6 +224,8 @@ def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile
     image, inverse = options.get("image", ()), options.get("inverse", ())
     parameters: Sequence[tuple[str, str]] = options.get("parameters", ())
     given = dict(parameters)
+    if are_equations(reference) and not (variables or rhs or image or inverse):
+        reference, rhs = None, (str(reference),)
     if len(given) < len(parameters):
         twice = next(name for k, (name, _) in enumerate(parameters) if name in dict(parameters[:k]))
         raise click.UsageError(f"found -p {twice}=... twice, expected one value for each parameter")
@@ -245,7 +252,7 @@ def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile
     if reference is None:
         raise click.UsageError(
             "missing SYSTEM: a file, a catalogue name ('kahanmaps systems' lists them), - for standard input, "
-            "or an inline system: --rhs \"x' = x*y; y' = -x^2\""
+            "or equations: \"x' = x*y; y' = -x^2\""
         )
     if reference == "-":
         text = sys.stdin.buffer.read(MAX_FILE_BYTES + 1)

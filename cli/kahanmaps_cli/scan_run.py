@@ -64,7 +64,7 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
     from kahanmaps.laboratory.scan.sweep import TimeOver
 
     names = names_of(options)
-    if is_inline(options):
+    if is_inline(options, system):
         given = {"eps", *(name for name, _ in options["parameters"])}
         options["parameters"] = (*options["parameters"], *((name, "1") for name in names if name not in given))
     if "eps" in names and (options.get("as_toml") or options.get("folder") is not None):

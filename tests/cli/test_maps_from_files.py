@@ -160,3 +160,11 @@ def test_a_notebook_shows_the_analysis_of_a_map():
     found = analyze(load("lyness"), seconds=3)
     assert "y~ = (y + 3)/x" in found._repr_html_()
     assert not re.search(r"\beps\b", found._repr_html_())
+
+
+def test_equations_in_the_place_of_a_system_are_one(kahanmaps):
+    shear, turn = "\"x' = y^2; y' = 0\"", "\"x' = y; y' = -x\""
+    assert kahanmaps(f"check-commute {turn} \"x' = -3*y; y' = 3*x\" -q").status == 0
+    assert kahanmaps(f"check-commute {shear} {turn} -q").status == 1
+    assert kahanmaps("scan \"x' = y^2; y' = -x + a*y\" --over a -q").status == 0
+    assert "give a SYSTEM" in kahanmaps(f"degrees {turn} --vars x,y").err

@@ -34,7 +34,7 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
     For one SYSTEM of kind [family] the maps of H_0 and H_1 = A H_0 come along as a control: they are expected NOT
     to commute, and this does not change the exit status.
 
-    SYSTEM and OTHER are files, names of the catalogue, or - for standard input.
+    SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x".
 
     Exit status: 0 they commute (proved or supported), 1 refuted, 2 wrong use, 3 undecided or stopped early.
     """
