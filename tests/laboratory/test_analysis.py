@@ -441,6 +441,7 @@ def test_what_is_said_of_singularities(runs, expected):
             eps=fmpq(*map(int, eps.split("/"))),
             verdict=verdict,
             followed=followed,
+            unit="step",
             text=f"{verdict} within {followed}",
             hypersurfaces=[SimpleNamespace(confined_at=at) for at in ends],
         )
