@@ -268,7 +268,7 @@ def analyze(
 
     def confinement() -> None:
         values = default_eps(map_, seed) if found.eps is None else (found.eps,)
-        part = share(0.2 if dim <= WRITTEN_DIMENSION else 0.1) / len(values)
+        part = share(0.4 if dim <= WRITTEN_DIMENSION else 0.1) / len(values)
         if all(can_be_written(map_, value, part) for value in values):
             found.singularities = [
                 singularities(map_, value, seed=seed, seconds=part, progress=told("singularities")) for value in values
