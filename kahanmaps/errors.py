@@ -50,6 +50,10 @@ class ExpressionError(InputError):
         super().__init__(message if column is None else f"{message}\n{_caret(text, column)}")
 
 
+class UnknownName(ExpressionError):
+    """An expression has a letter or word that stands for nothing."""
+
+
 class SystemFileError(InputError):
     """A system file with mistakes: all of them at once, each with its key.
 

@@ -20,7 +20,7 @@ from flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx, fmpz
 
 from kahanmaps.algebra.numerals import BLANKS, Limits, is_name, number_in
 from kahanmaps.algebra.polynomials import RationalFunction
-from kahanmaps.errors import ExpressionError, quoted
+from kahanmaps.errors import ExpressionError, UnknownName, quoted
 
 _TOKEN = re.compile(
     r"(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)|(?P<name>[A-Za-z_][A-Za-z_0-9]*)|\*\*|[-+*/^()]"
@@ -498,10 +498,10 @@ class _Arithmetic:
     def refusal(self, message: str, column: int) -> ExpressionError:
         return ExpressionError(message, self.text, column)
 
-    def unknown(self, name: str, column: int | None) -> ExpressionError:
+    def unknown(self, name: str, column: int | None) -> UnknownName:
         known = list(self.names)
         if not known:
-            return ExpressionError(f"found the name {quoted(name)}, expected numbers only", self.text, column)
+            return UnknownName(f"found the name {quoted(name)}, expected numbers only", self.text, column)
         meant = ""
         if len(name) <= 40:  # the search for a look-alike is quadratic
             folded = {other.lower(): other for other in known}
@@ -510,7 +510,7 @@ class _Arithmetic:
             meant = next(products, meant)
         hint = f"did you mean {meant}? " if meant else ""
         listed = ", ".join(known[:30]) + (", ..." if len(known) > 30 else "")
-        return ExpressionError(f"found the unknown name {quoted(name)}: {hint}known are {listed}", self.text, column)
+        return UnknownName(f"found the unknown name {quoted(name)}: {hint}known are {listed}", self.text, column)
 
 
 def _total(values: list[_T], add: Callable[[_T, _T], _T]) -> _T:

@@ -14,7 +14,7 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomial, parse_rational_function
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
-from kahanmaps.errors import InputError, counted, quoted
+from kahanmaps.errors import InputError, UnknownName, counted, quoted
 from kahanmaps.systems.quadratic import MAX_DIMENSION
 
 KINDS = ("system", "hamiltonian", "family", "bilinear", "map", "composition")
@@ -113,6 +113,9 @@ class PartReader:
         try:
             tail = (*self.symbols, "eps") if of_map else ()
             polynomial = parse_polynomial(text, (*self.variables, *more, *tail), self.parameters)
+        except UnknownName as error:
+            self._mistake(path, f"{error}\nif it is a parameter, give its value: in [parameters], or -p NAME=VALUE")
+            return None
         except InputError as error:
             self._mistake(path, str(error))
             return None
