@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Any
 
 import flint
-from flint import arb, fmpq, fmpq_poly, fmpz, nmod_poly
+from flint import arb, fmpq, fmpq_mpoly, fmpq_poly, fmpz, nmod_poly
 
 from kahanmaps.algebra.bounds import Bound, BoundField, Size, log2
 from kahanmaps.algebra.etale import EtaleAlgebra
@@ -69,6 +69,11 @@ class Root:
         if isinstance(field, FunctionField) and field.modulus is not None:
             return field.variables[-1]
         raise InputError(f"a {self} is no element of {field}")
+
+    def remainder(self, polynomial: fmpq_mpoly, k: int) -> fmpq_mpoly:
+        """A polynomial with the root for its k-th variable, in lowest terms: 0 where it vanishes at the root."""
+        x = polynomial.context().gens()[k]
+        return polynomial % sum((x**j * c for j, c in enumerate(self.polynomial.coeffs())), 0 * x)
 
     def rounded(self, bits: int = 256) -> fmpq:
         """A rational number as close to the real root as so many bits allow."""

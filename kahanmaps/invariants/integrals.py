@@ -107,16 +107,17 @@ class ClaimedIntegral(ClaimedFunction):
         self, name: str, function: RationalFunction, eps: fmpq | None = None, root: Root | None = None
     ) -> None:
         super().__init__(name, function, root)
-        self.condition = integral_condition(function, len(function.names) - 1 - (root is not None), eps)
+        self.condition = integral_condition(function, len(function.names) - 1 - (root is not None), eps, root)
 
 
-def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None) -> str:
+def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
     """For which symbols and eps I = P/Q has values, and that it is a constant if it is: such are always conserved.
 
     Args:
         integral: a function of `dim` variables, then of symbols and eps.
         dim: the dimension.
         eps: an exact number, or None for every eps.
+        root: what the only symbol stands for, where it is algebraic.
 
     Returns:
         This in words; empty where I has values at all of them, or at none, and is no constant.
@@ -128,10 +129,10 @@ def integral_condition(integral: RationalFunction, dim: int, eps: fmpq | None) -
     ['being a constant']
     ['']
     """
-    above, below = at_eps(integral, eps)
+    above, below = at_eps(integral, eps, root, dim)
     if below.is_zero():
         return ""
-    constant = constancy(eps) if is_constant(above, below, dim) else ""
+    constant = constancy(eps) if is_constant(above, below, dim, root) else ""
     return ", ".join(filter(None, [where(dim, below), constant]))
 
 
@@ -140,11 +141,12 @@ def constancy(eps: fmpq | None) -> str:
     return "being a constant" if eps is None else f"being a constant at eps = {eps}"
 
 
-def is_constant(above: fmpq_mpoly, below: fmpq_mpoly, dim: int) -> bool:
+def is_constant(above: fmpq_mpoly, below: fmpq_mpoly, dim: int, root: Root | None = None) -> bool:
     """Whether the quotient of two polynomials does not depend on the first `dim` variables; `below` is not 0."""
     monomial = below.monoms()[0][:dim]
     P, Q = (_coefficient(part, monomial) for part in (above, below))
-    return bool(above * Q == below * P)
+    difference = above * Q - below * P
+    return bool((difference if root is None else root.remainder(difference, dim)).is_zero())
 
 
 def _coefficient(polynomial: fmpq_mpoly, monomial: tuple[int, ...]) -> fmpq_mpoly:

@@ -51,24 +51,25 @@ class ClaimedDensity(ClaimedFunction):
 
     def __init__(self, function: RationalFunction, eps: fmpq | None = None, root: Root | None = None) -> None:
         super().__init__("phi", function, root)
-        self.condition = density_condition(function, len(function.names) - 1 - (root is not None), eps)
+        self.condition = density_condition(function, len(function.names) - 1 - (root is not None), eps, root)
         self.formula = f"phi = {self.formula}"
 
 
-def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None) -> str:
+def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None, root: Root | None = None) -> str:
     """The hypothesis that phi is a function other than 0, of which every law for dx/phi holds for no reason.
 
     Args:
         phi: a function of `dim` variables, then of symbols and eps.
         dim: the dimension.
         eps: an exact number, or None for every eps.
+        root: what the only symbol stands for, where it is algebraic.
 
     Returns:
         For which symbols and eps neither phi nor its denominator is identically 0, in words; empty where it is so
         for all of them.
 
     Raises:
-        InputError: where phi is identically 0 or 0/0, for that eps if one is given.
+        InputError: where phi is identically 0 or 0/0, for that eps and root if they are given.
 
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> for text in ("a*x + b*y", "(10*eps - 1)*x", "x/(a*y)", "a*x + y"):
@@ -79,11 +80,12 @@ def density_condition(phi: RationalFunction, dim: int, eps: fmpq | None) -> str:
     ['where a is not 0']
     ['']
     """
-    above, below = at_eps(phi, eps)
+    above, below = at_eps(phi, eps, root, dim)
     if above.is_zero():
         text = format_rational_function(phi)
         what = "0/0" if below.is_zero() else "identically 0"
-        which = f", which is {what} at eps = {eps}" if text != "0" else ""
+        at = " and ".join([f"eps = {eps}"] * (eps is not None) + [f"a {root}"] * (root is not None))
+        which = f", which is {what} at {at}" if text != "0" else ""
         raise InputError(
             f"found the density {quoted(text) if which else text}{which}, expected a function that is not zero: "
             "the measure is dx/phi"

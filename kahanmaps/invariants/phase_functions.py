@@ -62,11 +62,17 @@ class ClaimedFunction(PhaseFunction):
             return self.function.value(field, (*point, *values, field.convert(eps)))
 
 
-def at_eps(function: RationalFunction, eps: fmpq | None) -> tuple[fmpq_mpoly, fmpq_mpoly]:
-    """Numerator and denominator, with the number for eps if one is given; the denominator may then be 0."""
-    if eps is None:
-        return function.numerator, function.denominator
-    return substitute(function.numerator, {"eps": eps}), substitute(function.denominator, {"eps": eps})
+def at_eps(
+    function: RationalFunction, eps: fmpq | None, root: Root | None = None, k: int = 0
+) -> tuple[fmpq_mpoly, fmpq_mpoly]:
+    """Numerator and denominator, with the number for eps if one is given; the denominator may then be 0.
+
+    With a `root` they are remainders, and their k-th variable stands for it.
+    """
+    above, below = function.numerator, function.denominator
+    if eps is not None:
+        above, below = substitute(above, {"eps": eps}), substitute(below, {"eps": eps})
+    return (above, below) if root is None else (root.remainder(above, k), root.remainder(below, k))
 
 
 def where(dim: int, *polynomials: fmpq_mpoly) -> str:

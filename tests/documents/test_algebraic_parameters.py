@@ -43,6 +43,26 @@ def test_what_holds_for_this_root_fails_for_another_number():
     assert verdict(integral, "root of t^2 - 3") is verdict(integral, "3/2") is Verdict.REFUTED
 
 
+def test_a_density_that_is_zero_at_the_root_is_refused():
+    file = km.System("x' = a*y; y' = -x", a=ROOT)
+
+    def measure(phi: str) -> Verdict:
+        return km.check_measure(file, extra=km.parse_rational_function(phi, file.claim_names, file.parameters)).verdict
+
+    assert measure("a^2 + 2") is Verdict.PROVED
+    for phi in ("a^2 - 2", "(a^4 - 4)*x"):
+        with pytest.raises(InputError, match="identically 0 at a root of t"):
+            measure(phi)
+
+
+def test_an_integral_that_is_a_constant_at_the_root_is_called_one():
+    file = km.System(TOP, a=ROOT)
+    for text, is_constant in (("(a^2 - 2)*x + 5", True), ("(a*x + 2)/(x + a)", True), ("y^2 + z^2 + a^2 - 2", False)):
+        claimed = km.parse_rational_function(text, file.claim_names, file.parameters)
+        (finding,) = km.check_integrals(file, extra={"I": claimed}).findings
+        assert ("being a constant" in finding.claim) is is_constant
+
+
 def test_a_refutation_has_a_witness_over_the_number_field():
     report = km.check_commute(km.System(TOP, a=ROOT), km.System("x' = 2*y*z; y' = -x*z; z' = x*y"))
     witness = report.findings[0].witness
