@@ -312,7 +312,7 @@ class DocumentReader(CompositionReader):
         except InputError as error:
             self._mistake(path, str(error))
             return None
-        if reason := why_no_map(map_):
+        if reason := why_no_map(map_, None if self.root is None else self.root[1]):
             self._mistake(path, reason)
             return None
         return map_

@@ -526,18 +526,21 @@ def nonzero_eps(eps: Any, over: Field) -> Any:
     return element
 
 
-def why_no_map(map_: ImplicitMap) -> str:
+def why_no_map(map_: ImplicitMap, root: Root | None = None) -> str:
     """Empty, or what is wrong with a map that somebody has written down, found at random points modulo primes.
 
     It must have values, and where an inverse map is given too, lead back from them. A point says so by chance with
-    probability below 2^-40 for equations of any size that can be read, and these are three points.
+    probability below 2^-40 for equations of any size that can be read, and these are three points. With a `root` the
+    only symbol stands for it, and primes are those that have one.
     """
     rng = random.Random(f"map {seed_for(0, *map_.subject, *(e for row in map_.backward or () for e in row))}")
-    for _ in range(3):
+    tried = 0
+    while tried < 3:
         over = random_prime_field(rng)
         x = tuple(over.random(rng) for _ in range(map_.dim))
         try:
-            found = map_.at(over.random(rng), over, [over.random(rng) for _ in map_.symbols])
+            values = [over.random(rng) if root is None else root.over(over) for _ in map_.symbols]
+            found = map_.at(over.random(rng), over, values)
             image = found.step(x)
             if found.jacobian(x).det() == 0:
                 return "found a map whose image is not the whole space: det dPhi is 0 everywhere"
@@ -546,6 +549,7 @@ def why_no_map(map_: ImplicitMap) -> str:
             continue
         except SingularStep:
             return "found a map that has no value at random points: the new point is not determined"
+        tried += 1
         if back != x:
             return "found a map that does not lead back from the images of random points, expected the inverse map"
     return "" if map_.backward is not None else why_not_birational(map_.rows)

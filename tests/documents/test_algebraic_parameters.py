@@ -63,6 +63,21 @@ def test_an_integral_that_is_a_constant_at_the_root_is_called_one():
         assert ("being a constant" in finding.claim) is is_constant
 
 
+def test_whether_a_map_is_one_and_its_inverse_right_is_asked_at_the_root():
+    def explicit(image: str, inverse: str) -> str:
+        sides = f"image = ['y', '{image}']" + (f"\ninverse = ['{inverse}', 'x']" if inverse else "")
+        return f"variables = ['x', 'y']\n[parameters]\na = '{ROOT}'\n[map]\n{sides}"
+
+    map_ = km.parse_system(explicit("a*x", "a*y/2")).map.at(1)  # 1/a = a/2 for this root
+    assert map_.inverse.step(map_.step([3, 5])) == (3, 5)
+    for image, inverse, mistake in (
+        ("a*x", "a*y/3", "does not lead back"),
+        ("(a^2 - 2)*x + y^2", "", "image is not the whole space"),
+    ):
+        with pytest.raises(InputError, match=mistake):
+            km.parse_system(explicit(image, inverse))
+
+
 def test_a_refutation_has_a_witness_over_the_number_field():
     report = km.check_commute(km.System(TOP, a=ROOT), km.System("x' = 2*y*z; y' = -x*z; z' = x*y"))
     witness = report.findings[0].witness
