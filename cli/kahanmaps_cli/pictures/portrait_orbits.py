@@ -75,7 +75,7 @@ class Orbits:
             if not file.is_quadratic:
                 raise InputError(
                     f"found no starts for {file.map.kind}, expected --start X, --starts FILE or --random N: they are "
-                    "chosen around the fixed points of a vector field only"
+                    "chosen around the fixed points of a vector field over Q only"
                 )
             starts = automatic_starts(file.system, eps, plane, backward=backward)
         structure = structure_for(file, None)
