@@ -63,6 +63,15 @@ def test_starts_are_chosen_where_none_are_given(kahanmaps, drawn):
     assert drawn[0][0].points.shape == (21, 16, 2)
 
 
+def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn):
+    line = "plot portrait lotka_volterra --eps 1/20 --steps 30 --flow -p"
+    assert kahanmaps(line, "a=1.4142135623730951").status == kahanmaps(line, "'a=root of t^2 - 2 near 1.4'").status == 0
+    near, found = (portrait for portrait, _ in drawn)
+    np.testing.assert_allclose(found.points, near.points, rtol=1e-9)
+    assert len(found.flow.solutions) == len(near.flow.solutions) > 0
+    assert "may be" in kahanmaps(line, "'a=root of t^2 - 2'", "-o -").err
+
+
 def test_the_points_are_those_of_the_float_orbit(kahanmaps, drawn, tmp_path):
     kahanmaps(LV)
     kahanmaps(
