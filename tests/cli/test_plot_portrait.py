@@ -107,6 +107,11 @@ def test_one_variable_is_drawn_over_the_step(kahanmaps, drawn):
     assert drawn[0][0].labels == ("step", "$x$")
 
 
+def test_a_plane_over_the_step_has_no_arrows(kahanmaps, drawn):
+    assert kahanmaps(LV + " --axes x,y,step").status == kahanmaps(LV).status == 0
+    assert [len(portrait.flow.places) > 0 for portrait, _ in drawn] == [False, True]
+
+
 @pytest.mark.parametrize("word", ["--colour-by", "--color-by"])
 def test_points_are_coloured_by_an_integral(kahanmaps, drawn, word):
     kahanmaps(f"plot portrait weierstrass --eps 1/10 --start=-1/2,0 --steps 40 {word} modified_H")

@@ -262,7 +262,8 @@ class Orbits:
             return None
         functions = [axis for axis in axes if not isinstance(axis, str)]
         variables = [axis.variable for axis in functions if axis.variable is not None]
-        found = plane_flow(system, [] if options["no_field"] else variables, window)
+        in_plane = len(axes) == 2 and not options["no_field"]
+        found = plane_flow(system, variables if in_plane else [], window)
         if options["levels"] or options["euler"]:  # arrows among many grey lines tell nothing
             found = replace(found, places=found.places[:0], arrows=found.arrows[:0])
         if options["flow"]:
