@@ -69,6 +69,8 @@ def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn)
     near, found = (portrait for portrait, _ in drawn)
     np.testing.assert_allclose(found.points, near.points, rtol=1e-9)
     assert len(found.flow.solutions) == len(near.flow.solutions) > 0
+    top = "plot portrait euler_top --eps 1/10 --start 1,1,1 --colour-by F1 -p"
+    assert "found the name F1" in kahanmaps(top, "'a1=root of t^2 - 2 near 1.4'").err
     assert "may be" in kahanmaps(line, "'a=root of t^2 - 2'", "-o -").err
 
 

@@ -134,7 +134,7 @@ class Orbits:
 
         from kahanmaps.plots.drift_functions import functions_of
 
-        if self.file is None:
+        if self.file is None or self.file.map.root is not None:  # those are functions of the root as well
             return {}
         return functions_of(self.file, fmpq(0) if self.eps is None else self.eps)
 
