@@ -171,6 +171,8 @@ def check_poisson(file: SystemFile, settings: Settings | None = None, extra: Giv
         tensor = HamiltonianTensor(file.hamiltonian)
         proof = theorems.poisson_tensor_invariant(file.hamiltonian, file.member)
         source = "petrera-suris-2016, Theorem 12" if file.member is not None else ""
+    elif file.map.refusal:
+        raise InputError(file.map.refusal)
     else:
         raise InputError(
             f"{file.name} is of kind [{file.kind}]: Pi(x) = J - eps^2 f'(x)^2 J needs a Hamiltonian system, "

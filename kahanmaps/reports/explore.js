@@ -55,12 +55,14 @@ function functionAt(f, x, eps) {
   return valueOf(f.above, at) / valueOf(f.below, at);
 }
 
-// The range of most of the values, as in other pictures: a few that are far away do not spoil it.
+// The range of the start, which comes first, and of most of the values, as in other pictures: a few far away do not
+// spoil it.
 function rangeOf(values) {
   const sorted = values.slice().sort((a, b) => a - b);
   const at = (share) => sorted[Math.round(share * (sorted.length - 1))];
   const spread = at(0.9) - at(0.1) || Math.abs(at(0.5)) || 1;
-  const low = Math.max(sorted[0], at(0.1) - spread), high = Math.min(at(1), at(0.9) + spread);
+  const low = Math.min(values[0], Math.max(sorted[0], at(0.1) - spread));
+  const high = Math.max(values[0], Math.min(at(1), at(0.9) + spread));
   const margin = 0.06 * (high - low) || spread;
   return [low - margin, high + margin];
 }

@@ -63,6 +63,17 @@ def test_starts_are_chosen_where_none_are_given(kahanmaps, drawn):
     assert drawn[0][0].points.shape == (21, 16, 2)
 
 
+def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn):
+    line = "plot portrait lotka_volterra --eps 1/20 --steps 30 --flow -p"
+    assert kahanmaps(line, "a=1.4142135623730951").status == kahanmaps(line, "'a=root of t^2 - 2 near 1.4'").status == 0
+    near, found = (portrait for portrait, _ in drawn)
+    np.testing.assert_allclose(found.points, near.points, rtol=1e-9)
+    assert len(found.flow.solutions) == len(near.flow.solutions) > 0
+    top = "plot portrait euler_top --eps 1/10 --start 1,1,1 --colour-by F1 -p"
+    assert "found the name F1" in kahanmaps(top, "'a1=root of t^2 - 2 near 1.4'").err
+    assert "may be" in kahanmaps(line, "'a=root of t^2 - 2'", "-o -").err
+
+
 def test_the_points_are_those_of_the_float_orbit(kahanmaps, drawn, tmp_path):
     kahanmaps(LV)
     kahanmaps(
@@ -96,6 +107,11 @@ def test_of_more_than_two_variables_the_axes_are_chosen_and_said(kahanmaps, draw
 def test_one_variable_is_drawn_over_the_step(kahanmaps, drawn):
     assert "1 orbit, 100 steps" in kahanmaps("plot portrait riccati --eps 1/10 --start 0").err
     assert drawn[0][0].labels == ("step", "$x$")
+
+
+def test_a_plane_over_the_step_has_no_arrows(kahanmaps, drawn):
+    assert kahanmaps(LV + " --axes x,y,step").status == kahanmaps(LV).status == 0
+    assert [len(portrait.flow.places) > 0 for portrait, _ in drawn] == [False, True]
 
 
 @pytest.mark.parametrize("word", ["--colour-by", "--color-by"])

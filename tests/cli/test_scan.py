@@ -88,7 +88,7 @@ def test_the_time_may_be_over(kahanmaps):
     outcome = kahanmaps(f"scan {QUICK} --seconds 1e-6")
     assert outcome.status == 3
     assert outcome.out.splitlines()[1:] == [
-        "tried\tmembers modulo three primes are needed, those modulo 0 were tried",
+        "tried\tmembers modulo three primes are needed, those modulo 0 primes were tried",
         "open\tthere was no time for members modulo 101, 103, 107",
     ]
     assert outcome.err == "stopped early: the time was over before members modulo 101, 103, 107\n"

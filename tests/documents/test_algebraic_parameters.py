@@ -126,6 +126,14 @@ def test_degrees_are_those_of_another_value():
     )
 
 
+def test_degrees_that_grow_exponentially_in_the_plane_have_no_bounds_over_a_number_field():
+    file = km.load("lotka_volterra", {"a": ROOT})
+    found, rational = (km.degrees(one, max_terms=5) for one in (file, km.load("lotka_volterra", {"a": 2})))
+    assert found.degrees == rational.degrees
+    assert found.enclosure is None
+    assert rational.enclosure is not None
+
+
 def test_a_file_reads_back_equal():
     file = km.load("euler_top", {"a1": "root of 2*t^2 - 4"})
     assert 'a1 = "root of t^2 - 2"' in file.to_toml()
@@ -157,6 +165,8 @@ def test_what_needs_rational_numbers_refuses_in_a_sentence():
     for function in (km.analyze, km.find_density, km.find_integrals, km.find_symmetry, km.heights, km.find_commuting):
         with pytest.raises(InputError, match="found a parameter that is a root of"):
             function(file)
+    with pytest.raises(InputError, match="found a parameter that is a root of"):
+        km.check_poisson(km.load("henon_heiles", {"c": ROOT}))
     with pytest.raises(InputError, match=r"found an algebraic number in a \[family\]"):
         km.parse_system('parameters.a = "root of t^2 - 2"\n[family]\nA = [["a","0"],["0","a"]]\nH = "x1^3"')
     with pytest.raises(InputError, match="a second algebraic parameter"):

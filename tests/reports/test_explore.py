@@ -71,6 +71,16 @@ def test_another_eps_gives_another_orbit_and_a_singular_step_ends_it():
     assert len(in_node(one, 0.5, 5)[0]) == 6
 
 
+@pytest.mark.skipif(NODE is None, reason="needs node")
+def test_the_window_holds_the_start_of_an_orbit_that_converges():
+    program = (
+        f"const it = require({json.dumps(str(SCRIPT))}); console.log(JSON.stringify(it.rangeOf({[1] + 99 * [0]})))"
+    )
+    low, high = json.loads(subprocess.run([NODE, "-e", program], capture_output=True, check=True, timeout=60).stdout)
+    assert low < 0
+    assert high > 1
+
+
 @pytest.mark.parametrize("name", list(FILES))
 def test_the_page_has_the_verdict_and_nothing_of_the_network(name):
     analysis = found(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -91,6 +92,9 @@ def command(system: str | None, **options: Any) -> int:
     _require_consistent(system, options)
     if options["output"] == "-" and sys.stdout.isatty():
         raise click.UsageError("a terminal cannot show a page: give -o FILE.html")
+    suffix = Path(options["output"]).suffix
+    if suffix.lower() not in ("", ".html", ".htm", ".xhtml"):
+        raise click.UsageError(f"found the ending {suffix} of {options['output']}, expected .html: a page is HTML")
     with Progress(options["quiet"]) as progress:
         html, status = _page(system, options, progress)
     _write(html, options)

@@ -19,11 +19,20 @@ if TYPE_CHECKING:
     from kahanmaps.plots.point_functions import PointFunction
     from kahanmaps.plots.trajectories import Trajectories
     from kahanmaps.plots.windows import Window
+    from kahanmaps.systems.quadratic import QuadraticSystem
     from kahanmaps_cli.pictures.stored import Stored
 
 _PILOT = 4_000_000  # coordinates, from which the axes and the window of a density are chosen
 
 Told = Callable[[str], None]
+
+
+def _field_of(file: SystemFile) -> QuadraticSystem | None:
+    """The vector field whose Kahan map it is, a rational number in the place of an algebraic one; else None."""
+    from kahanmaps.maps.kahan import Kahan
+
+    map_ = file.map.rounded
+    return map_.system if isinstance(map_, Kahan) and not map_.system.symbols else None
 
 
 @dataclass(eq=False)
@@ -72,12 +81,13 @@ class Orbits:
             named = [text.strip() for text in (axes or "").split(",")]
             plane = [file.variables.index(text) for text in named if text in file.variables]
             plane = [*plane, *(k for k in range(file.dim) if k not in plane)][:2]
-            if not file.is_quadratic:
+            field = _field_of(file)
+            if field is None:
                 raise InputError(
                     f"found no starts for {file.map.kind}, expected --start X, --starts FILE or --random N: they are "
                     "chosen around the fixed points of a vector field only"
                 )
-            starts = automatic_starts(file.system, eps, plane, backward=backward)
+            starts = automatic_starts(field, eps, plane, backward=backward)
         structure = structure_for(file, None)
         form = None if isinstance(structure, NoStructure) else structure.form
         ensemble = ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
@@ -124,7 +134,7 @@ class Orbits:
 
         from kahanmaps.plots.drift_functions import functions_of
 
-        if self.file is None:
+        if self.file is None or self.file.map.root is not None:  # those are functions of the root as well
             return {}
         return functions_of(self.file, fmpq(0) if self.eps is None else self.eps)
 
@@ -199,7 +209,8 @@ class Orbits:
         from kahanmaps.plots.trajectories import euler_orbits
 
         assert self.file is not None
-        found = euler_orbits(self.file.system, -self.eps if self.backward else self.eps, self.starts, self.steps)
+        system = _field_of(self.file) or self.file.system  # which says why there is none
+        found = euler_orbits(system, -self.eps if self.backward else self.eps, self.starts, self.steps)
         for reason, count in found.ended.items():
             self.notes.append(f"explicit Euler: {counted(count, 'orbit')} {reason}")
         return found
@@ -244,13 +255,15 @@ class Orbits:
         from kahanmaps.plots.flow import plane_flow, solutions
         from kahanmaps.plots.windows import window_of
 
-        if self.file is None or not self.file.is_quadratic:
+        system = None if self.file is None else _field_of(self.file)
+        if system is None:
             if options["flow"]:
                 raise InputError("--flow draws solutions of x' = f(x): name a system with a quadratic field")
             return None
         functions = [axis for axis in axes if not isinstance(axis, str)]
         variables = [axis.variable for axis in functions if axis.variable is not None]
-        found = plane_flow(self.file.system, [] if options["no_field"] else variables, window)
+        in_plane = len(axes) == 2 and not options["no_field"]
+        found = plane_flow(system, variables if in_plane else [], window)
         if options["levels"] or options["euler"]:  # arrows among many grey lines tell nothing
             found = replace(found, places=found.places[:0], arrows=found.arrows[:0])
         if options["flow"]:
@@ -258,7 +271,7 @@ class Orbits:
                 raise InputError("--flow draws curves in phase space: it does not go with the axis step")
             box = window_of(self._points.reshape(-1, len(self.variables)), self.starts)
             time = float(2 * self.eps * self.steps) * (-1 if self.backward else 1) if self.steps else None
-            curves = solutions(self.file.system, self.starts, box, time)
+            curves = solutions(system, self.starts, box, time)
             found = replace(found, solutions=tuple(np.stack([axis(x) for axis in functions], axis=-1) for x in curves))
         return found
 

@@ -93,8 +93,8 @@ def enclose(
     """Bounds of the dynamical degree of a planar map, the lower one above 1: positive entropy, proved.
 
     `eps` (half the time step) is exact, or None: then the bounds hold over Q(eps), which is for all eps but countably
-    many. Returns None where no lower bound above 1 was found in about `seconds` seconds. Then nothing is said: there is
-    none for an integrable map.
+    many. Returns None for algebraic coefficients, and where no lower bound above 1 was found in about `seconds`
+    seconds. Then nothing is said: there is none for an integrable map.
 
     Source: docs/mathematics.md.
 
@@ -105,7 +105,7 @@ def enclose(
     >>> enclose(load("nahm_tetrahedral").map, None) is None
     True
     """
-    if map_.dim != 2 or map_.symbols:
+    if map_.dim != 2 or map_.symbols or map_.root is not None:
         return None
     rng = random.Random(f"enclosure {seed_for(seed, map_.subject, eps)}")
     end = time.monotonic() + seconds

@@ -16,7 +16,7 @@ from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import member_of
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.conclusion import Conclusion
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 from kahanmaps.laboratory.scan.conjugates import MAX_FIELD_DEGREE, SPARE_BITS
@@ -168,7 +168,9 @@ class Scan(Displayed):
     def coverage(self) -> str:
         """What was tried, and what can have been missed: a sentence or two."""
         if not self.height:
-            return f"members modulo three primes are needed, those modulo {len(self.sweeps)} were tried"
+            return (
+                f"members modulo three primes are needed, those modulo {counted(len(self.sweeps), 'prime')} were tried"
+            )
         whole, lines, planes = (_listed([str(one.prime) for one in some]) for some in self._kinds)
         parts = [f"all members with parameters modulo {whole}"] if whole else []
         for width, what, some in ((1, "lines", lines), (2, "planes", planes)):
@@ -293,15 +295,15 @@ class Scan(Displayed):
     def with_dimensions(self, dim: int) -> Scan:
         """The scan of maps of this dimension with numbers of polynomials in the place of ranks."""
 
-        def counted(ranks: Degrees) -> Degrees:
+        def numbers(ranks: Degrees) -> Degrees:
             return tuple(comb(dim + d, d) - rank for d, rank in enumerate(ranks, 1))
 
         sweeps = (
-            replace(one, generic=counted(one.generic), classes={counted(d): x for d, x in one.classes.items()})
+            replace(one, generic=numbers(one.generic), classes={numbers(d): x for d, x in one.classes.items()})
             for one in self.sweeps
         )
-        components = tuple(replace(one, degrees=counted(one.degrees)) for one in self.components)
-        return replace(self, generic=counted(self.generic), components=components, sweeps=tuple(sweeps))
+        components = tuple(replace(one, degrees=numbers(one.degrees)) for one in self.components)
+        return replace(self, generic=numbers(self.generic), components=components, sweeps=tuple(sweeps))
 
     def member(self, component: Component) -> SystemFile:
         """The system of a rational member on a component. Raises InputError where none is known."""

@@ -24,7 +24,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
-from kahanmaps.errors import BadPrime, InputError, quoted
+from kahanmaps.errors import BadPrime, InputError, counted, quoted
 from kahanmaps.laboratory.scan.conditions import beside, conditions
 from kahanmaps.laboratory.scan.growth import Progress, with_growth, with_verdicts
 from kahanmaps.laboratory.scan.kept import Kept
@@ -223,13 +223,13 @@ def scan(
         total += sum(_size(len(names), *one) for one in further)
         take(further)
         known, missed = conditions(sweeps, names, rng, until(_UNTIL[1]))
-    omitted += [f"all conditions for {missed} sequences of degrees"] if missed else []
+    omitted += [f"all conditions for {counted(missed, 'sequence')} of degrees"] if missed else []
     for k, one in enumerate(known):
         try:
             tell(f"scan: confirms component {k + 1} of {len(known)}")
             known[k] = _confirmed(one, names, map_, exact, known, rng, by, until(_UNTIL[2]))
         except TimeOver:
-            omitted.append(f"the confirmation of {len(known) - k} components")
+            omitted.append(f"the confirmation of {counted(len(known) - k, 'component')}")
             break
     check = until(1 if analysis is None else _UNTIL[3])
     known, missed = with_growth(known, file, map_, exact, began + seconds, check, seed, tell, by)
