@@ -84,7 +84,7 @@ def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:
             eps=the_eps(options["eps"], options["time_step"], required=False),
             by=options["by"],
             terms=options["terms"],
-            primes=_primes(options["primes"]),
+            primes=primes_of(options["primes"]),
             analysis=options.get("analysis"),
             seconds=options["seconds"],
             seed=options["seed"],
@@ -104,7 +104,8 @@ def ending(found: Scan, quiet: bool) -> int:
     return 3 if found.ended == "time" else 130
 
 
-def _primes(text: str | None) -> list[int] | None:
+def primes_of(text: str | None) -> list[int] | None:
+    """The numbers of --primes."""
     if text is None:
         return None
     pieces = [piece.strip() for piece in text.split(",")]

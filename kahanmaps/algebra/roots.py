@@ -21,7 +21,7 @@ from kahanmaps.algebra.text import format_univariate, parse_number, parse_polyno
 from kahanmaps.errors import BadPrime, InputError, quoted
 
 MAX_DEGREE = 12
-_FORM = re.compile(r"\s*root\s+of\s+(?P<g>.+?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
+_FORM = re.compile(r"\s*root\s+of\b\s*(?P<g>.*?)(?:\s+near\s+(?P<near>\S+))?\s*", re.DOTALL)
 _GUARD_BITS = 64
 
 
@@ -42,7 +42,8 @@ class Root:
         if len(factors) != 1 or factors[0][1] != 1:
             parts = ", ".join(format_univariate(factor) for factor, _ in factors)
             g = format_univariate(polynomial)
-            raise InputError(f"found a root of {g}, expected an irreducible polynomial: its factors are {parts}")
+            what = f"it is a power of {parts}" if len(factors) == 1 else f"its factors are {parts}"
+            raise InputError(f"found a root of {g}, expected an irreducible polynomial: {what}")
         self.polynomial = polynomial / polynomial.leading_coefficient()
         self.near = near
 
@@ -97,13 +98,12 @@ class Root:
             found: list[arb] = [root.real for root, _ in roots if root.imag.is_zero()]
             if not found:
                 raise InputError(f"a {self} is not real: take exact or mod:P arithmetic")
-            if self.near is None and len(found) > 1:
-                texts = ", ".join(root.str(6, radius=False) for root in found)
-                raise InputError(
-                    f"a {self} may be {texts}: say which, e.g. {self} near {found[-1].str(4, radius=False)}"
-                )
             near = arb(0 if self.near is None else self.near)
-            return min(found, key=lambda root: float(abs(root - near)))
+            first, *others = sorted(found, key=lambda root: float(abs(root - near)))
+            if others and (self.near is None or not abs(first - near) < abs(others[0] - near)):  # a comparison of balls
+                texts = ", ".join(root.str(6, radius=False) for root in found)
+                raise InputError(f"a {self} may be {texts}: say which, e.g. near {found[-1].str(4, radius=False)}")
+            return first
 
     def _bound(self, field: BoundField) -> Bound:
         """A bound for all conjugates: the root is b/q for a b that is integral, and of Cauchy's size at most."""

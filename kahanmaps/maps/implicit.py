@@ -362,7 +362,7 @@ class BirationalMap(DisplayedAsFormula, ABC):
             return ""
         return (
             f"found a parameter that is a {self.root}, expected rational ones: algebraic numbers are for orbit, "
-            "check-commute, check-integrals, check-measure, degrees and cycles, and rounded for what is drawn in floats"
+            "ensemble, lyapunov, check-commute, check-integrals, check-measure, degrees, cycles and portraits"
         )
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -245,6 +246,8 @@ def _opened(output: str | None, form: str) -> Iterator[IO[Any]]:
         with whole_file(output) as stream:
             yield stream
     elif output is not None:
+        if form == "csv" and os.path.isdir(meta_of(output)):  # said before an older table is lost
+            raise click.UsageError(f"found a folder {meta_of(output)}, where what the table is of is written")
         try:
             with open(output, "w", encoding="utf-8", errors="backslashreplace") as stream:
                 yield stream

@@ -9,7 +9,7 @@ import click
 from kahanmaps_cli.params import PointText
 from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.scan_run import ending, names_of, scan_options, scanned
+from kahanmaps_cli.scan_run import ending, names_of, primes_of, scan_options, scanned
 
 
 @click.command("scan", cls=PictureCommand)
@@ -34,6 +34,8 @@ def command(system: str | None, **options: Any) -> int:
     Exit status: 0 done, 2 wrong use, 3 the time was over, 130 interrupted
     (the picture is written if something was found).
     """
+    from flint import fmpz
+
     from kahanmaps.maps.floats.fast import to_floats
     from kahanmaps.plots.scan import draw_scan
     from kahanmaps.plots.windows import require_window
@@ -42,6 +44,9 @@ def command(system: str | None, **options: Any) -> int:
     window = None if options["window"] is None else require_window(to_floats(options["window"]).tolist(), 2)
     if window is not None and options["modulo"] is not None:
         raise click.UsageError("give --window or --modulo, not both: modulo a prime the whole plane is shown")
+    modulo, primes = options["modulo"], primes_of(options["primes"])
+    if modulo is not None and not (modulo in primes if primes else fmpz(modulo).is_prime()):
+        raise click.UsageError(f"found --modulo {modulo}, expected one of the primes (--primes)")
     names = names_of(options)
     if len(names) != 2:
         raise click.UsageError(f"found --over {','.join(names)}, expected two parameters: a plane is drawn")
