@@ -15,6 +15,7 @@ Window = tuple[tuple[float, float], ...]  # low and high along each axis
 
 _SHARE = 10.0  # percent of the points, at either end, that do not say how far the picture reaches
 _REACH = 3.0  # ... unless they are within so many lengths of what the others fill
+_UNBOUNDED, _SHOWN = 1e12, 10  # times the reach of the starts
 _MARGIN = 0.04
 _LARGEST = 1e307  # what matplotlib can still subtract
 _LOOKED_AT = 4000  # points, when axes are chosen
@@ -26,21 +27,27 @@ def window_of(points: FloatArray, starts: FloatArray | None = None) -> Window:
     """A window for points (n, d) that a few points far away do not spoil: it need not hold all of them.
 
     Along each axis, the range of all points; or where some of the outer tenth at either end are farther away than three
-    times the length that the others and the `starts` fill, that length and half of it at either end. NaN is passed
-    over; a range of length 0 is widened.
+    times the length that the others and the `starts` fill, that length and half of it at either end. Where most orbits
+    go to infinity, so that this is 10^12 times what the starts reach, ten times their reach. NaN is passed over; a
+    range of length 0 is widened.
 
     >>> window_of(np.array([[0.0], [1.0]]))
     ((-0.04, 1.04),)
     >>> far = np.append(np.linspace(0, 1, 101), 1e9)[:, None]
     >>> window_of(far)[0][1] < 2
     True
+    >>> window_of(10.0 ** np.arange(30)[:, None], np.array([[1.0]]))[0][1] < 11
+    True
     """
     first = points[:0] if starts is None else starts
-    return tuple(_range(column, wanted) for column, wanted in zip(points.T, first.T, strict=True))
+    reach = float(np.abs(first[np.isfinite(first)]).max(initial=0))
+    return tuple(_range(column, wanted, reach) for column, wanted in zip(points.T, first.T, strict=True))
 
 
-def _range(column: FloatArray, wanted: FloatArray) -> tuple[float, float]:
+def _range(column: FloatArray, wanted: FloatArray, reach: float) -> tuple[float, float]:
     low, high = main_range(column, wanted)
+    if 0 < _UNBOUNDED * reach < max(-low, high):
+        low, high = main_range(column[np.abs(column) <= _SHOWN * reach], wanted)
     unit = max(abs(low), abs(high), np.finfo(float).tiny)  # in which nothing overflows
     margin = (high / unit - low / unit) * _MARGIN
     return (low / unit - margin) * unit, (high / unit + margin) * unit
