@@ -82,7 +82,7 @@ def test_an_error_is_broken_at_words(kahanmaps, monkeypatch):
     talk_to_forty_columns(monkeypatch)
     lines = kahanmaps("analyze").err.splitlines()
     assert max(map(len, lines)) <= 40
-    assert " ".join(" ".join(lines).split()).endswith("--rhs \"x' = x*y; y' = -x^2\"")
+    assert " ".join(" ".join(lines).split()).endswith("or equations: \"x' = x*y; y' = -x^2\"")
 
 
 # The lines themselves
