@@ -25,7 +25,7 @@ test: dev-venv  ## the tests and the examples in docstrings, without the slow on
 
 test-slow: dev-venv  ## all tests, the slow ones too
 	@.ci/tools
-	@$(python) -m pytest -n 2 --timeout 1800 $(ARGS)
+	@$(python) -m pytest -n 2 --timeout 1800 --hypothesis-profile=thorough $(ARGS)
 
 mutants: dev-venv  ## do tests see single changes to the mathematics? Half an hour; ARGS="--count 40 --seed 7"
 	@nice $(python) tests/mutants.py $(ARGS)

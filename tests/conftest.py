@@ -5,15 +5,20 @@ from __future__ import annotations
 import gc
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 # No deadline: exact numbers vary in size, and the time of one example with them, the more so on a busy machine; nor a
 # complaint that examples are drawn slowly, which there is no reason for but the same. An identity of polynomials that
-# is wrong fails at nearly every point, so that fifty say what hypothesis' hundred would.
-settings.register_profile("kahanmaps", max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("kahanmaps")
+# is wrong fails at nearly every point, so that twenty say what hypothesis' hundred would; `make test-slow`
+# takes fifty.
+for profile, examples in [("quick", 20), ("thorough", 50)]:
+    settings.register_profile(
+        profile, max_examples=examples, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    )
+settings.load_profile("quick")
 
 # What a shell without job control or nohup starts is deaf to these signals, and so is all that it starts itself.
 for number, handler in [
@@ -23,6 +28,17 @@ for number, handler in [
 ]:
     if signal.getsignal(number) is signal.SIG_IGN:
         signal.signal(number, handler)
+
+THOROUGH = frozenset((Path(__file__).parent / "thorough.txt").read_text(encoding="utf-8").splitlines())
+
+
+@pytest.hookimpl(tryfirst=True)  # before `-m` chooses
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests and cases that thorough.txt names: dear ones, whose subject has quicker tests as well."""
+    for item in items:
+        if not THOROUGH.isdisjoint({item.nodeid, item.nodeid.split("[")[0]}):
+            item.add_marker(pytest.mark.slow)
+            item.add_marker(pytest.mark.thorough)
 
 
 @pytest.hookimpl(wrapper=True)

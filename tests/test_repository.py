@@ -82,3 +82,9 @@ def test_every_name_that_kahanmaps_exports_exists_and_is_documented():
     callables = {name: value for name, value in exported.items() if inspect.isroutine(value) or inspect.isclass(value)}
     assert callables
     assert [name for name, value in callables.items() if not value.__doc__] == []
+
+
+def test_every_test_that_is_left_to_the_thorough_runs_exists():
+    for line in (ROOT / "tests" / "thorough.txt").read_text(encoding="utf-8").splitlines():
+        path, name = line.split("[")[0].split("::")
+        assert f"def {name}(" in (ROOT / path).read_text(encoding="utf-8"), line

@@ -224,7 +224,7 @@ class ExperimentReader:
         if place.endswith(f".{TIME_STEP}"):
             read_eps = option.read  # of half the time step
             option = replace(option, read=lambda value: read_eps(number_of(value) / 2))
-        zipped = {"eps" if name == TIME_STEP else name for names in self.sound("zip") or [] for name in names or []}
+        zipped = {name for names in self._written_zips() for name in names or []}
         values, mistakes = read_values(option, raw, repeats=option.name in zipped)
         for position, sentence in mistakes:
             self.mistake(place + "".join(f"[{k}]" for k in position), sentence)
@@ -237,16 +237,23 @@ class ExperimentReader:
             known |= FAMILY | {"seed": VOCABULARY["seed"]}
         return known
 
+    def _written_zips(self) -> list[list[str] | None]:
+        """Canonical names of the axes of each zip, None where one has not the right shape, which is told already."""
+        zips: list[list[str] | None] = []
+        for number, written in enumerate(self.sound("zip") or []):
+            sound = self.sound("zip", number) is not None
+            sound = sound and all(self.sound("zip", number, k) is not None for k in range(len(written)))
+            zips.append(["eps" if name == TIME_STEP else name for name in written] if sound else None)
+        return zips
+
     def _read_zips(self, axes: Mapping[str, Values]) -> list[tuple[str, ...]]:
         zips: list[tuple[str, ...]] = []
         before: set[str] = set()
         given = {name for name, _, _ in self.entries("axes")}
-        for number, _ in enumerate(self.sound("zip") or [], start=1):
+        for number, names in enumerate(self._written_zips(), start=1):
             place = f"zip[{number}]"
-            written = self.sound("zip", number - 1)
-            if written is None or any(self.sound("zip", number - 1, k) is None for k in range(len(written))):
+            if names is None:
                 continue
-            names = ["eps" if name == TIME_STEP else name for name in written]
             unknown = [name for name in names if name not in axes]
             for name in unknown:
                 if name not in given:  # otherwise something else is wrong with it, and told
