@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps_cli.numbers import read_matrix
 from kahanmaps_cli.options import (
     output_options,
     seconds_option,
@@ -79,7 +80,7 @@ def command(system: str | None, **options: Any) -> int:
     def censuses(file: SystemFile, progress: Progress) -> tuple[fmpq_mat | None, list[tuple[Census, Comparison]]]:
         reversor = None
         if options["reversor"] is not None:
-            reversor = _matrix(options["reversor"])
+            reversor = read_matrix(options["reversor"])
         elif file.is_quadratic:
             reversor = find_reversor(file.system)
         runs = []
@@ -124,18 +125,6 @@ def _prime(text: str) -> int:
     if not text.isdecimal() or len(text) > 20:
         raise click.UsageError(f"found -p {text[:40]!r}, expected NAME=VALUE for a parameter, or a prime")
     return int(text)
-
-
-def _matrix(text: str) -> fmpq_mat:
-    """The matrix written row by row, rows separated by semicolons."""
-    from flint import fmpq_mat
-
-    from kahanmaps.algebra.text import parse_point
-
-    rows = [list(parse_point(row)) for row in text.split(";")]
-    if len({len(row) for row in rows}) != 1:
-        raise click.UsageError("found --reversor with rows of different lengths, expected a square matrix: 1,0;0,-1")
-    return fmpq_mat(rows)
 
 
 def _print(

@@ -11,7 +11,6 @@ from kahanmaps_cli.options import load_system, system_options
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.search import (
-    formula,
     heading,
     print_search,
     require_one_form,
@@ -19,7 +18,7 @@ from kahanmaps_cli.search import (
     search_options,
     symbols_and_eps,
 )
-from kahanmaps_cli.terminal import tell
+from kahanmaps_cli.terminal import formula, tell
 from kahanmaps_cli.value_rows import Cell, rows_of, table
 
 if TYPE_CHECKING:
