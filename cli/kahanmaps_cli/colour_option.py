@@ -27,11 +27,6 @@ def colour_option() -> click.Option:
     )
 
 
-def is_colour_option(parameter: click.Parameter) -> bool:
-    """Whether it is this option."""
-    return parameter.callback is _choose
-
-
 def with_colour_option(command: click.Command) -> click.Command:
     """The command, which knows --color from now on, as do the commands below it."""
     if all("--color" not in parameter.opts for parameter in command.params):

@@ -7,27 +7,34 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from kahanmaps_cli.options import stack
+
 if TYPE_CHECKING:
+    from kahanmaps.documents.files import SystemFile
     from kahanmaps.family.associated import FamilyMember
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def draw_options(function: F) -> F:
-    """--m, --eigenvalues, --generic, --chi and --size."""
-    for option in reversed(
-        (
-            click.option("--m", type=int, metavar="M", help="Half the dimension, 1 to 16 (for verify 1 to 8)."),
-            click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
-            click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q."),
-            click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'."),
-            click.option(
-                "--size", type=int, metavar="N", help="Bound for the integer coefficients drawn (default 2 or 1)."
-            ),
-        )
-    ):
-        function = option(function)
-    return function
+draw_options: Callable[[F], F] = stack(
+    click.option("--m", type=int, metavar="M", help="Half the dimension, 1 to 16 (for verify 1 to 8)."),
+    click.option("--eigenvalues", metavar="L1,L2,...", help="Rational eigenvalues of A, m of them."),
+    click.option("--generic", is_flag=True, help="A random integer chi, typically irreducible over Q."),
+    click.option("--chi", metavar="EXPR", help="chi itself, a polynomial in t: '(t-1)*(t^2-2)'."),
+    click.option("--size", type=int, metavar="N", help="Bound for the integer coefficients drawn (default 2 or 1)."),
+)
+DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
+
+
+def drawn_file(options: dict[str, Any]) -> SystemFile:
+    """The member that the options ask for as a system file; without any of them one with m = 3."""
+    from kahanmaps.documents.files import SystemFile
+
+    drawn = {name: options[name] for name in DRAWN}
+    if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
+        drawn["m"] = 3
+    member = draw_member(**drawn, seed=options["seed"])
+    return SystemFile.from_member(member, f"random member, m = {member.m}, seed {options['seed']}")
 
 
 def draw_member(

@@ -1,9 +1,14 @@
-"""Machine numbers for people and for JSON, which knows no infinity."""
+"""Machine numbers for people and for JSON, which knows no infinity; matrices on the line."""
 
 from __future__ import annotations
 
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from kahanmaps.errors import InputError, counted
+
+if TYPE_CHECKING:
+    from flint import fmpq_mat
 
 
 def json_float(value: Any) -> float | str:
@@ -23,3 +28,17 @@ def json_number(value: Any) -> Any:
 def short_float(value: Any) -> str:
     """Three digits."""
     return f"{float(value):.3g}"
+
+
+def read_matrix(text: str) -> fmpq_mat:
+    """A square matrix written row by row, rows separated by semicolons."""
+    from flint import fmpq_mat
+
+    from kahanmaps.algebra.text import parse_point
+    from kahanmaps.systems.quadratic import MAX_DIMENSION
+
+    rows = [list(parse_point(row)) for row in text.split(";")]
+    if len(rows) > MAX_DIMENSION or any(len(row) != len(rows) for row in rows):
+        found = f"{counted(len(rows), 'row')} of lengths {sorted({len(row) for row in rows})}"
+        raise InputError(f"found {found}, expected a square matrix, at most {MAX_DIMENSION} x {MAX_DIMENSION}")
+    return fmpq_mat(rows)

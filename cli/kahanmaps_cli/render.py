@@ -13,6 +13,7 @@ from kahanmaps_cli.terminal import COLOURS, NUMBER_WIDTH, console, on_terminal, 
 
 if TYPE_CHECKING:
     from kahanmaps.checks.claims import Evidence, Finding, Report
+    from kahanmaps.documents.files import SystemFile
 
 # On a terminal long lists of claims are cut to this many.
 CLAIMS_SHOWN = 40
@@ -23,6 +24,14 @@ def envelope(command: str) -> dict[str, str]:
     from kahanmaps.version import __version__
 
     return {"command": command, "version": __version__}
+
+
+def record_of(command: str, file: SystemFile, arithmetic: str, **more: Any) -> dict[str, Any]:
+    """What a command found of a system, as plain data, with the system itself."""
+    from kahanmaps.maps.convention import convention
+
+    common = {"system": file.name, "convention": convention(file.map), "arithmetic": arithmetic}
+    return {**envelope(command), **common, **more, "document": dict(file.document)}
 
 
 def print_json(data: Mapping[str, Any]) -> None:

@@ -7,33 +7,32 @@ from typing import Any, TypeVar
 
 import click
 
-from kahanmaps_cli.options import eps_options, output_options, seconds_option, seed_option, symbolic_option, the_eps
+from kahanmaps_cli.options import (
+    eps_options,
+    output_options,
+    seconds_option,
+    seed_option,
+    stack,
+    symbolic_option,
+    the_eps,
+)
 from kahanmaps_cli.render import envelope, print_json
-from kahanmaps_cli.terminal import on_terminal, shorten, tell
+from kahanmaps_cli.terminal import formula, tell
 
 F = TypeVar("F", bound=Callable[..., Any])
-_FORMULA_WIDTH = 400
 
 
 def search_options(section: str) -> Callable[[F], F]:
     """eps, --symbolic, --seconds, --seed and the forms of output; `section` is that of a system file."""
-
-    def apply(function: F) -> F:
-        for option in reversed(
-            (
-                eps_options,
-                symbolic_option,
-                seconds_option(60, "Time for the search."),
-                seed_option,
-                click.option("--toml", "as_toml", is_flag=True, help=f"The section [{section}] of a system file."),
-                click.option("--latex", "as_latex", is_flag=True, help="The formulas in LaTeX."),
-                output_options,
-            )
-        ):
-            function = option(function)
-        return function
-
-    return apply
+    return stack(
+        eps_options,
+        symbolic_option,
+        seconds_option(60, "Time for the search."),
+        seed_option,
+        click.option("--toml", "as_toml", is_flag=True, help=f"The section [{section}] of a system file."),
+        click.option("--latex", "as_latex", is_flag=True, help="The formulas in LaTeX."),
+        output_options,
+    )
 
 
 def require_one_form(options: dict[str, Any]) -> None:
@@ -74,11 +73,6 @@ def heading(name: str, found: Any) -> dict[str, Any]:
         "arithmetic": "exact formulas, from residues modulo primes",
         "seed": found.seed,
     }
-
-
-def formula(text: str) -> str:
-    """A long formula is shortened on a terminal only."""
-    return shorten(text, _FORMULA_WIDTH) if on_terminal() else text
 
 
 def print_search(

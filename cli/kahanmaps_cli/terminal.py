@@ -81,6 +81,11 @@ def console() -> Console:
     )
 
 
+def formula(text: str, width: int = 400) -> str:
+    """A long formula is shortened on a terminal only."""
+    return shorten(text, width) if on_terminal() else text
+
+
 def tell(text: str, hang: int = _LABEL, style: str = "") -> None:
     """Print lines of cells separated by tabs; on a terminal the first cell is a label, and the others stand beside it.
 

@@ -26,24 +26,33 @@ Row = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True)
 class Cell:
-    """What was found for one combination of values: in a line, as JSON, and whether it was decided."""
+    """What was found for one combination of values: in a line, as JSON, all of it, and why it is not decided."""
 
     line: str
     record: Callable[[], dict[str, Any]]
-    is_done: bool
+    show: Callable[[], None]
+    undecided: str = ""
 
 
-def table(
-    system: str | None, options: dict[str, Any], quiet: bool, found: Callable[[SystemFile, Progress], Cell]
-) -> int | None:
-    """A line for each combination of values, in JSON a record each, and the exit status; None without a range.
+def table(system: str | None, options: dict[str, Any], found: Callable[[SystemFile, Progress], Cell]) -> int:
+    """A line for each combination of values, without a range all that was found; in JSON a record each.
 
     A combination at which there is an error is told of on standard error, and the others go on; one everywhere is
-    raised.
+    raised. Returns the exit status.
     """
+    quiet = options["quiet"]
     rows = rows_of(options["parameters"], system)
     if rows is None:
-        return None
+        file = load_system(system, options)
+        with Progress(quiet) as progress:
+            cell = found(file, progress)
+        if options["as_json"]:
+            print_json(cell.record())
+        else:
+            cell.show()
+        if cell.undecided and not quiet:
+            say(cell.undecided)
+        return 3 if cell.undecided else 0
     done, refused = 0, list[tuple[str, KahanmapsError]]()
     for row in rows:
         name = ", ".join(f"{name} = {value}" for name, value in row)
@@ -58,7 +67,7 @@ def table(
             print_json(cell.record())
         else:
             tell(f"{name}\t{cell.line}")
-        done += cell.is_done
+        done += not cell.undecided
     if len(refused) == len(rows):
         raise refused[0][1]
     for name, reason in refused:

@@ -8,7 +8,7 @@ which. `undecided`: the reason is given. The four words are never mixed.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from dataclasses import field as field_of
 from enum import StrEnum
 from typing import Any
@@ -80,10 +80,6 @@ class Finding(Displayed):
     control: bool = False
     place: Mapping[str, Any] = field(default_factory=dict)  # where the claim stands, as plain data
     applies: bool = True  # False: stated for generic input, and this is special; it does not count
-
-    def with_also(self, *more: Evidence) -> Finding:
-        """The same finding with further evidence beside the one that decided."""
-        return replace(self, also=(*self.also, *more))
 
     @property
     def is_as_expected(self) -> bool:

@@ -34,9 +34,6 @@ from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.systems.quadratic import QuadraticSystem
 
-# With more rational factors than this only the K~ with a single minus sign are listed; the others are their
-# combinations.
-MAX_FACTORS = 8
 # The integrals that are also tried along an orbit, where there are many.
 _TRIED = 32
 _TRIED_IN_HIGH_DIMENSION = 2  # beyond dimension 16 one integral takes many seconds
@@ -66,7 +63,7 @@ def known_integrals(file: SystemFile) -> list[tuple[PhaseFunction, Evidence | No
     if file.member is not None:
         return _family_integrals(file.member)
     if file.hamiltonian is not None:
-        proof = theorems.modified_hamiltonian_conserved(file.hamiltonian)
+        proof = theorems.cubic_hamiltonian(file.hamiltonian)
         found.append((ModifiedHamiltonian(file.hamiltonian), proof, "cmoq-2013"))
         if file.hamiltonian.is_homogeneous and file.hamiltonian.is_standard:
             found.append((PaperIntegral(file.hamiltonian), proof, "petrera-suris-2016, eq. (tH)"))
@@ -150,12 +147,8 @@ def _constant(integral: ModifiedHamiltonian, settings: Settings) -> str:
 
 def _family_integrals(member: FamilyMember) -> list[tuple[PhaseFunction, Evidence | None, str]]:
     """Modified H in both normalisations, and K~_s for every rational associated system: the whole class shares them."""
-    count = len(member.factors)
-    if count > MAX_FACTORS:
-        flips = [tuple(-1 if i == k else 1 for i in range(count)) for k in range(count)]
-        associates = [member.associate(signs) for signs in [(1,) * count, *flips]]
-    else:
-        associates = list(member.associated())
+    # Where there are many factors the K~ of several minus signs are combinations of those listed.
+    associates = theorems.listed_associates(member)
     base = associates[0]
     proof = theorems.shared_integral(member, base)
     found: list[tuple[PhaseFunction, Evidence | None, str]] = [

@@ -87,7 +87,7 @@ def check_measure(file: SystemFile, settings: Settings | None = None, extra: Rat
     settings = settings or Settings()
     candidates: list[tuple[DeterminantDensity | ClaimedDensity, Evidence | None, str]] = []
     if file.hamiltonian is not None:
-        proof = theorems.determinant_density_invariant(file.hamiltonian)
+        proof = theorems.cubic_hamiltonian(file.hamiltonian)
         candidates.append((DeterminantDensity(file.system), proof, "petrera-suris-2016, eq. (eq: CMOQ measure)"))
     if extra is not None:
         file.require_claim("a density", extra)

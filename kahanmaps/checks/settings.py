@@ -26,10 +26,6 @@ from kahanmaps.version import __version__
 MAX_STEPS = 10_000  # of the exact orbit, all of whose points are kept
 
 
-def _silent(_: str) -> None:
-    return None
-
-
 @dataclass(frozen=True)
 class Settings:
     """How to check: at one `eps` or (None) for every eps; `steps` of an exact orbit from `start` (None: a random one).
@@ -46,7 +42,7 @@ class Settings:
     error_bits: int = DEFAULT_ERROR_BITS
     max_digits: int | None = None
     orbit_is_asked: bool = False
-    progress: Callable[[str], None] = _silent
+    progress: Callable[[str], None] = lambda _: None
 
     def __post_init__(self) -> None:
         if self.eps is not None:

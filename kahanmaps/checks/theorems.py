@@ -13,7 +13,7 @@ from flint import fmpq, fmpq_mat
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import rank
 from kahanmaps.algebra.polynomials import RationalFunction, gradient, linear_combinations
-from kahanmaps.checks.claims import Evidence, Finding, Verdict
+from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.family.associated import AssociatedSystem, FamilyMember
 from kahanmaps.family.cubics import belongs
 from kahanmaps.family.skew_hamiltonian import defects, evaluate_at_matrix, minimal_degree
@@ -24,6 +24,8 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 
 METHOD = "hypotheses"
 PROVED = Verdict.PROVED
+# All rational associated systems: 128 for as many factors, and 8128 pairs of them.
+MAX_FACTORS = 8
 
 
 def evidence(theorem: str, hypotheses: Iterable[tuple[str, bool]]) -> Evidence | None:
@@ -35,29 +37,30 @@ def evidence(theorem: str, hypotheses: Iterable[tuple[str, bool]]) -> Evidence |
     return Evidence(METHOD, f"{theorem} applies: {'; '.join(names)}", {"theorem": theorem, "hypotheses": names})
 
 
-def finding_by_hypotheses(claim: str, proof: Evidence | None, source: str) -> Finding:
-    """A claim that only a theorem can decide: proved, or undecided where the hypotheses do not hold."""
-    if proof is not None:
-        return Finding(claim, Verdict.PROVED, proof, source=source)
-    reason = Evidence(METHOD, "the hypotheses of the theorem do not all hold, which decides nothing")
-    return Finding(claim, Verdict.UNDECIDED, reason, source=source)
-
-
 def associated_hypotheses(member: FamilyMember, associate: AssociatedSystem) -> list[tuple[str, bool]]:
     """What makes `associate` an associated system of f_0 = J grad H, each verified here and now."""
     n = member.dim
-    power, total = _identity(n), fmpq_mat(n, n)
+    power, total = QQ.identity(n), fmpq_mat(n, n)
     for coefficient in associate.coefficients:
         total = total + power * coefficient
         power = power * member.A
     return [
         (f"B_{associate.label} is a polynomial in A", bool(total == associate.B)),
-        (f"B_{associate.label}^2 = I", bool(associate.B * associate.B == _identity(n))),
+        (f"B_{associate.label}^2 = I", bool(associate.B * associate.B == QQ.identity(n))),
         (
             f"grad K_{associate.label} = B_{associate.label} grad H",
             gradient(associate.K) == linear_combinations(associate.B, gradient(member.H)),
         ),
     ]
+
+
+def listed_associates(member: FamilyMember) -> list[AssociatedSystem]:
+    """All rational associated systems; of more than 8 factors those with at most one minus sign, f_0 first."""
+    count = len(member.factors)
+    if count <= MAX_FACTORS:
+        return list(member.associated())
+    flips = [tuple(-1 if i == k else 1 for i in range(count)) for k in range(count)]
+    return [member.associate(signs) for signs in [(1,) * count, *flips]]
 
 
 def member_hypotheses(member: FamilyMember) -> list[tuple[str, bool]]:
@@ -85,7 +88,7 @@ def commuting_by_splitting(f: QuadraticSystem, g: QuadraticSystem) -> Evidence |
     return evidence(
         "the splitting lemma (docs/mathematics.md)",
         [
-            ("g = C f with a constant matrix C", f.transformed(C) == _renamed(g, f)),
+            ("g = C f with a constant matrix C", f.transformed(C) == g.renamed(f.variables)),
             ("C^3 = C", bool(C * C * C == C)),
             ("C f'(x) = f'(x) C for every x", commutes(C, f)),
         ],
@@ -113,13 +116,11 @@ def commuting_over_splitting_field(member: FamilyMember) -> Evidence | None:
     )
 
 
-def modified_hamiltonian_conserved(hamiltonian: CubicHamiltonian) -> Evidence | None:
-    """For f = J grad H, H cubic, J constant and skew, Phi_f conserves modified H (cmoq-2013)."""
-    return evidence("the theorem of Celledoni, McLachlan, Owren and Quispel", _cubic_hypotheses(hamiltonian))
+def cubic_hamiltonian(hamiltonian: CubicHamiltonian) -> Evidence | None:
+    """For f = J grad H, H cubic, J constant and skew: modified H is conserved, and so is dx/det(I - eps f'(x)).
 
-
-def determinant_density_invariant(hamiltonian: CubicHamiltonian) -> Evidence | None:
-    """For f = J grad H, H cubic, J constant and skew, dx / det(I - eps f'(x)) is invariant (cmoq-2013)."""
+    Source: cmoq-2013.
+    """
     return evidence("the theorem of Celledoni, McLachlan, Owren and Quispel", _cubic_hypotheses(hamiltonian))
 
 
@@ -192,10 +193,8 @@ def linear_relation(f: QuadraticSystem, g: QuadraticSystem) -> fmpq_mat | None:
     n = f.dim
     F, G = _coefficients(f), _coefficients(g)
     if rank(QQ, F) < n:
-        for sign in (1, -1):
-            if G == F * fmpq(sign):
-                return _identity(n) * fmpq(sign)
-        return None
+        identity: fmpq_mat = QQ.identity(n)
+        return next((identity * fmpq(sign) for sign in (1, -1) if G == F * fmpq(sign)), None)
     # F has full row rank, so C F = G has at most one solution, C = G F^T (F F^T)^{-1}.
     gram = F * F.transpose()
     C = gram.solve(F * G.transpose()).transpose()
@@ -203,7 +202,7 @@ def linear_relation(f: QuadraticSystem, g: QuadraticSystem) -> fmpq_mat | None:
 
 
 def _annihilates(member: FamilyMember) -> bool:
-    value = _identity(member.dim)
+    value = QQ.identity(member.dim)
     for factor in member.factors:
         for _ in range(factor.multiplicity):
             value = value * evaluate_at_matrix(factor.polynomial, member.A)
@@ -230,12 +229,3 @@ def _coefficients(system: QuadraticSystem) -> fmpq_mat:
         quadratic = [system.Q[i][j, k] for j in range(n) for k in range(j, n)]
         rows.append([*quadratic, *(system.B[i, j] for j in range(n)), system.c[i]])
     return fmpq_mat(rows)
-
-
-def _renamed(g: QuadraticSystem, f: QuadraticSystem) -> QuadraticSystem:
-    """g in the variables of f: the names do not matter, their order does."""
-    return g.renamed(f.variables)
-
-
-def _identity(n: int) -> fmpq_mat:
-    return fmpq_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])

@@ -150,7 +150,7 @@ class Examiner(ABC):
                 return self._finding(claim, Verdict.PROVED, proof, (decision.evidence, *also))
             if decision.evidence.data.get("points") == 0:  # no prime, or none large enough, for a point
                 return self._finding(claim, Verdict.PROVED, proof, also)
-        return found.with_also(*also)
+        return replace(found, also=(*found.also, *also))
 
     def _examine_existence(self, claim: Claim) -> Finding:
         """Claims that something differs somewhere, or has a certain rank: one point that shows it is a proof."""

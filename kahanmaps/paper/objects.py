@@ -18,6 +18,7 @@ from kahanmaps.algebra.duals import DualField
 from kahanmaps.algebra.fields import Field
 from kahanmaps.algebra.matrices import rank, solve
 from kahanmaps.paper.calculus import Calculus, remembered
+from kahanmaps.systems.hamiltonian import standard_structure
 from kahanmaps.systems.quadratic import SystemOver
 
 
@@ -31,8 +32,8 @@ class PaperObjects(Calculus):
     """
 
     A: Any
-    J: Any
     third: Any
+    J: Any = None  # [[0, I], [-I, 0]] unless it is given
     roots: tuple[Any, ...] | None
     hessian_of_quadratic_part: Any = None  # of an inhomogeneous H
     gradient_of_linear_part: Any = None
@@ -50,6 +51,8 @@ class PaperObjects(Calculus):
         super().__post_init__()
         if self.minus is None:
             self.minus = -self.K.one
+        if self.J is None:
+            self.J = self.K.convert_matrix(standard_structure(self.n))
 
     @property
     def n(self) -> int:
@@ -508,7 +511,7 @@ class PaperObjects(Calculus):
             row = [K.zero] * (n * len(pairs))
             # The Hesse matrix of x_a x_b x_c has x_l in the places (j, k) and (k, j), {j, k, l} = {a, b, c}.
             for j, k, l in set(itertools.permutations((a, b, c))):
-                factor = self.number(_multiplicity(a, b, c))
+                factor = self.number({1: 6, 2: 2, 3: 1}[len({a, b, c})])  # the third derivative of x_a x_b x_c
                 for i in range(n):  # entry (i, k) of A nabla^2 H gains A_ij, entry (k, i) of nabla^2 H A^T as well
                     if i != k:
                         place = l * len(pairs) + pairs[min(i, k), max(i, k)]
@@ -523,8 +526,3 @@ def _times_linear(K: Field, polynomial: Sequence[Any], root: Any) -> list[Any]:
     for k, coefficient in enumerate(polynomial):
         product[k] = product[k] - root * coefficient
     return product
-
-
-def _multiplicity(a: int, b: int, c: int) -> int:
-    """The third derivative of x_a x_b x_c: 6, 2 or 1."""
-    return {1: 6, 2: 2, 3: 1}[len({a, b, c})]

@@ -31,7 +31,6 @@ from kahanmaps.family.skew_hamiltonian import chi as chi_of
 from kahanmaps.invariants.integrals import ModifiedHamiltonian, PaperIntegral
 from kahanmaps.invariants.poisson import poisson_tensor
 from kahanmaps.paper.objects import PaperObjects
-from kahanmaps.systems.hamiltonian import standard_structure
 from kahanmaps.systems.quadratic import SystemOver
 
 Draw = Callable[[str], Any]
@@ -65,7 +64,6 @@ class MemberObjects(PaperObjects):
         objects = cls(
             K=K,
             A=K.convert_matrix(member.A),
-            J=K.convert_matrix(standard_structure(member.dim)),
             third=K.convert_matrix(_third_matrix(member)),
             eps=eps,
             roots=roots,
@@ -183,9 +181,8 @@ def point_over(
     member: FamilyMember, K: Field, roots: tuple[Any, ...] | None, eps: fmpq | None, rng: random.Random, order: int
 ) -> MemberObjects:
     """A member at a random point over QQ or GF(p), eps random where it is not given."""
-    value = K.convert(eps) if eps is not None else K.zero
-    while value == 0:
-        value = K.random(rng)
+    value = K.zero if eps is None else K.convert(eps)
+    value = _not_zero(K, rng) if value == 0 else value
     signs = sign_sample(member.m, rng)
     return MemberObjects.at(member, K, value, random_draw(K, member.dim, rng), roots, signs, order)
 
@@ -218,14 +215,11 @@ def random_objects(m: int, K: Field, rng: random.Random, order: int) -> PaperObj
         middle = K.matrix(n, n, [slices[i, j * n + l] for i in range(n) for j in range(n)]) * S_inverse
         columns.append(middle.entries())
     third = K.matrix(n * n, n, [entry for row in zip(*columns, strict=True) for entry in row]) * S_inverse
-    eps = K.zero
-    while eps == 0:
-        eps = K.random(rng)
+    eps = _not_zero(K, rng)
     signs = sign_sample(m, rng)
     A = turned * A * S.transpose()
-    J = K.convert_matrix(standard_structure(n))
     return PaperObjects(
-        K=K, A=A, J=J, third=third, eps=eps, roots=roots, draw=random_draw(K, n, rng), sign_vectors=signs, order=order
+        K=K, A=A, third=third, eps=eps, roots=roots, draw=random_draw(K, n, rng), sign_vectors=signs, order=order
     )
 
 
@@ -243,7 +237,7 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
     lower = ["p", "q", "r", "s", "t"] if "linear" in vectors else []
     blockwise = [f"{c}{i + 1}" for i in range(m) for c in ["a", "c", "d", *lower]]
     drawn = [vector for vector in vectors if vector not in ("x", "linear", "u1", "u2", "u3")]
-    letters = {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(drawn)}
+    letters = _letters(drawn, n)
     names = [
         *(f"l{i + 1}" for i in range(m)),
         *blockwise,
@@ -255,7 +249,6 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
     roots = tuple(by_name[f"l{i + 1}"] for i in range(m))
     cubics = [[by_name[f"a{i + 1}"], K.zero, by_name[f"c{i + 1}"], by_name[f"d{i + 1}"]] for i in range(m)]
     A, third = _normal_form(K, roots, cubics)
-    J = K.convert_matrix(standard_structure(n))
 
     def draw(name: str) -> Any:
         if name == "x":
@@ -267,7 +260,6 @@ def normal_form_objects(m: int, vectors: Sequence[str], budget: int, order: int)
     objects = PaperObjects(
         K=K,
         A=A,
-        J=J,
         third=third,
         eps=by_name["eps"],
         roots=roots,
@@ -290,7 +282,7 @@ def member_functions(
 ) -> MemberObjects:
     """A given member with indeterminate x (and eps, where it is not given) over the rational functions."""
     n = member.dim
-    letters = {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(vectors)}
+    letters = _letters(vectors, n)
     names = ["eps", *(name for letter in letters.values() for name in letter)]
     K = FunctionField(names, budget)
     by_name = dict(zip(names, K.variables, strict=True))
@@ -312,12 +304,10 @@ def etale_objects(member: FamilyMember, rng: random.Random, eps: fmpq | None, or
     root = K.generator
     A, third = _normal_form(K, (root,), [[K.convert(c) for c in form.coefficients]])
     value = K.convert(eps if eps is not None else fmpq(1, rng.randint(2, 9)))
-    J = K.convert_matrix(standard_structure(2))
     signs = ((1,), (-1,))
     return PaperObjects(
         K=K,
         A=A,
-        J=J,
         third=third,
         eps=value,
         roots=(root,),
@@ -351,7 +341,6 @@ def ball_objects(member: FamilyMember, bits: int, rng: random.Random, eps: fmpq 
         return PaperObjects(
             K=K,
             A=K.convert_matrix(member.A),
-            J=K.convert_matrix(standard_structure(member.dim)),
             third=K.convert_matrix(_third_matrix(member)),
             eps=value,
             roots=roots,
@@ -380,7 +369,6 @@ def bound_objects(member: FamilyMember, eps: fmpq | None, order: int) -> PaperOb
     return PaperObjects(
         K=K,
         A=K.convert_matrix(member.A),
-        J=K.convert_matrix(standard_structure(n)),
         third=K.convert_matrix(_third_matrix(member)),
         eps=value,
         roots=(root,) * member.m,
@@ -404,7 +392,6 @@ def universal_bound_objects(m: int, order: int) -> PaperObjects:
     return PaperObjects(
         K=K,
         A=A,
-        J=K.convert_matrix(standard_structure(n)),
         third=third,
         eps=K.variable(),
         roots=(root,) * m,
@@ -415,6 +402,15 @@ def universal_bound_objects(m: int, order: int) -> PaperObjects:
 
 
 # ---- helpers ---------------------------------------------------------------------------------------------------
+
+
+def _not_zero(K: Field, rng: random.Random) -> Any:
+    return next(value for value in iter(lambda: K.random(rng), None) if value != 0)
+
+
+def _letters(vectors: Sequence[str], n: int) -> dict[str, list[str]]:
+    """Names for the entries of vectors of indeterminates."""
+    return {vector: [f"w{k}_{i + 1}" for i in range(n)] for k, vector in enumerate(vectors)}
 
 
 def _third_matrix(member: FamilyMember) -> fmpq_mat:

@@ -23,7 +23,6 @@ from kahanmaps.paper.objects import PaperObjects
 from kahanmaps.paper.registry import ClaimFunction, claims
 from kahanmaps.paper.variations import VARIATIONS
 from kahanmaps.paper.verify import verify_universal
-from kahanmaps.systems.hamiltonian import standard_structure
 
 _MOST_ONES = 7
 _KEY = "not "
@@ -129,7 +128,6 @@ def _objects(m: int, roots: tuple[int, ...], ones: Sequence[Slot], **more: Any) 
     return PaperObjects(
         K=QQ,
         A=QQ.matrix(n, n, [fmpq(roots[i % m] * (i == j)) for i in range(n) for j in range(n)]),
-        J=more.pop("J", standard_structure(n)),
         third=QQ.matrix(n * n, n, [fmpq(e) for row in cubic for e in row]),
         hessian_of_quadratic_part=QQ.matrix(n, n, [fmpq(e) for row in hessian for e in row]),
         gradient_of_linear_part=QQ.column([fmpq(e) for e in linear]),

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kahanmaps.maps.floats.classical import VectorField
 from kahanmaps.maps.floats.doubles import FloatArray
-from kahanmaps.plots.trajectories import VectorField
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 SADDLE, CENTRE, FOCUS, NODE, DEGENERATE = "saddle", "centre", "focus", "node", "degenerate equilibrium"
@@ -73,11 +73,11 @@ def isolated_equilibria(system: QuadraticSystem) -> list[Equilibrium]:
 
 def _newton(f: VectorField, x: FloatArray) -> FloatArray | None:
     for _ in range(40):
-        value = f(x[None])[0]
+        value = f(x)
         scale = 1 + float(np.abs(x).max())
         if np.abs(value).max() <= 1e-12 * scale:
             nearest = np.round(x, 9)
-            return nearest if np.abs(f(nearest[None])[0]).max() <= 1e-12 * scale else x
+            return nearest if np.abs(f(nearest)).max() <= 1e-12 * scale else x
         x = x + np.linalg.lstsq(f.jacobian(x), -value, rcond=1e-10)[0]  # equilibria need not be isolated
         if not np.isfinite(x).all() or np.abs(x).max() > 1e6:
             return None

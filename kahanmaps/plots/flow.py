@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kahanmaps.maps.floats.classical import VectorField
 from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.plots.equilibria import SADDLE, Equilibrium, isolated_equilibria
-from kahanmaps.plots.trajectories import VectorField
 from kahanmaps.plots.windows import Window
 from kahanmaps.systems.quadratic import QuadraticSystem
 
@@ -109,13 +109,13 @@ def _curve(f: VectorField, start: FloatArray, box: Window, time: float | None) -
     sign = -1.0 if time is not None and time < 0 else 1.0
 
     def speed(x: FloatArray) -> float:
-        return float(np.linalg.norm(f(x[None])[0] / size))
+        return float(np.linalg.norm(f(x) / size))
 
     corners = np.stack([low, high, middle])
     stop = _SLOW * max(map(speed, (*corners, start)))
 
     def direction(x: FloatArray) -> FloatArray:
-        value: FloatArray = sign * f(x[None])[0]
+        value: FloatArray = sign * f(x)
         found = float(np.linalg.norm(value / size))
         return value / found if found > 0 else value
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import numpy as np
 from flint import fmpq, fmpq_mpoly
@@ -16,13 +14,10 @@ from kahanmaps.algebra.text import parse_rational_function
 from kahanmaps.display.latex import latex_polynomial
 from kahanmaps.errors import InputError
 from kahanmaps.maps.floats.doubles import FloatArray, to_float
+from kahanmaps.maps.floats.fast import FLOATS
 from kahanmaps.plots.figures import label_of, plain
 
 _SHORT = 60  # characters of a formula that fits along an axis
-
-
-# Arrays of doubles, as far as evaluating a polynomial needs a field.
-_ARRAYS = SimpleNamespace(zero=0.0, one=1.0, convert=to_float, working=nullcontext)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +80,7 @@ class PointFunction:
 
     def _value(self, polynomial: fmpq_mpoly, points: FloatArray) -> FloatArray:
         coordinates = [*np.moveaxis(points, -1, 0), self.eps]
-        value = np.asarray(evaluate(polynomial, _ARRAYS, coordinates), dtype=np.float64)
+        value = np.asarray(evaluate(polynomial, FLOATS, coordinates), dtype=np.float64)
         filled: FloatArray = np.array(np.broadcast_to(value, points.shape[:-1]))
         filled[np.isnan(points).any(axis=-1)] = np.nan  # constants too: where there is no point there is no value
         return filled

@@ -13,7 +13,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.errors import InputError
 from kahanmaps.family.planar import NormalForm
 from kahanmaps.maps.explicit import explicit_map
-from kahanmaps.maps.floats.doubles import FloatArray, to_floats
+from kahanmaps.maps.floats.doubles import FloatArray
 from kahanmaps.maps.floats.ensemble import FloatEnsemble
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.orbits import require_steps
@@ -116,31 +116,3 @@ def euler_orbits(system: QuadraticSystem, eps: Any, starts: FloatArray, steps: i
     rhs = (f.compose(*x, ctx=context) for f in system.rhs)
     image = [RationalFunction(y + 2 * symbol * f, context.constant(1)) for y, f in zip(x, rhs, strict=True)]
     return walked(FloatEnsemble(explicit_map(system.variables, image), eps, starts, kernel="numpy"), steps)
-
-
-class VectorField:
-    """f of a system in doubles.
-
-    >>> f = VectorField(QuadraticSystem.from_text(["x", "y"], ["x*y + 1", "3*x"]))
-    >>> f(np.array([[2.0, 5.0]])).tolist(), f.jacobian(np.array([2.0, 5.0])).tolist()
-    ([[11.0, 6.0]], [[5.0, 2.0], [3.0, 0.0]])
-    """
-
-    def __init__(self, system: QuadraticSystem) -> None:
-        n = system.dim
-        self._quadratic = to_floats([entry for form in system.Q for entry in form.entries()]).reshape(n, n, n)
-        self._linear = to_floats(system.B.entries()).reshape(n, n)
-        self._constant = to_floats(system.c)
-
-    def __call__(self, x: FloatArray) -> FloatArray:
-        """The values at points (count, dim)."""
-        with np.errstate(all="ignore"):
-            squares = ((self._quadratic @ x.T).transpose(2, 0, 1) @ x[:, :, None])[:, :, 0]
-            value: FloatArray = squares + x @ self._linear.T + self._constant
-        return value
-
-    def jacobian(self, x: FloatArray) -> FloatArray:
-        """f'(x) at one point (dim,)."""
-        with np.errstate(all="ignore"):
-            jacobian: FloatArray = 2 * (self._quadratic @ x) + self._linear
-        return jacobian

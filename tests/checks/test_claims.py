@@ -89,13 +89,6 @@ def test_a_control_is_as_expected_only_when_refuted(verdict, control, expected):
     assert finding(verdict, control).is_as_expected is expected
 
 
-def test_further_evidence_stands_beside_the_one_that_decided():
-    first, second = Evidence("a", "1"), Evidence("b", "2")
-    found = finding(P).with_also(first).with_also(second)
-    assert found.also == (first, second)
-    assert found.evidence == finding(P).evidence
-
-
 # JSON
 
 

@@ -19,8 +19,8 @@ from kahanmaps_cli.options import (
 )
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
-from kahanmaps_cli.search import formula, symbols_and_eps
-from kahanmaps_cli.terminal import echo, on_terminal, tell
+from kahanmaps_cli.search import symbols_and_eps
+from kahanmaps_cli.terminal import echo, formula, on_terminal, tell
 
 if TYPE_CHECKING:
     from kahanmaps.laboratory.analysis import Analysis

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps_cli.numbers import read_matrix
 from kahanmaps_cli.options import (
-    load_system,
     output_options,
     seconds_option,
     seed_option,
     several_eps_options,
     system_or_prime_options,
 )
-from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import envelope, print_json
+from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.render import record_of
 from kahanmaps_cli.terminal import tell
 from kahanmaps_cli.value_rows import Cell, table
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from kahanmaps.laboratory.finite.cycles import Census
 
 _LENGTHS_SHOWN = 12
+_STOPPED = "stopped by the clock: give more --seconds, fewer --samples or a smaller prime"
 
 
 @click.command("cycles")
@@ -39,7 +41,7 @@ _LENGTHS_SHOWN = 12
 @seconds_option(60.0, "Time for the samples of one run.")
 @seed_option
 @output_options
-def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
+def command(system: str | None, **options: Any) -> int:
     """The orbits of the map of SYSTEM on projective space over a finite field, and how long its cycles are.
 
     \b
@@ -78,7 +80,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     def censuses(file: SystemFile, progress: Progress) -> tuple[fmpq_mat | None, list[tuple[Census, Comparison]]]:
         reversor = None
         if options["reversor"] is not None:
-            reversor = _matrix(options["reversor"])
+            reversor = read_matrix(options["reversor"])
         elif file.is_quadratic:
             reversor = find_reversor(file.system)
         runs = []
@@ -104,24 +106,14 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         common = _common(runs)
         longest = ", ".join(f"{census.longest} modulo {census.prime}" for census, _ in runs)
         line = f"longest cycle {longest}\tcompatible with {', '.join(common) or 'none of the laws'}"
-        stopped = any(census.stopped for census, _ in runs)
-        return Cell(line, lambda: _record(file, options, reversor, runs, common), not stopped)
+        return Cell(
+            line,
+            lambda: _record(file, options, reversor, runs, common),
+            lambda: _print(file, reversor, runs, common),
+            _STOPPED if any(census.stopped for census, _ in runs) else "",
+        )
 
-    status = table(system, {**options, "as_json": as_json}, quiet, cell)
-    if status is not None:
-        return status
-    file = load_system(system, options)
-    with Progress(quiet) as progress:
-        reversor, runs = censuses(file, progress)
-    common = _common(runs)
-    if as_json:
-        print_json(_record(file, options, reversor, runs, common))
-    else:
-        _print(file, reversor, runs, common)
-    stopped = any(census.stopped for census, _ in runs)
-    if stopped and not quiet:
-        say("stopped by the clock: give more --seconds, fewer --samples or a smaller prime")
-    return 3 if stopped else 0
+    return table(system, options, cell)
 
 
 def _common(runs: list[tuple[Census, Comparison]]) -> list[str]:
@@ -135,37 +127,19 @@ def _prime(text: str) -> int:
     return int(text)
 
 
-def _matrix(text: str) -> fmpq_mat:
-    """The matrix written row by row, rows separated by semicolons."""
-    from flint import fmpq_mat
-
-    from kahanmaps.algebra.text import parse_point
-
-    rows = [list(parse_point(row)) for row in text.split(";")]
-    if len({len(row) for row in rows}) != 1:
-        raise click.UsageError("found --reversor with rows of different lengths, expected a square matrix: 1,0;0,-1")
-    return fmpq_mat(rows)
-
-
-def _rows(matrix: fmpq_mat | None) -> list[list[str]] | None:
-    from kahanmaps.algebra.text import format_number
-
-    return None if matrix is None else [[format_number(entry) for entry in row] for row in matrix.tolist()]
-
-
 def _print(
     file: SystemFile, reversor: fmpq_mat | None, runs: list[tuple[Census, Comparison]], common: list[str]
 ) -> None:
-    from kahanmaps.algebra.text import format_number
+    from kahanmaps.algebra.plain import plain
 
     what = "the Kahan map" if file.is_quadratic else file.map.kind
     step = ", eps is half the time step" if file.map.has_time_step else ""
     tell(f"# {file.name}, {what} on P^{file.dim} over GF(p){step}")
-    rows = _rows(reversor)
+    rows = plain(reversor)
     shown = "none known" if rows is None else ";".join(",".join(row) for row in rows)
     tell(f"reversing symmetry\t{shown}")
     for census, found in runs:
-        at = f", eps = {format_number(census.eps)}" if file.map.has_eps else ""
+        at = f", eps = {census.eps}" if file.map.has_eps else ""
         tell(f"\n# p = {census.prime}{at}")
         for name, text in _lines(census):
             tell(f"{name}\t{text}")
@@ -210,61 +184,41 @@ def _record(
     runs: list[tuple[Census, Comparison]],
     common: list[str],
 ) -> dict[str, Any]:
-    from kahanmaps.algebra.text import format_number
-    from kahanmaps.maps.convention import convention
+    from kahanmaps.algebra.plain import attributes, plain
 
-    return {
-        **envelope("cycles"),
-        "system": file.name,
-        "convention": convention(file.map),
-        "arithmetic": "exact modulo primes",
-        "seed": options["seed"],
-        "samples": options["samples"],
-        "steps_asked": options["steps"],
-        "seconds": options["seconds"],
-        "reversor": _rows(reversor),
-        "primes": list(dict.fromkeys(options["primes"])),
-        "runs": [
+    def pairs(lengths: Mapping[int, int] | None) -> list[list[int]] | None:
+        return None if lengths is None else [[length, n] for length, n in lengths.items()]
+
+    return record_of(
+        "cycles",
+        file,
+        "exact modulo primes",
+        seed=options["seed"],
+        samples=options["samples"],
+        steps_asked=options["steps"],
+        seconds=options["seconds"],
+        reversor=plain(reversor),
+        primes=list(dict.fromkeys(options["primes"])),
+        runs=[
             {
-                "prime": census.prime,
-                "eps": format_number(census.eps),
-                "time_step": format_number(2 * census.eps) if file.map.has_time_step else None,
+                **attributes(census, "prime", "complete", "looked_at", "steps", "stopped", "degree", "lost", "falling"),
+                **attributes(census, "transient", "open", "periodic", "cycles", "longest", "mean"),
+                **attributes(census, common_factor="factor", singular_everywhere="is_undefined", fixed_points="fixed"),
+                "eps": str(census.eps),
+                "time_step": str(2 * census.eps) if file.map.has_time_step else None,
                 "points": str(census.points),
-                "complete": census.complete,
-                "looked_at": census.looked_at,
-                "steps": census.steps,
-                "stopped": census.stopped,
-                "degree": census.degree,
-                "common_factor": census.factor,
-                "singular_everywhere": census.is_undefined,
-                "lost": census.lost,
-                "falling": census.falling,
-                "transient": census.transient,
-                "open": census.open,
-                "periodic": census.periodic,
-                "cycles": census.cycles,
-                "longest": census.longest,
-                "mean": census.mean,
-                "lengths": [[length, n] for length, n in census.lengths.items()],
-                "at_infinity": [[length, n] for length, n in census.at_infinity.items()],
-                "symmetric": None
-                if census.symmetric is None
-                else [[length, n] for length, n in census.symmetric.items()],
-                "fixed_points": census.fixed,
-                "bound": found.bound,
-                "share_within_bound": found.share_within,
-                "longer_than_bound": [[length, n] for length, n in found.longer.items()],
-                "unexplained": list(found.unexplained),
-                "scale": found.scale,
-                "model_scale": found.model_scale,
-                "distance": found.distance,
-                "critical_distance": found.critical,
-                "compatible": list(found.compatible),
-                "not_compatible": list(found.refused),
-                "reasons": dict(found.reasons),
+                "lengths": pairs(census.lengths),
+                "at_infinity": pairs(census.at_infinity),
+                "symmetric": pairs(census.symmetric),
+                "longer_than_bound": pairs(found.longer),
+                **attributes(
+                    found, "bound", "unexplained", "scale", "model_scale", "distance", "compatible", "reasons"
+                ),
+                **attributes(
+                    found, share_within_bound="share_within", critical_distance="critical", not_compatible="refused"
+                ),
             }
             for census, found in runs
         ],
-        "compatible_in_all_runs": common,
-        "document": dict(file.document),
-    }
+        compatible_in_all_runs=common,
+    )

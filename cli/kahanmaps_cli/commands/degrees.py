@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from kahanmaps_cli.options import (
     eps_options,
-    load_system,
     output_options,
     seconds_option,
     seed_option,
     system_options,
     the_eps,
 )
-from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import envelope, print_json
+from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.render import record_of
 from kahanmaps_cli.terminal import tell
 from kahanmaps_cli.value_rows import Cell, table
 
@@ -42,7 +42,7 @@ _SHOWN = 8  # degrees in a line of a table
 )
 @seed_option
 @output_options
-def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
+def command(system: str | None, **options: Any) -> int:
     """Degrees of the iterates of the map of SYSTEM, their recurrence and the dynamical degree.
 
     \b
@@ -72,35 +72,19 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     eps = the_eps(options["eps"], options["time_step"], required=False)
 
     def cell(file: SystemFile, progress: Progress) -> Cell:
-        found = _measured(file, eps, options, progress)
+        found = measured(file, eps, options, progress)
         more = ", ..." if len(found.degrees) > _SHOWN else ""
         line = f"{', '.join(map(str, found.degrees[:_SHOWN]))}{more}\t{found.kind_text}"
-        return Cell(line, lambda: _record(file, options, found), _is_done(found, options["terms"]))
+        undecided = ""
+        if not is_done(found, options["terms"]):
+            undecided = f"undecided: {found.unconfirmed}" if found.unconfirmed else f"stopped early: {found.message}"
+        return Cell(line, lambda: _record(file, options, found), lambda: _print(file, found), undecided)
 
-    status = table(system, {**options, "as_json": as_json}, quiet, cell)
-    if status is not None:
-        return status
-    file = load_system(system, options)
-    with Progress(quiet) as progress:
-        found = _measured(file, eps, options, progress)
-    if as_json:
-        print_json(_record(file, options, found))
-    else:
-        lines = f"{len(found.primes)} random lines modulo primes of 63 bits"
-        at = "generic eps" if eps is None else f"eps = {eps} (time step 2 eps = {2 * eps})"
-        if not file.map.has_time_step:
-            at = at if eps is None else f"eps = {eps}"
-        at = f"{at}, " if file.map.has_eps else ""
-        tell(f"# {file.name}, {at}{lines}: measured, not proved")
-        tell(found.text)
-    if _is_done(found, options["terms"]):
-        return 0
-    if not quiet:
-        say(f"undecided: {found.unconfirmed}" if found.unconfirmed else f"stopped early: {found.message}")
-    return 3
+    return table(system, options, cell)
 
 
-def _measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> DegreeGrowth:
+def measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Callable[[str], None]) -> DegreeGrowth:
+    """The degrees that the options ask for."""
     from kahanmaps.laboratory.growth.degrees import degree_growth
 
     return degree_growth(
@@ -110,37 +94,37 @@ def _measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Pro
         max_terms=options["terms"],
         max_degree=options["max_degree"],
         seed=options["seed"],
-        steps=options["steps"],
+        steps=options.get("steps"),
         progress=progress,
     )
 
 
-def _is_done(found: DegreeGrowth, terms: int | None) -> bool:
+def is_done(found: DegreeGrowth, terms: int | None) -> bool:
+    """Whether nothing was left open that was asked for: `terms` degrees, or (None) a recurrence."""
     if found.ended in ("terms", "constant", "singular"):
         return True
     return terms is None and found.recurrence is not None
 
 
-def _time_step(file: SystemFile, found: DegreeGrowth) -> str | None:
-    from kahanmaps.algebra.text import format_number
-
-    if not file.map.has_time_step:
-        return None
-    return "generic" if found.eps is None else format_number(2 * found.eps)
+def _print(file: SystemFile, found: DegreeGrowth) -> None:
+    eps, lines = found.eps, f"{len(found.primes)} random lines modulo primes of 63 bits"
+    at = "generic eps" if eps is None else f"eps = {eps}"
+    if eps is not None and file.map.has_time_step:
+        at += f" (time step 2 eps = {2 * eps})"
+    at = f"{at}, " if file.map.has_eps else ""
+    tell(f"# {file.name}, {at}{lines}: measured, not proved")
+    tell(found.text)
 
 
 def _record(file: SystemFile, options: dict[str, Any], found: DegreeGrowth) -> dict[str, Any]:
-    from kahanmaps.maps.convention import convention
-
-    return {
-        **envelope("degrees"),
-        "system": file.name,
-        "time_step": _time_step(file, found),
-        "convention": convention(file.map),
-        "arithmetic": "modulo the primes of the lines",
-        "seconds": options["seconds"],
-        "terms_asked": options["terms"],
-        "max_degree": options["max_degree"],
+    time_step = "generic" if found.eps is None else str(2 * found.eps)
+    return record_of(
+        "degrees",
+        file,
+        "modulo the primes of the lines",
+        time_step=time_step if file.map.has_time_step else None,
+        seconds=options["seconds"],
+        terms_asked=options["terms"],
+        max_degree=options["max_degree"],
         **found.to_json(),
-        "document": dict(file.document),
-    }
+    )

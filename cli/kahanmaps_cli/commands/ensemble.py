@@ -23,7 +23,7 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.outputs import OutputFile
 from kahanmaps_cli.params import Arithmetic
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import envelope, print_json
+from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.terminal import tell
 
@@ -207,12 +207,9 @@ def _record(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> di
     if drawn_at_random and options["arithmetic"][0] == "float":
         box = "1" if options["box"] is None else format_number(options["box"])
     every = options["every"] or max(1, steps)
-    return {
-        **envelope("ensemble"),
-        "system": file.name,
-        "variables": list(file.variables),
+    more = {
         **eps_record(eps, file.map),
-        "arithmetic": _arithmetic(options),
+        "variables": list(file.variables),
         "method": run.method,
         "kernel": run.kernel,
         "direction": "backward" if options["backward"] else "forward",
@@ -229,5 +226,5 @@ def _record(file: SystemFile, eps: Any, options: dict[str, Any], run: Run) -> di
         "output": None
         if output is None
         else {"file": output, "shape": [run.records, *run.shape], "every": every, "axes": ["record", "orbit", "x"]},
-        "document": dict(file.document),
     }
+    return record_of("ensemble", file, _arithmetic(options), **more)

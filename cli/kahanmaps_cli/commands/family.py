@@ -11,6 +11,7 @@ import click
 from kahanmaps.errors import quoted
 from kahanmaps_cli.draw import draw_member, draw_options
 from kahanmaps_cli.groups import SuggestingGroup
+from kahanmaps_cli.numbers import read_matrix
 from kahanmaps_cli.options import (
     json_option,
     load_system,
@@ -23,7 +24,7 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.outputs import OutputFile, OutputFolder, file_name, will_write
 from kahanmaps_cli.progress import say
 from kahanmaps_cli.render import envelope, print_json
-from kahanmaps_cli.terminal import on_terminal, shorten, tell
+from kahanmaps_cli.terminal import formula, tell
 
 if TYPE_CHECKING:
     from flint import fmpq_mat
@@ -95,7 +96,9 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     For a SYSTEM of kind [hamiltonian] or [system] an A is looked for: any with A^T J = J A and
     A Hess(H) = Hess(H) A^T that is not a multiple of I makes it a member.
     """
+    from kahanmaps.algebra.plain import attributes, plain
     from kahanmaps.algebra.text import format_polynomial
+    from kahanmaps.family.planar import normal_form as normal_form_of
     from kahanmaps.family.skew_hamiltonian import chi, diagnosis, format_univariate
 
     file, member, hidden = _member_or_hidden(load_system(system, options))
@@ -105,7 +108,7 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
         "m": member.m,
         "dim": member.dim,
         "variables": list(member.variables),
-        "A": _rows(member.A),
+        "A": plain(member.A),
         "chi": format_univariate(chi(member.A)),
         "factors": [{"factor": str(f), "multiplicity": f.multiplicity} for f in member.factors],
         "generic": member.is_generic,
@@ -114,8 +117,8 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
         "hamiltonians": [format_polynomial(H) for H in member.chain],
     }
     if hidden is not None:
-        data["found"] = _hidden_data(hidden)
-    form = _normal_form(member) if normal_form else None
+        data["found"] = attributes(hidden, "text", "A", "dimension", "T", generic="is_generic", standard="is_standard")
+    form = normal_form_of(member) if normal_form else None
     if form is not None:
         data["normal_form"] = _normal_form_data(form)
     if as_json:
@@ -131,9 +134,9 @@ def show(system: str | None, normal_form: bool, as_json: bool, **options: Any) -
     tell("A =")
     _print_matrix(member.A)
     for k, text in enumerate(data["hamiltonians"]):
-        tell(f"H_{k} = {_formula(text)}")
+        tell(f"H_{k} = {formula(text)}")
     if any(sign < 0 for sign in member.signs):
-        tell(f"signs = {','.join(map(str, member.signs))}: K = {_formula(format_polynomial(member.chosen.K))}")
+        tell(f"signs = {','.join(map(str, member.signs))}: K = {formula(format_polynomial(member.chosen.K))}")
     if form is not None:
         _print_normal_form(form, "x" if hidden is None or hidden.is_standard else "y")
 
@@ -150,6 +153,7 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
       kahanmaps family space paper_m3
       kahanmaps family space --matrix '1,0,0,0; 0,2,0,0; 0,0,1,0; 0,0,0,2'
     """
+    from kahanmaps.algebra.plain import plain
     from kahanmaps.algebra.text import format_polynomial
     from kahanmaps.family.cubics import cubic_space
     from kahanmaps.family.skew_hamiltonian import diagnosis
@@ -157,14 +161,14 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
     if (system is None) == (matrix is None):
         raise click.UsageError("give a SYSTEM of kind [family], or --matrix ROWS, one of the two")
     if matrix is not None:
-        A, variables = _parse_matrix(matrix), None
+        A, variables = read_matrix(matrix), None
     else:
         member = _member(system, parameters)[1]
         A, variables = member.A, member.variables
     found = cubic_space(A, variables)
     data: dict[str, Any] = {
         **envelope("family space"),
-        "A": _rows(A),
+        "A": plain(A),
         "dim": A.nrows(),
         "dimension": found.dimension,
         "expected_for_generic_A": found.expected,
@@ -182,7 +186,7 @@ def space(system: str | None, parameters: tuple[tuple[str, str], ...], matrix: s
     )
     tell(data["diagnosis"])
     for k, text in enumerate(data["basis"], start=1):
-        tell(f"{k}\t{_formula(text)}")
+        tell(f"{k}\t{formula(text)}")
 
 
 @command.command("associated")
@@ -199,7 +203,8 @@ def associated(
       kahanmaps family associated paper_m3
       kahanmaps family associated pair.toml --write-to associated/
     """
-    from kahanmaps.algebra.text import format_number, format_polynomial
+    from kahanmaps.algebra.plain import plain
+    from kahanmaps.algebra.text import format_polynomial
     from kahanmaps.documents.files import SystemFile
     from kahanmaps.family.associated import FamilyMember
 
@@ -210,8 +215,8 @@ def associated(
         row: dict[str, Any] = {
             "label": associate.label,
             "signs": list(associate.signs),
-            "B_in_powers_of_A": [format_number(c) for c in associate.coefficients],
-            "B": _rows(associate.B),
+            "B_in_powers_of_A": plain(associate.coefficients),
+            "B": plain(associate.B),
             "K": format_polynomial(associate.K),
         }
         if write_to is not None:
@@ -240,7 +245,7 @@ def associated(
     tell(f"{file.name}: signs belong to the factors {named}; {len(rows)} associated up to sign, f_0 first")
     for row in rows:
         powers = ", ".join(row["B_in_powers_of_A"])
-        tell(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {_formula(row['K'])}")
+        tell(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {formula(row['K'])}")
 
 
 @command.command("tensor")
@@ -274,43 +279,34 @@ def tensor(system: str | None, algebra: str, output: str | None, quiet: bool, **
         say(f"{where}dimension {file.dim}; {len(file.integrals)} of {claimed} integrals inherited")
 
 
-def _normal_form(member: FamilyMember) -> NormalForm:
-    from kahanmaps.family.planar import normal_form
-
-    return normal_form(member)
-
-
 def _normal_form_data(form: NormalForm) -> dict[str, Any]:
-    from kahanmaps.algebra.text import format_number
+    from kahanmaps.algebra.plain import attributes, plain
 
     return {
         "chi": form.chi_text,
         "h": form.h_text,
         "D": form.D_text,
-        "S": _rows(form.S),
-        "h_in_powers_of_t": [[format_number(c[k]) for k in range(form.m)] for c in form.coefficients],
-        "parts": [
-            {"root": format_number(part.root), "weight": format_number(part.weight), "h": part.text, "D": part.D_text}
-            for part in form.parts
-        ],
+        "S": plain(form.S),
+        "h_in_powers_of_t": [[str(c[k]) for k in range(form.m)] for c in form.coefficients],
+        "parts": [attributes(part, "root", "weight", h="text", D="D_text") for part in form.parts],
     }
 
 
 def _print_normal_form(form: NormalForm, point: str) -> None:
     from kahanmaps.algebra.text import format_number
 
-    tell(f"normal form over Q[t]/chi, chi = {_formula(form.chi_text)}:")
+    tell(f"normal form over Q[t]/chi, chi = {formula(form.chi_text)}:")
     tell("X' = dh/dY, Y' = -dh/dX; X~ = (X + 2 eps X')/(1 + eps^2 D), Y~ = (Y + 2 eps Y')/(1 + eps^2 D)")
-    tell(f"h = {_formula(form.h_text)}")
-    tell(f"D = {_formula(form.D_text)}")
+    tell(f"h = {formula(form.h_text)}")
+    tell(f"D = {formula(form.D_text)}")
     tell(f"the Hamiltonian is the coefficient of t^{form.m - 1} in h")
     if form.parts:
         total = ", the Hamiltonian is the sum of weight * h" if len(form.parts) == form.m else ""
         tell(f"at rational roots of chi, with u = X(t), v = Y(t): u' = dh/dv, v' = -dh/du{total}")
         tell("the Kahan map conserves h/(1 + eps^2 D) at each of them")
     for part in form.parts:
-        root, weight = _formula(format_number(part.root)), _formula(format_number(part.weight))
-        tell(f"t = {root}: h = {_formula(part.text)}, D = {_formula(part.D_text)}, weight {weight}")
+        root, weight = formula(format_number(part.root)), formula(format_number(part.weight))
+        tell(f"t = {root}: h = {formula(part.text)}, D = {formula(part.D_text)}, weight {weight}")
     tell(f"{point} = S z with the coefficients z of 1, t, ... in X and in Y, S =")
     _print_matrix(form.S)
 
@@ -352,31 +348,6 @@ def _member_or_hidden(file: SystemFile) -> tuple[SystemFile, FamilyMember, Hidde
     return file, hidden.member, hidden
 
 
-def _hidden_data(hidden: HiddenMember) -> dict[str, Any]:
-    return {
-        "text": hidden.text,
-        "A": _rows(hidden.A),
-        "generic": hidden.is_generic,
-        "dimension": hidden.dimension,
-        "standard": hidden.is_standard,
-        "T": _rows(hidden.T),
-    }
-
-
-def _parse_matrix(text: str) -> fmpq_mat:
-    from flint import fmpq_mat
-
-    from kahanmaps.algebra.text import parse_point
-    from kahanmaps.errors import InputError, counted
-    from kahanmaps.systems.quadratic import MAX_DIMENSION
-
-    rows = [parse_point(row) for row in text.split(";")]
-    if len(rows) > MAX_DIMENSION or any(len(row) != len(rows) for row in rows):
-        found = f"{counted(len(rows), 'row')} of lengths {sorted({len(row) for row in rows})}"
-        raise InputError(f"found {found}, expected a square matrix, at most {MAX_DIMENSION} x {MAX_DIMENSION}")
-    return fmpq_mat([list(row) for row in rows])
-
-
 def _write(file: SystemFile, output: str | None) -> None:
     from kahanmaps.documents.files import parse_system
     from kahanmaps.whole_files import write_whole
@@ -389,19 +360,10 @@ def _write(file: SystemFile, output: str | None) -> None:
     write_whole(output, text.encode())
 
 
-def _rows(matrix: fmpq_mat) -> list[list[str]]:
-    from kahanmaps.algebra.text import format_number
-
-    return [[format_number(entry) for entry in row] for row in matrix.tolist()]
-
-
 def _print_matrix(matrix: fmpq_mat) -> None:
-    rows = [[_formula(cell, 24) for cell in row] for row in _rows(matrix)]
+    from kahanmaps.algebra.plain import plain
+
+    rows = [[formula(cell, 24) for cell in row] for row in plain(matrix)]
     widths = [max(len(row[j]) for row in rows) for j in range(len(rows))]
     for row in rows:
         tell("  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))
-
-
-def _formula(text: str, width: int = 400) -> str:
-    """A long formula is shortened on a terminal only."""
-    return shorten(text, width) if on_terminal() else text

@@ -11,7 +11,6 @@ from kahanmaps_cli.options import load_system, system_options
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.search import (
-    formula,
     heading,
     print_search,
     require_one_form,
@@ -19,8 +18,8 @@ from kahanmaps_cli.search import (
     search_options,
     symbols_and_eps,
 )
-from kahanmaps_cli.terminal import tell
-from kahanmaps_cli.value_rows import Cell, table
+from kahanmaps_cli.terminal import formula, tell
+from kahanmaps_cli.value_rows import Cell, rows_of, table
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
@@ -83,11 +82,11 @@ def command(system: str | None, **options: Any) -> int:
         formulas = "; ".join(f"{one.text} ({one.verdict})" for one in found.integrals)
         line = f"{_count(found).partition(chr(9))[2]}\t{formula(formulas)}".rstrip()
         document = {"document": dict(file.document)}
-        return Cell(line, lambda: {**heading("find-integrals", found), **found.to_json(), **document}, not found.reason)
+        record = {**heading("find-integrals", found), **found.to_json(), **document}
+        return Cell(line, lambda: record, lambda: None, found.reason)
 
-    ending = table(system, options, options["quiet"], cell)
-    if ending is not None:
-        return ending
+    if rows_of(options["parameters"], system) is not None:
+        return table(system, options, cell)
     with Progress(options["quiet"]) as progress:
         file = load_system(system, options)
         symbols, eps = symbols_and_eps(options)

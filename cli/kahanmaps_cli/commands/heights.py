@@ -9,7 +9,6 @@ import click
 from kahanmaps_cli.options import (
     Renamed,
     eps_options,
-    load_system,
     output_options,
     seconds_option,
     seed_option,
@@ -17,8 +16,8 @@ from kahanmaps_cli.options import (
     the_eps,
 )
 from kahanmaps_cli.params import PointText, Whole
-from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import envelope, print_json
+from kahanmaps_cli.progress import Progress
+from kahanmaps_cli.render import record_of
 from kahanmaps_cli.terminal import tell
 from kahanmaps_cli.value_rows import Cell, table
 
@@ -54,7 +53,7 @@ if TYPE_CHECKING:
 @seconds_option(30.0, "Stop after about so many seconds.")
 @seed_option
 @output_options
-def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> int:
+def command(system: str | None, **options: Any) -> int:
     """How fast the heights of exact orbits of the map of SYSTEM grow, from several starts.
 
     \b
@@ -74,49 +73,44 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     Exit status: 0 all orbits that were decided agree, 2 wrong use, 3 undecided, or the orbits disagree, or the time was
     over.
     """
-    from kahanmaps.errors import InputError
-    from kahanmaps.invariants.heights import Growth
-    from kahanmaps.laboratory.growth.height_survey import DEFAULT_STARTS, height_survey
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    require_heights(options)
 
+    def cell(file: SystemFile, progress: Progress) -> Cell:
+        from kahanmaps.invariants.heights import Growth
+
+        found = surveyed(file, eps, options, progress)
+        undecided = f"undecided: {found.text}" if found.kind is Growth.UNDECIDED else ""
+        if not found.is_whole:
+            undecided = "stopped early: the time was over before all orbits were finished"
+        return Cell(found.text, lambda: _record(file, options, found), lambda: _print(file, found), undecided)
+
+    return table(system, options, cell)
+
+
+def require_heights(options: dict[str, Any]) -> None:
+    """Options that contradict each other, or themselves."""
     if options["count"] is not None and options["given"]:
         raise click.UsageError("give --start X or --random N, not both")
     if options["max_digits"] < 1:
-        raise InputError(f"found --max-digits {options['max_digits']}, expected at least 1")
-    eps = the_eps(options["eps"], options["time_step"], required=False)
+        raise click.UsageError(f"found --max-digits {options['max_digits']}, expected at least 1")
 
-    def survey(file: SystemFile, progress: Progress) -> HeightSurvey:
-        return height_survey(
-            file.map,
-            eps,
-            starts=options["given"] or (DEFAULT_STARTS if options["count"] is None else options["count"]),
-            steps=options["steps"],
-            max_digits=options["max_digits"],
-            seconds=options["seconds"],
-            structure=file.structure,
-            seed=options["seed"],
-            progress=progress,
-        )
 
-    def is_done(found: HeightSurvey) -> bool:
-        return found.is_whole and found.kind is not Growth.UNDECIDED
+def surveyed(file: SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> HeightSurvey:
+    """The orbits that the options ask for."""
+    from kahanmaps.laboratory.growth.height_survey import DEFAULT_STARTS, height_survey
 
-    def cell(file: SystemFile, progress: Progress) -> Cell:
-        found = survey(file, progress)
-        return Cell(found.text, lambda: _record(file, options, found), is_done(found))
-
-    status = table(system, {**options, "as_json": as_json}, quiet, cell)
-    if status is not None:
-        return status
-    file = load_system(system, options)
-    with Progress(quiet) as progress:
-        found = survey(file, progress)
-    if as_json:
-        print_json(_record(file, options, found))
-    else:
-        _print(file, found)
-    if not found.is_whole and not quiet:
-        say("stopped early: the time was over before all orbits were finished")
-    return 0 if is_done(found) else 3
+    return height_survey(
+        file.map,
+        eps,
+        starts=options["given"] or (DEFAULT_STARTS if options["count"] is None else options["count"]),
+        steps=options["steps"],
+        max_digits=options["max_digits"],
+        seconds=options["seconds"],
+        structure=file.structure,
+        seed=options["seed"],
+        progress=progress,
+    )
 
 
 def _print(file: SystemFile, found: HeightSurvey) -> None:
@@ -137,21 +131,7 @@ def _print(file: SystemFile, found: HeightSurvey) -> None:
 
 
 def _record(file: SystemFile, options: dict[str, Any], found: HeightSurvey) -> dict[str, Any]:
-    from kahanmaps.algebra.text import format_number
-    from kahanmaps.maps.convention import convention
-
-    values = dict.fromkeys(orbit.eps for orbit in found.orbits)
-    return {
-        **envelope("heights"),
-        "system": file.name,
-        "eps": [format_number(value) for value in values],
-        "time_step": [format_number(2 * value) for value in values if file.map.has_time_step],
-        "convention": convention(file.map),
-        "arithmetic": "exact",
-        "seed": options["seed"],
-        "steps": options["steps"],
-        "max_digits": options["max_digits"],
-        "seconds": options["seconds"],
-        **found.to_json(),
-        "document": dict(file.document),
-    }
+    values = [str(value) for value in dict.fromkeys(orbit.eps for orbit in found.orbits)]
+    steps = [str(2 * value) for value in dict.fromkeys(orbit.eps for orbit in found.orbits) if file.map.has_time_step]
+    asked = {name: options[name] for name in ("seed", "steps", "max_digits", "seconds")}
+    return record_of("heights", file, "exact", eps=values, time_step=steps, **asked, **found.to_json())

@@ -18,7 +18,7 @@ from kahanmaps_cli.options import (
     system_options,
 )
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import envelope, print_json
+from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.terminal import on_terminal, print_table, tell
 
 if TYPE_CHECKING:
@@ -122,32 +122,27 @@ def _numbers(values: Any) -> list[float | None]:
 
 
 def _record(file: SystemFile, eps: Any, options: dict[str, Any], found: Lyapunov) -> dict[str, Any]:
-    from kahanmaps.algebra.text import format_number
+    from kahanmaps.algebra.plain import attributes
     from kahanmaps.checks.settings import eps_record
 
     random = options["starts"] is None
-    box = "1" if options["box"] is None else format_number(options["box"])
-    return {
-        **envelope("lyapunov"),
-        "system": file.name,
-        "variables": list(file.variables),
+    box = "1" if options["box"] is None else str(options["box"])
+    return record_of(
+        "lyapunov",
+        file,
+        "float",
+        variables=list(file.variables),
         **eps_record(eps, file.map),
-        "arithmetic": "float",
-        "starts": {"random": found.orbits, "box": box} if random else {"file": options["starts"]},
-        "seed": (options["seed"] or 0) if random else None,
-        "orbits": found.orbits,
-        "ended": found.ended,
-        "steps_asked": options["steps"],
-        "seconds": options["seconds"],
-        "steps": found.steps,
-        "transient": found.transient,
-        "stopped": found.stopped,
-        "per_time": _numbers(found.mean),
-        "per_step": _numbers(found.mean * found.unit),
-        "spread": _numbers(found.spread),
-        "change_from_half": _numbers(found.change),
-        "sum": _numbers([found.mean.sum()])[0],
-        "log_volume": _numbers([found.log_volume.mean()])[0] if len(found.log_volume) else None,
-        "residual": _numbers([found.residual])[0],
-        "document": dict(file.document),
-    }
+        starts={"random": found.orbits, "box": box} if random else {"file": options["starts"]},
+        seed=(options["seed"] or 0) if random else None,
+        steps_asked=options["steps"],
+        seconds=options["seconds"],
+        **attributes(found, "orbits", "ended", "steps", "transient", "stopped"),
+        per_time=_numbers(found.mean),
+        per_step=_numbers(found.mean * found.unit),
+        spread=_numbers(found.spread),
+        change_from_half=_numbers(found.change),
+        sum=_numbers([found.mean.sum()])[0],
+        log_volume=_numbers([found.log_volume.mean()])[0] if len(found.log_volume) else None,
+        residual=_numbers([found.residual])[0],
+    )

@@ -9,7 +9,7 @@ import click
 from kahanmaps_cli.options import eps_options, load_system, output_options, system_options, the_eps
 from kahanmaps_cli.params import Arithmetic, PointText
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import envelope, print_json
+from kahanmaps_cli.render import envelope, print_json, record_of
 from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
@@ -184,34 +184,27 @@ def _record(
     file: SystemFile, structure: Structure, eps: Any, options: dict[str, Any], found: OrbitPeriod
 ) -> dict[str, Any]:
     """Numbers are text: periods exceed what readers of JSON hold exactly."""
-    from kahanmaps.algebra.text import format_number
-    from kahanmaps.maps.convention import CONVENTION
+    from kahanmaps.algebra.plain import attributes, plain
 
-    return {
-        **envelope("period"),
-        "system": file.name,
-        "structure": structure.text,
-        "eps": format_number(eps),
-        "time_step": format_number(2 * eps),
-        "convention": CONVENTION,
-        "arithmetic": _arithmetic(options),
-        "start": [format_number(entry) for entry in options["start"]],
-        "status": found.status,
-        "period": _text(found.period),
-        "meets_pole": found.meets_pole,
-        "planes": [
+    return record_of(
+        "period",
+        file,
+        _arithmetic(options),
+        structure=structure.text,
+        eps=str(eps),
+        time_step=str(2 * eps),
+        start=plain(options["start"]),
+        **attributes(found, "status", "meets_pole"),
+        period=_text(found.period),
+        planes=[
             {
-                "name": plane.name,
-                "status": plane.status,
+                **attributes(plane, "name", "status", "meets_pole", "reason"),
                 "period": _text(plane.period),
-                "meets_pole": plane.meets_pole,
                 "kind": plane.kind.name.lower(),
                 "kind_text": str(plane.kind),
                 "field_size": _text(plane.q or None),
-                "reason": plane.reason,
             }
             for plane in found.planes
         ],
-        "message": _message(found),
-        "document": dict(file.document),
-    }
+        message=_message(found),
+    )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kahanmaps_cli.draw import draw_member, draw_options
+from kahanmaps_cli.draw import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.options import (
     eps_options,
     load_system,
@@ -30,13 +30,12 @@ if TYPE_CHECKING:
     from kahanmaps.checks.settings import Settings
     from kahanmaps.documents.files import SystemFile
 
-_DRAWN = ("m", "eigenvalues", "generic", "chi", "size")
 _ONLY_FOR = {
     "symbolic": ("analyze",),
     "seconds": ("analyze",),
     "explore": ("analyze",),
     "sections": ("verify",),
-    **dict.fromkeys(_DRAWN, ("verify", "checks")),
+    **dict.fromkeys(DRAWN, ("verify", "checks")),
 }
 
 
@@ -116,7 +115,7 @@ def _require_consistent(system: str | None, options: dict[str, Any]) -> None:
     for name, sources in _ONLY_FOR.items():
         if _is_given(context, name) and options["source"] not in sources:
             raise click.UsageError(f"{_option_name(name)} is for --from {' or '.join(sources)}")
-    drawn = [name for name in _DRAWN if _is_given(context, name)]
+    drawn = [name for name in DRAWN if _is_given(context, name)]
     if drawn and (system is not None or options["variables"] or options["rhs"]):
         raise click.UsageError(f"give a system or say which member to draw ({_option_name(drawn[0])}), not both")
     no_system = system is None and not (options["variables"] or options["rhs"])
@@ -153,6 +152,7 @@ def _write(html: str, options: dict[str, Any]) -> None:
 
 def _page(system: str | None, options: dict[str, Any], progress: Progress) -> tuple[str, int]:
     """The page, and the exit status."""
+    from kahanmaps.checks.settings import Settings
     from kahanmaps.reports.report import report_html
 
     how: dict[str, Any] = {
@@ -169,7 +169,8 @@ def _page(system: str | None, options: dict[str, Any], progress: Progress) -> tu
     if options["source"] == "analyze":
         return _analysis(system, options, progress, how)
     file = _system_or_member(system, options)
-    settings = _settings(options, progress)
+    eps = the_eps(options["eps"], options["time_step"], required=False)
+    settings = Settings(eps=eps, seed=options["seed"], progress=progress)
     left_out: list[str] = []
     if options["source"] == "verify":
         from kahanmaps.paper.examiner import VerifyOptions
@@ -194,26 +195,13 @@ def _analysis(system: str | None, options: dict[str, Any], progress: Progress, h
     return report_html(found, explore=options["explore"], **how), 3 if found.conclusion.kind == "undecided" else 0
 
 
-def _settings(options: dict[str, Any], progress: Progress) -> Settings:
-    from kahanmaps.checks.settings import Settings
-
-    eps = the_eps(options["eps"], options["time_step"], required=False)
-    return Settings(eps=eps, seed=options["seed"], progress=progress)
-
-
 def _system_or_member(system: str | None, options: dict[str, Any]) -> SystemFile:
     """The system that is named; for verify, and where one is to be drawn, a member of the family."""
-    from kahanmaps.documents.files import SystemFile
-
-    drawn = {name: options[name] for name in _DRAWN}
-    is_drawn = any(value is not None and value is not False for value in drawn.values())
+    is_drawn = any(options[name] is not None and options[name] is not False for name in DRAWN)
     named = system is not None or options["variables"] or options["rhs"]
     if named or not (is_drawn or options["source"] == "verify"):
         return load_system(system, options)
-    if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
-        drawn["m"] = 3
-    member = draw_member(**drawn, seed=options["seed"])
-    return SystemFile.from_member(member, f"random member, m = {member.m}, seed {options['seed']}")
+    return drawn_file(options)
 
 
 def _checks(file: SystemFile, settings: Settings) -> tuple[list[Report], list[str]]:

@@ -12,7 +12,7 @@ from kahanmaps_cli.options import output_options
 from kahanmaps_cli.outputs import OutputFolder, file_name, will_write
 from kahanmaps_cli.params import Seconds, Shard
 from kahanmaps_cli.progress import say
-from kahanmaps_cli.render import print_json
+from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.scan_run import ending, scan_options, scanned
 from kahanmaps_cli.terminal import tell
 
@@ -116,15 +116,6 @@ def _write(found: Scan, folder: str, quiet: bool) -> None:
 
 def _record(found: Scan, options: dict[str, Any]) -> dict[str, Any]:
     from kahanmaps.checks.settings import eps_record
-    from kahanmaps.version import __version__
 
-    return {
-        "command": "scan",
-        "version": __version__,
-        "system": found.file.name,
-        **eps_record(found.eps, found.file.map),
-        "arithmetic": "modulo primes",
-        "seconds": options["seconds"],
-        **found.to_json(),
-        "document": dict(found.file.document),
-    }
+    more = {**eps_record(found.eps, found.file.map), "seconds": options["seconds"], **found.to_json()}
+    return record_of("scan", found.file, "modulo primes", **more)

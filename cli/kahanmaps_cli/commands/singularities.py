@@ -16,8 +16,8 @@ from kahanmaps_cli.options import (
     the_eps,
 )
 from kahanmaps_cli.progress import Progress, say
-from kahanmaps_cli.render import envelope, print_json
-from kahanmaps_cli.terminal import on_terminal, shorten, tell
+from kahanmaps_cli.render import print_json, record_of
+from kahanmaps_cli.terminal import formula, tell
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
@@ -118,27 +118,22 @@ def _told(found: Hypersurface) -> str:
 
 
 def _print(file: SystemFile, runs: list[SingularityRun], symbolic: list[tuple[str, int]] | None, verdict: str) -> None:
-    from kahanmaps.algebra.text import format_number
-
-    def cut(text: str) -> str:
-        return shorten(text, 200) if on_terminal() else text
-
     name = file.map.denominator_name
     tell(f"# {file.name}, dimension {file.map.dim}" + (", eps is half the time step" if file.map.has_time_step else ""))
     if symbolic is not None:
         factors = " * ".join(f"({text})" + (f"^{power}" if power > 1 else "") for text, power in symbolic)
-        tell(f"factors of {name}\t{cut(factors) or 'none'}")
+        tell(f"factors of {name}\t{formula(factors, 200) or 'none'}")
     for run in runs:
-        at = f"eps = {format_number(run.eps)}: " if file.map.has_eps else ""
+        at = f"eps = {run.eps}: " if file.map.has_eps else ""
         tell(f"\n# {at}map of degree {run.map_degree}, {run.text}")
         if run.word is not None:
             tell(f"# {run.word.text}")
-        tell(f"{name}\t{cut(run.denominator)}")
+        tell(f"{name}\t{formula(run.denominator, 200)}")
         for found in run.hypersurfaces:
             kind = f"degree {found.degree}" + (", pole" if found.is_pole else "")
             kind += " in all" if found.polynomial == "?" else ""
             kind += "" if found.stage is None else f", of map {found.stage + 1}"
-            tell(f"{cut(found.polynomial)}\t{kind}\t{_told(found)}")
+            tell(f"{formula(found.polynomial, 200)}\t{kind}\t{_told(found)}")
             if found.steps:
                 tell(f"  ranks {_ranks(found)}\tpoles {_poles(found)}")
     tell(f"\n# {verdict}")
@@ -151,57 +146,43 @@ def _record(
     symbolic: list[tuple[str, int]] | None,
     verdict: str,
 ) -> dict[str, Any]:
-    from kahanmaps.algebra.text import format_number
+    from kahanmaps.algebra.plain import attributes
     from kahanmaps.laboratory.singular.singularities import steps_by_default
-    from kahanmaps.maps.convention import convention
 
-    return {
-        **envelope("singularities"),
-        "system": file.name,
-        "convention": convention(file.map),
-        "arithmetic": "exact; series modulo primes",
-        "seed": options["seed"],
-        "steps": options["steps"] or steps_by_default(file.map.dim),
-        "seconds": options["seconds"],
-        "verdict": verdict,
-        "symbolic_denominator": symbolic,
-        "runs": [
+    return record_of(
+        "singularities",
+        file,
+        "exact; series modulo primes",
+        seed=options["seed"],
+        steps=options["steps"] or steps_by_default(file.map.dim),
+        seconds=options["seconds"],
+        verdict=verdict,
+        symbolic_denominator=symbolic,
+        runs=[
             {
-                "eps": format_number(run.eps),
-                "time_step": format_number(2 * run.eps),
-                "verdict": run.verdict,
-                "denominator": run.denominator,
-                "map_degree": run.map_degree,
-                "critical_degree": run.critical_degree,
-                "stopped": run.stopped,
-                "singular_everywhere": run.is_undefined,
-                "dominant": run.is_dominant,
-                "followed": run.followed,
-                "text": run.text,
+                **attributes(
+                    run, "verdict", "denominator", "map_degree", "critical_degree", "stopped", "followed", "text"
+                ),
+                **attributes(run, singular_everywhere="is_undefined", dominant="is_dominant"),
+                "eps": str(run.eps),
+                "time_step": str(2 * run.eps),
                 "maps_a_step": None if run.word is None else run.word.length,
-                "hypersurfaces": [
-                    {
-                        "polynomial": found.polynomial,
-                        "degree": found.degree,
-                        "is_pole": found.is_pole,
-                        "multiplicity": found.multiplicity,
-                        "status": found.status,
-                        "contracted_at": found.contracted_at,
-                        "confined_at": found.confined_at,
-                        "followed": found.followed,
-                        "settled_at": found.settled_at,
-                        "ranks": [step.rank for step in found.steps],
-                        "poles": [step.pole for step in found.steps],
-                        "denominators": [step.denominator for step in found.steps],
-                        "common": [step.common for step in found.steps],
-                        "primes": [str(prime) for prime in found.primes],
-                        "note": found.note,
-                        "stage": found.stage,
-                    }
-                    for found in run.hypersurfaces
-                ],
+                "hypersurfaces": [_hypersurface(found) for found in run.hypersurfaces],
             }
             for run in runs
         ],
-        "document": dict(file.document),
+    )
+
+
+def _hypersurface(found: Hypersurface) -> dict[str, Any]:
+    from kahanmaps.algebra.plain import attributes
+
+    steps = {"ranks": "rank", "poles": "pole", "denominators": "denominator", "common": "common"}
+    return {
+        **attributes(
+            found, "polynomial", "degree", "is_pole", "multiplicity", "status", "contracted_at", "confined_at"
+        ),
+        **attributes(found, "followed", "settled_at", "note", "stage"),
+        **{name: [getattr(step, of) for step in found.steps] for name, of in steps.items()},
+        "primes": [str(prime) for prime in found.primes],
     }

@@ -9,7 +9,7 @@ import click
 from kahanmaps_cli.complete import complete_system
 from kahanmaps_cli.options import json_option, load_reference, parameter_option
 from kahanmaps_cli.render import envelope, print_json
-from kahanmaps_cli.terminal import on_terminal, shorten, tell, tell_entry
+from kahanmaps_cli.terminal import formula, tell, tell_entry
 
 
 @click.command("systems")
@@ -144,14 +144,9 @@ def _latex(file: Any) -> str:
         formulas.append((latex_name(name) if name else "I", latex_rational_function(integral)))
     if file.density is not None:
         formulas.append((latex_name("phi"), latex_rational_function(file.density)))
-    for name, formula in formulas:
-        lines += [r"\[", f"{name} = {formula}", r"\]"]
+    for name, text in formulas:
+        lines += [r"\[", f"{name} = {text}", r"\]"]
     return "\n".join(lines)
-
-
-def _formula(text: str) -> str:
-    """A long formula is shortened on a terminal only."""
-    return shorten(text, 300) if on_terminal() else text
 
 
 def _show(file: Any) -> None:
@@ -162,13 +157,13 @@ def _show(file: Any) -> None:
     for name, value in file.parameters.items():
         tell(f"  {name} = {value}")
     for line in str(file.map).split("\n"):
-        tell(_formula(line))
+        tell(formula(line))
     if file.hamiltonian is not None:
-        tell(f"H = {_formula(format_polynomial(file.hamiltonian.H))}")
+        tell(f"H = {formula(format_polynomial(file.hamiltonian.H))}")
     for name, text in facts["integrals"].items():
-        tell(f"integral {name} = {_formula(text)}")
+        tell(f"integral {name} = {formula(text)}")
     if facts["density"]:
-        tell(f"density phi = {_formula(facts['density'])}  (dx/phi is invariant)")
+        tell(f"density phi = {formula(facts['density'])}  (dx/phi is invariant)")
     known = _known_lines(file)
     if known:
         tell("for generic parameters and eps:" if file.parameters else "for generic eps:")

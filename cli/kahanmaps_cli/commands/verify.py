@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli.draw import draw_member, draw_options
+from kahanmaps_cli.draw import DRAWN, draw_options, drawn_file
 from kahanmaps_cli.options import (
     eps_options,
     evidence_options,
@@ -74,14 +74,13 @@ def command(system: str | None, **options: Any) -> int:
     Misprints are expected to be refuted and do not count.
     """
     from kahanmaps.checks.settings import Settings
-    from kahanmaps.documents.files import SystemFile
     from kahanmaps.paper.examiner import VerifyOptions
     from kahanmaps.paper.survivors import survivors
     from kahanmaps.paper.verify import verify, verify_universal
 
     if options["as_json"] and options["as_markdown"]:
         raise click.UsageError("give --json or --markdown, not both")
-    drawn = {name: options[name] for name in ("m", "eigenvalues", "generic", "chi", "size")}
+    drawn = {name: options[name] for name in DRAWN}
     given = [name for name, value in drawn.items() if value is not None and value is not False]
     if options["universal"] or options["beyond"]:
         clash = [f"--{name}" for name in given if name != "m"]
@@ -115,9 +114,6 @@ def command(system: str | None, **options: Any) -> int:
             if system is not None:
                 file = load_system(system, {"parameters": options["parameters"]})
             else:
-                if drawn["m"] is None and drawn["eigenvalues"] is None and drawn["chi"] is None:
-                    drawn["m"] = 3
-                member = draw_member(**drawn, seed=options["seed"])
-                file = SystemFile.from_member(member, f"random member, m = {member.m}, seed {options['seed']}")
+                file = drawn_file(options)
             report = verify(file, settings, what)
     return print_verification(report, options["as_json"], options["as_markdown"], options["verbose"], options["quiet"])

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import chain, count
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps_cli.commands.degrees import is_done, measured
 from kahanmaps_cli.options import (
     eps_options,
     inline_options,
@@ -21,7 +23,6 @@ from kahanmaps_cli.pictures.records import read_record
 from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
     from kahanmaps.laboratory.growth.degrees import DegreeGrowth
 
 
@@ -75,9 +76,9 @@ def command(systems: tuple[str, ...], **options: Any) -> int:
     files = [load_system(name, options) for name in asked]
     with Progress(options["quiet"]) as progress:
         for file in files:
-            found = _measured(file, eps, options, progress)
+            found = measured(file, eps, options, partial(_tell, progress, file.name))
             _add(growths, file.name, found)
-            if found.recurrence is None and found.ended not in ("terms", "constant", "singular"):
+            if not is_done(found, None):
                 early.append(f"{file.name}: stopped early: {found.message}")
     figure = draw_degrees(growths, style_from(options), scale=options["scale"])
     deliver(figure, options, files[0] if len(files) == 1 else None)
@@ -87,18 +88,8 @@ def command(systems: tuple[str, ...], **options: Any) -> int:
     return 3 if early else 0
 
 
-def _measured(file: SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> DegreeGrowth:
-    from kahanmaps.laboratory.growth.degrees import degree_growth
-
-    return degree_growth(
-        file.map,
-        eps,
-        seconds=options["seconds"],
-        max_terms=options["terms"],
-        max_degree=options["max_degree"],
-        seed=options["seed"],
-        progress=lambda sentence: progress(f"{file.name}: {sentence}"),
-    )
+def _tell(progress: Progress, name: str, sentence: str) -> None:
+    progress(f"{name}: {sentence}")
 
 
 def _from_record(path: str, growths: dict[str, DegreeGrowth]) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps_cli.commands.heights import require_heights, surveyed
 from kahanmaps_cli.options import eps_options, load_system, seconds_option, seed_option, system_options, the_eps
 from kahanmaps_cli.params import PointText, Whole
 from kahanmaps_cli.pictures.output import PictureCommand, deliver, picture_options, require_output, style_from
@@ -14,7 +15,6 @@ from kahanmaps_cli.progress import Progress, say
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.growth.height_survey import HeightSurvey
 
 # Of OrbitEnd: a number limit or a return are ends that the picture is made for, a hole in the map is not.
 _EARLY = ("singular",)
@@ -54,8 +54,7 @@ def command(system: str | None, **options: Any) -> int:
     from kahanmaps.plots.height_curves import curves_of_record, height_curves
 
     require_output(options)
-    if options["count"] is not None and options["given"]:
-        raise click.UsageError("give --start X or --random N, not both: --random draws the starts")
+    require_heights(options)
     file: SystemFile | None = None
     whole, digits = True, options["max_digits"]
     if options["record"] is not None:
@@ -66,7 +65,9 @@ def command(system: str | None, **options: Any) -> int:
         whole, digits = record.get("whole") is not False, record.get("max_digits", digits)
     else:
         file = load_system(system, options)
-        survey = _surveyed(file, options)
+        eps = the_eps(options["eps"], options["time_step"], required=False)
+        with Progress(options["quiet"]) as progress:
+            survey = surveyed(file, eps, options, progress)
         curves, whole = height_curves(survey), survey.is_whole
     deliver(draw_heights(curves, style_from(options), scale=options["scale"]), options, file)
     early = sum(curve.status in _EARLY for curve in curves)
@@ -79,23 +80,3 @@ def command(system: str | None, **options: Any) -> int:
         if not whole:
             say("stopped early: the time was over before all orbits were finished")
     return 3 if early or not whole else 0
-
-
-def _surveyed(file: SystemFile, options: dict[str, Any]) -> HeightSurvey:
-    from kahanmaps.errors import InputError
-    from kahanmaps.laboratory.growth.height_survey import DEFAULT_STARTS, height_survey
-
-    if options["max_digits"] < 1:
-        raise InputError(f"found --max-digits {options['max_digits']}, expected at least 1")
-    with Progress(options["quiet"]) as progress:
-        return height_survey(
-            file.map,
-            the_eps(options["eps"], options["time_step"], required=False),
-            starts=options["given"] or (DEFAULT_STARTS if options["count"] is None else options["count"]),
-            steps=options["steps"],
-            max_digits=options["max_digits"],
-            seconds=options["seconds"],
-            structure=file.structure,
-            seed=options["seed"],
-            progress=progress,
-        )

@@ -49,7 +49,7 @@ class ClassicalOrbit:
         self._dim = system.dim
         self._h = to_float(2 * rational(eps))
         self._start = to_floats(start)
-        self._field = _Field(system)
+        self._field = VectorField(system)
 
     def portions(self) -> Iterator[tuple[int, FloatArray]]:
         """The step reached, and the points (count, dim) on the way; the start first."""
@@ -101,30 +101,37 @@ class ClassicalOrbit:
         return None
 
 
-class _Field:
-    """f and f' in machine numbers: f_i(x) = z^T S_i z with z = (x, 1) and S_i symmetric."""
+class VectorField:
+    """f and f' in doubles: f_i(x) = z^T S_i z with z = (x, 1) and S_i symmetric.
+
+    >>> f = VectorField(QuadraticSystem.from_text(["x", "y"], ["x*y + 1", "3*x"]))
+    >>> f(np.array([2.0, 5.0])).tolist(), f.jacobian(np.array([2.0, 5.0])).tolist()
+    ([11.0, 6.0], [[5.0, 2.0], [3.0, 0.0]])
+    """
 
     def __init__(self, system: QuadraticSystem) -> None:
         n = system.dim
         self._S = np.zeros((n, n + 1, n + 1))
         for i in range(n):
-            self._S[i, :n, :n] = [[to_float(entry) for entry in row] for row in system.Q[i].tolist()]
-            self._S[i, :n, n] = self._S[i, n, :n] = [to_float(system.B[i, j] / 2) for j in range(n)]
-            self._S[i, n, n] = to_float(system.c[i])
-        self._z = np.ones(n + 1)
-
-    def _half(self, x: FloatArray) -> FloatArray:
-        self._z[:-1] = x
-        half: FloatArray = self._S @ self._z
-        return half
+            self._S[i, :n, :n] = to_floats(system.Q[i].entries()).reshape(n, n)
+            self._S[i, :n, n] = self._S[i, n, :n] = to_floats([system.B[i, j] / 2 for j in range(n)])
+        self._S[:, n, n] = to_floats(system.c)
 
     def __call__(self, x: FloatArray) -> FloatArray:
-        value: FloatArray = self._half(x) @ self._z
+        """The values at points (..., dim)."""
+        with np.errstate(all="ignore"):
+            z, half = self._half(x)
+            value: FloatArray = (half @ z[..., None])[..., 0]
         return value
 
     def jacobian(self, x: FloatArray) -> FloatArray:
-        """f'(x)."""
-        return 2.0 * self._half(x)[:, :-1]
+        """f'(x) at one point."""
+        with np.errstate(all="ignore"):
+            return 2.0 * self._half(x)[1][:, :-1]
+
+    def _half(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        z = np.concatenate([x, np.ones_like(x[..., :1])], axis=-1)
+        return z, np.moveaxis(self._S @ z.T, -1, 0) if z.ndim > 1 else self._S @ z
 
 
 def _end(no_solution: bool, step: int) -> OrbitEnd:

@@ -89,10 +89,10 @@ class PlanarNumpy:
             if r < reals and kind != GENERAL:
                 fine = _canonical(kind, z[2 * r : 2 * end : 2], z[2 * r + 1 : 2 * end : 2], count, good)
             elif r < reals:
-                fine = _real(z[2 * r : 2 * r + 2], k, count, good)
+                fine = _alone(real_general, NEAR, z[2 * r : 2 * r + 2], k, count, good)
             else:
-                at = 4 * r - 2 * reals
-                fine = _complex(complex_lines if kind == LINES else complex_general, z[at : at + 4], k, count, good)
+                at, formula = 4 * r - 2 * reals, complex_lines if kind == LINES else complex_general
+                fine = _alone(formula, NEAR_SQUARED, z[at : at + 4], k, count, good)
             if not fine:
                 return z, False
         return z, True
@@ -113,22 +113,12 @@ def _canonical(kind: int, U: FloatArray, V: FloatArray, count: int, good: Any) -
     return True
 
 
-def _real(z: FloatArray, k: list[float], count: int, good: Any) -> bool:
+def _alone(formula: Any, near: float, z: FloatArray, k: list[float], count: int, good: Any) -> bool:
+    """Steps of one block, in place; of a complex one the formula gives the squares of |w| and |g|."""
     for _ in range(count):
-        z[0], z[1], w, g = real_general(z[0], z[1], k)
-        usual = np.abs(w) > NEAR + NEAR * np.abs(g)
-        if good is not None:
-            good &= usual
-        elif not usual.all():
-            return False
-    return True
-
-
-def _complex(formula: Any, z: FloatArray, k: list[float], count: int, good: Any) -> bool:
-    for _ in range(count):
-        *image, w, g = formula(z[0], z[1], z[2], z[3], k)
+        *image, w, g = formula(*z, k)
         z[:] = image
-        usual = w > NEAR_SQUARED + NEAR_SQUARED * g
+        usual = np.abs(w) > near + near * np.abs(g)
         if good is not None:
             good &= usual
         elif not usual.all():
