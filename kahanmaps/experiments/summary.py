@@ -132,7 +132,7 @@ class Summary(Displayed):
             for group in self.groups
             for name, numbers in group.numbers.items()
         )
-        return Table("numbers", (*self.by, "name", "n", "same", *_SHOWN.values()), tuple(rows), len(self.by) + 1)
+        return Table("numbers", (*self.by, "number", "n", "same", *_SHOWN.values()), tuple(rows), len(self.by) + 1)
 
     def flags(self, digits: int | None = None) -> Table:
         """How often each entry that is true or false was which, in each group."""
@@ -141,7 +141,7 @@ class Summary(Displayed):
             for group in self.groups
             for name, (true, false) in group.flags.items()
         )
-        return Table("true or false", (*self.by, "name", "true", "false"), tuple(rows), len(self.by) + 1)
+        return Table("true or false", (*self.by, "flag", "true", "false"), tuple(rows), len(self.by) + 1)
 
     def tables(self, digits: int | None = None) -> list[Table]:
         """The tables that have rows, the counts always. With `digits`, for the eye: floats have so many significant
@@ -182,7 +182,7 @@ def summarise(
     2       1       1
     10      2       2
     <BLANKLINE>
-    m       name    n       same    min     5 %     median  95 %    max
+    m       number  n       same    min     5 %     median  95 %    max
     2       height  1       yes     3       3       3       3       3
     10      height  2       no      7/3     7/3     7/3     2.5     2.5
     """

@@ -243,11 +243,11 @@ def test_the_lines_are_tables_with_tabs():
         "9\t1\t1\t1\t0",
         "10\t2\t2\t1\t1",
         "",
-        "m\tname\tn\tsame\tmin\t5 %\tmedian\t95 %\tmax",
+        "m\tnumber\tn\tsame\tmin\t5 %\tmedian\t95 %\tmax",
         "9\theight\t1\tyes\t4\t4\t4\t4\t4",
         "10\theight\t2\tno\t5/3\t5/3\t5/3\t7/3\t7/3",
         "",
-        "m\tname\ttrue\tfalse",
+        "m\tflag\ttrue\tfalse",
         "9\tdone\t1\t0",
         "10\tdone\t1\t1",
     ]

@@ -190,6 +190,8 @@ class Orbits:
             pieces = [piece.strip() for piece in text.split(",")]
             if len(pieces) not in (2, 3) or not all(pieces):
                 raise InputError(f"found --axes {text[:60]}, expected two or three: x,y or x,y,z")
+            if len(set(pieces)) < len(pieces):
+                raise InputError(f"found --axes {text[:60]}, expected different ones")
             return tuple(
                 "step" if piece == "step" and "step" not in self.variables else self.function(piece) for piece in pieces
             )
