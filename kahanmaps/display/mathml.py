@@ -187,7 +187,7 @@ def _quotient(function: RationalFunction, characters: int | None) -> list[str]:
 def _factors(number: int, powers: Sequence[tuple[fmpq_mpoly, int]]) -> list[str]:
     """The elements of one side of a product, the number and the variables together."""
     variables = [g**k for g, k in powers if len(g) == 1]
-    parts = [_sum(prod(variables) * number)] if variables else []
+    parts = [_sum(prod(variables[1:], start=variables[0] * number))] if variables else []
     if not variables and (number > 1 or not powers):
         parts = [[_math(f"<mn>{number}</mn>", str(number))]]
     parts += [_bracketed(g, None, k) for g, k in powers if len(g) > 1]
