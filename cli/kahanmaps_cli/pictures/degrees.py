@@ -76,9 +76,9 @@ def command(systems: tuple[str, ...], **options: Any) -> int:
     with Progress(options["quiet"]) as progress:
         for file in files:
             found = _measured(file, eps, options, progress)
-            _add(growths, file.name, found)
+            _add(growths, file.label, found)
             if found.recurrence is None and found.ended not in ("terms", "constant", "singular"):
-                early.append(f"{file.name}: stopped early: {found.message}")
+                early.append(f"{file.label}: stopped early: {found.message}")
     figure = draw_degrees(growths, style_from(options), scale=options["scale"])
     deliver(figure, options, files[0] if len(files) == 1 else None)
     if not options["quiet"]:

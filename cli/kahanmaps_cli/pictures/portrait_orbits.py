@@ -92,7 +92,7 @@ class Orbits:
         form = None if isinstance(structure, NoStructure) else structure.form
         ensemble = ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
         return cls(
-            file.name,
+            file.label,
             file.variables,
             file,
             eps,
