@@ -101,6 +101,14 @@ def test_sliders_move_eps_and_the_start_and_integrals_stay(tmp_path):
     assert cell(elsewhere, "first0") != cell(dom, "first0")
 
 
+def test_at_one_eps_its_slider_stays(tmp_path):
+    html = report_html(km.analyze(km.load("euler_top"), eps="1/7", seconds=5), explore=True)
+    dom, asked, console = dumped(tmp_path, html)
+    assert (asked, console, cell(dom, "eps-value")) == ([], [], "0.142857")
+    assert re.search('<input disabled[^>]* id="explore-eps"', dom)
+    assert not re.search('<input disabled[^>]* id="explore-x1"', dom)
+
+
 @pytest.mark.slow
 def test_a_page_that_fetches_or_complains_is_seen(tmp_path):
     assert dumped(tmp_path, FETCHING)[1] == ["http://localhost:9/x.png"]

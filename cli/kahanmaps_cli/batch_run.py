@@ -34,6 +34,7 @@ _SHOW_EVERY = 0.1  # the same for the bar on a terminal
 
 def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
     """Read the spec, and say what it would do."""
+    from kahanmaps.experiments.records import option_words, system_words
     from kahanmaps.experiments.spec import MAX_TASKS, read_spec
     from kahanmaps.maps.convention import CONVENTION
 
@@ -70,8 +71,8 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
             task = experiment[k]
             given = {name: value for name, value in task.options.items() if value is not None}
             if "other" in given:
-                given["other"] = _recipe(given["other"])
-            tell(f"\t{task.key[:8]}\t{_recipe(task.system)}\t{_pairs(given)}")
+                given["other"] = system_words(given["other"])
+            tell(f"\t{task.key[:8]}\t{system_words(task.system)}\t{option_words(given)}")
         if experiment.size > _SHOWN:
             tell(f"\t... and {experiment.size - _SHOWN} more")
     tell(_tasks(sum(e.size for e in chosen)) + ("" if missing is None else f", {missing} of them without result"))
@@ -229,22 +230,6 @@ def _tasks(number: int) -> str:
 
 def _task_data(task: Any) -> dict[str, Any]:
     return {"key": task.key, "task": task.kind, "system": task.system, "options": dict(task.options)}
-
-
-def _recipe(recipe: Mapping[str, Any] | None) -> str:
-    if recipe is None:
-        return "-"
-    if "family" in recipe:
-        return "family " + _pairs(recipe["family"])
-    return f"{recipe['name']} {_pairs(recipe['parameters'])}".rstrip()
-
-
-def _pairs(values: Mapping[str, Any]) -> str:
-    return " ".join(f"{name}={_word(value)}" for name, value in values.items())
-
-
-def _word(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else json.dumps(value)
 
 
 class BatchProgress:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from kahanmaps.errors import quoted
 from kahanmaps_cli.options import (
     eps_options,
     is_inline,
@@ -53,8 +54,12 @@ scan_options: Callable[[F], F] = stack(
 
 
 def names_of(options: dict[str, Any]) -> list[str]:
-    """The parameters of --over, each once."""
-    return list(dict.fromkeys(name.strip() for name in options["over"].split(",") if name.strip()))
+    """The parameters of --over."""
+    names = [name.strip() for name in options["over"].split(",") if name.strip()]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise click.UsageError(f"found {quoted(twice)} twice in --over, expected different parameters")
+    return names
 
 
 def scanned(system: str | None, quiet: bool, options: dict[str, Any]) -> Scan:

@@ -1,4 +1,4 @@
-"""The order in which a polynomial is read, its terms, and the beginning of one that is too long to be shown."""
+"""The terms of a polynomial as they are written, and the beginning of one that is too long to be shown."""
 
 from __future__ import annotations
 
@@ -9,18 +9,8 @@ from flint import fmpq, fmpq_mpoly
 from kahanmaps.algebra.polynomials import names_of
 
 
-def reading_order(polynomial: fmpq_mpoly) -> list[tuple[tuple[int, ...], fmpq]]:
-    """Exponents and coefficients of the terms, those without eps first: what remains for eps = 0 is read first.
-
-    >>> from kahanmaps.algebra.text import parse_polynomial
-    >>> reading_order(parse_polynomial("eps*x^2 - 1/2", ["x", "eps"]))
-    [((0, 0), -1/2), ((2, 1), 1)]
-    """
-    return list(_terms(polynomial))
-
-
 def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
-    """The first terms in reading order that take about so many characters, perhaps none; exact, all if they fit.
+    """The first terms that take about so many characters, perhaps none; exact, all if they fit.
 
     >>> from kahanmaps.algebra.text import parse_polynomial
     >>> first_terms(parse_polynomial("(x + y)^20", ["x", "y"]), 30)
@@ -28,7 +18,7 @@ def first_terms(polynomial: fmpq_mpoly, characters: int) -> fmpq_mpoly:
     """
     kept: dict[tuple[int, ...], fmpq] = {}
     names, left = names_of(polynomial), characters
-    for monomial, value in _terms(polynomial):
+    for monomial, value in terms_of(polynomial):
         # The length of a number without writing it: a coefficient of a million digits takes seconds.
         left -= int((value.p.bit_length() + value.q.bit_length()) * 0.30103) + 3
         left -= sum(len(name) + 2 for name, exponent in zip(names, monomial, strict=True) if exponent)
@@ -60,13 +50,7 @@ def factors_of(
     return factors
 
 
-def _terms(polynomial: fmpq_mpoly) -> Iterator[tuple[tuple[int, ...], fmpq]]:
-    """The terms in reading order, one by one: of a hundred thousand, often only the first few are wanted."""
-    names = names_of(polynomial)
-    order: Sequence[int] = range(len(polynomial))
-    if "eps" in names:
-        at = names.index("eps")
-        powers = [int(monomial[at]) for monomial in polynomial.monoms()]
-        order = sorted(order, key=powers.__getitem__)
-    for k in order:
+def terms_of(polynomial: fmpq_mpoly) -> Iterator[tuple[tuple[int, ...], fmpq]]:
+    """Exponents and coefficients in the order of the ring, one by one: of very many only the first may be wanted."""
+    for k in range(len(polynomial)):
         yield tuple(int(exponent) for exponent in polynomial.monomial(k)), polynomial.coefficient(k)

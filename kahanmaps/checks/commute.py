@@ -105,7 +105,7 @@ def _check_pair(file: SystemFile, other: SystemFile, settings: Settings, eps2: f
     orbit = run_orbit(f, settings, g.subject, proof is not None and file.member is not None)
     kahan = "Kahan maps" if file.is_quadratic and other.is_quadratic else "maps"
     finding = judge(
-        f"the {kahan} of f = {file.name} and g = {other.name} commute",
+        f"the {kahan} of {file.labelled('f')} and {other.labelled('g')} commute",
         identity,
         settings,
         proof,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from flint import fmpq
 
@@ -82,11 +83,9 @@ def integrals_html(search: IntegralSearch) -> str:
 @html_form.register
 def densities_html(search: DensitySearch) -> str:
     """The densities phi with dx/phi invariant."""
-    rows = [
-        (formula(one.function, "phi", CHARACTERS), markup.verdict(one.verdict)) for one in search.densities[:_FORMULAS]
-    ]
+    rows = [(formula(one.function, "phi", CHARACTERS), markup.verdict(one.verdict)) for one in search.shown]
     inside = markup.table(["dx/phi is invariant", "verdict"], rows) if rows else ""
-    notes = _notes([_rest(search.densities, _FORMULAS), search.note, search.reason])
+    notes = _notes([search.further, search.note, search.reason])
     more = eps_sentence(search.eps, search.file.map)
     return markup.titled(f"densities of {_name(search.file)}", inside + notes, more)
 
@@ -279,9 +278,17 @@ def degrees_text(found: DegreeGrowth) -> str:
 
 
 @text_form.register
-def formulas_text(found: IntegralSearch | DensitySearch) -> str:
+def integrals_text(found: IntegralSearch) -> str:
     """Every formula with its verdict and what that rests on, then why there are no more."""
-    densities = getattr(found, "densities", ())
-    named = [("phi", one) for one in densities] or [(one.name, one) for one in getattr(found, "integrals", ())]
+    return _formulas([(one.name, one) for one in found.integrals], (found.note, found.reason))
+
+
+@text_form.register
+def densities_text(found: DensitySearch) -> str:
+    """The formula with its verdict and what that rests on, then what more there is, or why there is none."""
+    return _formulas([("phi", one) for one in found.shown], (found.further, found.note, found.reason))
+
+
+def _formulas(named: Sequence[tuple[str, Any]], notes: Sequence[str]) -> str:
     lines = [f"{name}\t{one.verdict}\t{one.text}\n\t{one.evidence.summary}" for name, one in named]
-    return "\n".join([*lines, *(f"note\t{text}" for text in (found.note, found.reason) if text)])
+    return "\n".join([*lines, *(f"note\t{text}" for text in notes if text)])

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, common_denominator, names_of
-from kahanmaps.algebra.reading import factors_of, first_terms, reading_order
+from kahanmaps.algebra.reading import factors_of, first_terms, terms_of
 from kahanmaps.algebra.text import shorter_factors, sides
 from kahanmaps.displayed import latex_form
 from kahanmaps.errors import InputError, counted
@@ -72,17 +72,17 @@ def latex_number(value: fmpq) -> str:
 
 @latex_form.register
 def latex_polynomial(polynomial: fmpq_mpoly) -> str:
-    r"""A polynomial over Q as LaTeX, exact: its terms by increasing powers of eps, else in the order of its ring.
+    r"""A polynomial over Q as LaTeX, exact: its terms in the order of its ring, as in plain text.
 
     >>> from kahanmaps.algebra.text import parse_polynomial
     >>> print(latex_polynomial(parse_polynomial("x1^3/3 - eps^12*x1 + 1/2", ["x1", "eps"])))
-    \frac{1}{3} x_1^3 + \frac{1}{2} - \varepsilon^{12} x_1
+    -\varepsilon^{12} x_1 + \frac{1}{3} x_1^3 + \frac{1}{2}
     """
     names = names_of(polynomial)
     order = sorted(range(len(names)), key=lambda k: names[k] != "eps")
     ordered = [latex_name(names[k]) for k in order]
     text = ""
-    for monomial, coefficient in reading_order(polynomial):
+    for monomial, coefficient in terms_of(polynomial):
         term = " ".join(factors_of(abs(coefficient), [monomial[k] for k in order], ordered, _power, latex_number))
         if coefficient < 0:
             text += f" - {term}" if text else f"-{term}"
@@ -96,20 +96,17 @@ def latex_rational_function(function: RationalFunction) -> str:
     r"""A quotient of polynomials over Q as LaTeX, exact, without fractions inside the fraction, in factors where they
     are shorter.
 
-    Otherwise the denominator starts with a positive term, and common factors stay, as they do in `RationalFunction`.
+    Both sides of a fraction start with a positive term. Common factors stay, as they do in `RationalFunction`.
 
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> print(latex_rational_function(parse_rational_function("(x/2 + 1)/(1 - eps^2*x)", ["x", "eps"])))
-    \frac{x + 2}{2 - 2 \varepsilon^2 x}
+    -\frac{x + 2}{2 \varepsilon^2 x - 2}
     >>> print(latex_rational_function(parse_rational_function("-2*(x + 1)^2*y/3", ["x", "y"])))
     -\frac{2 y \left(x + 1\right)^2}{3}
     """
     found = shorter_factors(function)
-    if found is not None and _is_product(found[0]):
-        # The first term is read first, and is to be positive.
-        negative = [(g, k) for g, k in found[0] if reading_order(g)[0][1] < 0]
-        factors = [(-g if (g, k) in negative else g, k) for g, k in found[0]]
-        constant = -found[1] if sum(k for _, k in negative) % 2 else found[1]
+    if found is not None and is_product(found[0]):
+        factors, constant = found
         above, below = (
             latex_polynomial(powers[0][0])
             if number == 1 and [k for _, k in powers] == [1]
@@ -117,18 +114,22 @@ def latex_rational_function(function: RationalFunction) -> str:
             for number, powers in sides(factors, constant)
         )
         return ("-" if constant < 0 else "") + (above if below == "1" else rf"\frac{{{above}}}{{{below}}}")
-    above, below = map(latex_polynomial, above_and_below(function))
-    return above if function.is_polynomial else rf"\frac{{{above}}}{{{below}}}"
+    sign, *parts = above_and_below(function)
+    above, below = map(latex_polynomial, parts)
+    return above if below == "1" else rf"{sign}\frac{{{above}}}{{{below}}}"
 
 
-def above_and_below(function: RationalFunction) -> tuple[fmpq_mpoly, fmpq_mpoly]:
-    """Numerator and denominator as they are written: without fractions, the first term of the denominator positive."""
-    if function.is_polynomial:  # the denominator is 1 then
-        return function.numerator, function.denominator
-    factor = fmpq(common_denominator(function.numerator))
-    if reading_order(function.denominator)[0][1] < 0:
-        factor = -factor
-    return function.numerator * factor, function.denominator * factor
+def above_and_below(function: RationalFunction) -> tuple[str, fmpq_mpoly, fmpq_mpoly]:
+    """Sign, numerator and denominator of a fraction as they are written: without fractions, the first terms positive.
+
+    Polynomials have the denominator 1 and their own signs.
+    """
+    above, below = function.numerator, function.denominator
+    if function.is_polynomial or above.is_zero():
+        return "", above, above.context().constant(1)
+    factor = fmpq(common_denominator(above))
+    signs = [1 if part.coefficient(0) > 0 else -1 for part in (above, below)]
+    return "-" if signs[0] != signs[1] else "", above * (factor * signs[0]), below * (factor * signs[1])
 
 
 def latex_cut(polynomial: fmpq_mpoly, characters: int) -> str:
@@ -160,7 +161,7 @@ def latex_aligned(equations: Sequence[tuple[str, str]], most: int = 12) -> str:
     return rf"$\displaystyle \begin{{aligned}} {inside} \end{{aligned}}$"
 
 
-def _is_product(factors: Sequence[tuple[fmpq_mpoly, int]]) -> bool:
+def is_product(factors: Sequence[tuple[fmpq_mpoly, int]]) -> bool:
     """Whether there are several sums above or below the line, or powers of sums."""
     powers = [k for g, k in factors if len(g) > 1]
     return sum(k for k in powers if k > 0) > 1 or sum(k for k in powers if k < 0) < -1

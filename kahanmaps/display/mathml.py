@@ -1,21 +1,23 @@
 r"""Names, polynomials and rational functions as MathML, exactly: formulas that a browser shows without JavaScript.
 
-Only MathML Core is used, and the same normal form as in latex.py: terms by increasing powers of eps, fractions without
-fractions inside. Core has no line breaks. So a long formula is a <span class="formula"> of several <math> elements,
-between which the browser wraps, one for each term. Every <math> has its plain text as `alttext`.
+Only MathML Core is used, and the same normal form as in latex.py: terms in the order of the ring, fractions without
+fractions inside, factors where they are shorter. Core has no line breaks. So a long formula is a <span class="formula">
+of several <math> elements, between which the browser wraps, one for each term. Every <math> has its plain text as
+`alttext`.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from math import prod
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
-from kahanmaps.algebra.reading import factors_of, first_terms, reading_order
-from kahanmaps.algebra.text import format_number
-from kahanmaps.display.latex import GREEK_NAMES, above_and_below
+from kahanmaps.algebra.reading import factors_of, first_terms, terms_of
+from kahanmaps.algebra.text import format_number, format_product, shorter_factors, sides
+from kahanmaps.display.latex import GREEK_NAMES, above_and_below, is_product
 from kahanmaps.display.markup import escape
 from kahanmaps.errors import InputError, counted
 
@@ -26,6 +28,7 @@ _ONE_PIECE = 32
 # Names of several letters would run together without a little space.
 _TIMES = '<mo lspace="0em" rspace="0.12em">\u2062</mo>'
 _PRIME = "<mo>′</mo>"
+_MINUS = '<mo form="prefix">−</mo>'
 
 
 def mathml_name(name: str) -> str:
@@ -67,18 +70,26 @@ def mathml_polynomial(polynomial: fmpq_mpoly) -> str:
 
 
 def mathml_rational_function(function: RationalFunction) -> str:
-    """A quotient of polynomials over Q as MathML, exact, without fractions inside the fraction.
+    """A quotient of polynomials over Q as MathML, exact, without fractions inside the fraction, in factors where they
+    are shorter.
 
-    The denominator starts with a positive term. Common factors stay, as they do in `RationalFunction`.
+    Both sides of a fraction start with a positive term. Common factors stay, as they do in `RationalFunction`.
 
     >>> from kahanmaps.algebra.text import parse_rational_function
     >>> mathml_rational_function(parse_rational_function("x/y^2", ["x", "y"]))
     '<mfrac><mrow><mi>x</mi></mrow><mrow><msup><mi>y</mi><mn>2</mn></msup></mrow></mfrac>'
     """
-    above, below = above_and_below(function)
-    if below.is_one():
-        return mathml_polynomial(above)
-    return f"<mfrac>{mathml_polynomial(above)}{mathml_polynomial(below)}</mfrac>"
+    found = shorter_factors(function)
+    if found is not None and is_product(found[0]):
+        sign = "-" if found[1] < 0 else ""
+        above, below = (_product(number, powers) for number, powers in sides(*found))
+        is_whole = below == "<mrow><mn>1</mn></mrow>"
+    else:
+        sign, *parts = above_and_below(function)
+        above, below = map(mathml_polynomial, parts)
+        is_whole = parts[1].is_one()
+    whole = above if is_whole else f"<mfrac>{above}{below}</mfrac>"
+    return f"<mrow>{_MINUS}{whole}</mrow>" if sign else whole
 
 
 def formula(function: fmpq_mpoly | RationalFunction, left: str = "", characters: int | None = None) -> str:
@@ -150,23 +161,65 @@ def _sum(polynomial: fmpq_mpoly, characters: int | None = None) -> list[str]:
 
 
 def _quotient(function: RationalFunction, characters: int | None) -> list[str]:
-    above, below = above_and_below(function)
-    if below.is_one():
-        return _sum(above, characters)
+    """The elements of a fraction, one if it is short, else with a slash; in factors, if all of it is shown."""
+    sign, above, below = above_and_below(function)
     fits = characters is None or all(len(first_terms(part, characters)) == len(part) for part in (above, below))
-    if fits and max(len(_plain(above)), len(_plain(below))) <= _ONE_PIECE:
+    found = shorter_factors(function) if fits else None
+    if found is not None and is_product(found[0]):
+        sign, plain = "-" if found[1] < 0 else "", format_product(*found)
+        over, under = sides(*found)
+        top, bottom, is_whole = _factors(*over), _factors(*under), under == (1, [])
+        if len(under[1]) + (under[0] > 1) > 1:
+            bottom = _enclosed(bottom)
+    elif below.is_one():
+        return _sum(above, characters)
+    else:
+        plain = f"{sign}({_plain(above)})/({_plain(below)})"
+        top, bottom, is_whole = _bracketed(above, characters), _bracketed(below, characters), False
+    if fits and max(map(len, plain.split("/"))) <= _ONE_PIECE + len("()"):
         # Without a style of its own a fraction within a line is set in the small letters of an index.
-        fraction = f'<mstyle displaystyle="true">{mathml_rational_function(function)}</mstyle>'
-        return [_math(fraction, f"({_plain(above)})/({_plain(below)})")]
-    return [*_bracketed(above, characters), _math("<mo>/</mo>", "/"), *_bracketed(below, characters)]
+        return [_math(f'<mstyle displaystyle="true">{mathml_rational_function(function)}</mstyle>', plain)]
+    if sign:
+        top[0] = _math(_MINUS, "-") + top[0]
+    return top if is_whole else [*top, _math("<mo>/</mo>", "/"), *bottom]
 
 
-def _bracketed(polynomial: fmpq_mpoly, characters: int | None) -> list[str]:
-    """The elements of a sum in brackets, with no break between a bracket and the term beside it."""
-    inside = _sum(polynomial, characters)
-    opening, closing = (_math(f'<mo stretchy="false">{bracket}</mo>', bracket) for bracket in "()")
-    inside[0] = opening + inside[0]
-    inside[-1] += closing
+def _factors(number: int, powers: Sequence[tuple[fmpq_mpoly, int]]) -> list[str]:
+    """The elements of one side of a product, the number and the variables together."""
+    variables = [g**k for g, k in powers if len(g) == 1]
+    parts = [_sum(prod(variables[1:], start=variables[0] * number))] if variables else []
+    if not variables and (number > 1 or not powers):
+        parts = [[_math(f"<mn>{number}</mn>", str(number))]]
+    parts += [_bracketed(g, None, k) for g, k in powers if len(g) > 1]
+    for part in parts[:-1]:
+        part[-1] += _math(_TIMES, "*")
+    return [element for part in parts for element in part]
+
+
+def _product(number: int, powers: Sequence[tuple[fmpq_mpoly, int]]) -> str:
+    """One side of a product as one row."""
+    if number == 1 and [k for _, k in powers] == [1]:
+        return mathml_polynomial(powers[0][0])
+    parts = [f"<mn>{number}</mn>"] if number > 1 or not powers else []
+    for g, k in powers:
+        if len(g) == 1:
+            parts.append(mathml_polynomial(g**k))
+            continue
+        base = f'<mrow><mo stretchy="false">(</mo>{mathml_polynomial(g)}<mo stretchy="false">)</mo></mrow>'
+        parts.append(base if k == 1 else _raised(base, f"<mn>{k}</mn>"))
+    return f"<mrow>{_TIMES.join(parts)}</mrow>"
+
+
+def _bracketed(polynomial: fmpq_mpoly, characters: int | None, power: int = 1) -> list[str]:
+    return _enclosed(_sum(polynomial, characters), power)
+
+
+def _enclosed(inside: list[str], power: int = 1) -> list[str]:
+    """The elements in brackets, with no break between a bracket and what is beside it."""
+    opening, closing = (f'<mo stretchy="false">{bracket}</mo>' for bracket in "()")
+    end = _math(closing, ")") if power == 1 else _math(_raised(closing, f"<mn>{power}</mn>"), f")^{power}")
+    inside[0] = _math(opening, "(") + inside[0]
+    inside[-1] += end
     return inside
 
 
@@ -181,7 +234,7 @@ def _pieces(polynomial: fmpq_mpoly) -> list[tuple[str, str]]:
     ordered = [mathml_name(names[k]) for k in order]
     plain = [names[k] for k in order]
     found: list[tuple[str, str]] = []
-    for monomial, coefficient in reading_order(polynomial):
+    for monomial, coefficient in terms_of(polynomial):
         exponents, size = [monomial[k] for k in order], abs(coefficient)
         sign = "−" if coefficient < 0 else "+" if found else ""
         form = "infix" if found else "prefix"

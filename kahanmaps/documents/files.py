@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
 
 MAX_FILE_BYTES = 16_000_000
+_LONGEST_LABEL = 120
 _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
 
 
@@ -58,6 +59,19 @@ class SystemFile(Displayed):
     integrals: Mapping[str, RationalFunction]
     density: RationalFunction | None
     document: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def label(self) -> str:
+        """What pictures and pages call it: its name, or the equations of a system from the command line, if short."""
+        if self.name != "inline" or not self.is_quadratic:
+            return self.name
+        rhs = zip(self.variables, self.system.rhs, strict=True)
+        shown = ", ".join(f"{name}' = {format_polynomial(f)}" for name, f in rhs)
+        return shown if len(shown) <= _LONGEST_LABEL else self.name
+
+    def labelled(self, letter: str) -> str:
+        """The system with a letter for it: f = euler_top, or f: (x' = y, y' = -x)."""
+        return f"{letter} = {self.name}" if self.label == self.name else f"{letter}: ({self.label})"
 
     @property
     def variables(self) -> tuple[str, ...]:

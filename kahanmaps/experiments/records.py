@@ -88,6 +88,24 @@ class Task:
         return recipe.get("family", {}).get(name)
 
 
+def system_words(recipe: Mapping[str, Any] | None) -> str:
+    """A recipe of a system as people read it.
+
+    >>> system_words({"document": "51b2", "name": "euler_top", "parameters": {"a1": "1/2"}}), system_words(None)
+    ('euler_top a1=1/2', '-')
+    """
+    if recipe is None:
+        return "-"
+    if "family" in recipe:
+        return "family " + option_words(recipe["family"])
+    return f"{recipe.get('name', recipe['document'])} {option_words(recipe['parameters'])}".rstrip()
+
+
+def option_words(values: Mapping[str, Any]) -> str:
+    """Names with their values: m=3 seed=0 size=null."""
+    return " ".join(f"{name}={v if isinstance(v, str) else json.dumps(v)}" for name, v in values.items())
+
+
 @dataclass(frozen=True)
 class Limits:
     """What one task may take: `time` in seconds, `memory` in bytes beyond what an idle child has; None: no limit.

@@ -19,7 +19,7 @@ from typing import Any
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import InputError, quoted
 from kahanmaps.experiments.export import NUMBER, Entry, entries, known, plain
-from kahanmaps.experiments.records import KEPT, Row, canonical
+from kahanmaps.experiments.records import KEPT, Row, canonical, system_words
 
 QUANTILES = {"min": 0, "p5": 5, "p25": 25, "median": 50, "p75": 75, "p95": 95, "max": 100}  # in percent
 VERDICTS = ("proved", "supported", "refuted", "undecided")
@@ -29,6 +29,7 @@ _SHOWN = {"min": "min", "p5": "5 %", "median": "median", "p95": "95 %", "max": "
 _LONGEST_NUMBER = 2_000  # characters of a text: longer ones are no numbers to sort, but texts
 # Names whose values are words, also when they look like numbers: an experiment may be called 007, a digest be 12e34567.
 _WORDS = ("task", "experiment", "system", "document", "outcome", "verdict", "message")
+_FEW = 5  # different values, whose counts are kept
 _RELATED = 3  # names suggested for a mistaken one
 _LISTED = 60
 # Characters in tables for the eye; texts are what failures say, and what systems are.
@@ -44,6 +45,7 @@ class Numbers:
     n: int
     quantiles: Mapping[str, Number]
     is_same: bool  # all n of them are equal
+    counts: Mapping[str, int] = field(default_factory=dict)  # of each value; empty where many are different
 
     def to_json(self) -> dict[str, Any]:
         """The numbers as plain data."""
@@ -132,7 +134,7 @@ class Summary(Displayed):
             for group in self.groups
             for name, numbers in group.numbers.items()
         )
-        return Table("numbers", (*self.by, "name", "n", "same", *_SHOWN.values()), tuple(rows), len(self.by) + 1)
+        return Table("numbers", (*self.by, "number", "n", "same", *_SHOWN.values()), tuple(rows), len(self.by) + 1)
 
     def flags(self, digits: int | None = None) -> Table:
         """How often each entry that is true or false was which, in each group."""
@@ -141,7 +143,7 @@ class Summary(Displayed):
             for group in self.groups
             for name, (true, false) in group.flags.items()
         )
-        return Table("true or false", (*self.by, "name", "true", "false"), tuple(rows), len(self.by) + 1)
+        return Table("true or false", (*self.by, "flag", "true", "false"), tuple(rows), len(self.by) + 1)
 
     def tables(self, digits: int | None = None) -> list[Table]:
         """The tables that have rows, the counts always. With `digits`, for the eye: floats have so many significant
@@ -182,7 +184,7 @@ def summarise(
     2       1       1
     10      2       2
     <BLANKLINE>
-    m       name    n       same    min     5 %     median  95 %    max
+    m       number  n       same    min     5 %     median  95 %    max
     2       height  1       yes     3       3       3       3       3
     10      height  2       no      7/3     7/3     7/3     2.5     2.5
     """
@@ -252,7 +254,8 @@ class _Values:
             passed += count
             while ahead and ahead[-1][1] <= passed:
                 quantiles[ahead.pop()[0]] = value
-        return Numbers(n, quantiles, Fraction(quantiles["min"]) == Fraction(quantiles["max"]))
+        counts = {text: count for *_, text, _, count in ordered} if len(ordered) <= _FEW else {}
+        return Numbers(n, quantiles, Fraction(quantiles["min"]) == Fraction(quantiles["max"]), counts)
 
 
 @dataclass
@@ -311,9 +314,12 @@ def _place(row: Row, by: Sequence[str], found: Sequence[tuple[Entry, Any]]) -> l
         for entry, value in found:
             if entry.section == section:
                 values.update((name, value) for name in names_of_entry(entry) if name in by)
-    place = []
+    place: list[tuple[Any, Any]] = []
     for name in by:
-        if name in _WORDS:
+        if name == "system":
+            word: str | None = system_words(row.task.system)  # other files may have the same name
+            place.append(((2, word, canonical(row.task.system)), word))
+        elif name in _WORDS:
             word = _word(row, name)
             place.append(((2, word) if word is not None else (3,), word))
         else:

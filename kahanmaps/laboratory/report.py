@@ -9,7 +9,6 @@ from itertools import takewhile
 from flint import fmpq_mat
 
 from kahanmaps.algebra.text import format_number, format_polynomial
-from kahanmaps.checks.claims import Verdict
 from kahanmaps.errors import counted
 from kahanmaps.family.skew_hamiltonian import factors_of_chi
 from kahanmaps.family.structure import Structure
@@ -145,11 +144,11 @@ def _measure_lines(found: Findings) -> list[Statement]:
         return []
     lines = []
     if search.densities:
-        shortest = min(search.densities, key=lambda one: (one.verdict is not Verdict.PROVED, len(one.text)))
-        lines.append(Statement(str(shortest.verdict), f"dx/phi is invariant, phi = {shortest.text}"))
+        lines += [Statement(str(one.verdict), f"dx/phi is invariant, phi = {one.text}") for one in search.shown]
         if len(search.densities) > 1:
-            number = counted(len(search.densities) - 1, "further polynomial")
-            lines.append(Statement(NOTE, f"{number} phi, this one times integrals: find-density writes them out"))
+            names = [] if found.integrals is None else [one.name for one in found.integrals.integrals]
+            times = f"any function of {_listed(names)}" if names else "any integral"
+            lines.append(Statement(NOTE, f"so is dx/phi for this phi times {times}"))
     else:
         lines.append(Statement(MEASURED if "no polynomial" in search.reason else UNDECIDED, search.reason))
     if search.turning is not None:

@@ -134,9 +134,9 @@ def _quotient(left: str, function: RationalFunction) -> list[tuple[str, str]]:
     whole = latex_rational_function(function)
     if len(whole) <= _LINE or function.is_polynomial:
         return [(left, whole)]
-    above, below = map(latex_polynomial, above_and_below(function))
+    sign, above, below = above_and_below(function)
     P, Q = f"P_{{{left}}}", f"Q_{{{left}}}"
-    return [(left, rf"\frac{{{P}}}{{{Q}}}"), (P, above), (Q, below)]
+    return [(left, rf"{sign}\frac{{{P}}}{{{Q}}}"), (P, latex_polynomial(above)), (Q, latex_polynomial(below))]
 
 
 def _aligned(rows: Sequence[tuple[str, str]]) -> str:

@@ -29,6 +29,7 @@ _PANEL = 5.5  # centimetres that a panel needs beside another
 _FEW = 5  # numbers, of which the quantiles of a summary are all there are
 _WIDE = 1000  # a range of so many times the least is drawn logarithmically
 _LONGEST = 28
+_SHORT = 12  # characters of a number in a legend
 # Kinds of ends in the order of the bars: colour and hatching, so that they differ in grey.
 _LOOKS = {
     "proved": ("#0072B2", ""),
@@ -44,7 +45,8 @@ _LOOKS = {
     "true": ("#0072B2", ""),
     "false": ("#D55E00", "///"),
 }
-_OTHER = ("#999999", "---")
+# ... and of values, or of what else there is.
+_VALUES = (("#0072B2", ""), ("#E69F00", "///"), ("#56B4E9", ""), ("#009E73", "..."), ("#999999", "---"))
 
 
 def draw_batch(
@@ -54,9 +56,10 @@ def draw_batch(
 
     A box holds the middle half of the numbers, a line in it the median, whiskers the middle nine tenths, dots the least
     and the largest; 5 numbers or fewer are dots, all of them. These are the quantiles of the summary, so numbers that
-    occur. Entries that are true or false become counts. `scale` is "linear" or "log"; by default logarithmic where all
-    numbers are positive and range over more than three orders of magnitude. Raises InputError for no group or more than
-    40, for more than 4 values, and for names that no group has.
+    occur. Entries that are true or false become counts, and so do numbers that have few values, unless a `scale` is
+    given: "linear" or "log"; by default logarithmic where all numbers are positive and range over more than three
+    orders of magnitude. Raises InputError for no group or more than 40, for more than 4 values, and for names that no
+    group has.
 
     >>> from kahanmaps.experiments.summary import summarise
     >>> from kahanmaps.experiments.records import Outcome, Record, Row, Task
@@ -85,10 +88,12 @@ def draw_batch(
         figure = new_figure(style, _aspect(style, len(groups), rows))
         every = figure.subplots(rows, columns, sharey=columns > 1, squeeze=False).ravel()
         for axes, name in zip(every, values, strict=False):
-            if any(name in group.numbers for group in groups):
+            few = _few_values(groups, name) if scale is None else None
+            if few is None and any(name in group.numbers for group in groups):
                 _draw_numbers(axes, groups, name, scale)
             else:
-                _draw_bars(axes, [_flags(group, name) for group in groups], f"tasks by {plain(name)}", style)
+                counts = few or [_flags(group, name) for group in groups]
+                _draw_bars(axes, counts, f"tasks by {plain(name)}", style)
         if not values:
             _draw_bars(every[0], [_ends(group) for group in groups], "tasks", style)
         for k, axes in enumerate(every):
@@ -128,6 +133,8 @@ def draw_pairs(pairs: Pairs, style: Style | None = None, *, scale: str | None = 
             if finite.sum() <= 500:
                 how["markersize"] = 3.2  # or one mark looks like another
             points(axes, _spread(x[here], pairs.x, k), y[here], marker=marker, **how)
+        if len(places := np.unique(x[finite])) <= _FEW and pairs.x.categories is None:
+            axes.set_xticks(places)
         if pairs.x.categories is not None:
             _name_words(axes, pairs.x, x, y, finite)
         axes.set_xlabel(_label(pairs.x.name))
@@ -197,17 +204,29 @@ def _flags(group: Group, name: str) -> dict[str, int]:
     return {"true": true, "false": false}
 
 
+def _few_values(groups: Sequence[Group], name: str) -> list[dict[str, int]] | None:
+    """How often a number has each of its values, where these are few and some of them are frequent."""
+    found = [group.numbers[name] for group in groups if name in group.numbers]
+    values = sorted({value for numbers in found for value in numbers.counts}, key=Fraction)
+    if not all(numbers.counts for numbers in found) or not len(values) <= _FEW < max((n.n for n in found), default=0):
+        return None
+    counts = [group.numbers[name].counts if name in group.numbers else {} for group in groups]
+    told = {value: value if len(value) <= _SHORT else f"{_double(value):.6g}" for value in values}
+    return [{f"{name} = {told[value]}": count[value] for value in values if value in count} for count in counts]
+
+
 def _draw_bars(axes: Axes, counts: Sequence[dict[str, int]], label: str, style: Style) -> None:
     from matplotlib.ticker import MaxNLocator
 
     kinds = dict.fromkeys(
         [*(kind for kind in _LOOKS if any(c.get(kind) for c in counts)), *(k for c in counts for k in c)]
     )
+    others = [kind for kind in kinds if kind not in _LOOKS]
     left = np.zeros(len(counts))
     for kind in kinds:
         widths = np.array([float(c.get(kind, 0)) for c in counts])
         if widths.any():
-            colour, hatch = _LOOKS.get(kind, _OTHER)
+            colour, hatch = _LOOKS[kind] if kind in _LOOKS else _VALUES[others.index(kind) % len(_VALUES)]
             look: dict[str, Any] = {"color": colour, "hatch": hatch, "edgecolor": "black", "linewidth": 0.4}
             axes.barh(range(len(counts)), widths, 0.62, left, label=kind, **look)
             left += widths
@@ -284,7 +303,7 @@ def _name_words(axes: Axes, column: Column, x: Any, y: Any, finite: Any) -> None
     axes.set_xticks(range(len(words)), words, rotation=30 if max(map(len, words)) > 6 else 0)
     for k in range(len(words)):
         here = y[finite & (x == k)]
-        if len(here):
+        if len(here) > 1:
             axes.plot([k - 0.35, k + 0.35], [np.sort(here)[(len(here) - 1) // 2]] * 2, color=COLOURS[5], linewidth=1.3)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 _ASPECT = 0.8
 _MANY = f"{GrowthClass.EXPONENTIAL} growth"  # drawn thin, and none of it is named
 _LETTERS, _LETTER = 0.8, 0.5  # the size of conditions, of that of other text; the width of a letter, of its size
+_PLACES, _DOTS = 12, 300  # parts of a curve, at whose ends its condition may stand, and to tell what it crosses
 _INNER = (0.85, 0.85)  # of the picture, the axes
 _USUAL: Window = ((-2.0, 2.0), (-2.0, 2.0))
 
@@ -67,8 +68,8 @@ def draw_scan(
             kind,
             points[kind],
             [piece for one in some if one.dimension == 1 for piece in _curve(one, window)],
-            [(one.text, _place(one)) for one in some if one.is_rational_point]
-            + [(one.text, _middle(pieces)) for one in some if one.dimension == 1 and (pieces := _curve(one, window))]
+            [(one.text, [_place(one)]) for one in some if one.is_rational_point]
+            + [(one.text, _along(pieces)) for one in some if one.dimension == 1 and (pieces := _curve(one, window))]
             if kind != _MANY
             else [],
         )
@@ -84,7 +85,7 @@ class _Kind:
     name: str
     points: Sequence[tuple[float, ...]]
     curves: Sequence[np.ndarray]
-    labels: Sequence[tuple[str, tuple[float, ...]]]
+    labels: Sequence[tuple[str, Sequence[tuple[float, ...]]]]
 
 
 def _modulo(sweep: Sweep, kinds: dict[str, list[Component]]) -> list[_Kind]:
@@ -98,7 +99,7 @@ def _modulo(sweep: Sweep, kinds: dict[str, list[Component]]) -> list[_Kind]:
             rest[one.degrees] = beside(before, [one], sweep.prime) if before else []
             on = sorted(set(before) - set(rest[one.degrees]))
             points += on
-            labels += [(one.text, on[len(on) // 2])] if on and kind != _MANY else []
+            labels += [(one.text, [on[len(on) // 2]])] if on and kind != _MANY else []
         drawn.append(_Kind(kind, points, [], labels))
     left = [point for points in rest.values() for point in points]
     return [*drawn, _Kind("on no component", left, [], [])] if left else drawn
@@ -133,7 +134,8 @@ def _draw(found: Scan, style: Style, kinds: list[_Kind], window: Window, beside_
 def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None:
     """Conditions beside what they describe, as far as there is room: curves first, which may cover points if need be.
 
-    Of points those with the fastest growth that is not exponential come first.
+    Of points those with the fastest growth that is not exponential come first. Of the places where a text fits it takes
+    the one that the fewest curves cross.
     """
     em = _LETTERS * style.font_size
     room = [side * part for side, part in zip(style.inches(_ASPECT), _INNER, strict=True)]
@@ -144,35 +146,48 @@ def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None
     def inside(place: Sequence[float]) -> tuple[float, ...]:
         return tuple((c - low) / (end - low) for c, (low, end) in zip(place, window, strict=True))
 
-    places = [inside(place) for kind in kinds for place in kind.points]
+    points = [inside(place) for kind in kinds for place in kind.points]
     u, v = 0.35 * across, 0.35 * high
-    marks = [(x - u, x + u, y - v, y + v) for x, y in places]
+    marks = [(x - u, x + u, y - v, y + v) for x, y in points]
+    lines = np.array([inside(x) for kind in kinds for piece in kind.curves for x in _resampled(piece, _DOTS)])
     taken: list[tuple[float, ...]] = []
-    for text, place, colour in wanted:
-        x, y = inside(place)
+    for text, places, colour in wanted:
         wide = _LETTER * len(text) * across
         is_curve = " = " in text
-        for covers, side, up in product((False, True)[: 1 + is_curve], (1, -1), (1, -1)):
+        found: list[Any] = []
+        for place, side, up in product(places, (1, -1), (1, -1)):
+            x, y = inside(place)
             low, bottom = x + (0.4 * across if side > 0 else -0.4 * across - wide), y + up * 0.7 * high - 0.5 * high
             box = (low, low + wide, bottom, bottom + high)
-            if min(box) < 0 or max(box) > 1 or any(_overlap(box, one) for one in (*taken, *(() if covers else marks))):
+            covered = sum(_overlap(box, one) for one in marks)
+            if min(box) < 0 or max(box) > 1 or any(_overlap(box, one) for one in taken) or (covered and not is_curve):
                 continue
+            held = (lines.reshape(-1, 2) > (box[0], box[2])) & (lines.reshape(-1, 2) < (box[1], box[3]))
+            found.append((covered, int(held.all(axis=1).sum()), len(found), place, side, up, box))
+        if found:
+            *_, place, side, up, box = min(found, key=lambda one: one[:3])
             taken.append(box)
             where = {"ha": "left" if side > 0 else "right", "va": "center"}
             offset = (0.4 * em * side, 0.7 * em * up)
-            write(axes, text, place, offset, halo=1.5, size=em, color=colour, zorder=20, **where)
-            break
+            write(axes, text, place, offset, halo=2.5, size=em, color=colour, zorder=20, **where)
 
 
 def _overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return one[0] < other[1] and other[0] < one[1] and one[2] < other[3] and other[2] < one[3]
 
 
-def _middle(pieces: list[np.ndarray]) -> tuple[float, float]:
-    """A place on the longest piece of a curve."""
-    longest = max(pieces, key=len)
-    x, y = longest[len(longest) // 2]
-    return float(x), float(y)
+def _along(pieces: list[np.ndarray]) -> list[tuple[float, ...]]:
+    """Places on the longest piece of a curve, first where other curves seldom cross it: off the middle."""
+    ends = _resampled(max(pieces, key=len), _PLACES + 1)
+    parts = sorted(range(1, _PLACES), key=lambda k: abs(4 * k - 3 * _PLACES))
+    return [tuple(map(float, ends[k])) for k in parts]
+
+
+def _resampled(piece: np.ndarray, count: int) -> np.ndarray:
+    """So many points along a curve, at equal distances."""
+    lengths = np.concatenate([[0.0], np.hypot(*np.diff(piece, axis=0).T).cumsum()])
+    at = np.linspace(0, lengths[-1], count)
+    return np.stack([np.interp(at, lengths, column) for column in piece.T], axis=-1)
 
 
 def _kinds(found: Scan) -> dict[str, list[Component]]:

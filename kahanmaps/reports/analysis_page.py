@@ -127,7 +127,7 @@ def _degrees(found: Analysis, pictures: Pictures) -> list[str]:
     )
     rows = [(str(n), str(d)) for n, d in enumerate(growth.degrees)]
     return [
-        pictures.draw("degrees", caption, alt, lambda style: draw_degrees({found.file.name: growth}, style)),
+        pictures.draw("degrees", caption, alt, lambda style: draw_degrees({found.file.label: growth}, style)),
         markup.details("Degrees as a table", wide(markup.table(["n", "degree of the n-th iterate"], rows))),
     ]
 

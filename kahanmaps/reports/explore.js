@@ -68,7 +68,7 @@ function rangeOf(values) {
 }
 
 function ticksIn([low, high]) {
-  const raw = (high - low) / 5, unit = 10 ** Math.floor(Math.log10(raw));
+  const raw = (high - low) / 8, unit = 10 ** Math.floor(Math.log10(raw));
   const gap = [1, 2, 5, 10].map((m) => m * unit).find((m) => m >= raw);
   const found = [];
   for (let k = Math.ceil(low / gap); k * gap <= high; k++) found.push(k * gap);
@@ -82,8 +82,8 @@ function show(data) {
   const sliders = data.variables.map((_, k) => element("x" + k));
   const epsSlider = data.has_eps ? element("eps") : null;
   const axes = [element("horizontal"), element("vertical")];
-  const left = 62, bottom = 40, top = 10, right = 12;
-  let windows = null, points = [];
+  const bottom = 40, top = 20, right = 30;
+  let left = 62, windows = null, points = [];
   const number = (value) => String(Number(value.toPrecision(6)));
   const coordinate = (k, axis) => (axis < n ? points[k][axis] : k);
   const chosen = () => axes.map((axis) => Number(axis.value));
@@ -100,12 +100,13 @@ function show(data) {
 
   function drawFrame() {
     const names = [...data.variables, "step"], [a, b] = chosen();
+    pen.font = "17px sans-serif";
+    left = 12 + Math.max(...[names[b], ...ticksIn(windows[1]).map(number)].map((word) => pen.measureText(word).width));
     pen.fillStyle = "#ffffff";
     pen.fillRect(0, 0, canvas.width, canvas.height);
     pen.strokeStyle = "#888888";
     pen.strokeRect(left, top, canvas.width - left - right, canvas.height - bottom - top);
     pen.fillStyle = "#222222";
-    pen.font = "14px sans-serif";
     pen.textBaseline = "middle";
     pen.textAlign = "center";
     for (const t of ticksIn(windows[0])) pen.fillText(number(t), place(t, 0), canvas.height - bottom + 14);
@@ -113,7 +114,7 @@ function show(data) {
     pen.textAlign = "right";
     for (const t of ticksIn(windows[1])) pen.fillText(number(t), left - 6, place(t, 1));
     pen.textAlign = "left";
-    pen.fillText(names[b], 4, top + 8);
+    pen.fillText(names[b], 4, top - 10);
   }
 
   function draw() {

@@ -92,6 +92,7 @@ def explore_data(found: Analysis) -> dict[str, Any]:
         "rows": rows,
         "has_eps": map_.has_eps,
         "eps": to_float(_EPS if found.eps is None else found.eps),
+        "eps_moves": found.eps is None,
         "start": [float(f"{value:.4g}") for value in start],
         "reach": reach,
         "functions": [one for one in watched if len(one["above"]) + len(one["below"]) <= _MOST_TERMS],
@@ -128,7 +129,8 @@ def _picture(data: Mapping[str, Any]) -> str:
     lines = [_slider(f"x{k}", name, -reach, reach, data["start"][k]) for k, name in enumerate(data["variables"])]
     if data["has_eps"]:
         most = max(_LARGEST_EPS, 2 * abs(data["eps"]))
-        lines.insert(0, _slider("eps", "eps", -most if data["eps"] < 0 else 0, most, data["eps"]))
+        slider = _slider("eps", "eps", -most if data["eps"] < 0 else 0, most, data["eps"])
+        lines.insert(0, slider if data["eps_moves"] else slider.replace("<input", "<input disabled"))
     lines.append(_slider("steps", "steps", 10, _MOST_STEPS, _STEPS, "10"))
     first, second = (n, 0) if n == 1 else (0, 1)
     return f"""<canvas id="explore-canvas" width="720" height="540" role="img" aria-label="the orbit"></canvas>
@@ -141,7 +143,7 @@ def _picture(data: Mapping[str, Any]) -> str:
 
 
 def _slider(name: str, label: str, low: float, high: float, value: float, step: str = "any") -> str:
-    limits = f'min="{low:g}" max="{high:g}" step="{step}" value="{value:g}"'
+    limits = f'min="{low:g}" max="{high:g}" step="{step}" value="{value!r}"'
     return (
         f'<label><span>{markup.escape(label)}</span><input type="range" id="explore-{name}" {limits}/>'
         f'<output id="explore-{name}-value"></output></label>\n'

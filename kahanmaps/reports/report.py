@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Report
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.errors import InputError
@@ -19,8 +18,6 @@ from kahanmaps.reports.claims_page import claims_page
 from kahanmaps.reports.explore_page import explore_page
 from kahanmaps.reports.pictures import Pictures
 from kahanmaps.whole_files import write_whole
-
-_LONGEST_TITLE = 120
 
 
 def report_html(
@@ -89,9 +86,4 @@ def write_report(path: str | Path, found: Any, **options: Any) -> None:
 
 def _title(file: SystemFile) -> str:
     """What the catalogue calls it; equations from the command line have no name and stand for themselves, if short."""
-    if file.name == "inline" and file.is_quadratic:
-        shown = ", ".join(
-            f"{name}' = {format_polynomial(f)}" for name, f in zip(file.variables, file.system.rhs, strict=True)
-        )
-        return shown if len(shown) <= _LONGEST_TITLE else file.name
-    return str(file.catalog.get("title", "")) or file.name
+    return str(file.catalog.get("title", "")) or file.label

@@ -55,7 +55,7 @@ def test_a_system_that_is_stopped_early_is_told_and_drawn(kahanmaps):
     image = " ".join(f"--image '{entry}'" for entry in ("b", "c", "d", "e", "(3 + b + c^2 + d + e)/a"))
     done = kahanmaps(f"plot degrees --vars a,b,c,d,e {image} --max-degree 30")
     assert done.status == 3
-    assert "inline: stopped early: the degree of iterate 9 is above 30" in done.err
+    assert ": stopped early: the degree of iterate 9 is above 30" in done.err
     done = kahanmaps("plot degrees euler_top --max-degree 300")
     assert "euler_top: stopped" not in done.err
 

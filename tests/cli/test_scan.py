@@ -157,7 +157,7 @@ def test_what_another_scan_has_kept_is_refused(kahanmaps, tmp_path):
     assert kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept").status == 0
     outcome = kahanmaps(f"scan {QUICK} --keep {tmp_path}/kept --seed 1")
     assert (outcome.status, outcome.out) == (2, "")
-    assert "of a scan with another value of seed, expected this one" in outcome.err
+    assert "of a scan with another seed, expected one of this scan" in outcome.err
     (tmp_path / "other").write_text("name = 1\n")
     assert "expected a file that a scan has kept" in kahanmaps(f"scan {QUICK} --keep {tmp_path}/other").err
     assert (tmp_path / "other").read_text() == "name = 1\n"

@@ -156,13 +156,13 @@ EULER = r"""\[
 \right.
 \]
 \[
-F_1 = \frac{1 - \varepsilon^2 x_2^2}{1 + 2 \varepsilon^2 x_3^2}
+F_1 = -\frac{\varepsilon^2 x_2^2 - 1}{2 \varepsilon^2 x_3^2 + 1}
 \]
 \[
-F_2 = \frac{1 + 2 \varepsilon^2 x_3^2}{1 + 2 \varepsilon^2 x_1^2}
+F_2 = \frac{2 \varepsilon^2 x_3^2 + 1}{2 \varepsilon^2 x_1^2 + 1}
 \]
 \[
-\phi = \left(1 + 2 \varepsilon^2 x_3^2\right)^2
+\phi = \left(2 \varepsilon^2 x_3^2 + 1\right)^2
 \]
 """
 

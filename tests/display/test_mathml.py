@@ -85,11 +85,16 @@ def test_a_polynomial_is_read_back_equal(polynomial):
 def test_a_rational_function_is_read_back_equal(above, below):
     function = RationalFunction(above, below)
     found = ElementTree.fromstring(mathml_rational_function(function))
-    if function.is_polynomial:
+    if function.is_polynomial or function.numerator.is_zero():
         assert read_row(found) == function.numerator
         return
+    sign = 1
+    if found.tag == "mrow":
+        minus, found = found
+        assert minus.text == "−"
+        sign = -1
     assert found.tag == "mfrac"
-    assert RationalFunction(read_row(found[0]), read_row(found[1])) == function
+    assert RationalFunction(sign * read_row(found[0]), read_row(found[1])) == function
     assert len(list(found.iter("mfrac"))) == 1, "a fraction within the fraction"
 
 
@@ -124,9 +129,27 @@ def test_a_short_formula_is_one_piece_and_a_long_one_has_one_for_each_term():
 def test_a_long_quotient_is_written_with_a_slash():
     short = element(formula(parse_rational_function("x/(1 + y)", ["x", "y"])))
     assert [one.tag for one in short.iter("mfrac")] == ["mfrac"]
-    long = element(formula(RationalFunction(LONG, parse_polynomial("x*y", ["x", "y"])), "I"))
+    long = element(formula(RationalFunction(LONG + 1, parse_polynomial("x*y", ["x", "y"])), "I"))
     texts = [math.get("alttext") for math in long.iter("math")]
     assert (texts[:2], texts[-4:]) == (["I =", "("], ["/", "(", "x*y", ")"])
+
+
+@pytest.mark.parametrize(
+    ("text", "plain", "first"),
+    [
+        ("(x^2 - 1)*y/(1 - x*y)^2", "y*(x^2 - 1)/(x*y - 1)^2", "mstyle"),
+        ("-3*(x - y)^2*(x + y)^3*(x + 2*y)^2*(x + 5*y)/(2*y*(x + 3*y)*(x - 7*y)^2)", None, "mo"),
+        ("(x + 1)^4*y", "y*(x + 1)^4", "mstyle"),
+    ],
+)
+def test_products_are_shown_in_factors_with_powers_behind_the_brackets(text, plain, first):
+    function = parse_rational_function(text, ["x", "y"])
+    pieces = list(element(formula(function)).iter("math"))
+    assert pieces[0][0].tag == first
+    shown = " ".join(math.get("alttext") for math in pieces)
+    assert parse_rational_function(shown, ["x", "y"]) == function
+    assert "(" in shown
+    assert plain in (None, shown)
 
 
 def test_what_is_too_long_is_cut_and_its_terms_are_told():

@@ -92,9 +92,18 @@ def test_true_and_false_are_counted():
     assert bars(axes) == {"true": [3], "false": [1]}
 
 
+def test_numbers_with_few_values_are_counted_unless_a_scale_is_given():
+    rows = numbers([1, 1, 1, 2, 2, 1, 1, "2.29663026288653824570"] * 2)
+    axes = draw_batch(summarise(rows, []), ["c"]).axes[0]
+    assert [label.get_text() for label in axes.figure.legends[0].get_texts()] == ["c = 1", "c = 2", "c = 2.29663"]
+    assert [bar.get_width() for bar in axes.patches] == [10, 4, 2]
+    assert not draw_batch(summarise(rows, []), ["c"], scale="linear").legends
+    assert not draw_batch(summarise(numbers(range(16)), []), ["c"]).legends
+
+
 def test_several_values_are_several_panels():
     figure = draw_batch(summarise(numbers(range(9)), ["m"]), ["c", "seconds"], Style(width=17))
-    assert [axes.get_xlabel() for axes in figure.axes] == ["$c$", "seconds"]
+    assert [axes.get_xlabel() for axes in figure.axes] == ["$c$", "tasks by seconds"]
 
 
 def test_of_numbers_beyond_doubles_the_finite_quantiles_are_drawn_and_the_others_told():

@@ -25,6 +25,8 @@ def command(system: str | None, **options: Any) -> int:
       kahanmaps find-density nahm_tetrahedral --toml
       kahanmaps find-density zander_120 --flow
 
+    phi times any integral is a density again: the shortest is shown, --json has all that were found.
+
     Products of powers of known polynomials are of any degree, exponents of either sign. What is found is verified as
     an identity.
 
@@ -48,5 +50,6 @@ def command(system: str | None, **options: Any) -> int:
             seed=options["seed"],
             progress=progress,
         )
-    print_search("find-density", found, options, [("phi", one, "") for one in found.densities])
+    further = f"note\t{found.further}" if found.further else ""
+    print_search("find-density", found, options, [("phi", one, "") for one in found.shown], further)
     return 0 if found.densities else 3

@@ -131,6 +131,8 @@ def command(
     output = None if output == "-" else output
     if as_json and form not in (None, "json"):
         raise click.UsageError(f"give --json or --format {form}, not both")
+    if as_json and output is not None and Path(output).suffix.lower() not in ("", ".json"):
+        raise click.UsageError(f"found --json and the name {output}: give it the ending .json, or leave out --json")
     form = "json" if as_json else form or _form_from_name(output)
     if form == "npy":
         _require_npy(options, output)

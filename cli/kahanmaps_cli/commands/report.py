@@ -84,13 +84,16 @@ def command(system: str | None, **options: Any) -> int:
     analyze: what the map preserves and how it grows, the verdict first. verify: the paper's claims for a member of the
     family, section by section. checks: the four checks, those that apply. The page is one file with its pictures
     inside; it needs no network and no JavaScript, and says how it was made. Only --explore has JavaScript in it: eps
-    and the start move by sliders, and the exact verdict stands beside the picture of the orbit.
+    and the start move by sliders, and the exact verdict stands beside the picture of the orbit. A verdict at one --eps
+    leaves only the start to move.
 
     Exit status: as the command that the page is made of, and 0 for a batch.
     """
     _require_consistent(system, options)
     if options["output"] == "-" and sys.stdout.isatty():
         raise click.UsageError("a terminal cannot show a page: give -o FILE.html")
+    if options["explore"] and options["no_pictures"]:
+        raise click.UsageError("found --explore and --no-pictures, expected one of the two: what moves is a picture")
     suffix = Path(options["output"]).suffix
     if suffix.lower() not in ("", ".html", ".htm", ".xhtml"):
         raise click.UsageError(f"found the ending {suffix} of {options['output']}, expected .html: a page is HTML")

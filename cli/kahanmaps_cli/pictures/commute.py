@@ -72,7 +72,7 @@ def command(system: str | None, other: str | None, **options: Any) -> int:
             captions = list[str]()
             pairs = list(pairs_of_member(file))
         else:
-            captions = [f"f = {file.name}, g = {second.name}"]
+            captions = [f"{file.labelled('f')}, {second.labelled('g')}"]
             pairs = [pair_of_systems(file, second, eps, options["eps2"])]
         found = [squares(pair, options["start"], eps, options["steps"], progress) for pair in pairs]
         below = goes_to_terminal(options)  # side by side, two panels of it are too coarse

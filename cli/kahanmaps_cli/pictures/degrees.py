@@ -76,10 +76,10 @@ def command(systems: tuple[str, ...], **options: Any) -> int:
     files = [load_system(name, options) for name in asked]
     with Progress(options["quiet"]) as progress:
         for file in files:
-            found = measured(file, eps, options, partial(_tell, progress, file.name))
-            _add(growths, file.name, found)
+            found = measured(file, eps, options, partial(_tell, progress, file.label))
+            _add(growths, file.label, found)
             if not is_done(found, None):
-                early.append(f"{file.name}: stopped early: {found.message}")
+                early.append(f"{file.label}: stopped early: {found.message}")
     figure = draw_degrees(growths, style_from(options), scale=options["scale"])
     deliver(figure, options, files[0] if len(files) == 1 else None)
     if not options["quiet"]:

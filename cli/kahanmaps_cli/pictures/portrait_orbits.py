@@ -92,7 +92,7 @@ class Orbits:
         form = None if isinstance(structure, NoStructure) else structure.form
         ensemble = ensemble_for(file.map, fmpq(1) if eps is None else eps, starts, steps, backward=backward, form=form)
         return cls(
-            file.name,
+            file.label,
             file.variables,
             file,
             eps,
@@ -190,6 +190,8 @@ class Orbits:
             pieces = [piece.strip() for piece in text.split(",")]
             if len(pieces) not in (2, 3) or not all(pieces):
                 raise InputError(f"found --axes {text[:60]}, expected two or three: x,y or x,y,z")
+            if len(set(pieces)) < len(pieces):
+                raise InputError(f"found --axes {text[:60]}, expected different ones")
             return tuple(
                 "step" if piece == "step" and "step" not in self.variables else self.function(piece) for piece in pieces
             )

@@ -14,4 +14,6 @@ def two_variables(option: str, text: str | None, variables: tuple[str, ...]) -> 
         raise click.UsageError(
             f"found {option} {text[:60]}, expected two of the variables {', '.join(variables)}, as X,Y"
         )
+    if names[0] == names[1] and len(variables) > 1:
+        raise click.UsageError(f"found {option} {text[:60]}, expected two different variables")
     return variables.index(names[0]), variables.index(names[1])

@@ -23,7 +23,7 @@ from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.checks.theorems import product_density_invariant
 from kahanmaps.displayed import Printed, latex
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InputError
+from kahanmaps.errors import InputError, counted
 from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint
 from kahanmaps.laboratory.preserve.cofactors import (
@@ -92,6 +92,19 @@ class DensitySearch(Printed):
     flow: bool = False  # whether the densities are those of the differential equation
 
     @property
+    def shown(self) -> tuple[FoundDensity, ...]:
+        """The one that stands for all, which are this one times integrals: the shortest, proved if any is."""
+        return tuple(sorted(self.densities, key=lambda one: (one.verdict is not Verdict.PROVED, len(one.text)))[:1])
+
+    @property
+    def further(self) -> str:
+        """That there are more than the one that is shown; empty where there are not."""
+        if len(self.densities) < 2:
+            return ""
+        number = counted(len(self.densities) - 1, "further polynomial")
+        return f"phi times any integral is a density again: so are {number}, which --json lists"
+
+    @property
     def note(self) -> str:
         """That orbits close, and for which eps; of which phi the sign changes; empty where there is nothing to say."""
         closes = closing_note(self.period, self.eps, self.file.map)
@@ -114,13 +127,13 @@ class DensitySearch(Printed):
         }
 
     def toml_section(self) -> str:
-        """The first density as a section [density] of a system file, which `check-measure` accepts.
+        """The density that is shown as a section [density] of a system file, which `check-measure` accepts.
 
         Empty where there is none; for a given eps a comment says that it holds there only.
         """
         if not self.densities:
             return ""
-        return "\n".join([*toml_comment(self.eps, self.file.map), "[density]", f'phi = "{self.densities[0].text}"', ""])
+        return "\n".join([*toml_comment(self.eps, self.file.map), "[density]", f'phi = "{self.shown[0].text}"', ""])
 
 
 def find_densities(

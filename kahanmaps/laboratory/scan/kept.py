@@ -14,6 +14,14 @@ from kahanmaps.errors import InputError
 from kahanmaps.laboratory.scan.sweep import Choice, Sweep
 
 _SETTINGS = "settings"
+_OTHER = {
+    "document": "another system",
+    "over": "other parameters",
+    "eps": "another eps",
+    "by": "another --by",
+    "terms": "other --terms",
+    "seed": "another seed",
+}
 
 
 class Kept:
@@ -48,7 +56,7 @@ class Kept:
             if content and not others:
                 raise InputError(f"found {self._path}, expected a file that a scan has kept")
             if wrong:
-                raise InputError(f"found {self._path} of a scan with another value of {wrong[0]}, expected this one")
+                raise InputError(f"found {self._path} of a scan with {_OTHER[wrong[0]]}, expected one of this scan")
             stream.truncate(len(whole))
             self._sweeps.update(found)
             if not others:

@@ -137,7 +137,10 @@ def scan(
         raise InputError(f"found a scan by {quoted(by)}, expected one by {', '.join(WORDS)}")
     if jobs is not None and jobs < 1:
         raise InputError(f"found {jobs} jobs, expected at least 1")
-    if primes is not None and (len(set(primes)) < 3 or any(p < 5 or not fmpz(p).is_prime() for p in primes)):
+    composite = [p for p in primes or () if not fmpz(p).is_prime()]
+    if composite:
+        raise InputError(f"found {composite[0]} among the primes to scan modulo, which is not one")
+    if primes is not None and (len(set(primes)) < 3 or min(primes) < 5):
         given = ", ".join(map(str, primes))
         raise InputError(f"found the primes {given}, expected at least three different ones, from 5 on")
     rng = random.Random(start := f"scan {seed_for(seed, names, map_.subject, exact)}")
