@@ -62,7 +62,7 @@ class Root:
         if isinstance(field, EtaleAlgebra) and field == self.number_field:
             return field.generator
         if isinstance(field, PrimeField):
-            return self._modulo(field)
+            return field.convert(self.residues(field)[0])
         if isinstance(field, BallField | ComplexBallField):
             return field.convert(self._real(field.bits))
         if isinstance(field, BoundField):
@@ -82,7 +82,8 @@ class Root:
         mantissa, exponent = middle.man_exp()
         return fmpq(mantissa) * fmpq(2) ** int(exponent)
 
-    def _modulo(self, field: PrimeField) -> Any:
+    def residues(self, field: PrimeField) -> list[int]:
+        """All roots modulo the prime, each once. Raises BadPrime where there is none."""
         p = field.prime
         if p >= 2**63:
             raise InputError(f"found a prime of {p.bit_length()} bits, expected at most 63 with a {self}")
@@ -90,7 +91,7 @@ class Root:
         roots = sorted(int(root) for root, _ in nmod_poly(residues, p).roots())
         if not roots:
             raise BadPrime(f"{format_univariate(self.polynomial)} has no root modulo {p}: take another prime", p)
-        return field.convert(roots[0])
+        return roots
 
     def _real(self, bits: int) -> arb:
         with flint.ctx.workprec(bits + _GUARD_BITS):
