@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_mat
 
-from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.document import DocumentReader
@@ -34,7 +34,7 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 if TYPE_CHECKING:
-    from kahanmaps.family.associated import FamilyMember
+    from kahanmaps.family.associated import ConjugateAssociate, FamilyMember
 
 MAX_FILE_BYTES = 16_000_000
 _SECTIONS = ("catalog", "parameters", *KINDS, "integrals", "density")
@@ -143,6 +143,17 @@ class SystemFile(Displayed):
             document["variables"] = list(member.variables)
         chosen = member.chosen
         return cls(name, "family", {}, Kahan(chosen.system), chosen.hamiltonian, member, {}, None, document)
+
+    @classmethod
+    def from_conjugate(cls, given: ConjugateAssociate, name: str = "conjugate") -> SystemFile:
+        """An associated system over a number field: a Hamiltonian system with the root as its parameter."""
+        document = {
+            "name": name,
+            "variables": list(names_of(given.chain[0])),
+            "parameters": {given.name: str(given.root)},
+            "hamiltonian": {"H": given.K_text, "J": "standard"},
+        }
+        return parse_system(to_toml(document, ("name", "variables"), _SECTIONS), name)
 
     def to_toml(self) -> str:
         """The file as text; `parse_system` reads it back equal."""

@@ -141,8 +141,8 @@ def analyze(
     """What a map preserves and how it grows, within a time budget.
 
     Args:
-        file: the map, of a differential equation its Kahan map; its claims and facts are not looked at. With an algebraic
-            parameter what is not done over a number field is named in `skipped`.
+        file: the map, of a differential equation its Kahan map; its claims and facts are not looked at. With an
+            algebraic parameter what is not done over a number field is named in `skipped`.
         symbols: names of parameters that integrals and densities are to contain; all else is for the given values.
         eps: an exact number, to analyse the map at that eps only (time step 2 eps); None for every eps.
         seconds: time for everything, about; by default 16 for planar systems, up to 150 from dimension 6 on.

@@ -45,9 +45,9 @@ class Laboratory:
     With `eps` (exact; the time step is 2 eps) all maps are at that eps. With `flow` they are flows, of an adjusted
     Kahan map that of the field at eps = 0, and of a polarised map `map` is then x + eps f. `system` is there if the map
     is the Kahan map of a system without eps in its coefficients: what theorems say of these is known then. `field` is
-    the system or, with `flow`, the field of any degree. Where a parameter is an algebraic number, the `root`, and this is
-    `algebraic`, it is the only one of the `symbols`, with no values but the roots modulo primes; `free_symbols` are those
-    that have any value.
+    the system or, with `flow`, the field of any degree. Where a parameter is an algebraic number, the `root`, and this
+    is `algebraic`, it is the only one of the `symbols`, with no values but the roots modulo primes; `free_symbols` are
+    those that have any value.
     Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
@@ -97,7 +97,8 @@ class Laboratory:
         if flow and (self.field is None or self.eps is not None):
             what = "eps = " + str(self.eps) if self.field is not None else self.map.kind
             raise InputError(f"found {what}, expected a polynomial vector field without eps: its flow is asked for")
-        self.seed = seed_for(seed, self.symbols, file.map.subject if self.root else self.map.subject, self.eps)  # of all that is drawn for this map
+        subject = self.map.subject if self.root is None else file.map.subject
+        self.seed = seed_for(seed, self.symbols, subject, self.eps)  # of all that is drawn for this map
         self.maps = list(self._drawn("laboratory", 2))
 
     def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:

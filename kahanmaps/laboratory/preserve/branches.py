@@ -21,6 +21,7 @@ from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator
 from kahanmaps.algebra.roots import Root
 from kahanmaps.laboratory.modular_points import ModularMap
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.number_fields import reconstruct_at
 
 Pattern = tuple[tuple[bool, ...], ...]
 Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]
@@ -55,7 +56,12 @@ class Branches:
 
 
 def tell_apart(
-    model: Sequence[DarbouxSpace], alike: Alike, names: Sequence[str], seed: int, deadline: float, root: Root | None = None
+    model: Sequence[DarbouxSpace],
+    alike: Alike,
+    names: Sequence[str],
+    seed: int,
+    deadline: float,
+    root: Root | None = None,
 ) -> Branches | None:
     """What tells spaces of one pattern apart at every value of `names`; None where they are conjugate or time is over.
 

@@ -30,8 +30,8 @@ MAX_DEGREE = 6  # of a field: its polynomial splits modulo one prime in 720 or m
 def reconstruct_at(root: Root | None, black_box: BlackBox, names: Sequence[str], **options: Any) -> Reconstruction:
     """As `reconstruct` does, the first of the names standing for the root where there is one.
 
-    The box is asked at all roots modulo primes at which the polynomial splits; the functions are polynomials of a degree
-    below that of the field in the first name. `options` are those of `reconstruct`.
+    The box is asked at all roots modulo primes at which the polynomial splits; the functions are polynomials of a
+    degree below that of the field in the first name. `options` are those of `reconstruct`.
     """
     if root is None:
         return reconstruct(black_box, names, **options)
@@ -90,7 +90,10 @@ def primitive_over(root: Root, polynomial: fmpq_mpoly, n: int) -> fmpq_mpoly:
         while rest:
             content, rest = rest, _divided(content, rest)[1]
     entries = {
-        (*exponents, e): c for exponents, row in parts.items() for e, c in enumerate(_divided(row, content)[0]) if c != 0
+        (*exponents, e): c
+        for exponents, row in parts.items()
+        for e, c in enumerate(_divided(row, content)[0])
+        if c != 0
     }
     found = []
     for unit in {str(c): c for c in entries.values()}.values():
