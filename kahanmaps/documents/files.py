@@ -94,6 +94,17 @@ class SystemFile(Displayed):
         )
 
     @property
+    def rounded(self) -> SystemFile:
+        """The file, for floats: with a rational number next to the root where a parameter is an algebraic one.
+
+        Raises InputError where that is not real.
+        """
+        if not isinstance(self.map, AlgebraicMap):
+            return self
+        value = {self.map.given.symbols[0]: self.map.root.rounded()}
+        return SystemFile(*DocumentReader(dict(self.document), self.name, value).read())
+
+    @property
     def structure(self) -> Structure | NoStructure:
         """The normal form of the system, looked for anew each time, or why there is none."""
         if not self.is_quadratic:
