@@ -211,6 +211,26 @@ def is_inline(options: Mapping[str, Any], reference: str | None = None) -> bool:
     return are_equations(reference) or any(options.get(name) for name in ("variables", "rhs", "image", "inverse"))
 
 
+def load_pair(
+    reference: str | None, other: str | None, options: Mapping[str, Any]
+) -> tuple[SystemFile, SystemFile | None]:
+    """Two systems, the second one perhaps none: -p sets a parameter of both, or of the one that has it."""
+    given = dict(options.get("parameters", ()))
+    if other is None or not given:
+        return load_system(reference, options), None if other is None else load_system(other, {})
+    if other == "-":  # which can be read once
+        raise click.UsageError("found -p with OTHER on standard input, expected a file: is the parameter one of both?")
+    named = [
+        set(given) if are_equations(one) else set(load_system(one, {}).document.get("parameters", ()))
+        for one in (other, *([] if reference in (None, "-") else [reference]))
+    ]
+    of_first = [pair for pair in options["parameters"] if pair[0] not in named[0] or pair[0] in named[-1]]
+    if len(named) == 1:  # the first one is inline, and may have every parameter
+        of_first = options["parameters"]
+    of_second = [pair for pair in options["parameters"] if pair[0] in named[0]]
+    return load_system(reference, {**options, "parameters": of_first}), load_system(other, {"parameters": of_second})
+
+
 def load_system(reference: str | None, options: Mapping[str, Any]) -> SystemFile:
     """The system that a command line names: a path, a catalogue name, `-` for standard input, equations, or options.
 

@@ -141,6 +141,12 @@ def _eps(header: dict[str, Any]) -> str:
     return f"eps = {header['eps']}{step}, "
 
 
+def _algebraic(header: dict[str, Any]) -> str:
+    """Which number a parameter is, t in exact points, where it is an algebraic one."""
+    t = "t = " if header["arithmetic"] == "exact" else ""
+    return "".join(f", {t}{name} = {root}" for name, root in header.get("algebraic", {}).items())
+
+
 class Text(Writer):
     """Tab-separated columns; on a terminal of that many columns numbers are shortened so that a row fits a line.
 
@@ -156,7 +162,7 @@ class Text(Writer):
     def header(self, header: dict[str, Any]) -> None:
         names = [*self.columns, *self.integrals]
         title = (
-            f"# {header['system']}, {_eps(header)}{header['arithmetic']} arithmetic"
+            f"# {header['system']}, {_eps(header)}{header['arithmetic']} arithmetic{_algebraic(header)}"
             + (f" ({header['kernel']})" if "kernel" in header else "")
             + (", backward" if header["direction"] == "backward" else "")
         )

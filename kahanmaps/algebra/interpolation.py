@@ -72,6 +72,7 @@ def reconstruct(
     max_degree: int = 40,
     max_samples: int = 3000,
     deadline: float | None = None,
+    draw: Callable[[random.Random], int] = random_prime,
 ) -> Reconstruction:
     """The rational functions over Q of the symbols `names` that a black box gives the values of.
 
@@ -83,6 +84,7 @@ def reconstruct(
         max_degree: along any line the degrees of numerator and denominator add up to at most twice this number.
         max_samples: bound for the number of calls.
         deadline: a value of `time.monotonic()` at which to give up, looked at between calls.
+        draw: what gives a random prime, where not all will do.
 
     Returns:
         A `Reconstruction`: functions in lowest terms, or None and a reason. A black box that is not rational, or that
@@ -106,9 +108,9 @@ def reconstruct(
     primes: list[int] = []
 
     def fresh() -> Values:
-        prime = random_prime(rng)
+        prime = draw(rng)
         while prime in primes:
-            prime = random_prime(rng)
+            prime = draw(rng)
         primes.append(prime)
         return Values(black_box, prime, budget)
 

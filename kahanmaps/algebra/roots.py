@@ -7,6 +7,7 @@ every root of g. Modulo a prime any root there stands for it; real numbers need 
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -29,8 +30,8 @@ class Root:
     """A root of the irreducible `polynomial`, monic; of several real ones that next to `near`, where it is given.
 
     >>> root = parse_root("root of 2*t^2 - 4 near 1.4")
-    >>> root, root.number_field
-    (root of t^2 - 2 near 7/5, QQ[t]/(t^2 - 2))
+    >>> root, root.number_field, root == parse_root("root of t^2 - 2 near 3/2")
+    (root of t^2 - 2 near 1.414, QQ[t]/(t^2 - 2), True)
     """
 
     def __init__(self, polynomial: fmpq_poly, near: fmpq | None = None) -> None:
@@ -46,6 +47,21 @@ class Root:
             raise InputError(f"found a root of {g}, expected an irreducible polynomial: {what}")
         self.polynomial = polynomial / polynomial.leading_coefficient()
         self.near = near
+        self._near_text = "" if near is None else QQ.format(near)
+        if near is not None:
+            with suppress(InputError):  # which is said where the real number is needed
+                self._shorten()
+
+    def _shorten(self) -> None:
+        """One text for all numbers that mean the same root: the first decimal of 4, 8, ... digits that does."""
+        root = self._real(256)
+        for digits in (4, 8, 16, 32, 64):
+            text = root.str(digits, radius=False)
+            near = parse_number(text)
+            with suppress(InputError):
+                if self._real(256, near).overlaps(root):
+                    self.near, self._near_text = near, text
+                    return
 
     @property
     def degree(self) -> int:
@@ -62,7 +78,7 @@ class Root:
         if isinstance(field, EtaleAlgebra) and field == self.number_field:
             return field.generator
         if isinstance(field, PrimeField):
-            return self._modulo(field)
+            return field.convert(self.residues(field)[0])
         if isinstance(field, BallField | ComplexBallField):
             return field.convert(self._real(field.bits))
         if isinstance(field, BoundField):
@@ -82,7 +98,8 @@ class Root:
         mantissa, exponent = middle.man_exp()
         return fmpq(mantissa) * fmpq(2) ** int(exponent)
 
-    def _modulo(self, field: PrimeField) -> Any:
+    def residues(self, field: PrimeField) -> list[int]:
+        """All roots modulo the prime, each once. Raises BadPrime where there is none."""
         p = field.prime
         if p >= 2**63:
             raise InputError(f"found a prime of {p.bit_length()} bits, expected at most 63 with a {self}")
@@ -90,17 +107,26 @@ class Root:
         roots = sorted(int(root) for root, _ in nmod_poly(residues, p).roots())
         if not roots:
             raise BadPrime(f"{format_univariate(self.polynomial)} has no root modulo {p}: take another prime", p)
-        return field.convert(roots[0])
+        return roots
 
-    def _real(self, bits: int) -> arb:
+    @property
+    def decimal(self) -> str:
+        """The real root that is meant, `, about 1.41421356237310`; empty where there is none, or no choice."""
+        try:
+            return f", about {self._real(64).str(15, radius=False)}"
+        except InputError:
+            return ""
+
+    def _real(self, bits: int, near: fmpq | None = None) -> arb:
+        near = self.near if near is None else near
         with flint.ctx.workprec(bits + _GUARD_BITS):
             roots: Any = self.polynomial.numer().complex_roots()  # FLINT's stubs say less
             found: list[arb] = [root.real for root, _ in roots if root.imag.is_zero()]
             if not found:
                 raise InputError(f"a {self} is not real: take exact or mod:P arithmetic")
-            near = arb(0 if self.near is None else self.near)
-            first, *others = sorted(found, key=lambda root: float(abs(root - near)))
-            if others and (self.near is None or not abs(first - near) < abs(others[0] - near)):  # a comparison of balls
+            middle = arb(0 if near is None else near)
+            first, *others = sorted(found, key=lambda root: float(abs(root - middle)))
+            if others and (near is None or not abs(first - middle) < abs(others[0] - middle)):  # a comparison of balls
                 texts = ", ".join(root.str(6, radius=False) for root in found)
                 raise InputError(f"a {self} may be {texts}: say which, e.g. near {found[-1].str(4, radius=False)}")
             return first
@@ -118,7 +144,7 @@ class Root:
         return hash(str(self))
 
     def __repr__(self) -> str:
-        near = "" if self.near is None else f" near {QQ.format(self.near)}"
+        near = f" near {self._near_text}" if self._near_text else ""
         return f"root of {format_univariate(self.polynomial)}{near}"
 
 

@@ -176,8 +176,8 @@ def run_orbit(
 def along(identity: Identity, run: OrbitRun) -> tuple[Evidence, Witness | None]:
     """Try an identity at every point of an exact orbit."""
     tried = poles = 0
-    for point in run.points:
-        eps = identity.ground.convert(run.eps)
+    for exact in run.points:
+        point, eps = tuple(map(identity.ground.convert, exact)), identity.ground.convert(run.eps)
         sides = identity.at(identity.ground, point, eps)
         if sides is None:
             poles += 1

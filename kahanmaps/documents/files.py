@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from flint import fmpq, fmpq_mat
 
-from kahanmaps.algebra.polynomials import RationalFunction
+from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.document import DocumentReader
@@ -34,7 +34,7 @@ from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 if TYPE_CHECKING:
-    from kahanmaps.family.associated import FamilyMember
+    from kahanmaps.family.associated import ConjugateAssociate, FamilyMember
 
 MAX_FILE_BYTES = 16_000_000
 _LONGEST_LABEL = 120
@@ -108,6 +108,17 @@ class SystemFile(Displayed):
         )
 
     @property
+    def rounded(self) -> SystemFile:
+        """The file, for floats: with a rational number next to the root where a parameter is an algebraic one.
+
+        Raises InputError where that is not real.
+        """
+        if not isinstance(self.map, AlgebraicMap):
+            return self
+        value = {self.map.given.symbols[0]: self.map.root.rounded()}
+        return SystemFile(*DocumentReader(dict(self.document), self.name, value).read())
+
+    @property
     def structure(self) -> Structure | NoStructure:
         """The normal form of the system, looked for anew each time, or why there is none."""
         if not self.is_quadratic:
@@ -157,6 +168,17 @@ class SystemFile(Displayed):
             document["variables"] = list(member.variables)
         chosen = member.chosen
         return cls(name, "family", {}, Kahan(chosen.system), chosen.hamiltonian, member, {}, None, document)
+
+    @classmethod
+    def from_conjugate(cls, given: ConjugateAssociate, name: str = "conjugate") -> SystemFile:
+        """An associated system over a number field: a Hamiltonian system with the root as its parameter."""
+        document = {
+            "name": name,
+            "variables": list(names_of(given.chain[0])),
+            "parameters": {given.name: str(given.root)},
+            "hamiltonian": {"H": given.K_text, "J": "standard"},
+        }
+        return parse_system(to_toml(document, ("name", "variables"), _SECTIONS), name)
 
     def to_toml(self) -> str:
         """The file as text; `parse_system` reads it back equal."""

@@ -14,12 +14,16 @@ from functools import cached_property
 
 from flint import fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly
 
+from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.polynomials import names_of
+from kahanmaps.algebra.roots import MAX_DEGREE, Root
+from kahanmaps.algebra.text import format_polynomial, format_univariate
 from kahanmaps.displayed import Displayed
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.cubics import chain
 from kahanmaps.family.skew_hamiltonian import (
     Factor,
+    chi,
     evaluate_at_matrix,
     factors_of_chi,
     require_skew_hamiltonian,
@@ -51,6 +55,37 @@ class AssociatedSystem(Displayed):
     def label(self) -> str:
         """The signs as text, `++-`."""
         return "".join("+" if sign > 0 else "-" for sign in self.signs)
+
+
+@dataclass(frozen=True, eq=False)
+class ConjugateAssociate:
+    """f_s for signs that are those of a rational associated system but at the `root` t of a factor of chi.
+
+    `coefficients` are those of B as a polynomial in A, in Q[t]/g; with the `chain` of H they give K.
+    """
+
+    root: Root
+    signs: tuple[int, ...]
+    coefficients: tuple[EtaleElement, ...]
+    chain: tuple[fmpq_mpoly, ...]
+
+    @cached_property
+    def name(self) -> str:
+        """A name for the root that is none of the variables."""
+        names = names_of(self.chain[0])
+        candidates = itertools.chain(["t"], (f"t{k}" for k in itertools.count()))
+        return next(name for name in candidates if name not in names)
+
+    @cached_property
+    def K_text(self) -> str:
+        """The cubic K with grad K = B grad H, its coefficients polynomials in the root."""
+        terms: dict[str, EtaleElement] = {}
+        for coefficient, H in zip(self.coefficients, self.chain, strict=True):
+            for monomial, number in H.terms():
+                text = format_polynomial(H.context().from_dict({monomial: 1}))
+                terms[text] = terms.get(text, 0 * coefficient) + coefficient * number
+        written = (f"({format_univariate(c.polynomial, self.name)})*{text}" for text, c in terms.items() if c != 0)
+        return " + ".join(written) or "0"
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +170,36 @@ class FamilyMember(Displayed):
         """All rational associated systems up to an overall sign, 2^(r-1) for r factors; the first is f_0 itself."""
         for rest in itertools.product((1, -1), repeat=len(self.factors) - 1):
             yield self.associate((1, *rest))
+
+    @cached_property
+    def roots(self) -> dict[int, Root]:
+        """Roots of the factors, by their place, of degree 2 or more that occur once."""
+        factors = enumerate(self.factors)
+        return {k: Root(f.polynomial) for k, f in factors if f.multiplicity == 1 and 2 <= f.degree <= MAX_DEGREE}
+
+    def conjugate_associates(self) -> Iterator[ConjugateAssociate]:
+        """Those with the other sign at one root t of an irreducible factor g of degree 2 or more, over Q[t]/g.
+
+        For every such factor that occurs once and every choice of signs for the others, up to an overall sign. The
+        conjugates of B differ in the root, and the product of two of them has the other sign at both: with the rational
+        ones they generate all B_s where no root is repeated.
+
+        >>> from kahanmaps.algebra.text import parse_polynomial
+        >>> A = fmpq_mat(4, 4, [0, 2, 0, 0,  1, 0, 0, 0,  0, 0, 0, 1,  0, 0, 2, 0])
+        >>> H = parse_polynomial("2*x1^3 + 3*x1*x2^2 + x3^3 + 6*x3*x4^2", ["x1", "x2", "x3", "x4"])
+        >>> [(str(one.root), one.K_text) for one in FamilyMember(A, H).conjugate_associates()]
+        [('root of t^2 - 2', '(-3*t)*x1^2*x2 + (-1/2*t)*x2^3 + (-3*t)*x3^2*x4 + (-2*t)*x4^3')]
+        """
+        for k, root in self.roots.items():
+            rest = [root.number_field.one]  # chi/(x - t), the highest coefficient first
+            for c in chi(self.A).coeffs()[-2:0:-1]:
+                rest.append(rest[-1] * root.number_field.generator + c)
+            at_root = sum((c * root.number_field.generator**j for j, c in enumerate(reversed(rest))), 0 * rest[0])
+            flipped = [2 * c / at_root for c in reversed(rest)]
+            for signs in itertools.product((1, -1), repeat=len(self.factors) - 1):
+                given = self.associate((*signs[:k], 1, *signs[k:]))
+                coefficients = tuple(a - b for a, b in zip(given.coefficients, flipped, strict=True))
+                yield ConjugateAssociate(root, given.signs, coefficients, self.chain)
 
     @cached_property
     def chosen(self) -> AssociatedSystem:

@@ -4,6 +4,10 @@ The height of a rational point x = (p_1 : ... : p_d : q), integers without a com
 the largest of them, that is floor(log2 max(|p_1|, ..., |p_d|, |q|)) + 1: the logarithmic projective height up to
 less than one bit.
 
+Over a number field Q[t]/g of degree m it is the height of the rational point of all coefficients of 1, t, t^2, ...:
+between that of the point and m times as much, up to a constant (denominators are ideals, and the least integer in one
+is at most its norm), so that the kind of growth is the same.
+
 What is known. One step is a rational map of some degree d, so h(Phi(x)) <= d h(x) + O(1): no growth is faster than
 exponential. Where an orbit stays on a curve, some power of the map is an automorphism of (the smooth model of) a part
 of it. On a rational curve this is a Moebius map: heights grow linearly, or logarithmically where there is one fixed
@@ -41,6 +45,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
+from kahanmaps.algebra.etale import EtaleAlgebra, EtaleElement
 from kahanmaps.algebra.fields import QQ, rational
 from kahanmaps.errors import InputError, counted
 from kahanmaps.family.structure import NoStructure, Structure
@@ -174,14 +179,15 @@ class HeightGrowth:
 
 
 def height(point: Sequence[Any]) -> int:
-    """The height of a point with exact rational coordinates, in bits.
+    """The height of a point with exact coordinates, in bits; over Q[t]/g that of all coefficients of 1, t, t^2, ...
 
     >>> height(["3/4", "-1/6", 0])  # (9 : -2 : 0 : 12)
     4
     """
     # In lowest terms as a whole: a prime that divides the least common denominator to its full power does so in one of
     # the fractions, whose numerator it does not divide.
-    return IntegerPoint.from_rationals([rational(entry) for entry in point]).bits
+    numbers = [entry.coefficients if isinstance(entry, EtaleElement) else [rational(entry)] for entry in point]
+    return IntegerPoint.from_rationals([number for row in numbers for number in row]).bits
 
 
 def height_of(point: OrbitPoint) -> int:
@@ -219,14 +225,16 @@ def height_growth(
     >>> found.heights[:6], found.kind, decimal_text(found.constant)
     ((2, 7, 17, 32, 52, 82), <Growth.QUADRATIC: 'quadratic'>, '3.04132')
     """
-    if kahan_map.field is not QQ:
-        raise InputError(f"found a map over {kahan_map.field}, expected one over Q: only there are heights")
+    if kahan_map.field is not QQ and not isinstance(kahan_map.field, EtaleAlgebra):
+        raise InputError(
+            f"found a map over {kahan_map.field}, expected one over Q or a number field: only there are heights"
+        )
     if every < 1:
         raise InputError(f"found every = {every}, expected at least 1")
     require_steps(steps)
     at = range(0, steps + 1, every)
     first = height(kahan_map.point(start))
-    bits = max(first, kahan_map.eps.p.bit_length(), kahan_map.eps.q.bit_length())
+    bits = max(first, height([kahan_map.eps]))
     if max_digits is not None and 0 < max_digits * 100_000 // 30103 < bits:
         # One step may take minutes then, and its numbers are that long as a rule.
         end = OrbitEnd("budget", 0, f"eps or the start has more digits than the budget of {max_digits} (--max-digits)")

@@ -50,6 +50,7 @@ from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
 _MOST_SECONDS = 150.0
 _MAX_DEGREE = 200_000
+_OVER_NUMBER_FIELDS = ("degrees", "integrals", "densities", "heights")
 _TENSORS = {3: 3, 4: 2}  # degrees of Poisson tensors by dimension; in the plane they are densities
 
 
@@ -140,7 +141,8 @@ def analyze(
     """What a map preserves and how it grows, within a time budget.
 
     Args:
-        file: the map, of a differential equation its Kahan map; its claims and facts are not looked at.
+        file: the map, of a differential equation its Kahan map; its claims and facts are not looked at. With an
+            algebraic parameter what is not done over a number field is named in `skipped`.
         symbols: names of parameters that integrals and densities are to contain; all else is for the given values.
         eps: an exact number, to analyse the map at that eps only (time step 2 eps); None for every eps.
         seconds: time for everything, about; by default 16 for planar systems, up to 150 from dimension 6 on.
@@ -161,13 +163,13 @@ def analyze(
     """
     if seconds is not None and not (seconds > 0 and math.isfinite(seconds)):
         raise InputError(f"found {seconds} seconds, expected a positive number")
-    laboratory = Laboratory(file, symbols, eps, seed)  # refuses what is wrong before any work is done
+    laboratory = Laboratory(file, symbols, eps, seed, algebraic=True)  # refuses what is wrong before any work is done
     map_, dim = file.map, file.dim
     system = file.system if file.is_quadratic else None
     # Without its claims, so that none can be read; with symbols the file itself is needed, and its claims are not read.
     bare = file if symbols or system is None else SystemFile.from_system(system, file.name)
     total = seconds if seconds is not None else _SECONDS.get(dim, _MOST_SECONDS)
-    found = Analysis(file, laboratory.eps, total, seed, laboratory.symbols)
+    found = Analysis(file, laboratory.eps, total, seed, laboratory.free_symbols)
     began = time.monotonic()
 
     def left() -> float:
@@ -184,11 +186,11 @@ def analyze(
             bare, symbols=symbols, eps=found.eps, seconds=share(0.45), seed=seed, progress=told("integrals")
         )
         proved = [one for one in found.integrals.integrals if one.verdict is Verdict.PROVED]
-        if dim == 2 and len(proved) == 1 and not found.symbols:
+        if dim == 2 and len(proved) == 1 and not laboratory.symbols:
             found.pencil = pencil_of(proved[0].name, proved[0].function, found.eps, seed=seed, seconds=share(0.1))
         profile = found.integrals.profile
         if profile.first_degree is not None and profile.period is None:
-            maps = Laboratory(bare, (), found.eps, seed).maps
+            maps = Laboratory(bare, (), found.eps, seed, algebraic=True).maps
             top = profile.degree if profile.dim - profile.codimension <= 1 else profile.first_degree + 1
             for degree in range(profile.first_degree, min(top, profile.degree, 4) + 1):
                 first = 1 + len({name for relation in found.relations for name in relation.names})
@@ -288,6 +290,8 @@ def analyze(
     ]
     # Where degrees make use of them singularities come first; in more dimensions they are slow, and come last.
     parts.insert(2 if dim <= WRITTEN_DIMENSION else len(parts), ("singularities", confinement))
+    if laboratory.root is not None:
+        parts = [part for part in parts if part[0] in _OVER_NUMBER_FIELDS]
     found.pending = [name for name, _ in parts]
     reached(found)
     for name, part in parts:
@@ -301,7 +305,12 @@ def analyze(
                 found.skipped.append(f"{name}: {error}")
         found.pending.remove(name)
         reached(found)
-    if system is None:
+    if laboratory.root is not None:
+        found.skipped.append(
+            f"over the number field {laboratory.root.number_field}: invariant curves, integrals in iterates, the flow, "
+            "Poisson tensors, singularities, symmetries, Hamiltonian structure, the family, commuting systems"
+        )
+    elif system is None:
         found.skipped.append(
             "Hamiltonian structure, the commuting family, symmetries, commuting systems: for fields only"
         )

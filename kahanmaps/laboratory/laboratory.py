@@ -14,6 +14,7 @@ from kahanmaps.algebra.chance import seed_for
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.polynomials import RationalFunction, ring, substitute
 from kahanmaps.algebra.residues import random_prime
+from kahanmaps.algebra.roots import Root
 from kahanmaps.checks.claims import Evidence, Verdict
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
@@ -25,6 +26,8 @@ from kahanmaps.laboratory.preserve.cofactors import Cofactor, cofactor_of_affine
 from kahanmaps.laboratory.preserve.flow import ModularFlow, euler_map, is_kept_by_flow
 from kahanmaps.laboratory.preserve.flow_polynomials import FlowPolynomials, flow_polynomials
 from kahanmaps.laboratory.preserve.identities import verdict_on
+from kahanmaps.laboratory.preserve.number_fields import MAX_DEGREE
+from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.implicit import ImplicitMap
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.polynomial import PolynomialField
@@ -33,6 +36,7 @@ from kahanmaps.systems.quadratic import QuadraticSystem
 _INTEGRAL = Evidence("expansion", "f . grad I is 0, multiplied out")
 _TIMED = Evidence("expansion", "f . grad I is c I for the constant c, multiplied out")
 _DENSITY = Evidence("expansion", "f . grad phi is phi div f, multiplied out")
+_STAND_IN = fmpq(1000003, 7)  # for an algebraic number, where invariant hyperplanes over Q are looked for
 
 
 class Laboratory:
@@ -41,7 +45,9 @@ class Laboratory:
     With `eps` (exact; the time step is 2 eps) all maps are at that eps. With `flow` they are flows, of an adjusted
     Kahan map that of the field at eps = 0, and of a polarised map `map` is then x + eps f. `system` is there if the map
     is the Kahan map of a system without eps in its coefficients: what theorems say of these is known then. `field` is
-    the system or, with `flow`, the field of any degree.
+    the system or, with `flow`, the field of any degree. Where a parameter is an algebraic number, the `root`, and this
+    is `algebraic`, it is the only one of the `symbols`, with no values but the roots modulo primes; `free_symbols` are
+    those that have any value.
     Raises InputError for eps = 0, for eps both a number and a symbol, and for symbols that `map_with_symbols` refuses.
 
     >>> from kahanmaps.documents.catalog import load
@@ -51,16 +57,31 @@ class Laboratory:
     """
 
     def __init__(
-        self, file: SystemFile, symbols: Sequence[str] = (), eps: Any = None, seed: int = 0, *, flow: bool = False
+        self,
+        file: SystemFile,
+        symbols: Sequence[str] = (),
+        eps: Any = None,
+        seed: int = 0,
+        *,
+        flow: bool = False,
+        algebraic: bool = False,
     ) -> None:
         self.file = file
-        self.symbols = tuple(name for name in dict.fromkeys(symbols) if name != "eps")
+        self.symbols = self.free_symbols = tuple(name for name in dict.fromkeys(symbols) if name != "eps")
+        self.root: Root | None = None
         self.eps = None if eps is None else rational(eps)
         if self.eps == 0:
             raise InputError("found eps = 0, expected another number: at eps = 0 the Kahan map is the identity")
         if self.eps is not None and "eps" in symbols:
             raise InputError("found eps both as a number and as a symbol, expected one of the two")
-        self.map = map_with_symbols(file, self.symbols)
+        if algebraic and not flow and isinstance(file.map, AlgebraicMap):
+            self.root, self.map = file.map.root, file.map.given
+            if symbols or self.root.degree > MAX_DEGREE:
+                found = f"a symbol beside a {self.root}" if symbols else f"a {self.root}"
+                raise InputError(f"found {found}, expected no other symbols and a degree of at most {MAX_DEGREE}")
+            self.symbols = self.map.symbols
+        else:
+            self.map = map_with_symbols(file, self.symbols)
         if flow and isinstance(self.map, Kahan) and self.map.system.symbols == ("eps",):
             rhs = tuple(substitute(polynomial, {"eps": fmpq(0)}) for polynomial in self.map.system.rhs)
             self.file = SystemFile.from_system(QuadraticSystem(rhs), file.name)
@@ -76,7 +97,8 @@ class Laboratory:
         if flow and (self.field is None or self.eps is not None):
             what = "eps = " + str(self.eps) if self.field is not None else self.map.kind
             raise InputError(f"found {what}, expected a polynomial vector field without eps: its flow is asked for")
-        self.seed = seed_for(seed, self.symbols, self.map.subject, self.eps)  # of all that is drawn for this map
+        subject = self.map.subject if self.root is None else file.map.subject
+        self.seed = seed_for(seed, self.symbols, subject, self.eps)  # of all that is drawn for this map
         self.maps = list(self._drawn("laboratory", 2))
 
     def map_at(self, prime: int, values: Sequence[int], eps: int) -> ModularMap:
@@ -103,7 +125,10 @@ class Laboratory:
         while count > 0:
             prime = random_prime(rng)
             try:
-                yield self.map_at(prime, [rng.randrange(2, prime) for _ in self.symbols], rng.randrange(2, prime))
+                values = [rng.randrange(2, prime) for _ in self.free_symbols]
+                if self.root is not None:
+                    values = self.root.residues(GF(prime))[:1]
+                yield self.map_at(prime, values, rng.randrange(2, prime))
             except BadPrime:
                 continue
             count -= 1
@@ -156,8 +181,8 @@ class Laboratory:
         gens = context.gens()[: self.system.dim]
         return [
             cofactor_of_affine(one.function, self.system)
-            for one in affine_darboux(self.file.system).functions
-            # l is to divide l' with the symbols free, not only at the values that the file gives them
+            for one in affine_darboux(self.system.at([_STAND_IN]) if self.root else self.file.system).functions
+            # l is to divide l' with the symbols free, not only at the values that the file gives them, or at that one
             if darboux_cofactor(self.system, one.function.compose(*gens, ctx=context)) is not None
         ]
 
@@ -180,7 +205,8 @@ class Laboratory:
             kept = is_kept_by_flow(self.field, function, is_density=is_density, factor=factor)
             evidence = _DENSITY if is_density else _INTEGRAL if factor is None else _TIMED
             return (Verdict.PROVED if kept else Verdict.REFUTED), evidence
-        return verdict_on(self.map, function, self.eps, self.seed, is_density=is_density, factor=factor)
+        map_ = self.map if self.root is None else self.file.map
+        return verdict_on(map_, function, self.eps, self.seed, is_density=is_density, factor=factor)
 
     def formulas(self, model: Spaces, spaces_on: Callable[[ModularMap], Spaces | None], deadline: float) -> ClosedForms:
         """The polynomials that span spaces known modulo primes: `model` on the first map, `spaces_on(map)` on others.
@@ -193,6 +219,7 @@ class Laboratory:
             self.map.variables,
             self.symbols,
             self.eps_enters,
+            root=self.root,
             seed=self.seed,
             seconds=max(1.0, deadline - time.monotonic()),
         )

@@ -18,6 +18,7 @@ from kahanmaps.algebra.text import parse_polynomial, parse_rational_function
 from kahanmaps.documents.files import SystemFile
 from kahanmaps.documents.symbols import map_with_symbols
 from kahanmaps.errors import InputError
+from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.kahan import Kahan
 
@@ -30,8 +31,8 @@ MAX_DIMENSION_OF_FORMULAS = 8
 class Formulas:
     """The formulas of a system file, its parameters numbers or, those in `symbols`, symbols.
 
-    `names` are the variables, then the symbols; `rhs` and `H` are in these names, all else in these names and eps. Of a
-    map that is not Kahan's there is no `rhs`.
+    An algebraic number is such a symbol. `names` are the variables, then the symbols; `rhs` and `H` are in these names,
+    all else in these names and eps. Of a map that is not Kahan's there is no `rhs`.
     """
 
     file: SystemFile
@@ -45,9 +46,14 @@ class Formulas:
     def of(cls, file: SystemFile, kept: Sequence[str] = ()) -> Formulas:
         """The formulas of a file; the parameters `kept` are left as symbols. Raises InputError where that cannot be."""
         hamiltonian = file.hamiltonian
-        map_ = map_with_symbols(file, kept)
-        rhs = map_.system.rhs if file.is_quadratic and isinstance(map_, Kahan) else ()
-        if not kept:
+        if isinstance(file.map, AlgebraicMap):
+            if kept:
+                raise InputError(f"found symbols beside a {file.map.root}, expected none: it is one")
+            map_ = file.map.given
+        else:
+            map_ = map_with_symbols(file, kept)
+        rhs = map_.system.rhs if isinstance(map_, Kahan) and "eps" not in map_.system.symbols else ()
+        if not map_.symbols:
             H = None if hamiltonian is None else hamiltonian.H
             return cls(file, map_, rhs, file.integrals, file.density, H)
         symbols, names = map_.symbols, map_.names[:-1]

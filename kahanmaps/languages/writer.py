@@ -57,6 +57,10 @@ def header(formulas: Formulas, command: str, width: int = 100) -> list[str]:
         lines.append(f"Parameters: {', '.join(numbers)}")
     if formulas.symbols:
         lines.append(f"Parameters left as symbols: {', '.join(formulas.symbols)}")
+    if (root := file.map.root) is not None:
+        lines.append(
+            f"where {formulas.symbols[0]} is a {root}{root.decimal}: give that number, or any of its conjugates."
+        )
     convention = file.catalog.get("convention")
     lines += [f"Convention of the source: {convention}"] if convention else []
     lines += [f"Source: {SOURCES[key]}" for key in file.catalog.get("sources", ())]

@@ -361,8 +361,9 @@ class BirationalMap(DisplayedAsFormula, ABC):
         if self.root is None:
             return ""
         return (
-            f"found a parameter that is a {self.root}, expected rational ones: algebraic numbers are for orbit, "
-            "ensemble, lyapunov, check-commute, check-integrals, check-measure, degrees, cycles and portraits"
+            f"found a parameter that is a {self.root}, expected rational ones: algebraic numbers are for analyze, "
+            "orbit, ensemble, lyapunov, check-commute, check-integrals, check-measure, find-integrals, find-density, "
+            "degrees, heights, cycles and portraits"
         )
 
     @property

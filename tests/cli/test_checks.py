@@ -127,6 +127,17 @@ def test_the_second_map_may_have_another_step(kahanmaps):
     assert (report["eps"], report["eps2"], report["holds"]) == ("1/10", "1/7", True)
 
 
+def test_parameters_are_those_of_both_systems_or_of_the_one_that_has_them(kahanmaps):
+    linear = "check-commute \"x' = a*y; y' = -x\" \"x' = 3*a*y; y' = -3*x\" --json -p"
+    assert kahanmaps(linear, "'a=root of t^2 - 2'").json["verdict"] == "proved"
+    same = kahanmaps("check-commute euler_top euler_top -p a1=3 --json").json
+    assert same["verdict"] == "proved"
+    assert same["document"]["parameters"]["a1"] == same["other_document"]["parameters"]["a1"] == "3"
+    assert kahanmaps("check-commute weierstrass lotka_volterra -p b=7").status == 1
+    assert kahanmaps("check-commute lotka_volterra weierstrass -p b=7").status == 1
+    assert "unknown parameter 'q'" in kahanmaps("check-commute lotka_volterra weierstrass -p q=7").err
+
+
 def test_an_inline_system_may_be_compared_with_another(kahanmaps):
     report = kahanmaps("check-commute --vars x,y --rhs y --rhs=-x harmonic --json").json
     assert (report["system"], report["other"], report["holds"]) == ("inline", "harmonic", True)

@@ -218,6 +218,16 @@ def test_the_associated_systems_are_written_as_files(kahanmaps, pair, tmp_path):
         assert shown["document"]["family"].get("signs", [1, 1]) == row["signs"]
 
 
+def test_associated_systems_over_number_fields_are_written_as_files_that_commute(kahanmaps, tmp_path):
+    file, folder = tmp_path / "mix.toml", tmp_path / "new"
+    assert kahanmaps("family new --chi '(t-1)*(t^2-2)' --seed 1 -o", file).status == 0
+    rows = kahanmaps("family associated", file, "--json --write-to", folder).json["conjugate"]
+    assert [(row["root"], row["signs"]) for row in rows] == [("root of t^2 - 2", [1, 1]), ("root of t^2 - 2", [-1, 1])]
+    assert [Path(row["file"]).name for row in rows] == ["mix-pp-t.toml", "mix-mp-t.toml"]
+    assert kahanmaps("check-commute", rows[0]["file"], rows[1]["file"]).status == 0
+    assert "++ but at t, a root of t^2 - 2\tB = [t + 2, -1/2*t, -1/2*t - 1]" in kahanmaps("family associated", file).out
+
+
 @pytest.mark.parametrize("name", ["../escape", "/escape", "a/b", "..", "a b\\c", "n\u00e4me", "x" * 40])
 def test_files_stay_in_their_folder_whatever_the_name_of_the_system(kahanmaps, tmp_path, name):
     kahanmaps(f"family new --eigenvalues 1,2 --name '{name}' -o", tmp_path / "a.toml")

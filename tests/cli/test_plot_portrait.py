@@ -7,6 +7,7 @@ import signal
 import numpy as np
 import pytest
 
+import kahanmaps as km
 from kahanmaps.documents.catalog import load
 from kahanmaps.maps.floats.fast import FloatOrbit
 from kahanmaps.plots import draw_portrait as drawing
@@ -70,8 +71,24 @@ def test_an_algebraic_parameter_is_rounded_for_starts_and_flow(kahanmaps, drawn)
     np.testing.assert_allclose(found.points, near.points, rtol=1e-9)
     assert len(found.flow.solutions) == len(near.flow.solutions) > 0
     top = "plot portrait euler_top --eps 1/10 --start 1,1,1 --colour-by F1 -p"
-    assert "found the name F1" in kahanmaps(top, "'a1=root of t^2 - 2 near 1.4'").err
+    assert kahanmaps(top, "'a1=root of t^2 - 2 near 1.4'").status == 0
+    top = "plot portrait euler_top --eps 1/10 --start 1,1,1 --levels a1*x1+eps*x2 --axes x1,x2 -p"
+    assert kahanmaps(top, "'a1=root of t^2 - 2 near 1.4'").status == 0
     assert "may be" in kahanmaps(line, "'a=root of t^2 - 2'", "-o -").err
+
+
+@pytest.mark.parametrize("ending", [".csv", ".jsonl", ".npz"])
+def test_stored_points_over_a_number_field_are_drawn_at_the_root_that_is_meant(kahanmaps, drawn, tmp_path, ending):
+    line = "orbit euler_top --eps 1/4 --start 1,1,1 --steps 6 -p"
+    for k, a in enumerate(("root of t^2 - 2 near 1.4", "root of t^2 - 2 near -1.4", "root of t^2 - 2")):
+        assert kahanmaps(line, f"'a1={a}'", "-o", tmp_path / f"{k}{ending}").status == 0
+    assert kahanmaps("plot portrait --from", tmp_path / f"0{ending}").status == 0
+    assert kahanmaps("plot portrait --from", tmp_path / f"1{ending}").status == 0
+    assert "may be" in kahanmaps("plot portrait --from", tmp_path / f"2{ending}").err
+    file = km.load("euler_top", a1="root of t^2 - 2 near 1.4")
+    known = [point.x[:2] for point in km.orbit(file, [1, 1, 1], "1/4", 6, arithmetic="float")]
+    np.testing.assert_allclose(drawn[0][0].points[:, 0], known, rtol=1e-12)
+    assert not np.allclose(drawn[1][0].points[:, 0], known, rtol=1e-3)
 
 
 def test_the_points_are_those_of_the_float_orbit(kahanmaps, drawn, tmp_path):

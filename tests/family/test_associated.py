@@ -7,16 +7,20 @@ at which an irreducible chi splits; and the neighbours that do not commute. Sour
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from flint import fmpq_mat, fmpq_poly
 from helpers import random_point
 
+import kahanmaps as km
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.polynomials import gradient, linear_combinations
 from kahanmaps.algebra.text import parse_polynomial
 from kahanmaps.errors import HypothesisError, InputError
 from kahanmaps.family.associated import FamilyMember, sign_polynomial
-from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues
+from kahanmaps.family.cubics import cubic_space
+from kahanmaps.family.draw import draw_generic, draw_with_chi, draw_with_eigenvalues, parse_chi
 from kahanmaps.family.skew_hamiltonian import Factor, defects, evaluate_at_matrix
 from kahanmaps.maps.kahan import KahanMap
 from kahanmaps.systems.hamiltonian import CubicHamiltonian, standard_structure
@@ -235,3 +239,38 @@ def test_a_matrix_outside_the_family_makes_no_member():
 def test_the_chain_of_a_member_is_that_of_its_matrix():
     member = MEMBERS["m = 2, irreducible"]
     assert gradient(member.chain[1]) == linear_combinations(member.A, gradient(member.chain[0]))
+
+
+# over number fields
+
+
+@pytest.mark.parametrize(
+    ("chi", "count"),
+    [("t^2 - 2", 1), ("t^2 + t + 1", 1), ("t^3 - t - 1", 1), ("(t - 1)*(t^2 - 2)", 2), ("(t - 1)^2", 0)],
+)
+def test_associated_systems_over_a_number_field_commute_with_the_member_and_others_do_not(chi, count):
+    member = draw_with_chi(parse_chi(chi), seed=3)
+    found = list(member.conjugate_associates())
+    assert len(found) == count
+    for one in found:
+        K = one.root.number_field
+        powers = [K.convert_matrix(member.A**k) for k in range(member.m)]
+        unit = K.identity(member.dim)
+        B = sum((P * c for P, c in zip(powers, one.coefficients, strict=True)), unit * 0)
+        assert B * B == unit != B
+        file = km.SystemFile.from_conjugate(one)
+        assert km.parse_system(file.to_toml()) == file
+        assert km.check_commute(km.SystemFile.from_member(member), file).holds
+    if found:
+        # The square of B + 1 is not 1.
+        wrong = replace(found[0], coefficients=(found[0].coefficients[0] + 1, *found[0].coefficients[1:]))
+        wrong_file = km.SystemFile.from_conjugate(wrong)
+        assert km.check_commute(km.SystemFile.from_member(member), wrong_file).verdict is km.Verdict.REFUTED
+
+
+def test_the_root_has_a_name_that_no_variable_has():
+    A = fmpq_mat(4, 4, [0, 2, 0, 0,  1, 0, 0, 0,  0, 0, 0, 1,  0, 0, 2, 0])  # fmt: skip
+    H = cubic_space(A, ("t", "u", "v", "t0")).basis[0]
+    (one,) = FamilyMember(A, H).conjugate_associates()
+    assert one.name == "t1"
+    assert km.SystemFile.from_conjugate(one).variables == ("t", "u", "v", "t0")

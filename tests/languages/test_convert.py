@@ -38,3 +38,22 @@ def test_integrals_and_density_of_a_hamiltonian_system_come_from_theorems():
     text = convert(km.SystemFile.from_hamiltonian(hamiltonian), "sage")
     assert "def modified_hamiltonian(point, eps):" in text
     assert "def density(point, eps):" in text
+
+
+def test_an_algebraic_parameter_is_an_argument_of_the_functions():
+    sympy = pytest.importorskip("sympy")
+    file = km.load("euler_top", a1="root of t^2 - 2 near 1.4")
+    text = convert(file, "sympy")
+    assert "where a1 is a root of t^2 - 2 near 1.414, about 1.41421356237310" in text
+    made: dict = {}
+    exec(text, made)
+    x = sympy.Matrix([1, 1, 1])
+    ((_, point),) = [(p.step, p.text) for p in km.orbit(file, [1, 1, 1], "1/4", 1)][1:]
+    for t, is_it in ((sympy.sqrt(2), True), (-sympy.sqrt(2), True), (sympy.Integer(2), False)):
+        image = made["kahan_map"](x, sympy.Rational(1, 4), t)
+        wanted = [sympy.sympify(entry).subs("t", t) for entry in point]
+        assert all(sympy.simplify(a - b) == 0 for a, b in zip(image, wanted, strict=True)) is is_it
+    for language in LANGUAGES:
+        assert "a1" in convert(file, language)
+    with pytest.raises(km.InputError, match="found symbols beside a root"):
+        convert(file, "pari", symbols=["a2"])

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from kahanmaps_cli.complete import complete_system
-from kahanmaps_cli.options import check_options, inline_options, is_inline, load_system, settings_from, system_argument
+from kahanmaps_cli.options import check_options, inline_options, is_inline, load_pair, settings_from, system_argument
 from kahanmaps_cli.params import ExactNumber
 from kahanmaps_cli.progress import Progress
 from kahanmaps_cli.render import print_report
@@ -34,7 +34,8 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
     For one SYSTEM of kind [family] the maps of H_0 and H_1 = A H_0 come along as a control: they are expected NOT
     to commute, and this does not change the exit status.
 
-    SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x".
+    SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x". -p sets
+    a parameter of both, or of the one that has it.
 
     Exit status: 0 they commute (proved or supported), 1 refuted, 2 wrong use, 3 undecided or stopped early.
     """
@@ -47,7 +48,6 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
         raise click.UsageError("found - twice, but standard input holds one system only")
     with Progress(options["quiet"]) as progress:
         settings = settings_from(options, progress)
-        file = load_system(system, options)
-        second = load_system(other, {}) if other is not None else None
+        file, second = load_pair(system, other, options)
         report = check_commute(file, second, settings, eps2)
     return print_report(report, options["as_json"], options["verbose"], options["quiet"])

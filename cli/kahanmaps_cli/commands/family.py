@@ -201,10 +201,15 @@ def associated(
 
     \b
       kahanmaps family associated paper_m3
-      kahanmaps family associated pair.toml --write-to associated/
+      kahanmaps family associated paper_m3_irreducible --write-to associated/
+      kahanmaps check-commute paper_m3_irreducible \\
+          associated/paper_m3_irreducible-p-t.toml
+
+    Where a factor g of chi is irreducible of degree 2 or more, also those over Q[t]/g that have the other sign at one
+    root t of it only: systems with t as a parameter, "root of g". Conjugates, and products of them, are all others.
     """
     from kahanmaps.algebra.plain import plain
-    from kahanmaps.algebra.text import format_polynomial
+    from kahanmaps.algebra.text import format_polynomial, format_univariate
     from kahanmaps.documents.files import SystemFile
     from kahanmaps.family.associated import FamilyMember
 
@@ -227,6 +232,23 @@ def associated(
             will_write(str(path))
             row["file"] = str(path)
         rows.append(row)
+    conjugate = []
+    for other in member.conjugate_associates():
+        text = "".join("p" if sign > 0 else "m" for sign in other.signs)
+        more: dict[str, Any] = {
+            "root": str(other.root),
+            "symbol": other.name,
+            "signs": list(other.signs),
+            "B_in_powers_of_A": [format_univariate(c.polynomial, other.name) for c in other.coefficients],
+            "K": other.K_text,
+        }
+        if write_to is not None:
+            which = list(member.roots.values()).index(other.root) + 1 if len(member.roots) > 1 else ""
+            path = Path(write_to) / f"{file_name(file.name)}-{text}-{other.name}{which}.toml"
+            written[str(path)] = SystemFile.from_conjugate(other, path.stem)
+            will_write(str(path))
+            more["file"] = str(path)
+        conjugate.append(more)
     if write_to is not None:
         Path(write_to).mkdir(parents=True, exist_ok=True)
     for name, associate_file in written.items():
@@ -238,6 +260,7 @@ def associated(
                 "system": file.name,
                 "factors": [str(f) for f in member.factors],
                 "associated": rows,
+                "conjugate": conjugate,
             }
         )
         return
@@ -246,6 +269,9 @@ def associated(
     for row in rows:
         powers = ", ".join(row["B_in_powers_of_A"])
         tell(f"{row['label']}\tB = [{powers}] in 1, A, A^2, ...\tK = {formula(row['K'])}")
+    for row in conjugate:
+        signs, powers = "".join("+" if sign > 0 else "-" for sign in row["signs"]), ", ".join(row["B_in_powers_of_A"])
+        tell(f"{signs} but at {row['symbol']}, a {row['root']}\tB = [{powers}]\tK = {formula(row['K'])}")
 
 
 @command.command("tensor")

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_system
+from kahanmaps_cli.options import eps_of, eps_options, inline_options, is_inline, load_pair
 from kahanmaps_cli.params import ExactNumber, PointText
 from kahanmaps_cli.pictures.output import (
     PictureCommand,
@@ -63,8 +63,7 @@ def command(system: str | None, other: str | None, **options: Any) -> int:
     if options["eps2"] is not None and other is None:
         raise click.UsageError("--eps2 needs a second system: kahanmaps plot commute SYSTEM OTHER --eps E --eps2 E2")
     with Progress(options["quiet"]) as progress:
-        file = load_system(system, options)
-        second = None if other is None else load_system(other, {})
+        file, second = load_pair(system, other, options)
         eps = eps_of(file if second is None or file.map.has_eps else second, options)
         eps = fmpq(1) if eps is None else eps
         chosen = two_variables("--axes", options["axes"], file.variables)

@@ -62,9 +62,10 @@ def command(system: str | None, **options: Any) -> int:
 
     require_output(options)
     file = load_system(system, options)
-    _ = file.system  # it is compared with methods for vector fields
+    rounded = file.rounded
+    _ = rounded.system  # it is compared with methods for vector fields
     eps = the_eps(options["eps"], options["time_step"])
-    survey = _surveyed(file, eps, options)
+    survey = _surveyed(rounded, eps, options)
     style = style_from(options)
     if options["size"] is None and options["output"] == "-" and options["kind"] in (None, "text"):
         style = replace(style, width=_WIDE, height=0.56 * _WIDE)

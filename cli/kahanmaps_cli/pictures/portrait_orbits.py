@@ -121,7 +121,7 @@ class Orbits:
         from kahanmaps.plots.point_functions import point_function
 
         named = {name: known.function for name, known in self._known().items() if isinstance(known, Expression)}
-        parameters = {} if self.file is None else self.file.parameters
+        parameters = {} if self.file is None else self.file.rounded.parameters
         return point_function(text.strip(), self.variables, self.eps, parameters, named)
 
     def colouring(self, text: str) -> PointFunction | WatchedFunction:
@@ -134,9 +134,9 @@ class Orbits:
 
         from kahanmaps.plots.drift_functions import functions_of
 
-        if self.file is None or self.file.map.root is not None:  # those are functions of the root as well
+        if self.file is None:
             return {}
-        return functions_of(self.file, fmpq(0) if self.eps is None else self.eps)
+        return functions_of(self.file.rounded, fmpq(0) if self.eps is None else self.eps)
 
     def walk(self, progress: Told) -> Trajectories:
         """All points."""

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -112,7 +113,8 @@ def _from_npz(path: str) -> Stored:
     if x.ndim != 2:
         raise InputError(f"{path}: found an array of shape {x.shape}, expected (points, dim)")
     if x.dtype.kind == "S":
-        x = [[_number(cell.decode()) for cell in row] for row in x.tolist()]
+        number = _reader(header)
+        x = [[number(cell.decode()) for cell in row] for row in x.tolist()]
     return _stored(steps, x, header, end)
 
 
@@ -121,15 +123,17 @@ def _from_jsonl(path: str) -> Stored:
     end: dict[str, Any] = {}
     steps: list[int] = []
     rows: list[list[float]] = []
+    number: Callable[[str], float] = _number
     for line in _lines(path):
         record = json.loads(line)
         if record["record"] == "header":
             header = record
+            number = _reader(header)
         elif record["record"] == "end":
             end = record
         else:
             steps.append(int(record["step"]))
-            rows.append([_number(str(entry)) for entry in record["x"]])
+            rows.append([number(str(entry)) for entry in record["x"]])
     return _stored(steps, rows, header, end)
 
 
@@ -143,7 +147,8 @@ def _from_csv(path: str, variables: Sequence[str] | None) -> Stored:
         told = json.loads(Path(meta_of(path)).read_text(encoding="utf-8"))
     header = dict(told["header"])
     width = len(header["variables"])
-    rows = [[_number(cell) for cell in row[1 : 1 + width]] for row in cells]
+    number = _reader(header)
+    rows = [[number(cell) for cell in row[1 : 1 + width]] for row in cells]
     return _stored([row[0] for row in cells], rows, header, dict(told.get("end") or {}))
 
 
@@ -173,6 +178,25 @@ def _names(header: dict[str, Any], width: int) -> tuple[str, ...]:
     if width and len(names) != width:
         raise ValueError(f"{len(names)} names for {width} columns")
     return names
+
+
+def _reader(header: dict[str, Any]) -> Callable[[str], float]:
+    """What reads the numbers of an orbit; those over a number field are read at the real root that is meant."""
+    from kahanmaps.algebra.fields import QQ
+    from kahanmaps.algebra.polynomials import evaluate
+    from kahanmaps.algebra.roots import parse_root
+    from kahanmaps.algebra.text import parse_polynomial
+
+    root = next((parse_root(str(text)) for text in header.get("algebraic", {}).values()), None)
+    if root is None or header.get("arithmetic") != "exact":
+        return _number
+    rounded = cache(root.rounded)
+
+    def number(text: str) -> float:
+        bits = 1 << max(256, 8 * len(text)).bit_length()  # more than can be lost where conjugates are far away
+        return _number(str(evaluate(parse_polynomial(text, ["t"]), QQ, [rounded(bits)])))
+
+    return number
 
 
 def _number(text: str) -> float:

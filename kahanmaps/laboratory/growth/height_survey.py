@@ -63,12 +63,13 @@ class SurveyedOrbit:
 class HeightSurvey(Displayed):
     """The orbits of the survey, in the order of eps and then of starts; `is_whole` is False where time ended it.
 
-    For a map that has no eps that of the orbits means nothing.
+    For a map that has no eps that of the orbits means nothing. `heights.height` says what heights over a field are.
     """
 
     orbits: tuple[SurveyedOrbit, ...]
     is_whole: bool
     has_eps: bool = True
+    over: str = ""  # the number field, where it is not Q
 
     @property
     def kinds(self) -> tuple[Growth, ...]:
@@ -97,7 +98,8 @@ class HeightSurvey(Displayed):
         eps = {orbit.eps for orbit in self.orbits}
         many = f"{decided} of {total}" if decided < total else f"all {total}" if total > 1 else "the"
         at = f", at {counted(len(eps), 'value')} of eps" if self.has_eps else ""
-        return f"{_GROWN[self.kind]} on {many} exact {'orbit' if total == 1 else 'orbits'} tried{at}"
+        of = f", of the coefficients over one denominator of points over {self.over}" if self.over else ""
+        return f"{_GROWN[self.kind]} on {many} exact {'orbit' if total == 1 else 'orbits'} tried{at}{of}"
 
     @property
     def _eps_differ(self) -> bool:
@@ -147,15 +149,14 @@ def height_survey(
     deadline = time.monotonic() + seconds
     orbits: list[SurveyedOrbit] = []
     map_ = as_map(given)
-    if map_.refusal:
-        raise InputError(map_.refusal)
+    field = "" if map_.root is None else map_.root.number_field.name
     for value in (fmpq(1),) if not map_.has_eps else DEFAULT_EPS if eps is None else (rational(eps),):
         over = map_.at(value)
         draws = _generic_starts(map_.dim, seed_for(seed, map_.subject, value))
-        wanted = [None] * starts if isinstance(starts, int) else [over.point(start) for start in starts]
+        wanted = [None] * starts if isinstance(starts, int) else [tuple(map(rational, start)) for start in starts]
         for k, start in enumerate(wanted):
             if orbits and time.monotonic() > deadline:
-                return HeightSurvey(tuple(orbits), False, map_.has_eps)
+                return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
             progress(f"heights: {f'eps = {value}, ' if map_.has_eps else ''}orbit {k + 1} of {len(wanted)}")
             for candidate in islice(draws, _DRAWS) if start is None else (start,):
                 found = height_growth(
@@ -165,8 +166,8 @@ def height_survey(
                     break
             orbits.append(SurveyedOrbit(value, tuple(candidate), found))
             if found.end.status == "interrupted":
-                return HeightSurvey(tuple(orbits), False, map_.has_eps)
-    return HeightSurvey(tuple(orbits), True, map_.has_eps)
+                return HeightSurvey(tuple(orbits), False, map_.has_eps, field)
+    return HeightSurvey(tuple(orbits), True, map_.has_eps, field)
 
 
 def _generic_starts(dim: int, seed: int) -> Iterator[tuple[fmpq, ...]]:

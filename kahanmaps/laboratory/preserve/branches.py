@@ -17,10 +17,11 @@ from dataclasses import dataclass
 from flint import fmpq
 
 from kahanmaps.algebra.fields import GF
-from kahanmaps.algebra.interpolation import reconstruct
 from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, ring, substitute
+from kahanmaps.algebra.roots import Root
 from kahanmaps.laboratory.modular_points import ModularMap
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.number_fields import reconstruct_at
 
 Pattern = tuple[tuple[bool, ...], ...]
 Alike = Callable[[int, tuple[int, ...]], Sequence[DarbouxSpace] | None]
@@ -55,7 +56,12 @@ class Branches:
 
 
 def tell_apart(
-    model: Sequence[DarbouxSpace], alike: Alike, names: Sequence[str], seed: int, deadline: float
+    model: Sequence[DarbouxSpace],
+    alike: Alike,
+    names: Sequence[str],
+    seed: int,
+    deadline: float,
+    root: Root | None = None,
 ) -> Branches | None:
     """What tells spaces of one pattern apart at every value of `names`; None where they are conjugate or time is over.
 
@@ -71,7 +77,7 @@ def tell_apart(
         for place in places[:_COEFFICIENTS]:
             if time.monotonic() > deadline:
                 return None
-            roots = _roots(place, len(model), alike, names, samples, seed, deadline)
+            roots = _roots(place, len(model), alike, names, samples, seed, deadline, root)
             if roots is not None:
                 return Branches(place, roots) if len(roots) == len(model) else None
     return None
@@ -85,6 +91,7 @@ def _roots(
     samples: int,
     seed: int,
     deadline: float,
+    root: Root | None,
 ) -> tuple[RationalFunction, ...] | None:
     """The functions of `names` whose values the coefficient has on so many spaces, as far as they are rational."""
     row, column = place
@@ -100,7 +107,7 @@ def _roots(
             coefficients = [(here - w * before) % prime for here, before in shifted]
         return coefficients[1:]
 
-    answer = reconstruct(symmetric_functions, names, seed=seed, max_samples=samples, deadline=deadline)
+    answer = reconstruct_at(root, symmetric_functions, names, seed=seed, max_samples=samples, deadline=deadline)
     if answer.functions is None:
         return None
     context = ring((*names, "T"))

@@ -9,11 +9,12 @@ from typing import Any
 
 from flint import fmpq_mpoly
 
-from kahanmaps.algebra.interpolation import reconstruct
 from kahanmaps.algebra.polynomials import RationalFunction, over_one_denominator, primitive_part, ring
+from kahanmaps.algebra.roots import Root
 from kahanmaps.errors import BadPrime
 from kahanmaps.laboratory.modular_points import NoPoint, exponents_up_to
 from kahanmaps.laboratory.preserve.darboux_spaces import DarbouxSpace
+from kahanmaps.laboratory.preserve.number_fields import primitive_over, reconstruct_at
 
 Spaces = Sequence[DarbouxSpace]
 
@@ -33,6 +34,7 @@ def closed_forms(
     symbols: Sequence[str],
     eps_enters: str,
     *,
+    root: Root | None = None,
     seed: int = 0,
     seconds: float = 60.0,
 ) -> ClosedForms:
@@ -42,7 +44,7 @@ def closed_forms(
     and, where it enters as a "symbol", of eps last; None at a special value. eps "not" entering, they are for a given
     number; entering "by weight", they are for eps = 1, and x becomes eps x in them: so it is for homogeneous f. The
     results are polynomials in (variables, symbols, eps), primitive: integer coefficients without a common factor,
-    that of a polynomial in the symbols included.
+    that of a polynomial in the symbols included. With a `root` the only symbol stands for it.
     """
     supports = [space.support for space in model]
     places = [_places(space) for space in model]
@@ -65,7 +67,7 @@ def closed_forms(
     deadline = time.monotonic() + seconds
     functions: list[RationalFunction] = []
     if any(places):
-        answer = reconstruct(box, names, seed=seed, deadline=deadline)
+        answer = reconstruct_at(root, box, names, seed=seed, deadline=deadline)
         if answer.functions is None:
             return ClosedForms(None, answer.reason)
         functions += answer.functions
@@ -74,6 +76,8 @@ def closed_forms(
     for space, cells in zip(model, places, strict=True):
         coefficients = {cell: functions.pop(0) for cell in cells}
         basis = [_polynomial(space, i, coefficients, context, len(variables)) for i in range(len(space.basis))]
+        if root is not None:
+            basis = [primitive_over(root, P, len(variables)) for P in basis]
         bases.append([_weighted(P, len(variables)) for P in basis] if eps_enters == "by weight" else basis)
     return ClosedForms(bases)
 

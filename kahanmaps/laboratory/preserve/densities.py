@@ -176,7 +176,7 @@ def find_densities(
         raise InputError(f"found {seconds} seconds, expected a time above 0")
     if max_degree is not None and max_degree < 0:
         raise InputError(f"found the largest degree {max_degree}, expected at least 0")
-    laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
+    laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
     densities, tried, reason, period = list[FoundDensity](), -1, laboratory.defect, None
     product = turning = None
     if not reason:
@@ -193,7 +193,7 @@ def find_densities(
                 densities = [*_product_of_variables(laboratory, max_degree), *densities]
     return DensitySearch(
         file,
-        laboratory.symbols,
+        laboratory.free_symbols,
         laboratory.eps,
         tuple(densities),
         tried,

@@ -40,7 +40,7 @@ def verdict_on(
 
     Args:
         given: the map, some of its parameters symbols; a system stands for its Kahan map.
-        function: I or phi, an exact function of (variables, symbols, eps).
+        function: I or phi, an exact function of (variables, symbols, eps); an algebraic number is one of the symbols.
         eps: the paper's epsilon, an exact number (the time step is 2 eps), or None for every eps.
         seed: of the random points.
         is_density: whether the function is a phi.
@@ -85,13 +85,14 @@ def _identity(
     factor: RationalFunction | None,
 ) -> Identity:
     """P(x~) Q(x) = P(x) Q(x~) for P/Q, of a density times the determinants: in x, the symbols and eps."""
-    n = map_.dim
+    n, root = map_.dim, map_.root
 
     def sides(field: Field, place: tuple[Any, ...], step: Any) -> Sides | None:
-        point, values = place[:n], place[n:]
-        over = map_.at(step, field, values)
+        point, symbols = place[:n], place[n:]
+        over = map_.at(step, field, symbols)
         image = over.step(point)
-        here, there = (*place, step), (*image, *values, step)
+        values = symbols if root is None else (root.over(field),)
+        here, there = (*point, *values, step), (*image, *values, step)
         P, Q = (evaluate(part, field, here) for part in (function.numerator, function.denominator))
         P_there, Q_there = (evaluate(part, field, there) for part in (function.numerator, function.denominator))
         # Q may vanish at the eps in force, and where a map is not invertible on its image: then P/Q has no value there.
@@ -108,10 +109,10 @@ def _identity(
             left, right = left * below, right * above
         return [left], [right]
 
-    condition = (density_condition if is_density else integral_condition)(function, n, eps)
+    condition = (density_condition if is_density else integral_condition)(function, n, eps, root)
     step = [] if not map_.has_eps else ["every eps" if eps is None else f"eps = {eps}"]
     values = " and ".join([*step, *([f"every {', '.join(map_.symbols)}"] if map_.symbols else [])])
     told = f"{' ' if condition.startswith('where') else ', '}{condition}" if condition else ""
     scope = f"for {values}{told}" if values else told.removeprefix(", ").strip()
     subject = (map_.symbols, map_.subject, function, is_density, *([] if factor is None else [factor]))
-    return Identity(n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, subject=subject)
+    return Identity(n + len(map_.symbols), sides, eps, scope=scope, has_eps=map_.has_eps, root=root, subject=subject)

@@ -283,12 +283,12 @@ def find_integrals(
         raise InputError(f"found {seconds} seconds, expected a time above 0")
     if max_degree is not None and max_degree < 1:
         raise InputError(f"found the largest degree {max_degree}, expected at least 1")
-    laboratory = Laboratory(file, symbols, eps, seed, flow=flow)
+    laboratory = Laboratory(file, symbols, eps, seed, flow=flow, algebraic=True)
     deadline = time.monotonic() + seconds
     primes = laboratory.primes
 
     inherited: list[InheritedIntegrals] = []  # of each map; theorems speak of Kahan maps
-    if laboratory.system is not None and not flow:
+    if laboratory.system is not None and not flow and laboratory.root is None:
         # Without symbols the maps have the same values, none, and one system.
         systems = {
             values: inherited_integrals(laboratory.system.at(values), seed=seed)
@@ -303,11 +303,11 @@ def find_integrals(
         return inherited[laboratory.maps.index(map_)].gradients(map_, x) if inherited else []
 
     def result(integrals: Sequence[FoundIntegral], profile: Profile, reason: str) -> IntegralSearch:
-        values = f", at random values of {', '.join(laboratory.symbols)}" if laboratory.symbols else ""
+        values = f", at random values of {', '.join(symbols)}" if laboratory.free_symbols else ""
         theorems = inherited[0].text + values if inherited else ""
         found = (tuple(integrals), profile, reason, primes, seed, by_theorems, theorems)
         more = tuple(in_time), flow, tuple(in_iterates)
-        return IntegralSearch(file, laboratory.symbols, laboratory.eps, *found, *more)
+        return IntegralSearch(file, laboratory.free_symbols, laboratory.eps, *found, *more)
 
     empty = Profile(laboratory.map.dim, (), (), None, True, False)
     if laboratory.defect:
@@ -338,7 +338,7 @@ def find_integrals(
         progress("products of powers of known polynomials")
         integrals, in_time = _products(laboratory, cofactors, integrals, progress)
     done = result(integrals, profile, "")
-    if not flow and not done.is_complete:
+    if not flow and not done.is_complete and laboratory.root is None:
         integrals, in_iterates = _in_iterates(laboratory, done, deadline, progress)
         done = result(integrals, profile, "")
     missing = done.codimension - done.found

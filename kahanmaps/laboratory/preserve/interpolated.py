@@ -64,7 +64,7 @@ def _branches(
                 other = again(prime, values)
                 return None if other is None else classes(other.spaces[number])[kind]
 
-            told = tell_apart(model, alike, names, laboratory.seed, deadline)
+            told = tell_apart(model, alike, names, laboratory.seed, deadline, laboratory.root)
             if told is None:
                 return {}, f"nothing rational tells {len(model)} spaces of degree {model[0].degree} apart"
             branches.setdefault(number, {})[kind] = told

@@ -26,7 +26,6 @@ from flint import fmpq, fmpq_mpoly, fmpz, fmpz_mat, nmod_poly
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.functions import BudgetExceeded, FunctionField
-from kahanmaps.algebra.interpolation import reconstruct
 from kahanmaps.algebra.matrices import det
 from kahanmaps.algebra.polynomials import (
     RationalFunction,
@@ -43,6 +42,7 @@ from kahanmaps.laboratory.laboratory import Laboratory
 from kahanmaps.laboratory.modular_points import ModularMap, NoPoint, interpolated
 from kahanmaps.laboratory.preserve.cofactors import Cofactor
 from kahanmaps.laboratory.preserve.flow import coefficient_rows
+from kahanmaps.laboratory.preserve.number_fields import reconstruct_at
 from kahanmaps.maps.implicit import StepOver
 from kahanmaps.systems.polynomial import PolynomialField
 
@@ -402,7 +402,7 @@ def _constants(
     if all(is_one):
         return [one] * len(vectors)
     names = (*laboratory.symbols, "eps") if laboratory.eps_enters == "symbol" else laboratory.symbols
-    answer = reconstruct(box, names, seed=laboratory.seed)
+    answer = reconstruct_at(laboratory.root, box, names, seed=laboratory.seed)
     if answer.functions is None:
         return [one if good else None for good in is_one]
     gens = [gen for gen, name in zip(context.gens(), laboratory.map.names, strict=True) if name in names]

@@ -1,0 +1,115 @@
+"""Integrals, densities and heights of maps with an algebraic number: found modulo primes, proved over Q[t]/g."""
+
+from __future__ import annotations
+
+import pytest
+
+import kahanmaps as km
+from kahanmaps.algebra.fields import GF
+from kahanmaps.algebra.interpolation import reconstruct
+from kahanmaps.algebra.polynomials import ring
+from kahanmaps.algebra.roots import parse_root
+from kahanmaps.checks.claims import Verdict
+from kahanmaps.errors import BadPrime, InputError
+from kahanmaps.laboratory.preserve.number_fields import primitive_over, reconstruct_at
+
+TOP = "x' = a*y*z; y' = -x*z; z' = x*y"
+CUBIC = "root of t^3 - t - 1"
+
+
+@pytest.mark.parametrize(
+    ("equations", "a", "count"),
+    [
+        (TOP, "root of t^2 - 2", 2),
+        (TOP, "root of t^2 + 1", 2),
+        (TOP, CUBIC, 2),
+        ("x' = y; y' = a*x^2 - 1", CUBIC, 1),
+        ("x' = y; y' = x^2 + a*x", "root of t^4 - t - 1", 1),
+    ],
+)
+def test_integrals_and_densities_are_found_and_proved_over_the_number_field(equations, a, count):
+    file = km.System(equations, a=a)
+    integrals, densities = km.find_integrals(file, seconds=20), km.find_density(file, seconds=20)
+    assert [str(one.verdict) for one in integrals.integrals] == ["proved"] * count
+    assert integrals.codimension == count
+    assert densities.densities[0].verdict is Verdict.PROVED
+    # What is printed is read back, and checked by another way.
+    read = km.parse_system("\n".join([file.to_toml(), integrals.toml_section(), densities.toml_section()]))
+    assert km.check_integrals(read).verdict is km.check_measure(read).verdict is Verdict.PROVED
+
+
+def test_what_was_found_for_one_number_is_refuted_for_others():
+    found = km.find_integrals(km.System(TOP, a="root of t^2 - 2")).toml_section()
+    for other, expected in (("root of t^2 - 2", Verdict.PROVED), ("root of t^2 - 3", Verdict.REFUTED)):
+        file = km.parse_system(km.System(TOP, a=other).to_toml() + found)
+        assert km.check_integrals(file).verdict is expected
+
+
+def test_what_holds_for_the_root_only_is_found():
+    # x' = 2 x, y' = -a^2 y keeps x y for a^2 = 2, and nothing rational for a generic a.
+    equations = "x' = 2*x; y' = -a^2*y"
+    assert [one.text for one in km.find_integrals(km.System(equations, a="root of t^2 - 2")).integrals] == ["x*y"]
+    assert km.find_integrals(km.System(equations, a="root of t^2 - 3"), seconds=5).found == 0
+
+
+def test_no_integral_where_there_is_none():
+    found = km.find_integrals(km.System("x' = a*y + x^2; y' = -x + x*y - y^2", a="root of t^2 - 2"), seconds=5)
+    assert found.found == found.codimension == 0
+
+
+def test_coefficients_are_reconstructed_from_all_roots():
+    root = parse_root(CUBIC)
+
+    def box(p, point):
+        t, eps = point
+        return [(1 + 3 * t * t * eps) * pow(1 - t * eps, -1, p), 7]
+
+    found = reconstruct_at(root, box, ["a", "eps"]).functions
+    field = GF(2**61 - 1)
+    with pytest.raises(BadPrime):
+        parse_root("root of t^2 + 1").over(GF(2**61 - 1))  # so that this is no accident of the prime
+    t, eps = root.over(field), field.convert(5)
+    assert found[0].value(field, (t, eps)) == (1 + 3 * t * t * eps) / (1 - t * eps)
+    assert found[1].value(field, (t, eps)) == 7
+
+    # Another value at one of the roots only is no function of the root.
+    def wrong(p, point):
+        return [point[0] ** 2 * (min(root.residues(GF(p))) == point[0])]
+
+    assert reconstruct_at(root, wrong, ["a"], max_samples=60).functions is None
+    assert reconstruct_at(None, lambda p, point: [3], ()).functions == reconstruct(lambda p, point: [3], ()).functions
+
+
+def test_factors_without_variables_are_taken_out_over_the_field():
+    x, y, a, eps = ring(["x", "y", "a", "eps"]).gens()
+    root = parse_root("root of t^2 - 2")
+    for P in (x + a * y, x**2 * (1 - 2 * eps) + 3, x * y + eps * a):
+        for factor in (1 + a * eps, a + 1, (1 - eps**2) * (3 + a * eps)):
+            assert primitive_over(root, P * factor, 2) == primitive_over(root, P, 2)
+    assert primitive_over(root, x + a * y, 2) != primitive_over(root, x - a * y, 2)
+
+
+def test_heights_over_a_number_field_grow_as_over_q():
+    assert km.heights(km.System(TOP, a="root of t^2 - 2"), starts=1, seconds=20, steps=24).kind == "quadratic"
+    chaotic = km.System("x' = a*y + x^2; y' = -x + x*y - y^2", a="root of t^2 - 2")
+    found = km.heights(chaotic, "1/10", starts=[[1, 2]], seconds=20)
+    assert found.kind == "exponential"
+    assert "of points over QQ[t]/(t^2 - 2)" in found.text
+
+
+def test_analyze_says_once_what_is_not_done_over_a_number_field():
+    found = km.analyze(km.System(TOP, a="root of t^2 - 2"), seconds=20)
+    assert found.conclusion.sentence.startswith("Superintegrable (proved): 2 independent integrals")
+    assert len(found.skipped) == 1
+    assert found.skipped[0].startswith("over the number field QQ[t]/(t^2 - 2): invariant curves")
+    assert found.to_json()["parameters"] == {}
+
+
+def test_what_is_not_sought_over_a_number_field_is_refused():
+    file = km.System(TOP, a="root of t^2 - 2")
+    with pytest.raises(InputError, match="found a parameter that is a root of"):
+        km.find_integrals(file, flow=True)
+    with pytest.raises(InputError, match="a degree of at most 6"):
+        km.find_integrals(km.System(TOP, a="root of t^7 - 2"))
+    with pytest.raises(InputError, match="expected no other symbols"):
+        km.find_density(km.System("x' = a*y; y' = b*x^2", a="root of t^2 - 2", b=1), symbols=["b"])
