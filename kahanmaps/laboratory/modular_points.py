@@ -96,14 +96,17 @@ class ModularMap:
             longest = max(longest, len(found))
         raise NoPoint(_NO_VALUE if longest == 1 else "orbits modulo a prime meet the singular set")
 
-    def along_orbit(self, degree: int, count: int) -> tuple[list[list[int]], Point, int | None]:
+    def along_orbit(
+        self, degree: int, count: int, used: int | None = None
+    ) -> tuple[list[list[int]], Point, int | None]:
         """The values of all monomials up to a degree along an orbit: a row a point, the last point, the period.
 
-        A polynomial vanishes along the orbit if the rows annihilate its coefficients. Raises NoPoint.
+        A polynomial vanishes along the orbit if the rows annihilate its coefficients. With `used` there are rows of so
+        many of the first points only. Raises NoPoint.
         """
         points = self.orbit(count)
         period = len(points) if len(points) < count else None
-        return [monomial_values(x, degree, self.prime) for x in points], points[-1], period
+        return [monomial_values(x, degree, self.prime) for x in points[:used]], points[-1], period
 
     def moved(self, x: Point, image: Point, degree: int) -> tuple[list[int], list[int]]:
         """The values of all monomials up to a degree at a point, and what a step makes of them."""
@@ -158,6 +161,16 @@ def gradient_values(vector: Sequence[int], point: Point, degree: int, prime: int
     return value % prime, gradient
 
 
+def slope_values(point: Point, degree: int, prime: int) -> list[list[int]]:
+    """The partial derivatives of all monomials of degree at most `degree` at a point: a row a variable."""
+    powers = monomial_values(point, degree, prime)
+    rows = [[0] * len(powers) for _ in point]
+    for k, slopes in enumerate(monomial_tables(len(point), degree)):
+        for variable, exponent, place in slopes:
+            rows[variable][k] = exponent * powers[place] % prime
+    return rows
+
+
 def product_of(P: Sequence[int], Q: Sequence[int], dim: int, degree: int, prime: int) -> list[int] | None:
     """The coefficients of a product of polynomials, up to the degree; None where its degree is higher.
 
@@ -187,8 +200,13 @@ def null_space(rows: Sequence[Sequence[int]], columns: int, prime: int) -> list[
     if not rows:
         return [[int(i == j) for j in range(columns)] for i in range(columns)]
     basis, nullity = nmod_mat(rows, prime).nullspace()
+    return kernel_vectors(basis, nullity, prime)
+
+
+def kernel_vectors(kernel: nmod_mat, nullity: int, prime: int) -> list[list[int]]:
+    """The canonical basis of the span of the first columns of what `nmod_mat.nullspace` gives."""
     # The matrix is a square one, nearly all of it zeros that need not become integers of Python.
-    return echelon([[int(basis[i, k]) for i in range(columns)] for k in range(nullity)], prime)
+    return echelon([[int(kernel[i, k]) for i in range(kernel.nrows())] for k in range(nullity)], prime)
 
 
 def echelon(vectors: Sequence[Sequence[int]], prime: int) -> list[list[int]]:

@@ -3,9 +3,11 @@ close."""
 
 from __future__ import annotations
 
+from math import comb
 from types import SimpleNamespace
 
 import pytest
+from flint import nmod_mat
 from helpers import quick
 from search_helpers import random_system, system
 
@@ -60,6 +62,31 @@ def test_codimensions_are_those_of_the_catalogue(name):
     assert found.codimension == file.catalog["codimension"]
     assert (found.agree, found.complete, found.period) == (True, True, None)
     assert list(found.codimensions) == sorted(found.codimensions)
+
+
+@pytest.mark.parametrize(("name", "degree"), [("euler_top", 3), ("lorenz", 3), ("three_wave", 2)])
+def test_as_many_points_as_are_independent_make_all_relations(name, degree):
+    map_, other = maps(load(name))[0], maps(load(name))[0]  # the same orbit
+    every = relations_on_orbit(map_, degree)
+    independent = every.kernel.ncols() - every.dimension
+    again = relations_on_orbit(other, degree, independent)
+    assert (again.vectors, again.normals, again.end) == (every.vectors, every.normals, every.end)
+    # With a point less there are relations too many, so that all points are used, of another orbit.
+    assert relations_on_orbit(other, degree, independent - 1).dimension == every.dimension
+
+
+@pytest.mark.parametrize(
+    "independent",  # monomials of degree at most d
+    [
+        lambda d: comb(d + 2, 2),  # in the plane
+        lambda d: comb(d + 3, 3) - comb(d + 1, 3),  # on a quadric in dimension 3
+        lambda d: 3 * d + 1,  # on the twisted cubic
+    ],
+)
+def test_macaulays_bound_holds_and_is_reached(independent):
+    assert all(module._most(independent(d), d) >= independent(d + 1) for d in range(1, 9))
+    assert module._most(independent(8), 8) == independent(9)
+    assert module._most(independent(8) - 1, 8) < independent(9)
 
 
 @pytest.mark.parametrize("dim", [2, 3, 4])
@@ -189,24 +216,28 @@ def test_a_profile_is_settled_where_the_last_of_four_degrees_shows_no_more(nulli
 
 
 @pytest.mark.parametrize(
-    ("degrees", "expected"),
+    ("degrees", "expected", "with_known"),
     [  # for each degree and map: how many vectors, the codimension, the period
-        ([[(0, 0, None), (0, 0, None)], [(1, 1, None), (1, 1, None)]], ((0, 1), (0, 1), None, True)),
-        ([[(1, 1, None), (0, 0, None)], [(1, 1, None), (1, 1, None)]], ((0, 1), (0, 1), None, False)),
-        ([[(0, 0, None), (0, 0, None)], [(1, 1, None), (1, 0, None)]], ((0, 1), (0, 0), None, False)),
-        ([[(2, 2, None), (2, 2, None)], [(9, 2, None), (9, 2, None)]], ((2,), (2,), None, True)),  # orbits on curves
-        ([[(2, 2, 6), (2, 2, 6)], [(9, 3, 6), (9, 3, 6)]], ((2, 9), (2, 3), 6, True)),  # orbits that close are points
-        ([[(1, 1, 5), (1, 1, 6)], [(4, 1, 6), (4, 1, 6)]], ((1, 4), (1, 1), 6, True)),
+        ([[(0, 0, None), (0, 0, None)], [(1, 1, None), (1, 1, None)]], ((0, 1), (0, 1), None, True), 2),
+        ([[(1, 1, None), (0, 0, None)], [(1, 1, None), (1, 1, None)]], ((0, 1), (0, 1), None, False), 2),
+        ([[(0, 0, None), (0, 0, None)], [(1, 1, None), (1, 0, None)]], ((0, 1), (0, 0), None, False), 1),
+        ([[(2, 2, None), (2, 2, None)], [(9, 2, None), (9, 2, None)]], ((2,), (2,), None, True), 2),  # orbits on curves
+        (
+            [[(2, 2, 6), (2, 2, 6)], [(9, 3, 6), (9, 3, 6)]],
+            ((2, 9), (2, 3), 6, True),
+            3,
+        ),  # orbits that close are points
+        ([[(1, 1, 5), (1, 1, 6)], [(4, 1, 6), (4, 1, 6)]], ((1, 4), (1, 1), 6, True), 2),
     ],
 )
-def test_a_profile_has_the_least_numbers_of_all_maps(degrees, expected, monkeypatch):
+def test_a_profile_has_the_least_numbers_of_all_maps(degrees, expected, with_known, monkeypatch):
     maps = [SimpleNamespace(dim=3, prime=101, step=lambda x: x, random_point=lambda: (1, 2, 3)) for _ in range(2)]
 
-    def along(map_, degree):
+    def along(map_, degree, most=None):
         count, codimension, period = degrees[degree - 1][next(k for k, one in enumerate(maps) if one is map_)]
-        return OrbitRelations([[]] * count, [[1, 0, 0]], codimension, period, ())
+        return OrbitRelations(nmod_mat(0, 0, 101), count, [[1, 0, 0], [0, 1, 0], [0, 0, 1]][:codimension], period, ())
 
     monkeypatch.setattr(module, "relations_on_orbit", along)
     found = orbit_profile(maps, known=lambda map_, point: [[1, 1, 0]], max_degree=2)
     assert (found.nullities, found.codimensions, found.period, found.agree) == expected
-    assert (found.complete, found.with_known) == (True, 2)
+    assert (found.complete, found.with_known) == (True, with_known)

@@ -199,24 +199,35 @@ class Sample:
         return found
 
 
-def cofactor_space(sample: Sample, product: CofactorProduct, degree: int) -> DarbouxSpace:
+def cofactor_space(
+    sample: Sample, product: CofactorProduct, degree: int, model: DarbouxSpace | None = None
+) -> DarbouxSpace:
     """All polynomials P of degree at most `degree` with P(x~) = C(x) P(x); their basis may be empty.
 
-    The sample must have more points than there are monomials.
+    With a `model`, the space modulo another prime, they have no other monomials than its elements. The sample must have
+    `points_needed`.
     """
     dim, prime = sample.map.dim, sample.map.prime
+    terms = len(exponents_up_to(dim, degree))
+    places = range(terms) if model is None else model.places
     rows = []
     for (x, image), (above, below) in zip(
-        sample.pairs[: points_needed(dim, degree)], sample.values(product), strict=False
+        sample.pairs[: points_needed(dim, degree, model)], sample.values(product), strict=False
     ):
         here, there = sample.map.moved(x, image, degree)
-        rows.append([(below * b - above * a) % prime for a, b in zip(here, there, strict=True)])
-    return DarbouxSpace.spanned_by(dim, degree, null_space(rows, len(rows[0]), prime), prime)
+        rows.append([(below * there[k] - above * here[k]) % prime for k in places])
+    vectors = [dict(zip(places, vector, strict=True)) for vector in null_space(rows, len(places), prime)]
+    whole = [[vector.get(k, 0) for k in range(terms)] for vector in vectors]
+    return DarbouxSpace.spanned_by(dim, degree, whole, prime)
 
 
-def points_needed(dim: int, degree: int) -> int:
-    """How many points a sample needs for polynomials of this degree."""
-    return len(exponents_up_to(dim, degree)) + _SPARE
+def points_needed(dim: int, degree: int, model: DarbouxSpace | None = None) -> int:
+    """How many points a sample needs for polynomials of this degree, with the monomials of the model if there is one.
+
+    >>> points_needed(2, 3), points_needed(2, 3, DarbouxSpace(2, 3, [[1, 0, 1] + [0] * 7]))
+    (18, 10)
+    """
+    return (len(exponents_up_to(dim, degree)) if model is None else len(model.places)) + _SPARE
 
 
 def search_cofactors(

@@ -203,8 +203,8 @@ def _list(
     deadline: float,
 ) -> None:
     def spaces_on(map_: ModularMap) -> list[DarbouxSpace]:
-        sample = Sample.of(map_, cofactors, points_needed(map_.dim, model.degree))
-        return [_without_constants(cofactor_space(sample, product, model.degree), product)]
+        sample = Sample.of(map_, cofactors, points_needed(map_.dim, model.degree, model))
+        return [_without_constants(cofactor_space(sample, product, model.degree, model), product)]
 
     forms = laboratory.formulas([model], spaces_on, deadline)
     if forms.bases is None:

@@ -70,8 +70,12 @@ class DarbouxSpace:
     def support(self) -> tuple[tuple[int, ...], ...]:
         """The monomials that occur in it."""
         everything = exponents_up_to(self.dim, self.degree)
-        used = [any(vector[k] for vector in self.basis) for k in range(len(everything))]
-        return tuple(exponent for exponent, use in zip(everything, used, strict=True) if use)
+        return tuple(everything[k] for k in self.places)
+
+    @property
+    def places(self) -> list[int]:
+        """The numbers of these monomials."""
+        return [k for k, entries in enumerate(zip(*self.basis, strict=True)) if any(entries)]
 
     def multiples(self, degree: int, prime: int) -> Vectors:
         """A basis of the products with all monomials, up to a degree."""

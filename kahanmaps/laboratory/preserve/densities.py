@@ -226,8 +226,8 @@ def _search(
             return [], degree - 1, f"the time was over at degree {degree}"
         progress(f"densities of degree {degree}")
         try:
-            first, second = (_space(map_, degree) for map_ in laboratory.maps)
-            if first.basis and len(first.basis) == len(second.basis):
+            first = _space(laboratory.maps[0], degree)
+            if first.basis and len(first.basis) == len(_space(laboratory.maps[1], degree, first).basis):
                 found, reason = _formulas(laboratory, first, degree, deadline)
                 if found or product is None:
                     return found, degree, reason
@@ -308,15 +308,16 @@ def _period(laboratory: Laboratory) -> int | None:
     return None if periods or period == _CLOSES_WITHIN else period
 
 
-def _space(map_: ModularMap, degree: int) -> DarbouxSpace:
-    """The P of degree at most `degree` with P(x~) = det dPhi P(x)."""
-    return cofactor_space(Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree)), _ONCE, degree)
+def _space(map_: ModularMap, degree: int, model: DarbouxSpace | None = None) -> DarbouxSpace:
+    """The P of degree at most `degree` with P(x~) = det dPhi P(x), and with the monomials of the model."""
+    sample = Sample.of(map_, [DETERMINANT], points_needed(map_.dim, degree, model))
+    return cofactor_space(sample, _ONCE, degree, model)
 
 
 def _formulas(
     laboratory: Laboratory, model: DarbouxSpace, degree: int, deadline: float
 ) -> tuple[list[FoundDensity], str]:
-    forms = laboratory.formulas([model], lambda map_: [_space(map_, degree)], deadline)
+    forms = laboratory.formulas([model], lambda map_: [_space(map_, degree, model)], deadline)
     if forms.bases is None:
         return [], f"there is a density of degree {degree} modulo primes, but no closed form: {forms.reason}"
     found = []

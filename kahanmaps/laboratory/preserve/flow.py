@@ -103,10 +103,12 @@ class ModularFlow(ModularMap):
         ]
         return here, there
 
-    def along_orbit(self, degree: int, count: int) -> tuple[list[list[int]], Point, int | None]:
+    def along_orbit(
+        self, degree: int, count: int, used: int | None = None
+    ) -> tuple[list[list[int]], Point, int | None]:
         """The Taylor coefficients of all monomials along a solution: a row an order; and where it starts."""
         start = self.random_point()
-        return self.series(start, degree, count), start, None
+        return self.series(start, degree, used or count), start, None
 
     def series(self, start: Point, degree: int, count: int) -> list[list[int]]:
         """The first `count` Taylor coefficients of all monomials along the solution from a point: a row an order."""

@@ -11,14 +11,14 @@ petrera-pfadler-suris-2009.
 
 from __future__ import annotations
 
-import random
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import comb
 from typing import Any
 
-from flint import fmpq_mpoly
+from flint import fmpq_mpoly, nmod_mat
 
 from kahanmaps.algebra.fields import GF
 from kahanmaps.algebra.plain import attributes
@@ -26,11 +26,12 @@ from kahanmaps.algebra.polynomials import evaluate
 from kahanmaps.laboratory.modular_points import (
     ModularMap,
     Point,
-    combine,
     echelon,
-    gradient_values,
+    integers,
+    kernel_vectors,
     null_space,
     rank,
+    slope_values,
 )
 
 _SPARE = 8  # points beyond the number of unknowns: each lets a wrong relation pass with probability 1/p
@@ -43,16 +44,26 @@ _MAX_DEGREE = {1: 8, 2: 14, 3: 10, 4: 8, 5: 7, 6: 7, 7: 5}
 class OrbitRelations:
     """The polynomials up to a degree that vanish along one orbit.
 
-    `vectors` is the reduced echelon basis on the monomials `exponents_up_to` that degree; `normals` span their
-    gradients at the last point, `end`, and `codimension` is the rank of these; `period` is the number of points of an
-    orbit that closed, else None.
+    They span a space of this `dimension`, and the first columns of `kernel` are a basis on the monomials
+    `exponents_up_to` that degree; `normals` is one of the span of their gradients at the last point, `end`; `period` is
+    the number of points of an orbit that closed, else None.
     """
 
-    vectors: list[list[int]]
+    kernel: nmod_mat
+    dimension: int
     normals: list[list[int]]
-    codimension: int
     period: int | None
     end: Point
+
+    @property
+    def codimension(self) -> int:
+        """The rank of the gradients."""
+        return len(self.normals)
+
+    @cached_property
+    def vectors(self) -> list[list[int]]:
+        """The reduced echelon basis."""
+        return kernel_vectors(self.kernel, self.dimension, self.kernel.modulus())
 
 
 @dataclass(frozen=True)
@@ -98,25 +109,31 @@ class Profile:
         return attributes(self, *names, maps_agree="agree", complete="complete")
 
 
-def relations_on_orbit(map_: ModularMap, degree: int) -> OrbitRelations:
+def relations_on_orbit(map_: ModularMap, degree: int, most: int | None = None) -> OrbitRelations:
     """The polynomials of degree at most `degree` that vanish along a random orbit modulo a prime.
 
+    `most` says how many monomials are independent on orbits at most, as far as one knows: so many points and a few are
+    as good as all. For from a generic point on the rank of the rows grows until it has its final value: relations of
+    the points 0 to k that hold at the point k + 1 as well are, a step later, those of the points 1 to k + 1, and so on.
     Raises NoPoint where orbits meet the singular set.
     """
-    unknowns = comb(map_.dim + degree, degree)
-    count = unknowns + _SPARE
-    rows, end, period = map_.along_orbit(degree, count)
-    vectors = null_space(rows, unknowns, map_.prime)
-    normals = _normals(map_, vectors, degree, end)
-    return OrbitRelations(vectors, normals, rank(normals, map_.prime), period, end)
+    prime, unknowns = map_.prime, comb(map_.dim + degree, degree)
+    most = unknowns if most is None else min(most, unknowns)
+    rows, end, period = map_.along_orbit(degree, unknowns + _SPARE, most + _SPARE)
+    kernel, dimension = nmod_mat(rows, prime).nullspace()
+    if unknowns - dimension > most:  # what was known is of special orbits, and not all points were used
+        return relations_on_orbit(map_, degree)
+    slopes = nmod_mat(slope_values(end, degree, prime), prime) * kernel
+    return OrbitRelations(kernel, dimension, echelon(integers(slopes.transpose()), prime), period, end)
 
 
 def span_of_relations(map_: ModularMap, degree: int, seconds: float = 30.0) -> list[list[int]]:
     """The reduced echelon basis of the span of the relations of all orbits."""
     deadline = time.monotonic() + seconds
-    found, still = relations_on_orbit(map_, degree).vectors, 0
+    first, still = relations_on_orbit(map_, degree), 0
+    found, most = first.vectors, first.kernel.ncols() - first.dimension
     while found and still < 2 and time.monotonic() < deadline:
-        more = echelon([*found, *relations_on_orbit(map_, degree).vectors], map_.prime)
+        more = echelon([*found, *relations_on_orbit(map_, degree, most).vectors], map_.prime)
         still = still + 1 if len(more) == len(found) else 0
         found = more
     return found
@@ -175,11 +192,12 @@ def orbit_profile(
             break
         progress(f"relations of degree {degree} along orbits")
         began = time.monotonic()
-        found = [relations_on_orbit(map_, degree) for map_ in maps]
+        most = _most(comb(dim + degree - 1, dim) - nullities[-1], degree - 1) if nullities else None
+        found = [relations_on_orbit(map_, degree, most) for map_ in maps]
         took = time.monotonic() - began
-        agree = agree and len({(len(one.vectors), one.codimension) for one in found}) == 1
+        agree = agree and len({(one.dimension, one.codimension) for one in found}) == 1
         # A special orbit has more relations, never fewer.
-        nullities.append(min(len(one.vectors) for one in found))
+        nullities.append(min(one.dimension for one in found))
         codimensions.append(min(one.codimension for one in found))
         together = [
             rank([*one.normals, *known(map_, one.end)], map_.prime) for map_, one in zip(maps, found, strict=True)
@@ -268,10 +286,16 @@ def hirota_kimura_basis(maps: Sequence[ModularMap], functions: Sequence[fmpq_mpo
     )
 
 
-def _normals(map_: ModularMap, vectors: list[list[int]], degree: int, point: Point) -> list[list[int]]:
-    """The gradients at the point, of random combinations where there are many vectors."""
-    prime, rng = map_.prime, random.Random(map_.prime)
-    if len(vectors) > map_.dim + 2:
-        weights = [[rng.randrange(prime) for _ in vectors] for _ in range(map_.dim + 2)]
-        vectors = combine(weights, vectors, prime)
-    return [gradient_values(vector, point, degree, prime)[1] for vector in vectors]
+def _most(independent: int, degree: int) -> int:
+    """How many monomials of one degree more are independent at most on a variety where so many of a degree are.
+
+    Macaulay's bound for Hilbert functions: C(a, d) + C(b, d - 1) + ... with a > b > ... becomes C(a + 1, d + 1) + ...
+    """
+    total = 0
+    while independent:
+        a = degree
+        while comb(a + 1, degree) <= independent:
+            a += 1
+        independent, total = independent - comb(a, degree), total + comb(a + 1, degree + 1)
+        degree -= 1
+    return total

@@ -69,13 +69,15 @@ class Lifted(ModularMap):
             for i, j in pairs_of(self.dim)
         ]
 
-    def along_orbit(self, degree: int, count: int) -> tuple[list[list[int]], Point, int | None]:
+    def along_orbit(
+        self, degree: int, count: int, used: int | None = None
+    ) -> tuple[list[list[int]], Point, int | None]:
         """The values along an orbit, as for other maps."""
         points, shift = self.orbit(count + self.lift.shift), self.lift.shift
         closed = len(points) < count + shift
         ahead = points[shift % len(points) :] + (points[: shift % len(points)] if closed else [])
         rows = [self._values(x, y) for x, y in zip(points, ahead, strict=False)]
-        return rows, points[-1], len(points) if closed else None
+        return rows[:used], points[-1], len(points) if closed else None
 
     def moved(self, x: Point, image: Point, degree: int) -> tuple[list[int], list[int]]:
         """The values at a point, and those a step later."""
@@ -95,7 +97,7 @@ def lifted_spaces(map_: ModularMap, lift: Lift) -> list[DarbouxSpace]:
     if lift.rank == 1:
         return darboux_spaces(lifted, DEGREE)
     span = span_of_relations(lifted, DEGREE)
-    if len(span) - len(relations_on_orbit(lifted, DEGREE).vectors) != lift.rank:
+    if len(span) - relations_on_orbit(lifted, DEGREE).dimension != lift.rank:
         return []
     return [DarbouxSpace.spanned_by(map_.dim, DEGREE, span, map_.prime)]
 

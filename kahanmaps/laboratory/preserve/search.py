@@ -140,15 +140,15 @@ def repeat(
     their step, by which they are told apart.
     """
     again = Found()
-    top = max((step.degree for step in found.steps if step.kind == "cofactor"), default=0)
-    sample = Sample.of(map_, cofactors, points_needed(map_.dim, top)) if top else None
-    for number, (step, model) in enumerate(zip(found.steps, found.spaces, strict=True)):
+    steps = list(zip(found.steps, found.spaces, strict=True))
+    needed = [points_needed(map_.dim, step.degree, *model) for step, model in steps if step.product is not None]
+    sample = Sample.of(map_, cofactors, max(needed, default=0))
+    for number, (step, model) in enumerate(steps):
         if step.kind == "affine":
             affine = affine_space(map_)
             group = [affine] if affine is not None else []
         elif step.product is not None:
-            assert sample is not None
-            group = [cofactor_space(sample, step.product, step.degree)]
+            group = [cofactor_space(sample, step.product, step.degree, *model)]
         elif step.lift is not None:
             group = lifted_spaces(map_, step.lift)
         else:
