@@ -68,7 +68,8 @@ def commute(store: km.Store, chi: dict[tuple[int, str, int], str]) -> None:
         if result["controls_refuted"] < result["controls"]:
             alike[chi[member_of(row)]] += 1
     print(f"claims that associated maps commute: {claims}, proved for every eps: {proved}")
-    print(f"maps of H_0 and H_1 = A H_0: refuted that they commute for {refuted} members, not refuted for:")
+    which = "maps of H_0 and H_1 (grad H_1 = A grad H_0)"
+    print(f"{which}: refuted that they commute for {refuted} members, not refuted for:")
     for factors, count in alike.most_common():
         print(f"    {count} with chi = {factors}")
 

@@ -60,8 +60,8 @@ def check_commute(
     """Do the Kahan maps of two systems commute; of one member of the family: all its rational associated maps?
 
     `eps2` is the step of the second map where it differs (then `settings.eps` has to be given). For a family member the
-    maps of H_0 and H_1 = A H_0 are the control: they do not commute in general, and a check that finds them
-    commuting would be worthless. Raises InputError where there is nothing to compare.
+    maps of H_0 and H_1, grad H_1 = A grad H_0, are the control: they do not commute in general, and a check that finds
+    them commuting would be worthless. Raises InputError where there is nothing to compare.
     """
     settings = settings or Settings()
     if other is None:

@@ -167,7 +167,7 @@ def test_the_rotations_of_the_lagrange_top_commute_with_its_map():
 
 
 def test_a_family_with_a_base_is_given_by_it():
-    found = commuting_systems(system("x y z", "x", "2*y", "x^2"))
+    found = commuting_systems(system("x y z", "x", "2*y", "x^2"), "linear")
     assert [family.base.trivial for family in found.families] == ["-f", "0", "f"]
     assert {texts(g) for family in found.families for g in family.directions} == {"0, 2*y, 0"}
 
@@ -266,7 +266,7 @@ def test_everything_found_commutes_exactly(numbers):
 @pytest.mark.parametrize("names", ["x", "x y"])
 def test_the_zero_system(names):
     zero = system(names, *["0"] * len(names.split()))
-    linear, quadratic = commuting_systems(zero), commuting_systems(zero, "quadratic")
+    linear, quadratic = commuting_systems(zero, "linear"), commuting_systems(zero, "quadratic")
     assert ([g.trivial for g in linear.solutions], linear.complete, linear.every_g_commutes) == (["0"], True, False)
     assert linear.order == 2  # no equations at eps^4 and beyond are needed
     assert (quadratic.every_g_commutes, quadratic.dimension) == (True, [0, 3, 12][len(names.split())])
@@ -288,8 +288,17 @@ def test_solutions_that_are_refuted_are_counted(monkeypatch):
     assert (found.solutions, found.discarded) == ([], 3)  # 0, f and -f
 
 
+def test_all_quadratic_g_are_tried_by_default_in_small_dimensions():
+    """(y, x^2, x) commutes with fields that are no B f, (0, 0, 1) one of them."""
+    found = commuting_systems(system("x y z", "y", "x^2", "x"))
+    assert (found.shape, found.complete) == ("quadratic", True)
+    assert "0, 0, 1" in {texts(g) for family in found.families for g in family.directions}
+    assert commuting_systems(system("x y", "x^2", "x*y")).shape == "linear"  # where these are not found in a second
+    assert commuting_systems(load("henon_heiles").system).shape == "linear"
+
+
 def test_dependent_components_give_one_b_of_several():
-    found = commuting_systems(system("x y z", "y^2 + 1", "y^2 + 1", "z^2"))
+    found = commuting_systems(system("x y z", "y^2 + 1", "y^2 + 1", "z^2"), "linear")
     for g in [*found.solutions, *(d for family in found.families for d in family.directions)]:
         assert found.system.transformed(g.B) == g.system
 
@@ -384,7 +393,7 @@ def test_the_identity_of_a_family_is_bounded(f, g, below):
 
 
 def test_what_is_found_without_families_is_told_in_numbers():
-    found = commuting_systems(system("x y", "x^2 + 1", "y^2 - x*y")).to_json()
+    found = commuting_systems(system("x y", "x^2 + 1", "y^2 - x*y"), "linear").to_json()
     assert [found[name] for name in ("status", "verdict", "order", "discarded", "irrational", "families")] == [
         "complete",
         "proved",

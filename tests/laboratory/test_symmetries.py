@@ -155,10 +155,18 @@ def test_matrices_that_are_no_signed_permutations():
     """Conjugate a system with the group of order 12 of the triangle by a shear: the matrices are still found."""
     f = load("zander_111", {}).system
     found = linear_symmetries(f)
-    assert (found.order, len(found.others), found.complete) == (2, 10, True)
+    assert (len(found.signed), len(found.others), found.complete) == (2, 10, True)
+    assert (found.group_text, len(found.generators)) == ("12 rational matrices, 6 of them reversing", 2)
     for t in found.others:
         sign = -1 if t.reversing else 1
         assert holds_for_the_map(f, t.S, t.r, lambda eps, sign=sign: sign * eps)
+
+
+def test_a_group_is_not_joined_where_there_are_infinitesimal_symmetries():
+    """y' = 1 has translations: what signed permutations and other matrices generate need not be finite."""
+    found = linear_symmetries(system("x y", "x^2", "1"))
+    assert found.infinitesimal
+    assert found.group_of == "signed permutations"
 
 
 def test_infinitesimal_symmetries_are_those_of_the_three_wave_system():

@@ -31,8 +31,8 @@ def command(system: str | None, other: str | None, eps2: Any, **options: Any) ->
 
     Without --eps the question is asked for every eps.
 
-    For one SYSTEM of kind [family] the maps of H_0 and H_1 = A H_0 come along as a control: they are expected NOT
-    to commute, and this does not change the exit status.
+    For one SYSTEM of kind [family] the maps of H_0 and H_1, grad H_1 = A grad H_0, come along as a control: they are
+    expected NOT to commute, and this does not change the exit status.
 
     SYSTEM and OTHER are files, names of the catalogue, - for standard input, or equations: "x' = y; y' = -x". -p sets
     a parameter of both, or of the one that has it.

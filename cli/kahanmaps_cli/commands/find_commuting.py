@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -18,21 +18,14 @@ from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json
 from kahanmaps_cli.terminal import tell
 
-if TYPE_CHECKING:
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.laboratory.symmetry.commuting import CommutingField, CommutingSystems
-
-_SHAPES = {"linear": "g = B f with a constant matrix B", "quadratic": "any quadratic g"}
-
 
 @click.command("find-commuting")
 @system_options
 @click.option(
     "--shape",
-    type=click.Choice(list(_SHAPES)),
-    default="linear",
-    show_default=True,
-    help="linear: g = B f with a constant B; quadratic: any g of degree at most 2.",
+    type=click.Choice(["linear", "quadratic"]),
+    help="linear: g = B f with a constant B; quadratic: any g of degree at most 2 (default in dimension 1 to 3, where "
+    "a second is enough).",
 )
 @seed_option
 @error_bits_option("What is supported is false with probability below 2^-BITS.")
@@ -49,7 +42,7 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
 
     First the g with [f, g] = 0 by linear algebra; then equations from the next powers of eps, solved over Q; then every
     solution is proved, or supported at random points. Nothing is lost on the way, so the list is complete unless it
-    says otherwise. The solutions 0, f and -f are always there and told apart.
+    says otherwise. 0, f and -f always commute and are left out; --json has them, with a word in "trivial".
 
     Exit status: 0 the list is complete, 2 wrong use, 3 something remained open.
     """
@@ -72,60 +65,9 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
         context = settings.context([file], seconds=options["seconds"])
         print_json({"command": "find-commuting", **context, **found.to_json()})
     else:
-        _print(file, found)
+        tell(f"# find-commuting: {file.name}, {found.kind_text}, every eps (the time step is 2 eps)")
+        tell(str(found))
     if not quiet:
         for sentence in found.undecided:
             say(f"undecided: {sentence}")
     return 0 if found.complete else 3
-
-
-def _print(file: SystemFile, found: CommutingSystems) -> None:
-    tell(f"# find-commuting: {file.name}, {_SHAPES[found.shape]}, every eps (the time step is 2 eps)")
-    if found.dimension is not None:
-        tell(f"bracket\tthe g with [f, g] = 0 have dimension {found.dimension}")
-    if found.every_g_commutes:
-        tell("proved\tf = 0 and its map is x -> x: every g commutes")
-    for g in found.solutions:
-        if g.trivial:
-            tell(f"{g.finding.verdict}\ttrivial\tg = {g.trivial}")
-    told: list[Any] = []
-    for g in found.nontrivial:
-        if g.system.scaled(-1) in told:
-            continue
-        told.append(g.system)
-        tell(f"{g.finding.verdict}\tg and -g\t{_pasted(g)}")
-        _print_matrix(g)
-        tell(f"\t{g.finding.evidence.summary}")
-    for family in found.families:
-        letters = [f"t{k + 1}" for k in range(len(family.directions))]
-        base = "" if family.base.trivial == "0" else "base + "
-        total = " + ".join(f"{t}*g{k + 1}" for k, t in enumerate(letters))
-        tell(f"{family.finding.verdict}\tfamily\tg = {base}{total} for all {', '.join(letters)}")
-        named = [("base", family.base)] * bool(base) + [(f"g{k + 1}", g) for k, g in enumerate(family.directions)]
-        for name, g in named:
-            tell(f"\t{name}\t{_pasted(g)}")
-            _print_matrix(g)
-        tell(f"\t{family.finding.evidence.summary}")
-    if found.irrational:
-        tell(f"note\tmore solutions, not rational: {'; '.join(found.irrational)}")
-    if found.discarded:
-        tell(f"note\t{found.discarded} solutions of the equations up to eps^{found.order} do not commute")
-    shape = _SHAPES["linear"] if found.shape == "linear" else "quadratic g"
-    message = f"complete: no other rational {shape} commutes"
-    if found.every_g_commutes:
-        message = "complete: every g commutes"
-    elif not found.complete:
-        message = "undecided: there may be more, see standard error"
-    tell(f"# {message}")
-
-
-def _pasted(g: CommutingField) -> str:
-    """The system as options of any other command."""
-    texts = [f"--rhs='{text}'" for text in g.rhs]
-    return f"--vars {','.join(g.system.variables)} {' '.join(texts)}"
-
-
-def _print_matrix(g: CommutingField) -> None:
-    rows = g.to_json()["B"]
-    if rows is not None:
-        tell(f"\tB = [{', '.join('[' + ', '.join(row) + ']' for row in rows)}]")

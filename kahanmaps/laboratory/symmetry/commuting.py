@@ -25,7 +25,7 @@ from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Finding, Verdict, combined
 from kahanmaps.checks.decide import DEFAULT_ERROR_BITS
 from kahanmaps.checks.settings import Settings
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.symmetry.commuting_equations import commutator_equations
 from kahanmaps.laboratory.symmetry.commuting_proofs import affine, judge_family, judge_field
@@ -42,6 +42,7 @@ from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
 DEFAULT_SECONDS = 60
 ORDERS = (4, 6, 8)  # powers of eps in the commutator; odd ones follow from those before
 MAX_TOLD = 6  # sentences about equations that were not solved
+QUICK_DIMENSION, QUICK_SECONDS = 3, 1.0  # all quadratic g are tried by default: some hundredths of a second as a rule
 MAX_SPACE = 24  # the cubic equations have up to C(l + 2, 3) + l terms
 
 
@@ -90,7 +91,7 @@ class CommutingFamily:
 
 
 @dataclass
-class CommutingSystems(Displayed):
+class CommutingSystems(Printed):
     """What was found. `complete` says that there are no other rational g of that shape.
 
     `dimension` is that of the space of g with [f, g] = 0; `irrational` tells of solutions outside Q; `discarded` counts
@@ -114,6 +115,12 @@ class CommutingSystems(Displayed):
     def complete(self) -> bool:
         """Whether every rational g of the shape that commutes was found."""
         return not self.undecided
+
+    @property
+    def kind_text(self) -> str:
+        """Which g were tried."""
+        linear = self.shape == "linear"
+        return "fields g = B f (B a constant rational matrix)" if linear else "fields g of degree at most 2"
 
     @property
     def nontrivial(self) -> list[CommutingField]:
@@ -140,7 +147,7 @@ class CommutingSystems(Displayed):
 
 def commuting_systems(
     system: QuadraticSystem,
-    shape: str = "linear",
+    shape: str | None = None,
     *,
     seed: int = 0,
     error_bits: int = DEFAULT_ERROR_BITS,
@@ -149,8 +156,8 @@ def commuting_systems(
 ) -> CommutingSystems:
     """All rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
 
-    `shape` "linear": g = B f with a constant matrix B; "quadratic": any g with terms of degree at most 2. Exact over Q;
-    what no lemma proves is supported at random points, with a probability of error below 2^-error_bits. `seconds`
+    `shape` "linear": g = B f with a constant matrix B; "quadratic": any g with terms of degree at most 2; None: these
+    where the dimension is at most 3 and a second is enough to find all of them, else those. Exact over Q; what no lemma proves is supported at random points, with a probability of error below 2^-error_bits. `seconds`
     bounds the time, roughly. Raises InputError for another shape or a bound that is not positive. What is too large is
     told in `undecided`. Source: petrera-suris-2016.
 
@@ -158,6 +165,15 @@ def commuting_systems(
     >>> [(g.trivial, str(g.finding.verdict)) for g in commuting_systems(f).solutions]
     [('0', 'proved'), ('f', 'proved'), ('-f', 'proved')]
     """
+    if shape is None:
+        if system.dim <= QUICK_DIMENSION:
+            quick = min(seconds, QUICK_SECONDS)
+            found = commuting_systems(
+                system, "quadratic", seed=seed, error_bits=error_bits, seconds=quick, progress=progress
+            )
+            if found.complete:
+                return found
+        shape = "linear"
     if shape not in SHAPES:
         raise InputError(f"found the shape {shape!r}, expected {' or '.join(SHAPES)}")
     if not seconds > 0:

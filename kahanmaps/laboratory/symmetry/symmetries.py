@@ -22,7 +22,7 @@ from kahanmaps.algebra.plain import attributes, plain
 from kahanmaps.algebra.polynomials import linear_combinations, ring
 from kahanmaps.algebra.small_systems import solve_system
 from kahanmaps.algebra.text import format_polynomial
-from kahanmaps.displayed import Displayed
+from kahanmaps.displayed import Printed
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.symmetry.signed_permutations import MAX_DIMENSION as MAX_SIGNED
 from kahanmaps.laboratory.symmetry.signed_permutations import signed_permutations
@@ -33,6 +33,7 @@ DEFAULT_SECONDS = 30
 MAX_LINEAR = 16  # dimension up to which infinitesimal symmetries are computed: n^2 + n + 1 unknowns
 MAX_LISTED = 200  # of each kind in the JSON
 MAX_GENERAL = 3  # dimension up to which the polynomial equations for S are solved
+SIGNED, MATRICES = "signed permutations", "rational matrices"
 
 
 @dataclass(frozen=True)
@@ -50,14 +51,18 @@ class Symmetry:
         return f"({', '.join(self.variables)}) -> ({', '.join(_affine_text(self.variables, self.S, self.r))})"
 
     @property
+    def kind(self) -> str:
+        """Which of the two it is, in words."""
+        return "reversing symmetry" if self.reversing else "symmetry"
+
+    @property
     def obvious(self) -> bool:
         """Whether S is I or -I and r = 0."""
         return not any(e != 0 for e in self.r) and self.S in (QQ.identity(len(self.r)), -QQ.identity(len(self.r)))
 
     def to_json(self) -> dict[str, Any]:
         """Plain data: S, r, what it is, the action as text."""
-        kind = "reversing symmetry" if self.reversing else "symmetry"
-        return {"kind": kind, **attributes(self, "S", "r", "text", "obvious"), "verdict": "proved"}
+        return {**attributes(self, "kind", "S", "r", "text", "obvious"), "verdict": "proved"}
 
 
 @dataclass(frozen=True)
@@ -88,12 +93,13 @@ class Infinitesimal:
 
 
 @dataclass
-class Symmetries(Displayed):
+class Symmetries(Printed):
     """What was found. `complete` says that each search in `searched` came to its end.
 
     `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` a field of weight 1 or None;
     `signed` are all signed permutations (with a translation where needed), `others` linear symmetries that are none.
-    `generators` generate the linear parts of `signed`, which are a group of `order` elements (None: not known).
+    `generators` generate a group whose linear parts are `order` matrices (None: not known): those of `signed`, or of
+    `others` as well where there are no infinitesimal symmetries, so that all are finite in number; `group_of` says which.
     """
 
     system: QuadraticSystem
@@ -102,6 +108,7 @@ class Symmetries(Displayed):
     signed: list[Symmetry] = field(default_factory=list)
     generators: list[Symmetry] = field(default_factory=list)
     order: int | None = None
+    group_of: str = SIGNED
     others: list[Symmetry] = field(default_factory=list)
     searched: list[str] = field(default_factory=list)
     undecided: list[str] = field(default_factory=list)
@@ -110,6 +117,22 @@ class Symmetries(Displayed):
     def complete(self) -> bool:
         """Whether each search came to its end."""
         return not self.undecided
+
+    @property
+    def reversing_order(self) -> int:
+        """How many elements of the group take the map to its inverse."""
+        if self.group_of == SIGNED:
+            return sum(t.reversing for t in self.signed)
+        # f is not 0 here, so that none is both, and those that commute with the map are all or half of them
+        return (self.order or 0) // 2 if any(t.reversing for t in self.generators) else 0
+
+    @property
+    def group_text(self) -> str:
+        """What the group is: 4 signed permutations, 2 of them reversing; empty where there is but the identity."""
+        if self.order is None or self.order == 1:
+            return ""
+        back = self.reversing_order
+        return f"{self.order} {self.group_of}, {f'{back} of them reversing' if back else 'none of them reversing'}"
 
     @property
     def symmetries(self) -> list[Symmetry]:
@@ -123,11 +146,13 @@ class Symmetries(Displayed):
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, the shape that scripts rely on."""
+        signed = self.group_of == SIGNED
+        forward = sum(not t.reversing for t in self.signed) if signed else (self.order or 0) - self.reversing_order
         group = {
-            "of": "signed permutations",
+            "of": self.group_of,
             "order": self.order,
-            "symmetries": sum(not t.reversing for t in self.signed),
-            "reversing_symmetries": sum(t.reversing for t in self.signed),
+            "symmetries": forward,
+            "reversing_symmetries": self.reversing_order,
             **attributes(self, "generators"),
         }
         listed = {"symmetries": self.symmetries[:MAX_LISTED], "reversing_symmetries": self.reversing[:MAX_LISTED]}
@@ -263,7 +288,7 @@ def _generated(matrices: Sequence[fmpq_mat], n: int) -> set[tuple[str, ...]]:
 
 
 def _order(matrix: fmpq_mat) -> int:
-    """The order of a signed permutation."""
+    """The order of a matrix that has one."""
     power, count = matrix, 1
     while power != QQ.identity(matrix.nrows()):
         power, count = power * matrix, count + 1
@@ -299,6 +324,10 @@ def _add_general(found: Symmetries, deadline: float) -> None:
             found.undecided.append(f"the equations f(S x) = {'-' * (sign < 0)}S f(x) were not solved: {solved.reason}")
     if complete:
         found.searched.append("rational matrices S, without a translation: all")
+    # Without infinitesimal symmetries the affine group is finite, and so is what its elements generate.
+    if complete and found.others and found.order is not None and not found.infinitesimal:
+        found.generators = _generators([*found.signed, *found.others])
+        found.order, found.group_of = len(_generated([t.S for t in found.generators], n)), MATRICES
 
 
 def _key(matrix: fmpq_mat) -> tuple[str, ...]:
