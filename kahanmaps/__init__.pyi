@@ -92,6 +92,10 @@ from kahanmaps.laboratory.symmetry.commuting import CommutingSystems as Commutin
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems as commuting_systems
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries as Symmetries
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries as linear_symmetries
+from kahanmaps.laboratory.vector_field.equivalence import Equivalence as Equivalence
+from kahanmaps.laboratory.vector_field.equivalence import equivalent_system as equivalent_system
+from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch as FixedPointSearch
+from kahanmaps.laboratory.vector_field.fixed_points import fixed_points as fixed_points
 from kahanmaps.languages.convert import convert as convert
 from kahanmaps.maps.arithmetic import Arithmetic as Arithmetic
 from kahanmaps.maps.bilinear import bilinear_map as bilinear_map

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpz_mpoly_ctx, fmpz_mpoly_vec
+from flint import Ordering, fmpq, fmpq_mat, fmpq_mpoly, fmpq_poly, fmpz_mpoly_ctx, fmpz_mpoly_vec
 
 from kahanmaps.algebra.fields import QQ
 from kahanmaps.algebra.matrices import nullspace
@@ -70,10 +70,14 @@ class Component:
 
 @dataclass
 class Solutions:
-    """What was found: linear families and points, what was not solved, and what is not rational."""
+    """What was found: linear families and points, what was not solved, and what is not rational.
+
+    `conjugate` are the parts that have no rational point, in the order of `irrational`, which tells of them in words.
+    """
 
     components: list[Component] = field(default_factory=list)
     unsolved: list[Component] = field(default_factory=list)
+    conjugate: list[Component] = field(default_factory=list)
     irrational: list[str] = field(default_factory=list)
     reason: str = ""  # why something is unsolved
 
@@ -238,12 +242,12 @@ class _Solver:
             return
         for p in equations:
             if sum(e > 0 for e in p.degrees()) == 1:  # irreducible in one variable: no rational root
-                self.found.irrational.append(str(primitive_part(p)[1]))
+                self._no_rational_point(str(primitive_part(p)[1]), equations, values)
                 return
         if based:
             self._finite(equations, values)
             return
-        basis = _groebner(equations)
+        basis = groebner(equations)
         if basis is None:
             self._give_up(equations, values, "a Groebner basis would be too large")
             return
@@ -262,7 +266,7 @@ class _Solver:
     def _finite(self, basis: list[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
         """Branch on the rational values of a linear form, where the Groebner basis says that solutions are finite."""
         free = sorted({i for p in basis for i, e in enumerate(p.degrees()) if e})
-        quotient = _quotient(basis, free)
+        quotient = quotient_monomials(basis, free)
         if quotient is None:
             self._give_up(basis, values, "the solutions are not isolated points, and not linear families")
             return
@@ -275,9 +279,14 @@ class _Solver:
         _, factors = matrix.charpoly().factor()
         for factor, _ in factors:
             if factor.degree() > 1:
-                self.found.irrational.append(f"groups of {factor.degree()} conjugate solutions")
+                text = f"groups of {factor.degree()} conjugate solutions"
+                self._no_rational_point(text, [*basis, _at(factor, form)], values)
             else:
                 self.solve([*basis, form + factor[0] / factor[1]], values)
+
+    def _no_rational_point(self, text: str, equations: Sequence[fmpq_mpoly], values: tuple[fmpq_mpoly, ...]) -> None:
+        self.found.irrational.append(text)
+        self.found.conjugate.append(Component(values, tuple(equations)))
 
     def _give_up(self, equations: Sequence[fmpq_mpoly], values: tuple[fmpq_mpoly, ...], reason: str) -> None:
         part = Component(values, tuple(equations))
@@ -290,8 +299,22 @@ def _badness(factors: Sequence[fmpq_mpoly]) -> tuple[int, int]:
     return (max(degree(p) for p in factors), sum(len(p) for p in factors))
 
 
-def _groebner(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
-    """The reduced Groebner basis, or None if it exceeds the limits."""
+def _at(factor: fmpq_poly, form: fmpq_mpoly) -> fmpq_mpoly:
+    """The value of a polynomial in one variable at another polynomial."""
+    value = form.context().constant(0)
+    for coefficient in reversed(factor.coeffs()):
+        value = value * form + coefficient
+    return value
+
+
+def groebner(equations: Sequence[fmpq_mpoly]) -> list[fmpq_mpoly] | None:
+    """The reduced Groebner basis, graded and reverse lexicographic, or None if it exceeds the limits.
+
+    >>> from kahanmaps.algebra.polynomials import ring
+    >>> x, y = ring(["x", "y"]).gens()
+    >>> groebner([x*y - 1, x**2 - y])
+    [x*y - 1, x^2 - y, y^2 - x]
+    """
     context = equations[0].context()
     integers = fmpz_mpoly_ctx.get(names_of(equations[0]), Ordering.degrevlex)
 
@@ -308,7 +331,7 @@ def _integral(p: fmpq_mpoly, integers: fmpz_mpoly_ctx) -> Any:
     return integers.from_dict({tuple(m): c.p * (below // c.q) for m, c in p.terms()})
 
 
-def _quotient(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list[tuple[int, ...]] | None:
+def quotient_monomials(basis: Sequence[fmpq_mpoly], free: Sequence[int]) -> list[tuple[int, ...]] | None:
     """The monomials that no leading monomial divides; None if they are infinitely many."""
     leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
     for i in free:

@@ -15,6 +15,7 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.text import format_polynomial
 from kahanmaps.checks.claims import Verdict
 from kahanmaps.displayed import Displayed
 from kahanmaps.documents.files import SystemFile
@@ -45,6 +46,8 @@ from kahanmaps.laboratory.singular.singularities import (
 )
 from kahanmaps.laboratory.symmetry.commuting import commuting_systems
 from kahanmaps.laboratory.symmetry.symmetries import linear_symmetries
+from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
+from kahanmaps.laboratory.vector_field.fixed_points import fixed_points
 
 # Seconds for everything, by dimension; about half of it is used where nothing is hard.
 _SECONDS = {1: 16.0, 2: 16.0, 3: 30.0, 4: 60.0, 5: 110.0}
@@ -99,7 +102,8 @@ class Analysis(Findings, Displayed):
                 for title, lines in self.sections
                 for line in lines
             ],
-            **attributes(self, "integrals"),
+            "divergence": format_polynomial(self.file.system.divergence) if self.file.is_quadratic else None,
+            **attributes(self, "fixed_points", "equivalent", "integrals"),
             "invariant_curves": self._invariant_curves(),
             "hirota_kimura": [relation.text for relation in self.relations],
             **attributes(self, "densities", "flow", "poisson", "degrees", "heights"),
@@ -196,6 +200,11 @@ def analyze(
                 first = 1 + len({name for relation in found.relations for name in relation.names})
                 found.relations += sparse_relations(maps, degree, map_.variables, first=first) or ()
 
+    def vector_field() -> None:
+        if system is not None:
+            found.fixed_points = fixed_points(system, share(0.03))
+            found.equivalent = equivalent_system(file, found.fixed_points, share(0.03))
+
     def hamiltonian() -> None:
         if system is not None and dim <= MAX_HAMILTONIAN_DIMENSION:
             found.hamiltonian = constant_structures(system, seed=seed)
@@ -277,6 +286,7 @@ def analyze(
             ]
 
     parts: list[tuple[str, Callable[[], None]]] = [
+        ("the vector field", vector_field),
         ("hamiltonian structure", hamiltonian),
         ("the commuting family", family),
         ("degrees", degrees),
@@ -289,7 +299,7 @@ def analyze(
         ("commuting systems", commuting),
     ]
     # Where degrees make use of them singularities come first; in more dimensions they are slow, and come last.
-    parts.insert(2 if dim <= WRITTEN_DIMENSION else len(parts), ("singularities", confinement))
+    parts.insert(3 if dim <= WRITTEN_DIMENSION else len(parts), ("singularities", confinement))
     if laboratory.root is not None:
         parts = [part for part in parts if part[0] in _OVER_NUMBER_FIELDS]
     found.pending = [name for name, _ in parts]
@@ -307,12 +317,12 @@ def analyze(
         reached(found)
     if laboratory.root is not None:
         found.skipped.append(
-            f"over the number field {laboratory.root.number_field}: invariant curves, integrals in iterates, the flow, "
+            f"over the number field {laboratory.root.number_field}: fixed points, invariant curves, integrals in iterates, the flow, "
             "Poisson tensors, singularities, symmetries, Hamiltonian structure, the family, commuting systems"
         )
     elif system is None:
         found.skipped.append(
-            "Hamiltonian structure, the commuting family, symmetries, commuting systems: for fields only"
+            "fixed points, Hamiltonian structure, the commuting family, symmetries, commuting systems: for fields only"
         )
     found.elapsed = time.monotonic() - began
     return found

@@ -21,6 +21,8 @@ from kahanmaps.laboratory.preserve.sparse_relations import SparseRelation
 from kahanmaps.laboratory.singular.singularities import SingularityRun
 from kahanmaps.laboratory.symmetry.commuting import CommutingSystems
 from kahanmaps.laboratory.symmetry.symmetries import Symmetries
+from kahanmaps.laboratory.vector_field.equivalence import Equivalence
+from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch
 
 
 @dataclass
@@ -32,6 +34,8 @@ class Findings:
     seconds: float
     seed: int
     symbols: tuple[str, ...] = ()
+    fixed_points: FixedPointSearch | None = None
+    equivalent: Equivalence | None = None  # a system of the catalogue
     integrals: IntegralSearch | None = None
     pencil: Pencil | None = None  # in the plane
     relations: tuple[SparseRelation, ...] = ()

@@ -47,6 +47,7 @@ def sections(found: Findings, until_pending: bool = False) -> list[tuple[str, li
 def _sections() -> list[tuple[str, set[str], Callable[[Findings], list[Statement]]]]:
     """Titles, the parts of the analysis that their statements come from, and what makes these."""
     return [
+        ("vector field", {"the vector field"}, _field_lines),
         (
             "integrals",
             {"the commuting family", "degrees", "integrals"},
@@ -62,6 +63,27 @@ def _sections() -> list[tuple[str, set[str], Callable[[Findings], list[Statement
         ("commuting systems", {"commuting systems"}, _commuting_lines),
         ("not done", set(), lambda found: [Statement(NOTE, text) for text in found.skipped if not found.pending]),
     ]
+
+
+def _field_lines(found: Findings) -> list[Statement]:
+    search = found.fixed_points
+    if search is None:
+        return []
+    divergence = format_polynomial(found.file.system.divergence)
+    lines = [Statement(PROVED, f"div f = {divergence}" + (": the flow preserves volume" if divergence == "0" else ""))]
+    lines += [Statement(PROVED, one.text) for one in search.found[:_NAMES]]
+    if len(search.found) > _NAMES:
+        lines.append(Statement(NOTE, f"and {len(search.found) - _NAMES} more sets of fixed points: --json lists them"))
+    if search.undecided:
+        lines.append(Statement(UNDECIDED, f"not all fixed points were found: {search.undecided}"))
+    elif not search.found:
+        lines.append(Statement(PROVED, "f = 0 has no solution, not over the complex numbers either: no fixed point"))
+    else:
+        text = "flow and map have the same fixed points; an eigenvalue lambda of f' becomes the multiplier"
+        lines.append(Statement(NOTE, f"{text} (1 + eps*lambda)/(1 - eps*lambda) of the map"))
+    if found.equivalent is not None:
+        lines.append(Statement(PROVED, found.equivalent.text))
+    return lines
 
 
 def _integral_lines(found: Findings) -> list[Statement]:

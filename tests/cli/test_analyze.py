@@ -45,6 +45,7 @@ def test_the_report_as_text(kahanmaps):
     assert ("integrals", "measured", "along orbits x1^2 + c1*x3^2 + c2 = 0") in lines
     assert ("growth", "explained", "d_n = 2*n^2 + 1") in lines
     assert list(dict.fromkeys(section for section, _, _ in lines)) == [
+        "vector field",
         "integrals",
         "measure",
         "the flow",
@@ -64,7 +65,17 @@ def test_the_report_as_text(kahanmaps):
 
 def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
     found = kahanmaps(f"{TOP} --json --seed 5 --symbolic a2,eps --seconds 20").json
-    parts = ("integrals", "densities", "flow", "poisson", "degrees", "heights", "symmetries", "commuting")
+    parts = (
+        "fixed_points",
+        "integrals",
+        "densities",
+        "flow",
+        "poisson",
+        "degrees",
+        "heights",
+        "symmetries",
+        "commuting",
+    )
     for part in parts:
         assert isinstance(found.pop(part), dict)
     assert found.pop("document")["name"] == "euler_top"
@@ -95,6 +106,8 @@ def test_the_report_as_json_has_all_to_redo_it(kahanmaps):
             "curves; quadratic growth, dynamical degree 1 (explained). The integrals and densities are for every a2, "
             "all else is for the given values. It is Liouville integrable, with the Poisson tensor P1 (proved).",
         },
+        "divergence": "0",
+        "equivalent": None,  # it is one of the catalogue
         "invariant_curves": None,
         "hirota_kimura": ["x1^2 + c1*x3^2 + c2 = 0", "x2^2 + c3*x3^2 + c4 = 0"],
         "family": None,
@@ -181,7 +194,7 @@ def test_an_interrupt_in_any_part_leaves_what_was_found(kahanmaps, monkeypatch, 
     _, lines, verdict = report(outcome.out)
     assert outcome.status == 130
     assert "interrupted: the verdict rests on what was found so far" in outcome.err
-    assert list(dict.fromkeys(section for section, _, _ in lines)) == sections
+    assert list(dict.fromkeys(section for section, _, _ in lines)) == ["vector field", *sections]
     skipped = [text for section, _, text in lines if section == "not done"]
     assert skipped[-1] == "commuting systems: interrupted"
     assert (verdict[0] == "undecided") is (part == "constant_structures")

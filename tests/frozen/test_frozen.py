@@ -47,7 +47,7 @@ TOLD_BY["error_bound"] = {"summary"}  # which is about nothing else
 TOLD_BY["record"] = {"variables", "rhs"}
 TOLD_BY["summary"] = {"theorem", "hypotheses", "hypotheses_verified", "eps"}
 TOLD_BY["statements"] = {"integrals", "densities", "degrees", "heights", "symmetries", "commuting", "singularities"}
-TOLD_BY["statements"] |= {"poisson", "flow", "invariant_curves"}
+TOLD_BY["statements"] |= {"poisson", "flow", "invariant_curves", "divergence", "fixed_points", "equivalent"}
 
 # The keys of what is written as one line, there being much of it.
 LINES = {"method", "method summary", "step bits", "section status text", "kind text verdict"}

@@ -52,11 +52,12 @@ def command(system: str | None, markdown: bool, as_json: bool, quiet: bool, **op
       kahanmaps analyze --vars x,y --image 'y; -x + y + 7/y^2'
 
     SYSTEM is a vector field, which stands for its Kahan map, or any birational map (docs/system-files.md).
+    Fixed points with eigenvalues, and a system of the catalogue that an affine change of variables leads to.
     Integrals and densities in closed form with their proofs, which integrals of the flow it keeps, deforms and loses,
     genus and base points of the curves of a planar integral, Hirota-Kimura relations, degrees of the iterates and their
-    recurrence, heights, symmetries, commuting systems, singularity confinement, and whether the system belongs to the
-    commuting family, in these or other affine coordinates. Claims in the file are not read. Without --eps everything is
-    for every eps.
+    recurrence, heights, symmetries and reversing ones, commuting systems, singularity confinement, and whether the
+    system belongs to the commuting family, in these or other affine coordinates. Claims in the file are not read.
+    Without --eps everything is for every eps.
 
     proved, supported: formulas, as identities in x and eps. measured: modulo primes and along orbits, which is
     evidence. The number of integrals and the growth are separate findings.

@@ -119,8 +119,9 @@ class CommutingSystems(Printed):
     @property
     def kind_text(self) -> str:
         """Which g were tried."""
-        linear = self.shape == "linear"
-        return "fields g = B f (B a constant rational matrix)" if linear else "fields g of degree at most 2"
+        if self.shape == "linear":
+            return "fields g = B f (B a constant rational matrix)"
+        return "fields g of degree at most 2 with rational coefficients"
 
     @property
     def nontrivial(self) -> list[CommutingField]:
@@ -157,8 +158,9 @@ def commuting_systems(
     """All rational quadratic g whose Kahan map commutes with that of f = `system` at the same eps, for every eps.
 
     `shape` "linear": g = B f with a constant matrix B; "quadratic": any g with terms of degree at most 2; None: these
-    where the dimension is at most 3 and a second is enough to find all of them, else those. Exact over Q; what no lemma proves is supported at random points, with a probability of error below 2^-error_bits. `seconds`
-    bounds the time, roughly. Raises InputError for another shape or a bound that is not positive. What is too large is
+    where the dimension is at most 3 and a second is enough to find all of them, else those. Exact over Q; what no lemma
+    proves is supported at random points, with a probability of error below 2^-error_bits. `seconds` bounds the time,
+    roughly. Raises InputError for another shape or a bound that is not positive. What is too large is
     told in `undecided`. Source: petrera-suris-2016.
 
     >>> f = QuadraticSystem.from_text(["x", "y"], ["x^2 + 1", "y^2 - x*y"])

@@ -99,7 +99,7 @@ class Symmetries(Printed):
     `infinitesimal` is a basis of the Lie algebra, linear fields first; `scaling` a field of weight 1 or None;
     `signed` are all signed permutations (with a translation where needed), `others` linear symmetries that are none.
     `generators` generate a group whose linear parts are `order` matrices (None: not known): those of `signed`, or of
-    `others` as well where there are no infinitesimal symmetries, so that all are finite in number; `group_of` says which.
+    `others` as well where there are no infinitesimal symmetries, so that all are finite in number: see `group_of`.
     """
 
     system: QuadraticSystem

@@ -1,0 +1,282 @@
+"""Which system of the catalogue a vector field is in other coordinates: g(P x + q) = c P f(x), verified exactly.
+
+With y = P x + q the system x' = f(x) becomes y' = g(y)/c. Kahan's map goes along with affine changes of variables: that
+of f at eps is that of g at eps/c. Only some P are tried: permutations of the variables with a number each (up to
+dimension 5, else without), after a change to a frame that f itself has (invariant hyperplanes, lines of fixed points),
+and in the plane all P. Parameters of g are unknowns too. What is found holds; that nothing is found says nothing.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from flint import fmpq, fmpq_mat, fmpq_mpoly
+
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.polynomials import evaluate, linear_combinations, ring
+from kahanmaps.algebra.small_systems import solve_system
+from kahanmaps.algebra.text import format_number, format_polynomial
+from kahanmaps.documents.catalog import load, names
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.symbols import with_symbols
+from kahanmaps.laboratory.preserve.affine_functions import affine_darboux
+from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch, fixed_points
+from kahanmaps.systems.quadratic import LONG_COEFFICIENTS, QuadraticSystem
+
+MAX_DIMENSION = 6  # 720 permutations
+MAX_SCALED = 5  # dimension up to which each variable gets a number; above it Groebner bases may take a minute
+MAX_ORDERS = 24  # permutations that are tried of those that the terms allow: all 720 where every term is there
+MAX_FRAMES = 6
+_DEPTH = 4  # unknowns that are set to a number one after the other, where there are infinitely many solutions
+
+Monomials = frozenset[tuple[int, ...]]
+
+
+@dataclass(frozen=True)
+class Equivalence:
+    """y = P x + q and eps/c lead to the system of the catalogue with that name and these parameters."""
+
+    name: str
+    parameters: dict[str, fmpq]
+    variables: tuple[str, ...]
+    P: fmpq_mat
+    q: tuple[fmpq, ...]
+    c: fmpq
+
+    @property
+    def text(self) -> str:
+        """The system, and how one comes to it."""
+        values = ", ".join(f"{name} = {format_number(value)}" for name, value in self.parameters.items())
+        images = linear_combinations(self.P, ring(self.variables).gens())
+        point = ", ".join(format_polynomial(image + q) for image, q in zip(images, self.q, strict=True))
+        change = f"after ({', '.join(self.variables)}) -> ({point})"
+        if self.P == QQ.identity(len(self.q)) and not any(e != 0 for e in self.q):
+            change = "with its variables called " + ", ".join(self.variables)
+        factor = "-" if self.c == -1 else f"{format_number(1 / self.c)}*"
+        step = "" if self.c == 1 else f", {factor}eps for eps"
+        return f"equivalent to {self.name}{f' at {values}' if values else ''} {change}{step}"
+
+    def __str__(self) -> str:
+        return self.text
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return attributes(self, "name", "parameters", "P", "q", "c", "text")
+
+
+def equivalent_system(
+    file: SystemFile, fixed: FixedPointSearch | None = None, seconds: float = 10
+) -> Equivalence | None:
+    """A system of the catalogue that an affine change of variables leads to, proved; None where none was found.
+
+    Args:
+        file: a quadratic system. None is looked for if it is one of the catalogue itself.
+        fixed: its fixed points, if they are known already: lines of them are a frame.
+        seconds: bounds the time, roughly.
+
+    >>> from kahanmaps.documents.inline import System
+    >>> print(equivalent_system(System("x' = 3*y*z; y' = x*z; z' = -x*y")))
+    equivalent to euler_top at a1 = 3, a2 = 1, a3 = -1 with its variables called x, y, z
+    """
+    f, deadline = file.system, time.monotonic() + seconds
+    if f.degree < 2 or f.dim > MAX_DIMENSION or f.digits > LONG_COEFFICIENTS or _is_of_the_catalogue(file):
+        return None
+    tried = list(_tried(f, fixed_points(f, seconds) if fixed is None else fixed))
+    for is_scaled in (False, True) if f.dim <= MAX_SCALED else (False,):  # all that is quick comes first
+        for g, frame, order in tried:
+            if time.monotonic() > deadline:
+                return None
+            if (found := _matched(f, g, frame, order, is_scaled, deadline)) is not None:
+                return found
+    return None
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A system of the catalogue with its parameters as symbols; the monomials of degree 2 of each right-hand side."""
+
+    name: str
+    system: QuadraticSystem
+    defaults: dict[str, fmpq]
+    monomials: tuple[Monomials, ...]
+    is_homogeneous: bool
+
+
+@lru_cache(maxsize=MAX_DIMENSION)
+def _catalogue(dim: int) -> tuple[_Known, ...]:
+    """The systems of one dimension, few parameters first; with too many of them everything would be one of theirs."""
+    found = []
+    for name in names():
+        file = load(name)
+        if file.dim == dim and len(file.parameters) <= dim + 2:
+            system = with_symbols(file, tuple(file.parameters))
+            if system.degree >= 2:
+                terms = [m for p in system.rhs for m in p.monoms()]
+                is_homogeneous = all(sum(m[:dim]) == 2 for m in terms)
+                found.append(_Known(name, system, dict(file.parameters), _quadratic_monomials(system), is_homogeneous))
+    return tuple(sorted(found, key=lambda one: len(one.defaults)))
+
+
+def _quadratic_monomials(f: QuadraticSystem) -> tuple[Monomials, ...]:
+    n = f.dim
+    return tuple(frozenset(tuple(m[:n]) for m in p.monoms() if sum(m[:n]) == 2) for p in f.rhs)
+
+
+def _is_of_the_catalogue(file: SystemFile) -> bool:
+    if file.name not in names():
+        return False
+    known = load(file.name)
+    return known.parameters.keys() == file.parameters.keys() and (
+        load(file.name, file.parameters).system.rhs == file.system.rhs
+    )
+
+
+def _tried(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[tuple[_Known, fmpq_mat, tuple[int, ...] | None]]:
+    """Systems of the catalogue, frames, and the order of the variables, None where P may be any matrix."""
+    known = _catalogue(f.dim)
+    for frame in _frames(f, fixed):
+        monomials = _quadratic_monomials(f.composed(frame.inv(), [fmpq(0)] * f.dim).transformed(frame))
+        for g in known:
+            for order in itertools.islice(_fitting(monomials, g.monomials), MAX_ORDERS):
+                yield g, frame, order
+    if f.dim == 2:
+        yield from ((g, QQ.identity(2), None) for g in known)
+
+
+def _frames(f: QuadraticSystem, fixed: FixedPointSearch) -> Iterator[fmpq_mat]:
+    """Matrices F: in the coordinates F x the f may look like a system of the catalogue; the first one is I."""
+    n = f.dim
+    yield QQ.identity(n)
+    planes = [_slopes(one.function) for one in affine_darboux(f).functions]
+    yield from itertools.islice(_invertible(planes, n), MAX_FRAMES)
+    lines = [one for one in fixed.found if one.dimension == 1 and not one.equations]
+    directions = [[sum(_slopes(value), fmpq(0)) for value in line.coordinates] for line in lines]
+    yield from (columns.transpose().inv() for columns in itertools.islice(_invertible(directions, n), MAX_FRAMES))
+
+
+def _slopes(p: fmpq_mpoly) -> list[fmpq]:
+    """The coefficients of the variables in a polynomial of degree 1."""
+    n = p.context().nvars()
+    return [p.derivative(j)[(0,) * n] for j in range(n)]
+
+
+def _invertible(vectors: Sequence[Sequence[fmpq]], n: int) -> Iterator[fmpq_mat]:
+    """Matrices that have some of the vectors as rows."""
+    matrices = (fmpq_mat([list(row) for row in rows]) for rows in itertools.combinations(vectors, n))
+    return (matrix for matrix in matrices if matrix.det() != 0)
+
+
+def _fitting(wanted: Sequence[Monomials], given: Sequence[Monomials]) -> Iterator[tuple[int, ...]]:
+    """The permutations that take the monomials of each right-hand side to those of another system."""
+    if sorted(map(len, wanted)) != sorted(map(len, given)):
+        return
+    for order in itertools.permutations(range(len(wanted))):
+        back = sorted(range(len(order)), key=order.__getitem__)
+        if all(given[i] == {tuple(m[j] for j in back) for m in some} for some, i in zip(wanted, order, strict=True)):
+            yield order
+
+
+def _matched(
+    f: QuadraticSystem,
+    g: _Known,
+    frame: fmpq_mat,
+    order: Sequence[int] | None,
+    is_scaled: bool,
+    deadline: float,
+) -> Equivalence | None:
+    """Solve g(P x + q) = c P f(x) for P = c T F with T a permutation, with a number each if `is_scaled`, or any matrix.
+
+    F is the frame. Then the terms of degree 2 are free of c and q, and are solved first.
+    """
+    n = f.dim
+    entries = [(i, j) for i in range(n) for j in range(n) if order is None or order[j] == i]
+    # In the order in which they are set to their defaults where there is a choice.
+    scales = [f"t{i}{j}" for i, j in entries]
+    unknowns = ring(["c", *(f"q{i}" for i in range(n)), *scales, *(f"a{k}" for k in g.defaults)])
+    gens = unknowns.gens()
+    defaults = [fmpq(1), *[fmpq(0)] * n]
+    defaults += [*(fmpq(int(order is not None or i == j)) for i, j in entries), *g.defaults.values()]
+    joint = ring([*(f"x{i}" for i in range(n)), *unknowns.names()])
+    x, c, q = joint.gens()[:n], joint.gens()[n], joint.gens()[n + 1 : 2 * n + 1]
+    zero, T = joint.constant(0), [[joint.constant(0)] * n for _ in range(n)]
+    for (i, j), t in zip(entries, joint.gens()[2 * n + 1 :], strict=False):
+        T[i][j] = t
+    P0 = [[sum((T[i][k] * frame[k, j] for k in range(n)), zero) for j in range(n)] for i in range(n)]
+    images = [sum((P0[i][j] * c * x[j] for j in range(n)), q[i]) for i in range(n)]
+    at_x = [p.compose(*x, ctx=joint) for p in f.rhs]
+    sides = [sum((P0[i][j] * at_x[j] for j in range(n)), zero) * c * c for i in range(n)]
+    parameters = joint.gens()[2 * n + 1 + len(entries) :]
+    parts = [p.compose(*images, *parameters, ctx=joint) - r for p, r in zip(g.system.rhs, sides, strict=True)]
+    # The divergences go along: this follows, and is of lower degree.
+    parts.append(g.system.divergence.compose(*images, *parameters, ctx=joint) - f.divergence.compose(*x, ctx=joint) * c)
+    highest: list[fmpq_mpoly] = []
+    lower: list[fmpq_mpoly] = []
+    for k, part in enumerate(parts):
+        for size, coefficient in _coefficients(part, n, unknowns):
+            # c^size divides it
+            (highest if size == (2 if k < n else 1) else lower).append(coefficient / gens[0] ** size)
+    # No change of scale and no translation is tried first: then parameters are unknowns of linear equations as a rule.
+    simple = [t - value for t, value in zip(gens, defaults, strict=True)]
+    shift, scale = simple[: n + 1], simple[n + 1 :][: len(entries)]
+    always = shift if f.is_homogeneous and g.is_homogeneous else []
+    for start in (always,) if is_scaled else ([*shift, *scale], [*always, *scale]):
+        solved = solve_system([*highest, *start], gens, deadline)
+        for component in (*solved.components, *solved.unsolved):
+            equations = [p.compose(*component.values, ctx=unknowns) for p in lower]
+            for point in _points([*equations, *component.equations], component.values, defaults, deadline):
+                found = _verified(f, g, entries, frame, point)
+                if found is not None:
+                    return found
+    return None
+
+
+def _coefficients(p: fmpq_mpoly, count: int, unknowns: Any) -> list[tuple[int, fmpq_mpoly]]:
+    """The degree in the first variables, and the coefficient in the others, of each monomial in the first ones."""
+    found: dict[tuple[int, ...], dict[tuple[int, ...], fmpq]] = {}
+    for monomial, value in p.terms():
+        exponents = tuple(int(e) for e in monomial)
+        found.setdefault(exponents[:count], {})[exponents[count:]] = value
+    return [(sum(monomial), unknowns.from_dict(terms)) for monomial, terms in found.items()]
+
+
+def _points(
+    equations: Sequence[fmpq_mpoly],
+    values: Sequence[fmpq_mpoly],
+    defaults: Sequence[fmpq],
+    deadline: float,
+    depth: int = 0,
+) -> Iterator[list[fmpq]]:
+    """Some rational solutions, one of each family: `values` where the equations for their variables hold."""
+    context = values[0].context()
+    solved = solve_system([p for p in equations if not p.is_zero()], values, deadline)
+    for component in solved.components:
+        yield [evaluate(value, QQ, defaults) for value in component.values]
+    for part in solved.unsolved if depth < _DEPTH and time.monotonic() < deadline else ():
+        i = part.free[0]
+        for value in (defaults[i], defaults[i] + 1):
+            fixed = [*part.equations, context.gen(i) - value]
+            yield from _points(fixed, part.values, defaults, deadline, depth + 1)
+
+
+def _verified(
+    f: QuadraticSystem, g: _Known, entries: Sequence[tuple[int, int]], frame: fmpq_mat, point: Sequence[fmpq]
+) -> Equivalence | None:
+    """The equivalence that a solution stands for, where it is invertible and holds."""
+    n, c = f.dim, point[0]
+    T = fmpq_mat(n, n)
+    for (i, j), t in zip(entries, point[n + 1 :], strict=False):
+        T[i, j] = t
+    P, q, values = T * frame * c, point[1 : n + 1], point[n + 1 + len(entries) :]
+    if c == 0 or P.det() == 0:
+        return None
+    there = g.system.at(values) if values else g.system
+    if there.renamed(f.variables).composed(P, q).rhs != f.transformed(P).scaled(c).rhs:
+        return None
+    parameters = dict(zip(g.defaults, values, strict=True))
+    return Equivalence(g.name, parameters, f.variables, P, tuple(q), c)

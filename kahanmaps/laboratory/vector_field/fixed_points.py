@@ -1,0 +1,153 @@
+"""The equilibria of a vector field, which are the fixed points of its Kahan map, and the eigenvalues there.
+
+Phi(x) = x + 2 eps (I - eps f'(x))^{-1} f(x): where f(x) = 0 the map has the derivative (I - eps f')^{-1} (I + eps f'),
+and an eigenvalue lambda of f' becomes the multiplier (1 + eps lambda)/(1 - eps lambda). Everything is exact. Points
+that are not rational, and sets of positive dimension, are told by equations. Source: cmoq-2013.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flint import fmpq, fmpq_mpoly
+
+from kahanmaps.algebra.plain import attributes
+from kahanmaps.algebra.polynomials import names_of, primitive_part, ring
+from kahanmaps.algebra.small_systems import Component, groebner, normal_form, quotient_monomials, solve_system
+from kahanmaps.algebra.text import format_polynomial, format_product
+from kahanmaps.errors import counted
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+MAX_DIMENSION = 6  # above it Groebner bases of quadrics may take long, and they cannot be interrupted
+_KINDS = {1: "line", 2: "plane"}
+
+
+@dataclass(frozen=True)
+class FixedPoints:
+    """A point, or a set of points: `coordinates` in some of the variables, for which `equations` vanish.
+
+    `dimension` is that of the set, `count` the number of its points over the complex numbers, None where they are
+    infinitely many; `eigenvalues` the characteristic polynomial of f' there, in `eigenvalue` and these variables.
+    """
+
+    coordinates: tuple[fmpq_mpoly, ...]
+    equations: tuple[fmpq_mpoly, ...]
+    dimension: int
+    count: int | None
+    eigenvalues: fmpq_mpoly
+
+    @property
+    def where(self) -> str:
+        """The set in words: fixed point (1, 0), line of fixed points (x, 0), 2 fixed points (x, 1) with x^2 - 2 = 0."""
+        point = f"({', '.join(format_polynomial(value) for value in self.coordinates)})"
+        kind = _KINDS.get(self.dimension, f"space of dimension {self.dimension}")
+        if not self.equations:
+            return f"{kind} of fixed points {point}" if self.dimension else f"fixed point {point}"
+        size = f"set of dimension {self.dimension} of fixed points" if self.count is None else ""
+        size = size or counted(self.count or 0, "fixed point")
+        if len(self.equations) > len(self.coordinates):  # a basis that nobody reads, and not shorter than f = 0
+            return f"{size} {point} with f = 0{'' if self.count is None else ', not rational'}"
+        return f"{size} {point} with {', '.join(f'{format_polynomial(p)} = 0' for p in self.equations)}"
+
+    @property
+    def eigenvalues_text(self) -> str:
+        """The characteristic polynomial in factors."""
+        return format_product([(primitive_part(g)[1], int(k)) for g, k in self.eigenvalues.factor()[1]])
+
+    @property
+    def text(self) -> str:
+        """Where it is, and the eigenvalues."""
+        return f"{self.where}, eigenvalues of f': {self.eigenvalues_text} = 0"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        known = attributes(self, "coordinates", "equations", "dimension", "count")
+        return {**known, "eigenvalues": self.eigenvalues_text}
+
+
+@dataclass(frozen=True)
+class FixedPointSearch:
+    """All fixed points, rational ones first; `undecided` says what kept others from being found, else it is empty."""
+
+    found: tuple[FixedPoints, ...]
+    undecided: str
+
+    def __str__(self) -> str:
+        told = [one.text for one in self.found] or ["no fixed point"] * (not self.undecided)
+        return "\n".join([*told, *([f"undecided: {self.undecided}"] if self.undecided else [])])
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return attributes(self, "found", "undecided")
+
+
+def fixed_points(system: QuadraticSystem, seconds: float = 10) -> FixedPointSearch:
+    """All equilibria of the system over the complex numbers, with the eigenvalues of f' there; exact.
+
+    `seconds` bounds the time, roughly; in dimension above 6 nothing is searched. What is not found is told.
+
+    >>> pendulum = QuadraticSystem.from_text(["x", "y"], ["y", "x - x^2"])
+    >>> print(fixed_points(pendulum))
+    fixed point (0, 0), eigenvalues of f': (lambda - 1)*(lambda + 1) = 0
+    fixed point (1, 0), eigenvalues of f': lambda^2 + 1 = 0
+    >>> [one.where for one in fixed_points(QuadraticSystem.from_text(["x", "y"], ["x*y", "x^2 - 2*x"])).found]
+    ['fixed point (2, 0)', 'line of fixed points (0, y)']
+    >>> [one.text for one in fixed_points(QuadraticSystem.from_text(["x"], ["x^2 - 2"])).found]
+    ["2 fixed points (x) with x^2 - 2 = 0, eigenvalues of f': lambda - 2*x = 0"]
+    """
+    if system.dim > MAX_DIMENSION:
+        return FixedPointSearch((), f"they are sought up to dimension {MAX_DIMENSION}")
+    context = ring(system.variables)
+    solved = solve_system([p for p in system.rhs if not p.is_zero()], context.gens(), time.monotonic() + seconds)
+    found, undecided = [_on(system, part, []) for part in solved.components], ""
+    for part in (*solved.conjugate, *solved.unsolved):
+        basis = groebner(part.equations)
+        if basis is None:
+            undecided = solved.reason or "a Groebner basis would be too large"
+        elif not any(p.is_constant() for p in basis):
+            found.append(_on(system, part, basis))
+    return FixedPointSearch(tuple(found), undecided)
+
+
+def _on(system: QuadraticSystem, part: Component, basis: Sequence[fmpq_mpoly]) -> FixedPoints:
+    """The points of one part, whose equations have this Groebner basis."""
+    leading = [tuple(int(e) for e in p.monoms()[0]) for p in basis]
+    free = sorted({*part.free, *(i for p in basis for i, e in enumerate(p.degrees()) if e)})
+    # As large as the largest set of variables of which no power product is a leading monomial.
+    sizes = [
+        len(some)
+        for size in range(len(free) + 1)
+        for some in itertools.combinations(free, size)
+        if not any(all(e == 0 for i, e in enumerate(m) if i not in some) for m in leading)
+    ]
+    dimension = max(sizes)
+    count = len(quotient_monomials(basis, free) or ()) if basis else 1
+    return FixedPoints(
+        part.values, tuple(basis), dimension, None if dimension else count, _characteristic(system, part.values, basis)
+    )
+
+
+def _characteristic(system: QuadraticSystem, point: Sequence[fmpq_mpoly], basis: Sequence[fmpq_mpoly]) -> fmpq_mpoly:
+    """det(lambda I - f') by Faddeev and LeVerrier's recursion, reduced modulo the equations of the points."""
+    n, context = system.dim, point[0].context()
+    letter = next(name for name in ("lambda", "mu", *(f"mu{k}" for k in range(n))) if name not in system.variables)
+    joint = ring([letter, *names_of(point[0])])
+    names = joint.gens()
+    jacobian = [[p.derivative(j).compose(*point, ctx=context) for j in range(n)] for p in system.rhs]
+    coefficient, power = context.constant(1), [[context.constant(int(i == j)) for j in range(n)] for i in range(n)]
+    total = names[0] ** n
+    for k in range(1, n + 1):
+        power = [
+            [sum((a * power[m][j] for m, a in enumerate(row)), context.constant(0)) for j in range(n)]
+            for row in jacobian
+        ]
+        trace = sum((power[i][i] for i in range(n)), context.constant(0))
+        coefficient = normal_form(trace, basis) * fmpq(-1, k)
+        for i in range(n):
+            power[i][i] = power[i][i] + coefficient
+        total = total + coefficient.compose(*names[1:], ctx=joint) * names[0] ** (n - k)
+    return total

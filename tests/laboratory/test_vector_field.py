@@ -1,0 +1,184 @@
+"""What a vector field tells by itself: fixed points, which are those of the map, and systems of the catalogue in it."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from flint import fmpq, fmpq_mat
+
+from kahanmaps import KahanMap, System
+from kahanmaps.algebra.fields import QQ
+from kahanmaps.algebra.polynomials import evaluate
+from kahanmaps.documents.catalog import load
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.laboratory.vector_field.equivalence import equivalent_system
+from kahanmaps.laboratory.vector_field.fixed_points import FixedPointSearch, fixed_points
+from kahanmaps.systems.quadratic import QuadraticSystem
+
+
+def system(names, *rhs):
+    return QuadraticSystem.from_text(names.split(), rhs)
+
+
+def derivative_of_the_map(f, point, eps):
+    """dPhi at a fixed point, by its definition: each column from a difference of higher and higher precision."""
+    n, h = f.dim, fmpq(1, 10**60)
+    columns = []
+    for j in range(n):
+        moved = [x + (h if i == j else 0) for i, x in enumerate(point)]
+        columns.append([(y - x) / h for x, y in zip(point, KahanMap(f, eps).step(moved), strict=True)])
+    return fmpq_mat(columns).transpose()
+
+
+# Points and eigenvalues by hand.
+@pytest.mark.parametrize(
+    ("f", "texts"),
+    [
+        (system("x y", "y", "x - x^2"), ["fixed point (0, 0): (lambda - 1)*(lambda + 1)", "(1, 0): lambda^2 + 1"]),
+        (system("x y", "1", "x"), []),
+        (
+            system("x y", "x*y", "x^2 - 2*x"),
+            ["(2, 0): (lambda - 2)*(lambda + 2)", "line of fixed points (0, y): lambda*(lambda - y)"],
+        ),
+        (system("x", "x^2 - 2"), ["2 fixed points (x) with x^2 - 2 = 0: lambda - 2*x"]),
+        (
+            system("x y z", "x^2 + y^2 - 1", "0", "z"),
+            ["set of dimension 1 of fixed points (x, y, 0) with x^2 + y^2 - 1"],
+        ),
+        (system("x y", "0", "0"), ["plane of fixed points (x, y): lambda^2"]),
+        (system("lambda y", "lambda^2 - 1", "y"), ["(-1, 0): (mu - 1)*(mu + 2)", "(1, 0): (mu - 2)*(mu - 1)"]),
+    ],
+)
+def test_fixed_points_and_eigenvalues(f, texts):
+    search = fixed_points(f)
+    told = [one.text.replace(", eigenvalues of f'", "") for one in search.found]
+    assert (len(told), search.undecided) == (len(texts), "")
+    for text, wanted in zip(told, texts, strict=True):
+        assert wanted in text
+
+
+@pytest.mark.parametrize("name", ["lotka_volterra", "henon_heiles", "lorenz"])
+def test_the_map_has_the_multipliers_that_the_eigenvalues_give(name):
+    """(1 - eps lambda) mu = 1 + eps lambda turns the characteristic polynomial of f' into that of dPhi."""
+    f, eps = load(name).system, fmpq(1, 7)
+    for one in fixed_points(f).found:
+        if one.equations:
+            continue
+        point = [value[(0,) * f.dim] for value in one.coordinates]
+        multipliers = derivative_of_the_map(f, point, eps).charpoly()
+        for trial in (fmpq(2), fmpq(-3, 5)):
+            mu = (1 + eps * trial) / (1 - eps * trial)
+            wanted = evaluate(one.eigenvalues, QQ, [trial, *[fmpq(0)] * f.dim])
+            # prod(mu - mu_i) = prod(2 eps (trial - lambda_i) / ((1 - eps trial)(1 - eps lambda_i)))
+            at_inverse = evaluate(one.eigenvalues, QQ, [1 / eps, *[fmpq(0)] * f.dim]) * eps**f.dim
+            expected = wanted * (2 * eps) ** f.dim / ((1 - eps * trial) ** f.dim * at_inverse)
+            assert abs(multipliers(mu) - expected) < fmpq(1, 10**40)
+
+
+@pytest.mark.parametrize("name", ["euler_top", "volterra_periodic_4", "zhukovski_volterra_2", "clebsch_first_flow"])
+def test_every_set_of_fixed_points_solves_the_equations(name):
+    f = load(name).system
+    found = fixed_points(f).found
+    assert found
+    for one in found:
+        if not one.equations:
+            context = one.coordinates[0].context()
+            assert all(p.compose(*one.coordinates, ctx=context).is_zero() for p in f.rhs)
+
+
+def test_too_many_equations_are_told():
+    names = [f"x{k}" for k in range(7)]
+    assert fixed_points(QuadraticSystem.from_text(names, [f"{name}^2" for name in names])).undecided
+
+
+def elsewhere(name, P, q, c):
+    """A system of the catalogue in other coordinates and another time, without its name."""
+    return SystemFile.from_system(load(name).system.composed(P, q).transformed(P.inv()).scaled(c), "elsewhere")
+
+
+def holds(file, found):
+    """g(P x + q) = c P f(x), and the same for the maps at a point: T Phi_f(x, eps) = Phi_g(T x, eps/c)."""
+    g = load(found.name, found.parameters).system
+    x, eps = [fmpq(k + 2, 7) for k in range(file.dim)], fmpq(1, 11)
+
+    def moved(point):
+        column = found.P * fmpq_mat(file.dim, 1, list(point))
+        return [a + b for a, b in zip(column.entries(), found.q, strict=True)]
+
+    same = (
+        g.renamed(file.variables).composed(found.P, found.q).rhs == file.system.transformed(found.P).scaled(found.c).rhs
+    )
+    there = KahanMap(g, eps / found.c).step(moved(x))
+    return same and list(there) == moved(KahanMap(file.system, eps).step(x))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "riccati",
+        "lotka_volterra",
+        "nahm_octahedral",
+        "weierstrass",
+        "zander_111",
+        "volterra_periodic_3",
+        "volterra_periodic_4",
+    ],
+)
+def test_a_system_is_known_again_after_any_affine_change(name):
+    """In the plane, and where invariant hyperplanes are the axes of the catalogue."""
+    rng = random.Random(name)
+    n = load(name).dim
+    P = fmpq_mat(n, n, [rng.randint(-2, 2) + 5 * (i % (n + 1) == 0) for i in range(n * n)])
+    file = elsewhere(name, P, [fmpq(rng.randint(-2, 2)) for _ in range(n)], 3)
+    found = equivalent_system(file, seconds=60)
+    assert found is not None
+    assert found.name == name
+    assert holds(file, found)
+
+
+@pytest.mark.parametrize("name", ["euler_top", "lorenz", "henon_heiles", "dressing_chain_3", "zhukovski_volterra_1"])
+def test_a_system_is_known_again_after_a_change_of_scales_and_places(name):
+    n = load(name).dim
+    P = fmpq_mat(n, n, [(k + 2) * (-1) ** k if j == (k + 1) % n else 0 for k in range(n) for j in range(n)])
+    file = elsewhere(name, P, [fmpq(k, 2) for k in range(n)], -2)
+    found = equivalent_system(file, seconds=60)
+    assert found is not None
+    assert holds(file, found)
+
+
+def test_lines_of_fixed_points_are_a_frame():
+    """An Euler top with its axes turned: three lines of fixed points lead back to them."""
+    P = fmpq_mat([[1, 1, 0], [0, 1, 1], [1, 0, 3]])
+    file = elsewhere("euler_top", P, [fmpq(0)] * 3, 1)
+    found = equivalent_system(file, seconds=60)
+    assert found is not None
+    assert (found.name, holds(file, found)) == ("euler_top", True)
+    assert equivalent_system(file, FixedPointSearch((), ""), 60) is None  # without them it is not seen
+
+
+@pytest.mark.parametrize(
+    "equations",
+    [
+        "x' = x^2 - y^2; y' = 2*x*y",  # not free of divergence, as the Nahm systems are; no parameter makes it another
+        "x' = y; y' = -x",  # linear
+        "x' = y*z + x; y' = z*x; z' = x*y",
+    ],
+)
+def test_other_systems_are_not_taken_for_one(equations):
+    file = System(equations)
+    assert equivalent_system(file, seconds=60) is None
+
+
+def test_a_near_miss_is_no_equivalence():
+    """The verification by itself: an Euler top with one term more of degree 1."""
+    good, bad = System("x' = 3*y*z; y' = x*z; z' = -x*y"), System("x' = 3*y*z; y' = x*z; z' = -x*y + x/1000")
+    found = equivalent_system(good)
+    assert found is not None
+    assert found.text == "equivalent to euler_top at a1 = 3, a2 = 1, a3 = -1 with its variables called x, y, z"
+    assert holds(good, found)
+    assert not holds(bad, found)
+
+
+def test_a_system_of_the_catalogue_is_not_compared():
+    assert equivalent_system(load("euler_top", a1=7)) is None
