@@ -27,13 +27,15 @@ from kahanmaps.version import __version__ as __version__
 # The one list of public names is what type checkers read: __init__.pyi.
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="ascii")
 _MODULE_OF = {name: module for module, name in re.findall(r"^from (\S+) import (\w+) as", _STUB, re.MULTILINE)}
-# The same under the names of the commands.
-_OTHER_NAMES = dict(re.findall(r"^(\w+) = (\w+)$", _STUB, re.MULTILINE))
-__all__ = [*_MODULE_OF, *_OTHER_NAMES]
+# What takes whatever stands for a map, and the same under the names of the commands.
+_OTHER_NAMES = dict(re.findall(r"^(\w+) = (?:opened\(_)?(\w+)\)?$", _STUB, re.MULTILINE))
+_HIDDEN = {"map_at", "draw_orbits", "map"}  # the last is the name of a builtin, which `import *` leaves alone
+__all__ = list(dict.fromkeys(name for name in (*_MODULE_OF, *_OTHER_NAMES) if name not in _HIDDEN))
 
 
 def __getattr__(name: str) -> Any:
     known = _OTHER_NAMES.get(name, name)
+    known = _OTHER_NAMES.get(known, known)
     if known in _MODULE_OF:
         value = opened(getattr(import_module(_MODULE_OF[known]), known))
         globals()[name] = value

@@ -6,8 +6,12 @@ looks: hence by its name, the one place where an import points up.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from importlib import import_module
+from typing import Any
+
+from kahanmaps.errors import InputError
 
 
 class Displayed:
@@ -28,6 +32,19 @@ class Printed(Displayed):
     def __str__(self) -> str:
         _load(self)
         return text_form(self)
+
+    def to_pandas(self) -> Any:
+        """`rows()` as a table of pandas. Raises InputError where that, an extra, is not installed."""
+        return data_frame(self.rows())  # type: ignore[attr-defined]  # every result that is printed has rows
+
+
+def data_frame(rows: Sequence[Mapping[str, Any]]) -> Any:
+    """A table of pandas. Raises InputError where it is not installed."""
+    try:
+        pandas = import_module("pandas")
+    except ImportError as error:
+        raise InputError(f"a table needs pandas ({error}): pip install pandas, or take rows()") from error
+    return pandas.DataFrame(rows)
 
 
 class DisplayedAsFormula:

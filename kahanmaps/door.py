@@ -10,32 +10,57 @@ from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 from types import FunctionType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
 from kahanmaps.errors import InputError
 
 if TYPE_CHECKING:
     from kahanmaps.documents.files import SystemFile
+    from kahanmaps.maps.implicit import BirationalMap
+    from kahanmaps.systems.quadratic import QuadraticSystem
+
+    Given = str | Path | SystemFile | QuadraticSystem | BirationalMap
+    P = ParamSpec("P")
+    R = TypeVar("R", covariant=True)
+
+    class Opened(Protocol[P, R]):
+        """What `opened` returns, for type checkers: the rest of the arguments is checked where there is no eps."""
+
+        @overload
+        def __call__(self, given: Given, /, *others: P.args, **options: P.kwargs) -> R: ...
+        @overload
+        def __call__(self, given: Given, /, *others: Any, eps: Any, **options: Any) -> R: ...
+        @overload
+        def __call__(self, given: Given, /, *others: Any, time_step: Any, **options: Any) -> R: ...
+
 
 _FIRST = ("file", "system", "given")  # names of first arguments that stand for a map
 
 
-def opened(function: Any) -> Any:
+def opened(function: Callable[Concatenate[Any, P], R]) -> Opened[P, R]:
     """A function whose first argument is a file, a system or a map, for whatever stands for one.
 
-    It takes `time_step` in the place of `eps` too, which is half of it, and `eps` where it has only settings. Other
-    functions, and classes, are returned as they are.
+    It takes `time_step` in the place of `eps` too, which is half of it, and `eps` where it has only settings. Where eps
+    is named, the arguments without a name are the others in their order. Other functions, and classes, are returned as
+    they are.
     """
     if not isinstance(function, FunctionType) or function.__code__.co_varnames[:1] not in [(one,) for one in _FIRST]:
         return function
-    names = function.__code__.co_varnames[: function.__code__.co_argcount + function.__code__.co_kwonlyargcount]
+    code = function.__code__
+    names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+    required = names[: code.co_argcount - len(function.__defaults__ or ())]
     wanted = str(function.__annotations__[names[0]])
     convert: Callable[[Any], Any] = _file
     if "SystemFile" not in wanted:
         convert = _map if "BirationalMap" in wanted else _system
 
     @wraps(function)
-    def door(given: Any, /, *others: Any, time_step: Any = None, **options: Any) -> Any:
+    def door(*given: Any, time_step: Any = None, **options: Any) -> Any:
+        others = given[1:]
+        if "eps" in required and (time_step is not None or "eps" in options):
+            free = [name for name in required[1:] if name != "eps"]
+            options |= dict(zip(free, others, strict=False))
+            others = others[len(free) :]
         if time_step is not None:
             from kahanmaps.algebra.fields import rational
 
@@ -48,27 +73,15 @@ def opened(function: Any) -> Any:
             options["settings"] = Settings(eps=options.pop("eps"))
         if "other" in names and others:
             others = (_file(others[0]), *others[1:])
-        return function(convert(given), *others, **options)
+        return function(*map(convert, given[:1]), *others, **options)
 
     return door
 
 
 def _file(given: Any) -> SystemFile:
-    from kahanmaps.documents.catalog import load
-    from kahanmaps.documents.files import SystemFile
-    from kahanmaps.documents.inline import System
-    from kahanmaps.systems.quadratic import QuadraticSystem
+    from kahanmaps.documents.inline import file_of
 
-    if isinstance(given, SystemFile):
-        return given
-    if isinstance(given, QuadraticSystem):
-        return SystemFile.from_system(given)
-    if isinstance(given, str) and "=" in given:
-        return System(given)
-    if isinstance(given, str | Path):
-        return load(given)
-    kind = type(given).__name__
-    raise InputError(f"found a {kind}, expected a name of the catalogue, a file, a system, or equations as text")
+    return file_of(given)
 
 
 def _map(given: Any) -> Any:

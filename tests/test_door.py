@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -171,13 +174,52 @@ km.convert("euler_top", "sage")
 km.Kahan(km.load("euler_top").system)
 km.KahanMap(km.load("euler_top").system, "1/10")([1, 2, 3])
 km.KahanMap(km.load("euler_top").system, "1/10") ** -2
+km.load("euler_top").at("1/10")([1, 2, 3])
+km.load("euler_top")("1/10")
+km.load("euler_top").at(Fraction(1, 10)).inverse
+km.load("euler_top").rhs
+km.load("euler_top").dim
+km.load("euler_top").parameters
+km.load("euler_top").save("top.toml")
+km.map("euler_top", eps="1/10")([1, 2, 3])
+km.map("euler_top", "1/10") ** -2
+km.map("euler_top", time_step="1/5") @ km.map("lorenz", "1/10")
+np.array(km.map("euler_top", "1/10")([1, 2, 3]), dtype=float)
+km.map("lyness")([1, 2])
+len(km.orbit("euler_top", [1, 2, 3], "1/10", 3))
+km.orbit("euler_top", [1, 2, 3], "1/10", 3)[2].x
+km.orbit("euler_top", [1, 2, 3], "1/10", 3)[-1].text
+km.orbit("euler_top", [1, 2, 3], "1/10", 3)[1:3]
+float(km.orbit("euler_top", [1, 2, 3], "1/10", 3)[1].x[0])
+np.asarray(km.orbit("euler_top", [1, 2, 3], "1/10", 3))
+np.array(km.orbit("euler_top", [1, 2, 3], "1/10", 3, arithmetic="float"))
+km.orbit("euler_top", [1, 2, 3], "1/10", 3).rows()
+km.orbit("euler_top", [1, 2, 3], "1/10", 3).to_csv("o.csv")
+km.orbit("euler_top", start=[1, 2, 3], eps="1/10", steps=3).end
+km.cycles("weierstrass", 11, eps="1/10").lengths
+km.cycles("weierstrass", "1/10", 11)
+km.lyapunov("lorenz", [1, 2, 3], "1/100", 10).mean
+km.lyapunov("lorenz", [[1, 2, 3], [1, 1, 1]], eps="1/100", steps=10)
+km.singularities("weierstrass", eps="1/10")
+km.verify(m=1)
+km.analyze("weierstrass", seconds=2).conclusion.sentence
+km.heights("weierstrass", "1/10", starts=[[1, 2]], seconds=2).kind
+km.find_poisson("weierstrass", 1)
+km.convert("euler_top", "latex")
+km.plot.degrees(km.degrees("euler_top", max_terms=4))
+km.plot.heights(km.heights("weierstrass", "1/10", seconds=2))
+km.plot.orbit(km.orbit("euler_top", [1, 2, 3], "1/10", 20))
+km.plot.portrait("lotka_volterra", [1, 2], "1/10", 20)
+km.portrait("lotka_volterra", eps="1/20", steps=20)
+km.portrait("lotka_volterra", [[1, 2], [1, 3]], "1/20", steps=20)
 km.latex_polynomial(km.load("euler_top").system.rhs[0])
 km.parse_point("1/2,3")
 """.strip().splitlines()
 
 
 @pytest.mark.parametrize("expression", EXPRESSIONS)
-def test_what_one_writes_works(expression):
+def test_what_one_writes_works(expression, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     eval(expression, {"km": km, "np": np, "Fraction": Fraction})
 
 
@@ -187,12 +229,19 @@ def test_what_one_writes_works(expression):
         ('km.orbit("euler_top", [1, 2, 3], 0.1, 5)', 'e.g. "0.1"'),
         ('km.KahanMap("euler_top", "1/10")', r"km.load\(...\).system is one"),
         ('km.plot.degrees("euler_top")', r"km.plot.degrees\(km.degrees"),
+        ('km.plot.heights("euler_top")', r"km.plot.heights\(km.heights"),
         ('km.find_integral("euler_top")', "did you mean find_integrals"),
+        ('km.load("euler_top")()', 'found no eps, expected an exact number such as "1/10"'),
+        ('km.map("euler_top")', "euler_top depends on it"),
+        ('km.orbit("euler_top", [1, 2, 3], "1/10")', "expected a number of steps"),
+        ('km.cycles("weierstrass", 11, 13, eps="1/10")', "several values|multiple values|two values"),
+        ("km.verify()", "expected a member of the family, or m"),
+        ('np.array(km.orbit("euler_top", [1, 2, 3], "1/10", 2, arithmetic="ball:64"))', 'take arithmetic="float"'),
     ],
 )
 def test_what_does_not_work_says_what_does(expression, words):
-    with pytest.raises((InputError, AttributeError), match=words):
-        eval(expression, {"km": km})
+    with pytest.raises((InputError, AttributeError, TypeError), match=words):
+        eval(expression, {"km": km, "np": np})
 
 
 def test_degrees_are_drawn_on_axes_and_refuted_claims_are_rows():
@@ -201,3 +250,76 @@ def test_degrees_are_drawn_on_axes_and_refuted_claims_are_rows():
     wrong = km.parse_rational_function("x1", ["x1", "x2", "x3", "eps"])
     rows = km.check_integrals("euler_top", extra={"I": wrong}).rows()
     assert [row["verdict"] for row in rows] == ["proved", "proved", "refuted"]
+
+
+def test_points_of_an_orbit_are_the_same_however_one_asks():
+    once = [point.x for point in km.orbit("euler_top", [1, 2, 3], "1/10", 5)]
+    walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5)
+    assert len(walk) == 6
+    assert [point.x for point in walk] == [walk[k].x for k in range(6)] == once
+    assert walk.end.status == "completed"
+    for kind in ("exact", "float", "mod:101"):
+        walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5, arithmetic=kind)
+        assert np.asarray(walk).shape == (6, 3)
+        assert [row["step"] for row in walk.rows()] == list(range(6))
+    assert np.asarray(walk).tolist() == [[row[name] for name in walk.variables] for row in walk.rows()]
+    table = np.asarray(km.orbit("euler_top", [1, 2, 3], "1/10", 5))
+    assert table[1] == pytest.approx([65 / 37, 10 / 37, 125 / 37])
+    field = km.load("euler_top", a1="root of t^2 - 2")
+    with pytest.raises(InputError, match='arithmetic="float"'):
+        np.asarray(km.orbit(field, [1, 2, 3], "1/10", 2))
+
+
+def test_a_table_of_pandas_is_made_of_the_rows(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=list))
+    walk, found = km.orbit("euler_top", [1, 2, 3], "1/10", 2), km.degrees("weierstrass", max_terms=2)
+    assert walk.to_pandas() == walk.rows()
+    assert found.to_pandas() == found.rows()
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(InputError, match="pip install pandas"):
+        found.to_pandas()
+    walk.to_csv(tmp_path / "o.csv")
+    assert (tmp_path / "o.csv").read_text().splitlines()[:2] == ["step,x1,x2,x3", "0,1,2,3"]
+
+
+SCRIPT = """
+from fractions import Fraction
+from pathlib import Path
+
+import kahanmaps as km
+
+top = km.load("euler_top", a1=2)
+fish = km.System({"q": "p", "p": "a*q^2 - q"}, a=Fraction(1, 2))
+growth: km.DegreeGrowth = km.degrees("euler_top", max_terms=4)
+print(growth.growth_text, km.degrees(top, eps="1/10").rows(), km.degrees(Path("mine.toml"), time_step="1/5"))
+found: km.IntegralSearch = km.find_integrals("x' = y; y' = 6*x^2 - 2", seconds=5)
+print([one.text for one in found.integrals], km.find_density(fish).densities[0].text)
+report: km.Report = km.check_commute("euler_top", top, eps="1/10")
+print(report.verdict is km.Verdict.PROVED, km.check_measure("euler_top", eps="1/10").holds)
+walk = km.orbit("euler_top", [1, 2, 3], "1/10", 5)
+print(len(walk), walk[-1].text, [point.step for point in walk[1:3]], [point.x for point in walk])
+phi = km.map("euler_top", "1/10")
+print(phi([1, 2, 3]), (phi**-2 @ phi)([1, 2, 3]), top.at("1/10").inverse, top("1/10"))
+print(km.cycles("weierstrass", 101, eps="1/10").lengths, km.lyapunov("lorenz", [1, 2, 3], "1/100", 100).mean)
+print(km.heights(top.map, "1/10", seconds=1).kind, km.verify(m=1).verdict, km.analyze(top.system).conclusion.sentence)
+"""
+WRONG = {
+    "km.degrees(3)": "call-overload",
+    'km.degrees("euler_top", max_tems=4)': "call-overload",
+    'km.degrees("euler_top").growth_txt': "attr-defined",
+    'km.check_commute("euler_top", 3)': "arg-type",
+}
+
+
+def test_a_script_passes_a_strict_type_checker_and_a_wrong_one_does_not(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text("\n".join([SCRIPT, *WRONG]))
+    options = ["--strict", "--config-file=", "--cache-dir", str(tmp_path / "cache")]
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", *options, str(script)], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    lines = [line for line in done.stdout.splitlines() if ": error:" in line]
+    assert len(lines) == len(WRONG), done.stdout + done.stderr
+    for number, (line, kind) in enumerate(zip(lines, WRONG.values(), strict=True), len(SCRIPT.splitlines()) + 2):
+        assert line.startswith(f"script.py:{number}: error:")
+        assert line.endswith(f"[{kind}]")

@@ -16,8 +16,9 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flint import fmpq, fmpq_mat
+from flint import fmpq, fmpq_mat, fmpq_mpoly
 
+from kahanmaps.algebra.fields import rational
 from kahanmaps.algebra.polynomials import RationalFunction, names_of
 from kahanmaps.algebra.text import format_number, format_polynomial
 from kahanmaps.displayed import Displayed
@@ -28,10 +29,11 @@ from kahanmaps.documents.toml_text import to_toml
 from kahanmaps.errors import InputError, SystemFileError, quoted, reading
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.algebraic import AlgebraicMap
-from kahanmaps.maps.implicit import BirationalMap
+from kahanmaps.maps.implicit import BirationalMap, MapOver
 from kahanmaps.maps.kahan import Kahan
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.whole_files import write_whole
 
 if TYPE_CHECKING:
     from kahanmaps.family.associated import ConjugateAssociate, FamilyMember
@@ -106,6 +108,23 @@ class SystemFile(Displayed):
         raise InputError(
             f"{self.name} {what}, expected a quadratic vector field without eps: what is asked for is about fields"
         )
+
+    @property
+    def rhs(self) -> tuple[fmpq_mpoly, ...]:
+        """The right-hand sides of the quadratic system. Raises InputError where it is another map."""
+        return self.system.rhs
+
+    def at(self, eps: Any = None) -> MapOver:
+        """The map at an exact eps, half the time step where it has one: callable. Raises InputError where it lacks."""
+        if eps is None and self.map.has_eps:
+            raise InputError(f'found no eps, expected an exact number such as "1/10": {self.name} depends on it')
+        return self.map.at(fmpq(1) if eps is None else rational(eps))
+
+    __call__ = at
+
+    def save(self, path: str | Path) -> None:
+        """Write the file."""
+        write_whole(str(path), self.to_toml().encode())
 
     @property
     def rounded(self) -> SystemFile:
@@ -207,6 +226,16 @@ def read_system(path: str | Path, parameters: Mapping[str, Any] | None = None) -
     data = _read(path)
     with reading(path):
         return parse_system(data, str(path), parameters)
+
+
+def map_at(file: SystemFile, eps: Any = None) -> MapOver:
+    """The map of a file at an exact eps: callable, and composed by @ and powers. Raises InputError where eps lacks.
+
+    >>> from kahanmaps.documents.catalog import load
+    >>> map_at(load("euler_top"), "1/10")([1, 2, 3])
+    (65/37, 10/37, 125/37)
+    """
+    return file.at(eps)
 
 
 def parse_system(text: str | bytes, where: str = "system", parameters: Mapping[str, Any] | None = None) -> SystemFile:

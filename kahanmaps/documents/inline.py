@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
+from kahanmaps.documents.catalog import load
 from kahanmaps.documents.files import SystemFile, parse_system
+from kahanmaps.errors import InputError
+from kahanmaps.systems.quadratic import QuadraticSystem
 
 
 def inline_file(
@@ -57,3 +61,20 @@ def System(equations: str | Mapping[Any, Any] | Sequence[Any], variables: Any = 
     names = None if variables is None else ",".join(map(str, variables))
     values = {name: str(value) for name, value in parameters.items()}
     return parse_system(inline_file(names, values, "system", {"rhs": rhs}), "inline")
+
+
+def file_of(given: Any) -> SystemFile:
+    """The file that anything stands for: a file, a system, a name of the catalogue, a path, or equations as text.
+
+    Raises InputError for anything else.
+    """
+    if isinstance(given, SystemFile):
+        return given
+    if isinstance(given, QuadraticSystem):
+        return SystemFile.from_system(given)
+    if isinstance(given, str) and "=" in given:
+        return System(given)
+    if isinstance(given, str | Path):
+        return load(given)
+    kind = type(given).__name__
+    raise InputError(f"found a {kind}, expected a name of the catalogue, a file, a system, or equations as text")

@@ -357,7 +357,7 @@ def lyapunov(
 
     starts = starts_in_box(orbits, system.dim, float(to_floats([box])[0]), seed)
     skipped = steps // 10 if transient is None else transient
-    found = lyapunov_exponents(system.map, eps, starts, steps, transient=skipped, seconds=seconds)
+    found = lyapunov_exponents(system.map, starts, eps, steps, transient=skipped, seconds=seconds)
     mean, volume = found.mean, found.log_volume
     return {
         "status": "time" if found.stopped else "completed" if len(found.exponents) else "no orbit left",

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from math import gcd
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
 
 from flint import fmpq
 
+from kahanmaps.algebra.etale import EtaleElement
 from kahanmaps.algebra.fields import GF, rational
 from kahanmaps.algebra.text import parse_point
+from kahanmaps.displayed import data_frame
 from kahanmaps.errors import InputError
 from kahanmaps.family.structure import NoStructure, Structure, structure_of
 from kahanmaps.maps.accuracy import NotAccurate, bits_for
@@ -28,6 +32,7 @@ from kahanmaps.maps.orbits import (
 )
 from kahanmaps.systems.hamiltonian import CubicHamiltonian
 from kahanmaps.systems.quadratic import QuadraticSystem
+from kahanmaps.whole_files import write_whole
 
 if TYPE_CHECKING:
     from kahanmaps.family.associated import FamilyMember
@@ -135,20 +140,38 @@ def orbit(
         except NotAccurate as error:
             bits, remark = _BITS_AT_LEAST, str(error)
         arithmetic = Arithmetic("ball", bits)
-    return Walk(made(arithmetic), arithmetic, chosen.name, chosen.text, None if at is None else set(at), every, remark)
+    wanted = None if at is None else set(at)
+    return Walk(made(arithmetic), arithmetic, chosen.name, chosen.text, wanted, every, remark, map_.variables)
 
 
 class Walk:
-    """What `orbit` returns. `arithmetic` is the one used, `method` its name and `why` the reason; `orbit` does it."""
+    """What `orbit` returns. `arithmetic` is the one used, `method` its name and `why` the reason; `orbit` does it.
+
+    Iterate over it, and nothing is kept; or ask for its length, for points by their number, for a table or an array,
+    and all points are walked and kept.
+
+    >>> walk = orbit(QuadraticSystem.from_text(["x"], ["x^2"]), ["1/5"], "1/2", steps=3)
+    >>> len(walk), walk[-1].x, walk.rows()[0]
+    (4, (1/2,), {'step': 0, 'x': '1/5'})
+    """
 
     def __init__(
-        self, orbit: Any, arithmetic: Arithmetic, method: str, why: str, at: set[int] | None, every: int, remark: str
+        self,
+        orbit: Any,
+        arithmetic: Arithmetic,
+        method: str,
+        why: str,
+        at: set[int] | None,
+        every: int,
+        remark: str,
+        variables: Sequence[str],
     ) -> None:
         self.orbit = orbit
         self.arithmetic = arithmetic
         self.method = method
         self.why = why
         self._at, self._every, self._remark = at, every, remark
+        self.variables = tuple(variables)
 
     def wanted(self, step: int) -> bool:
         """Whether this step is one that was asked for: others may come as well."""
@@ -160,13 +183,61 @@ class Walk:
 
     @property
     def end(self) -> OrbitEnd:
-        """How it ended, once all points have come."""
-        end: OrbitEnd | None = self.orbit.end
-        if end is None:
-            raise AssertionError("an orbit has not ended, or without saying how")
+        """How it ended; where not all points have come yet, they are walked and kept."""
+        if self.orbit.end is None:
+            _ = self.points
+        end: OrbitEnd = self.orbit.end
         return OrbitEnd("precision", end.steps, self._remark) if self._remark and end.is_whole else end
 
+    @cached_property
+    def points(self) -> list[OrbitPoint]:
+        """All points."""
+        return list(self._walked())
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @overload
+    def __getitem__(self, index: int) -> OrbitPoint: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[OrbitPoint]: ...
+    def __getitem__(self, index: int | slice) -> OrbitPoint | list[OrbitPoint]:
+        return self.points[index]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """A row for each point: its step and the coordinates, floats and residues as numbers, others as exact text."""
+        kind = {"float": float, "mod": int}.get(self.arithmetic.kind, str)
+        return [
+            {"step": point.step, **{name: kind(x) for name, x in zip(self.variables, point.text, strict=True)}}
+            for point in self.points
+        ]
+
+    def to_pandas(self) -> Any:
+        """`rows()` as a table of pandas. Raises InputError where that, an extra, is not installed."""
+        return data_frame(self.rows())
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the points as `kahanmaps orbit -o` does: step and coordinates, exact."""
+        lines = [",".join(["step", *self.variables]), *(f"{p.step},{','.join(p.text)}" for p in self.points)]
+        write_whole(str(path), ("\n".join(lines) + "\n").encode())
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+        """The coordinates (points, dim), rounded to doubles. Raises InputError for balls and over number fields."""
+        import numpy as np
+
+        from kahanmaps.maps.floats.doubles import to_float
+
+        if self.arithmetic.kind == "ball" or any(isinstance(x, EtaleElement) for x in self[0].x):
+            raise InputError(f'found {self.arithmetic} arithmetic, expected numbers: take arithmetic="float"')
+        rows = [[to_float(x) if isinstance(x, fmpq) else float(int(x)) for x in p.x] for p in self.points]
+        if self.arithmetic.kind == "float":
+            rows = [list(p.x) for p in self.points]
+        return np.array(rows, dtype=dtype or np.float64)
+
     def __iter__(self) -> Iterator[OrbitPoint]:
+        return iter(self.__dict__.get("points") or self._walked())
+
+    def _walked(self) -> Iterator[OrbitPoint]:
         if self.arithmetic.kind != "float":
             yield from self.orbit
             return

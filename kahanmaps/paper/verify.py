@@ -56,12 +56,19 @@ NOTE_ON_PROOFS = (
 )
 
 
-def verify(file: SystemFile, settings: Settings | None = None, options: VerifyOptions | None = None) -> Report:
+def verify(
+    file: SystemFile | None = None,
+    settings: Settings | None = None,
+    options: VerifyOptions | None = None,
+    *,
+    m: int | None = None,
+) -> Report:
     """Every claim of the paper for a member of the family.
 
     `settings` gives eps (None: every eps, an indeterminate), the seed and the error bound. Exact but for the claims
-    whose verdict is `supported`. Returns a Report with one Finding a claim, in the order of the paper. Raises
-    InputError where the system is not of kind [family].
+    whose verdict is `supported`. Without a file, `m` asks for the member in general, as `verify_universal` does.
+    Returns a Report with one Finding a claim, in the order of the paper. Raises InputError where the system is not of
+    kind [family].
 
     Source: petrera-suris-2016, all of it.
 
@@ -71,6 +78,10 @@ def verify(file: SystemFile, settings: Settings | None = None, options: VerifyOp
     >>> str(report.verdict), report.findings[1].claim
     ('proved', 'Theorem 9: The Kahan maps of associated vector fields commute, all pairs of the class')
     """
+    if (file is None) == (m is None):
+        raise InputError("expected a member of the family, or m: half the dimension of the one in general")
+    if file is None:
+        return verify_universal(m or 0, settings, options)
     settings, options = settings or Settings(), options or VerifyOptions()
     member = file.member
     if member is None:

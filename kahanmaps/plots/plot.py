@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from kahanmaps.documents.files import SystemFile
+from kahanmaps.documents.inline import file_of
 from kahanmaps.errors import InputError
 from kahanmaps.laboratory.growth.degrees import DegreeGrowth
+from kahanmaps.laboratory.growth.height_survey import HeightSurvey
+from kahanmaps.maps.orbit import Walk
+from kahanmaps.plots.automatic_starts import automatic_starts
+from kahanmaps.plots.point_functions import point_function
+from kahanmaps.plots.portrait import portrait_of
+from kahanmaps.plots.style import Style
+from kahanmaps.plots.trajectories import Trajectories, ensemble_for, walked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,6 +35,53 @@ class Plot:
             raise InputError(f"found a {type(given).__name__}, expected a result: km.plot.degrees(km.degrees(...))")
         axes: Axes = draw_degrees({label: given}, scale=scale).axes[0]
         return axes
+
+    def heights(self, found: HeightSurvey, *, scale: str | None = None) -> Axes:
+        """What `km.heights` found. Raises InputError for anything else."""
+        from kahanmaps.plots.growth import draw_heights
+
+        given: Any = found
+        if not isinstance(given, HeightSurvey):
+            raise InputError(f"found a {type(given).__name__}, expected a result: km.plot.heights(km.heights(...))")
+        axes: Axes = draw_heights(given, scale=scale).axes[0]
+        return axes
+
+    def orbit(self, found: Walk, x: int = 0, y: int = 1) -> Axes:
+        """The points of what `km.orbit` returned, in two of its coordinates."""
+        points = np.asarray(found)[:, None]
+        return _drawn(Trajectories(found.variables, points, np.array([point.step for point in found])), (x, y))
+
+    def portrait(self, given: Any, *others: Any, **options: Any) -> Axes:
+        """As `km.portrait`."""
+        return draw_orbits(file_of(given), *others, **options)
+
+
+def draw_orbits(
+    file: SystemFile, starts: Any = None, eps: Any = None, steps: int = 1000, *, axes: Sequence[int] = (0, 1)
+) -> Axes:
+    """The float orbits of a map as a portrait in two coordinates: `plot portrait` has all that may be drawn beside.
+
+    Args:
+        file: the map.
+        starts: one start or many; by default those that `plot portrait` takes, around the fixed points of the field.
+        eps: an exact number, half the time step where there is one.
+        steps: of each orbit.
+        axes: the numbers of the two coordinates.
+    """
+    rounded = file.rounded
+    value = rounded.at(eps).eps
+    if starts is None:
+        starts = automatic_starts(rounded.system, value, axes)
+    x = np.atleast_2d(np.array(starts, dtype=np.float64))
+    return _drawn(walked(ensemble_for(rounded.map, value, x, steps), steps), axes)
+
+
+def _drawn(found: Trajectories, axes: Sequence[int]) -> Axes:
+    from kahanmaps.plots.draw_portrait import draw_portrait
+
+    shown = [point_function(found.variables[k], found.variables) for k in axes]
+    drawn: Axes = draw_portrait(portrait_of(found, shown), Style()).axes[0]
+    return drawn
 
 
 plot = Plot()

@@ -226,7 +226,7 @@ def test_a_census_is_that_of_the_library():
 
 def test_exponents_are_those_of_the_library():
     found = perform("lyapunov", LORENZ, eps="1/400", orbits=4, box="5", steps=50, transient=10, seed=3)
-    direct = lyapunov_exponents(LORENZ.system, "1/400", starts_in_box(4, 3, 5.0, 3), 50, transient=10)
+    direct = lyapunov_exponents(LORENZ.system, starts_in_box(4, 3, 5.0, 3), "1/400", 50, transient=10)
     assert found["exponents"] == direct.mean.tolist()
     assert (found["largest"], found["smallest"]) == (found["exponents"][0], found["exponents"][2])
     assert (found["status"], found["counted"], found["ended"]) == ("completed", 50, 0)

@@ -71,8 +71,8 @@ def command(system: str | None, as_json: bool, quiet: bool, **options: Any) -> i
     with Progress(quiet) as progress:
         found = lyapunov_exponents(
             file.map,
-            fmpq(1) if eps is None else eps,
             starts,
+            fmpq(1) if eps is None else eps,
             steps,
             transient=transient,
             seconds=options["seconds"],

@@ -83,15 +83,15 @@ class Lyapunov:
 
 def lyapunov_exponents(
     given: QuadraticSystem | BirationalMap,
-    eps: Any,
     starts: Any,
+    eps: Any,
     steps: int,
     *,
     transient: int = 0,
     seconds: float = 60.0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Lyapunov:
-    """The Lyapunov exponents of the float orbits of a map from `starts`, an array (orbits, dim) of floats.
+    """The Lyapunov exponents of the float orbits of a map from `starts`, an array (orbits, dim) of floats, or one.
 
     A system stands for its Kahan map. `eps` is exact, half the time step where there is one, of either sign; `steps`
     steps are counted after `transient` steps, both for at most about `seconds` seconds. Double precision: the numbers
@@ -100,7 +100,7 @@ def lyapunov_exponents(
     Source: benettin-1980.
 
     >>> oscillator = QuadraticSystem.from_text(["x", "y"], ["y", "-x"])
-    >>> found = lyapunov_exponents(oscillator, "1/10", np.array([[1.0, 0.0]]), 100)
+    >>> found = lyapunov_exponents(oscillator, [1, 0], "1/10", 100)
     >>> bool(np.abs(found.mean).max() < 1e-12), found.ended
     (True, 0)
     """
@@ -111,7 +111,7 @@ def lyapunov_exponents(
         )
     if steps < 2 or transient < 0:
         raise InputError(f"found {steps} steps after {transient}, expected at least 2 after 0 or more")
-    x: FloatArray = np.array(starts, dtype=np.float64)
+    x: FloatArray = np.atleast_2d(np.array(starts, dtype=np.float64))
     map_ = as_map(given).rounded
     n = map_.dim
     if x.ndim != 2 or x.shape[1] != n or len(x) == 0 or not np.isfinite(x).all():
