@@ -208,6 +208,19 @@ def test_csv_is_read_by_the_csv_module(kahanmaps):
         assert row["p"] == (record["integrals"]["p"] or "")
 
 
+@pytest.mark.parametrize(("arithmetic", "kind"), [("exact", None), ("float", "f")])
+def test_a_csv_file_is_a_table_without_options(kahanmaps, tmp_path, arithmetic, kind):
+    path = tmp_path / "orbit.csv"
+    kahanmaps(f"{TOP} --steps 4 --arithmetic {arithmetic} -o", path)
+    with path.open(newline="") as stream:
+        names, *rows = csv.reader(stream, strict=True)
+    assert (names, len(rows)) == (["step", "x1", "x2", "x3"], 5)
+    assert {len(row) for row in rows} == {4}
+    table = pytest.importorskip("pandas").read_csv(path)
+    assert (table.shape, table["step"].dtype.kind) == ((5, 4), "i")
+    assert kind in (None, table["x1"].dtype.kind)
+
+
 @pytest.fixture
 def npz(kahanmaps, tmp_path):
     """Run an orbit into an npz file and load it."""
