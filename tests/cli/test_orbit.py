@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 import shlex
 import signal
 import subprocess
@@ -326,6 +327,20 @@ def test_progress_on_a_terminal_is_one_line_that_goes_away(monkeypatch, slow_clo
     assert screen.getvalue() == f"\rstep 9 of 10 (10 s)\rstep 10 of 10 (20 s)\r{blank}\r"
 
 
+def test_the_clock_on_a_terminal_moves_by_itself_until_the_end(monkeypatch):
+    screen = io.StringIO()
+    screen.isatty = lambda: True
+    monkeypatch.setattr("sys.stderr", screen)
+    with Progress() as progress:
+        progress("a long step")
+        time.sleep(2.3)
+        progress.clear()
+        cleared = screen.getvalue()
+        time.sleep(1.2)
+    assert re.findall(r"a long step \((\d) s\)", cleared) == ["1", "2"]
+    assert screen.getvalue() == cleared
+
+
 # Terminals
 
 
@@ -338,6 +353,14 @@ def on_terminal():
 def test_long_numbers_are_shortened_on_a_terminal(on_terminal):
     assert "(72/72 digits)" in on_terminal.out
     assert max(len(line) for line in on_terminal.out.splitlines()) <= 100
+
+
+def test_in_narrow_columns_long_numbers_are_decimals_with_their_digits_as_well():
+    out = terminal(*shlex.split(f"{TOP} --steps 5"), columns=64).out
+    assert re.search(r"  -?[0-9.e+-]+ \(72/72\)", out)
+    assert "..." not in out
+    assert "# (30/28): digits above and below the line" in out
+    assert "(30/28)" not in terminal(*shlex.split(f"{TOP} --steps 1"), columns=64).out
 
 
 def test_columns_are_aligned_on_a_terminal(on_terminal):
