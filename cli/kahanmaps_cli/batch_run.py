@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kahanmaps.errors import counted, quoted, suggestion
-from kahanmaps_cli.batch_show import duration, print_status, status_data
-from kahanmaps_cli.progress import as_typed, say
+from kahanmaps_cli.batch_show import print_status, status_data
+from kahanmaps_cli.progress import as_typed, duration, say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.signals import interruptible
 from kahanmaps_cli.terminal import is_coloured, tell

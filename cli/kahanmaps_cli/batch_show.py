@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps_cli.progress import duration
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.terminal import echo, on_terminal, print_table, shorten, tell, tell_entry
 
@@ -209,15 +210,3 @@ _NEEDS = {
 
 def _compact(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value)
-
-
-def duration(seconds: float) -> str:
-    """A time for people: 8 s, 3 min, 2 h 5 min, 3 d 4 h.
-
-    >>> duration(8.2), duration(200), duration(7500), duration(273_000)
-    ('8 s', '3 min 20 s', '2 h 5 min', '3 d 4 h')
-    """
-    whole = round(seconds)
-    parts = [(whole // 86400, "d"), (whole // 3600 % 24, "h"), (whole // 60 % 60, "min"), (whole % 60, "s")]
-    first = next((k for k, (number, _) in enumerate(parts) if number), 3)
-    return " ".join(f"{number} {unit}" for number, unit in parts[first : first + 2] if number) or "0 s"

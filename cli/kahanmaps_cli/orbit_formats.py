@@ -158,6 +158,7 @@ class Text(Writer):
         self._width = width
         self._first = 6
         self._cell = 0  # no table
+        self._has_digits = False  # whether some number stands without the word digits
 
     def header(self, header: dict[str, Any]) -> None:
         names = [*self.columns, *self.integrals]
@@ -195,10 +196,14 @@ class Text(Writer):
             self._line(last)
         else:
             tell(last)
+            if self._has_digits:
+                tell("# (30/28): digits above and below the line; (30): the larger number of them")
         self.stream.flush()
 
     def _row(self, cells: Sequence[str]) -> str:
-        return "".join("  " + _elided(cell, self._cell).rjust(self._cell) for cell in cells)
+        shown = [_elided(cell, self._cell) for cell in cells]
+        self._has_digits |= any(text.endswith(")") and "digits" not in text for text in shown)
+        return "".join("  " + text.rjust(self._cell) for text in shown)
 
 
 class Npz(Writer):
@@ -259,24 +264,30 @@ def _quoted(name: str) -> str:
     return '"' + name.replace('"', '""') + '"' if any(c in name for c in ',"\n') else name
 
 
-def _approximated(text: str) -> str | None:
-    """A long exact number as a decimal and its digits, those above and those below; None for anything else.
+def _approximated(text: str) -> list[str]:
+    """A long exact number as a decimal and its digits, those above and those below, from long to short; else nothing.
 
     >>> _approximated("-133567234372186342562607635605/125821231910581795318152718151")
-    '-1.06156 (30/30 digits)'
+    ['-1.06156 (30/30 digits)', '-1.06156 (30/30)', '-1.06 (30/30)', '-1.06 (30)']
     """
     exact = re.fullmatch(r"(-?)([0-9]+)(?:/([0-9]+))?", text)
     if exact is None:
-        return None
+        return []
     sign, above, below = exact[1], exact[2], exact[3] or "1"
     # of numbers with thousands of digits Python would make no integer, nor a double
     value = int(above[:18]) / int(below[:18])
     power = len(above[18:]) - len(below[18:])
     mantissa, exponent = f"{value:.5e}".split("e")
     power += int(exponent)
-    shown = f"{float(mantissa) * 10**power:.6g}" if abs(power) < 5 else f"{float(mantissa):.6g}e{power:+03d}"
+
+    is_small = abs(power) < 5
+    long, short = (
+        sign + (f"{float(mantissa) * 10**power:.{kept}g}" if is_small else f"{float(mantissa):.{kept}g}e{power:+03d}")
+        for kept in (6, 3)
+    )
     digits = f"{len(above)}/{len(below)}" if exact[3] else f"{len(above)}"
-    return f"{sign}{shown} ({digits} digits)"
+    most = max(len(above), len(below))
+    return [f"{long} ({digits} digits)", f"{long} ({digits})", f"{short} ({digits})", f"{short} ({most})"]
 
 
 def _elided(text: str, width: int) -> str:
@@ -285,8 +296,8 @@ def _elided(text: str, width: int) -> str:
     middle, plus_minus, radius = text.partition(" +/- ")
     if plus_minus:
         return f"{middle[: max(3, width - len(radius) - 6)]}.. +/-{radius}"
-    shown = _approximated(text)
-    if shown is not None and len(shown) <= width:
+    shown = next((one for one in _approximated(text) if len(one) <= width), None)
+    if shown is not None:
         return shown
     keep = max(2, (width - 3) // 2)
     return f"{text[:keep]}...{text[-(width - 3 - keep) :]}"

@@ -13,6 +13,8 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from itertools import pairwise
+from threading import Event, RLock, Thread
 from types import TracebackType
 
 import click
@@ -20,6 +22,8 @@ import click
 from kahanmaps.errors import printable
 
 _FIRST_TOLD = 16  # step; what the first ones take says nothing
+_SHORTEST = 0.01  # seconds that are measured well
+_CENTURIES = 22.0  # a growth of the time, as a logarithm, that nobody waits for
 
 
 def say(message: str) -> None:
@@ -43,70 +47,119 @@ def _typed(word: str) -> str:
 
 
 class Progress:
-    """Call it with a sentence as often as you like inside a `with` block, whose end clears the line."""
+    """Call it with a sentence as often as you like inside a `with` block, whose end clears the line.
+
+    On a terminal the clock behind the last sentence moves by itself, for a step may take minutes.
+    """
 
     def __init__(self, quiet: bool = False) -> None:
         self._quiet = quiet
         self._terminal = sys.stderr.isatty()
         self._start = self._last = time.monotonic()
         self._shown = 0
+        self._sentence = ""
+        self._drawing = RLock()  # a signal may come while it is held
+        self._ended = Event()
 
     def __call__(self, sentence: str) -> None:
+        self._sentence = sentence
         now = time.monotonic()
         if self._quiet or now - self._start < 1 or now - self._last < (0.1 if self._terminal else 10):
             return
         self._last = now
-        text = f"{printable(sentence)} ({now - self._start:.0f} s)"
-        if self._terminal:
+        self._draw(now)
+
+    def _draw(self, now: float) -> None:
+        text = f"{printable(self._sentence)} ({now - self._start:.0f} s)"
+        if not self._terminal:
+            _write(text + "\n")
+            return
+        with self._drawing:
             text = text[: _width() - 1]
             _write("\r" + text.ljust(self._shown))
             self._shown = len(text)
-        else:
-            _write(text + "\n")
+
+    def _tick(self) -> None:
+        while not self._ended.wait(1):
+            if self._sentence:
+                self._draw(time.monotonic())
 
     def clear(self) -> None:
         """Take the line away from a terminal, until the next sentence."""
-        if self._shown:
-            _write("\r" + " " * self._shown + "\r")
-            self._shown = 0
+        with self._drawing:
+            self._sentence = ""
+            if self._shown:
+                _write("\r" + " " * self._shown + "\r")
+                self._shown = 0
 
     def __enter__(self) -> Progress:
+        if self._terminal and not self._quiet:
+            Thread(target=self._tick, daemon=True).start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._ended.set()
         self.clear()
 
 
 class TimeLeft:
-    """How long steps still take that become dearer: what n of them took grew like a power of n, from n/2 to n.
+    """How long steps still take that become dearer.
 
-    Heights that grow like n^2 make it a power between 3 and 4; where they grow faster the time is a lower bound.
+    What n of them took grew like a power of n, from n/2 to n: heights that grow like n^2 make it a power between 3 and
+    4. Where each of the last three steps made the time longer by two fifths it grows exponentially. Else the time is a
+    lower bound.
 
     >>> clock = iter([0.0, 1.0, 8.0])
     >>> left = TimeLeft(64, lambda: next(clock))
     >>> left(16), left(32)
     ('', ', at least 56 s left')
+    >>> clock = iter([0.0, 0.25, 0.5, 1.0, 2.0])
+    >>> left = TimeLeft(12, lambda: next(clock))
+    >>> [left(step) for step in (5, 6, 7, 8)][-1]
+    ', at least 30 s left'
     """
 
     def __init__(self, steps: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._steps, self._clock = steps, clock
         self._start = clock()
         self._before, self._last = (0, 0.0), (0, 0.0)
+        self._recent: list[tuple[int, float]] = []
 
     def __call__(self, step: int) -> str:
         """Words for behind the sentence of progress; empty where it is too early to tell."""
-        if step < _FIRST_TOLD or step >= self._steps:
-            return ""
         spent = self._clock() - self._start
-        if step >= 2 * self._last[0]:
+        self._recent = [*self._recent[-3:], (step, spent)]
+        if step >= 2 * self._last[0] and step >= _FIRST_TOLD:
             self._before, self._last = self._last, (step, spent)
-        n, t = self._before
-        if t <= 0 or spent <= t:
+        growth = self._growth(step, spent)
+        if growth is None or step >= self._steps:
             return ""
-        power = max(1.0, math.log(spent / t) / math.log(step / n))
-        return f", at least {spent * ((self._steps / step) ** power - 1):.0f} s left"
+        seconds = spent * math.expm1(min(growth, _CENTURIES))
+        return f", at least {duration(seconds) if growth < _CENTURIES else 'centuries'} left"
+
+    def _growth(self, step: int, spent: float) -> float | None:
+        """The logarithm of how much longer all steps take than those up to this one; None if it is too early."""
+        (first, began), *later = self._recent
+        if len(later) == 3 and began > _SHORTEST and all(t >= 1.4 * s for (_, s), (_, t) in pairwise(self._recent)):
+            return math.log(spent / began) * (self._steps - step) / (step - first)
+        n, t = self._before
+        if step < _FIRST_TOLD or t <= 0 or spent <= t:
+            return None
+        return max(1.0, math.log(spent / t) / math.log(step / n)) * math.log(self._steps / step)
+
+
+def duration(seconds: float) -> str:
+    """A time for people: 8 s, 3 min, 2 h 5 min, 3 d 3 h.
+
+    >>> duration(8.2), duration(200), duration(7500), duration(273_000)
+    ('8 s', '3 min 20 s', '2 h 5 min', '3 d 3 h')
+    """
+    whole = round(seconds)
+    parts = [(whole // 86400, "d"), (whole // 3600 % 24, "h"), (whole // 60 % 60, "min"), (whole % 60, "s")]
+    first = next((k for k, (number, _) in enumerate(parts) if number), 3)
+    return " ".join(f"{number} {unit}" for number, unit in parts[first : first + 2] if number) or "0 s"
 
 
 def _width() -> int:

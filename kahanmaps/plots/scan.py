@@ -157,8 +157,8 @@ def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None
         found: list[Any] = []
         for place, side, up in product(places, (1, -1), (1, -1)):
             x, y = inside(place)
-            low, bottom = x + (0.4 * across if side > 0 else -0.4 * across - wide), y + up * 0.7 * high - 0.5 * high
-            box = (low, low + wide, bottom, bottom + high)
+            low, bottom = x + (0.4 * across if side > 0 else -0.4 * across - wide), y + up * 0.7 * high - 0.6 * high
+            box = (low, low + wide, bottom, bottom + 1.2 * high)
             covered = sum(_overlap(box, one) for one in marks)
             if min(box) < 0 or max(box) > 1 or any(_overlap(box, one) for one in taken) or (covered and not is_curve):
                 continue
@@ -178,9 +178,11 @@ def _overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
 
 def _along(pieces: list[np.ndarray]) -> list[tuple[float, ...]]:
     """Places on the longest piece of a curve, first where other curves seldom cross it: off the middle."""
-    ends = _resampled(max(pieces, key=len), _PLACES + 1)
+    longest = max(pieces, key=len)
+    ends = _resampled(longest, _PLACES + 1)
     parts = sorted(range(1, _PLACES), key=lambda k: abs(4 * k - 3 * _PLACES))
-    return [tuple(map(float, ends[k])) for k in parts]
+    nearest = (longest[np.hypot(*(longest - ends[k]).T).argmin()] for k in parts)  # which is on the curve
+    return [tuple(map(float, point)) for point in nearest]
 
 
 def _resampled(piece: np.ndarray, count: int) -> np.ndarray:

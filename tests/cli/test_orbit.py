@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 import shlex
 import signal
 import subprocess
@@ -208,6 +209,19 @@ def test_csv_is_read_by_the_csv_module(kahanmaps):
         assert row["p"] == (record["integrals"]["p"] or "")
 
 
+@pytest.mark.parametrize(("arithmetic", "kind"), [("exact", None), ("float", "f")])
+def test_a_csv_file_is_a_table_without_options(kahanmaps, tmp_path, arithmetic, kind):
+    path = tmp_path / "orbit.csv"
+    kahanmaps(f"{TOP} --steps 4 --arithmetic {arithmetic} -o", path)
+    with path.open(newline="") as stream:
+        names, *rows = csv.reader(stream, strict=True)
+    assert (names, len(rows)) == (["step", "x1", "x2", "x3"], 5)
+    assert {len(row) for row in rows} == {4}
+    table = pytest.importorskip("pandas").read_csv(path)
+    assert (table.shape, table["step"].dtype.kind) == ((5, 4), "i")
+    assert kind in (None, table["x1"].dtype.kind)
+
+
 @pytest.fixture
 def npz(kahanmaps, tmp_path):
     """Run an orbit into an npz file and load it."""
@@ -313,6 +327,20 @@ def test_progress_on_a_terminal_is_one_line_that_goes_away(monkeypatch, slow_clo
     assert screen.getvalue() == f"\rstep 9 of 10 (10 s)\rstep 10 of 10 (20 s)\r{blank}\r"
 
 
+def test_the_clock_on_a_terminal_moves_by_itself_until_the_end(monkeypatch):
+    screen = io.StringIO()
+    screen.isatty = lambda: True
+    monkeypatch.setattr("sys.stderr", screen)
+    with Progress() as progress:
+        progress("a long step")
+        time.sleep(2.3)
+        progress.clear()
+        cleared = screen.getvalue()
+        time.sleep(1.2)
+    assert re.findall(r"a long step \((\d) s\)", cleared) == ["1", "2"]
+    assert screen.getvalue() == cleared
+
+
 # Terminals
 
 
@@ -325,6 +353,14 @@ def on_terminal():
 def test_long_numbers_are_shortened_on_a_terminal(on_terminal):
     assert "(72/72 digits)" in on_terminal.out
     assert max(len(line) for line in on_terminal.out.splitlines()) <= 100
+
+
+def test_in_narrow_columns_long_numbers_are_decimals_with_their_digits_as_well():
+    out = terminal(*shlex.split(f"{TOP} --steps 5"), columns=64).out
+    assert re.search(r"  -?[0-9.e+-]+ \(72/72\)", out)
+    assert "..." not in out
+    assert "# (30/28): digits above and below the line" in out
+    assert "(30/28)" not in terminal(*shlex.split(f"{TOP} --steps 1"), columns=64).out
 
 
 def test_columns_are_aligned_on_a_terminal(on_terminal):
