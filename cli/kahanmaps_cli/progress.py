@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from types import TracebackType
+from typing import Self
 
 import click
 
@@ -46,14 +47,14 @@ class Progress:
     """Call it with a sentence as often as you like inside a `with` block, whose end clears the line."""
 
     def __init__(self, quiet: bool = False) -> None:
-        self._quiet = quiet
+        self.quiet = quiet
         self._terminal = sys.stderr.isatty()
         self._start = self._last = time.monotonic()
         self._shown = 0
 
     def __call__(self, sentence: str) -> None:
         now = time.monotonic()
-        if self._quiet or now - self._start < 1 or now - self._last < (0.1 if self._terminal else 10):
+        if self.quiet or now - self._start < 1 or now - self._last < (0.1 if self._terminal else 10):
             return
         self._last = now
         text = f"{printable(sentence)} ({now - self._start:.0f} s)"
@@ -70,7 +71,7 @@ class Progress:
             _write("\r" + " " * self._shown + "\r")
             self._shown = 0
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
