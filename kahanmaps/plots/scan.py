@@ -155,17 +155,20 @@ def _write(axes: Axes, kinds: list[_Kind], window: Window, style: Style) -> None
         for covers, side, up in product((False, True)[: 1 + is_curve], (1, -1), (1, -1)):
             low, bottom = x + (0.4 * across if side > 0 else -0.4 * across - wide), y + up * 0.7 * high - 0.5 * high
             box = (low, low + wide, bottom, bottom + high)
-            if min(box) < 0 or max(box) > 1 or any(_overlap(box, one) for one in (*taken, *(() if covers else marks))):
+            if (
+                min(box) < 0
+                or max(box) > 1
+                or any(
+                    box[0] < one[1] and one[0] < box[1] and box[2] < one[3] and one[2] < box[3]
+                    for one in (*taken, *(() if covers else marks))
+                )
+            ):
                 continue
             taken.append(box)
             where = {"ha": "left" if side > 0 else "right", "va": "center"}
             offset = (0.4 * em * side, 0.7 * em * up)
             write(axes, text, place, offset, halo=1.5, size=em, color=colour, zorder=20, **where)
             break
-
-
-def _overlap(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    return one[0] < other[1] and other[0] < one[1] and one[2] < other[3] and other[2] < one[3]
 
 
 def _middle(pieces: list[np.ndarray]) -> tuple[float, float]:
