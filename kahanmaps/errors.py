@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from datetime import date, time
 from errno import EDQUOT, EFBIG, EIO, EMFILE, ENFILE, ENOMEM, ENOSPC
 from typing import Any
 
@@ -63,8 +64,9 @@ class SystemFileError(InputError):
     def __init__(self, where: str, mistakes: Sequence[tuple[str, str]]) -> None:
         self.where = where
         self.mistakes = tuple(mistakes)
+        shown = [(key, what.replace("\n", "\n    ")) for key, what in self.mistakes[:_MISTAKES_SHOWN]]
         lines = [f"{where}: {counted(len(self.mistakes), 'mistake')}"]
-        lines += [f"  {key}: {_indent(what)}" for key, what in self.mistakes[:_MISTAKES_SHOWN]]
+        lines += [f"  {key}: {indented}" for key, indented in shown]
         if len(self.mistakes) > _MISTAKES_SHOWN:
             lines.append(f"  and {len(self.mistakes) - _MISTAKES_SHOWN} more")
         super().__init__("\n".join(lines))
@@ -110,8 +112,19 @@ def _caret(text: str, column: int, width: int = 72) -> str:
     return f"  {before}{piece}{after}\n  {' ' * (len(before) + column - start)}^"
 
 
-def _indent(message: str) -> str:
-    return message.replace("\n", "\n    ")
+def show(value: Any, width: int = 60) -> str:
+    """A value as it might stand in a file, shortened, with nothing in it that a terminal would obey.
+
+    >>> show(True), show("two"), show({"a": 1})
+    ('true', "'two'", "{'a': 1}")
+    """
+    if isinstance(value, date | time):  # of which datetime is one
+        return value.isoformat()
+    try:
+        found = str(value).lower() if isinstance(value, bool) else repr(value)
+    except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
+        return "a value too large to show"
+    return found if len(found) <= width else f"{found[: width - 20]}...{found[-15:]}"
 
 
 def quoted(text: str, width: int = 40) -> str:

@@ -192,13 +192,13 @@ LIMITS: list[tuple[str, int, Callable[[], str], str]] = [
     ),
     ("checks.settings.MAX_STEPS", 5, lambda: refused(lambda: Settings(steps=5)), "found 5 steps"),
     (
-        "checks.commute.MAX_FACTORS",
+        "checks.theorems.MAX_FACTORS",
         2,
         lambda: notes(check_commute(MEMBER)),
         "chi has 2 factors",
     ),
     (
-        "checks.conserve.MAX_FACTORS",
+        "checks.theorems.MAX_FACTORS",
         2,
         lambda: str(len(check_integrals(MEMBER).findings)),
         "5",

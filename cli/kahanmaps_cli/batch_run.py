@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from kahanmaps.errors import counted, quoted, suggestion
 from kahanmaps_cli.batch_show import print_status, status_data
-from kahanmaps_cli.progress import as_typed, duration, say
+from kahanmaps_cli.progress import Progress, as_typed, duration, say
 from kahanmaps_cli.render import envelope, print_json
 from kahanmaps_cli.signals import interruptible
-from kahanmaps_cli.terminal import is_coloured, tell
+from kahanmaps_cli.terminal import tell
 
 if TYPE_CHECKING:
     from kahanmaps.experiments.records import Executor, Job, Record
@@ -28,8 +26,6 @@ if TYPE_CHECKING:
     from kahanmaps.experiments.tables import Planned
 
 _SHOWN = 3  # tasks of each experiment in a dry run
-_LINE_EVERY = 10.0  # seconds between words on how it is coming along, where there is no terminal
-_SHOW_EVERY = 0.1  # the same for the bar on a terminal
 
 
 def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
@@ -50,7 +46,10 @@ def dry_run(path: str, db: str, options: Mapping[str, Any]) -> int:
                 "tasks": experiment.size,
                 "axes": {name: len(values) for name, values in experiment.grid.axes.items()},
                 "limits": {"time": experiment.limits.time, "memory": experiment.limits.memory},
-                "first": [_task_data(experiment[k]) for k in range(min(_SHOWN, experiment.size))],
+                "first": [
+                    {"key": task.key, "task": task.kind, "system": task.system, "options": dict(task.options)}
+                    for task in map(experiment.__getitem__, range(min(_SHOWN, experiment.size)))
+                ],
             }
             for experiment in chosen
         ]
@@ -120,13 +119,13 @@ def _do(jobs: Iterator[Job], store: Store, progress: BatchProgress, options: Map
     """Do the jobs, each record stored before the next job is handed out; whether somebody interrupted."""
     from kahanmaps.experiments.run import Batch
 
-    with closing(_executor(store, options)) as executor:
+    with closing(_executor(store, progress, options)) as executor:
         batch = Batch(jobs, executor)
 
         def interrupt() -> None:
             batch.interrupt()
-            if not options["quiet"] and executor.in_flight:
-                say(f"finishing {_tasks(executor.in_flight)} in flight (Ctrl-C again ends at once)")
+            if executor.in_flight:
+                progress.say(f"finishing {_tasks(executor.in_flight)} in flight (Ctrl-C again ends at once)")
 
         with interruptible(interrupt):
             for records in batch:
@@ -139,18 +138,17 @@ def _do(jobs: Iterator[Job], store: Store, progress: BatchProgress, options: Map
     return batch.was_interrupted
 
 
-def _executor(store: Store, options: Mapping[str, Any]) -> Executor:
+def _executor(store: Store, progress: BatchProgress, options: Mapping[str, Any]) -> Executor:
     from kahanmaps.experiments.run import executor_for
     from kahanmaps.maps.kernels import processors
 
-    talk = (lambda text: None) if options["quiet"] else say
     return executor_for(
         store.document,
         options["jobs"] or processors(),
         options["scheduler"],
         options["worker_python"],
         options["group_seconds"],
-        talk,
+        progress.say,
     )
 
 
@@ -228,25 +226,15 @@ def _tasks(number: int) -> str:
     return counted(number, "task")
 
 
-def _task_data(task: Any) -> dict[str, Any]:
-    return {"key": task.key, "task": task.kind, "system": task.system, "options": dict(task.options)}
-
-
-class BatchProgress:
-    """A context that is told of records; `todo` of them are expected."""
+class BatchProgress(Progress):
+    """Progress that is told of records; `todo` of them are expected."""
 
     def __init__(self, todo: int, quiet: bool) -> None:
+        super().__init__(quiet)
         self.todo = todo
         self.outcomes: Counter[str] = Counter()
         self.why_lost = ""  # the last of them
-        self._quiet = quiet
-        self._in_flight = 0
-        self._begin = self._last = time.monotonic()
-        self._bar: Any = None
-        self._bar_task: Any = None
-        if not quiet and sys.stderr.isatty():
-            self._bar = _bar()
-            self._bar_task = self._bar.add_task("", total=todo, text="")
+        self._begin = time.monotonic()
 
     @property
     def done(self) -> int:
@@ -265,64 +253,20 @@ class BatchProgress:
 
     def tell(self, records: Sequence[Record], in_flight: int) -> None:
         """Some more records, or none for a while; how many tasks are being done."""
-        self._in_flight = in_flight
         for record in records:
             self.outcomes[str(record.outcome)] += 1
             if record.outcome == "lost":
                 self.why_lost = record.message
-        now = time.monotonic()
-        if self._quiet or now - self._last < (_SHOW_EVERY if self._bar is not None else _LINE_EVERY):
-            return
-        self._last = now
-        if self._bar is not None:
-            self._bar.update(self._bar_task, completed=self.done, text=self.text())
-        else:
-            say(f"{self.done} of {self.todo} tasks, {self.text()}")
-
-    def text(self) -> str:
-        """Rate, remaining time, failures."""
         rate = self.done / max(self.seconds, 1e-9)
-        pieces = [f"{rate:.3g} a second"]
+        bad = self.done - self.outcomes["ok"]
+        pieces = [f"{self.done} of {_tasks(self.todo)}", f"{rate:.3g} a second"]
         if self.done and self.done < self.todo:
             pieces.append(f"about {duration((self.todo - self.done) / rate)} left")
-        if self._in_flight:
-            pieces.append(f"{self._in_flight} running")
-        bad = self.done - self.outcomes["ok"]
-        if bad:
-            pieces.append(f"{bad} failed")
-        if self.lost:
-            pieces.append(f"{self.lost} lost")
-        return ", ".join(pieces)
+        counts = {"running": in_flight, "failed": bad, "lost": self.lost}
+        self(", ".join([*pieces, *(f"{count} {word}" for word, count in counts.items() if count)]))
 
-    def __enter__(self) -> BatchProgress:
-        if self._bar is not None:
-            self._bar.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bar is not None:
-            self._bar.update(self._bar_task, completed=self.done, text=self.text())
-            self._bar.stop()
-
-
-def _bar() -> Any:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    return Progress(
-        BarColumn(bar_width=None, style="default", complete_style="cyan", finished_style="green"),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[text]}", markup=False),
-        console=Console(
-            stderr=True,
-            markup=False,
-            emoji=False,
-            highlight=False,
-            color_system="standard" if is_coloured(sys.stderr) else None,
-        ),
-        transient=True,
-        redirect_stdout=False,
-        redirect_stderr=False,
-    )
+    def say(self, text: str) -> None:
+        """A message on a line of its own."""
+        if not self.quiet:
+            self.clear()
+            say(text)

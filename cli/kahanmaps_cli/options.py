@@ -14,6 +14,7 @@ from kahanmaps_cli.groups import close_to
 from kahanmaps_cli.params import ExactNumber, NameValue, PointText, Seconds, Whole
 
 if TYPE_CHECKING:
+    from kahanmaps.algebra.polynomials import RationalFunction
     from kahanmaps.checks.settings import Settings
     from kahanmaps.documents.files import SystemFile
 
@@ -150,6 +151,16 @@ def integral_option(help_text: str) -> Callable[[F], F]:
     )
 
 
+def asked_integral(file: SystemFile, name: str, text: str, otherwise: str) -> tuple[str, RationalFunction]:
+    """An integral of the file by its name, or an expression, called by its own text where that is short."""
+    from kahanmaps.algebra.text import parse_rational_function
+
+    if text in file.integrals:
+        return name or text, file.integrals[text]
+    function = parse_rational_function(text, file.claim_names, file.parameters)
+    return name or (" ".join(text.split()) if len(text) <= 30 else otherwise), function
+
+
 def seconds_option(default: float | None, help_text: str) -> Callable[[F], F]:
     """--seconds T; None where the default depends on the system, and `help_text` says how."""
     return click.option(
@@ -178,7 +189,7 @@ check_options: Callable[[F], F] = stack(
     ),
     click.option("--steps", type=int, metavar="N", help="Steps of that orbit (default 10)."),
     evidence_options,
-    click.option("--max-digits", type=int, metavar="N", help="Digit budget of that orbit (default: by dimension)."),
+    click.option("--max-digits", type=Whole(1), metavar="N", help="Its digit budget (default: by dimension)."),
     verbose_option,
     output_options,
 )
@@ -320,16 +331,13 @@ def settings_from(options: dict[str, Any], progress: Callable[[str], None]) -> S
     from kahanmaps.checks.settings import Settings
 
     steps = options["steps"]
-    digits = options["max_digits"]
-    if digits is not None and digits < 1:
-        raise click.UsageError(f"found --max-digits {digits}, expected at least 1")
     return Settings(
         eps=the_eps(options["eps"], options["time_step"], required=False),
         start=options["start"],
         steps=10 if steps is None else steps,
         seed=options["seed"],
         error_bits=options["error_bits"],
-        max_digits=digits,
+        max_digits=options["max_digits"],
         orbit_is_asked=options["start"] is not None or steps is not None,
         progress=progress,
     )

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kahanmaps_cli.options import asked_integral
+
 if TYPE_CHECKING:
     from kahanmaps.algebra.polynomials import RationalFunction
     from kahanmaps.documents.files import SystemFile
@@ -93,18 +95,11 @@ class OrbitRun:
                 yield point.step, None, []
 
     def _add_integrals(self, requests: Sequence[tuple[str, str]]) -> None:
-        from kahanmaps.algebra.text import parse_rational_function
-
         for k, (name, text) in enumerate(requests, start=1):
             if text == "known" and not name:
                 self._add_known()
-                continue
-            if text in self.file.integrals:
-                name, function = name or text, self.file.integrals[text]
             else:
-                name = name or (" ".join(text.split()) if len(text) <= 30 else f"I{k}")
-                function = parse_rational_function(text, self.file.claim_names, self.file.parameters)
-            self._add_function(name, function)
+                self._add_function(*asked_integral(self.file, name, text, f"I{k}"))
 
     def _add_known(self) -> None:
         from kahanmaps.checks.conserve import known_integrals

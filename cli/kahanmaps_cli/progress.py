@@ -16,6 +16,7 @@ from contextlib import suppress
 from itertools import pairwise
 from threading import Event, RLock, Thread
 from types import TracebackType
+from typing import Self
 
 import click
 
@@ -53,7 +54,7 @@ class Progress:
     """
 
     def __init__(self, quiet: bool = False) -> None:
-        self._quiet = quiet
+        self.quiet = quiet
         self._terminal = sys.stderr.isatty()
         self._start = self._last = time.monotonic()
         self._shown = 0
@@ -64,7 +65,7 @@ class Progress:
     def __call__(self, sentence: str) -> None:
         self._sentence = sentence
         now = time.monotonic()
-        if self._quiet or now - self._start < 1 or now - self._last < (0.1 if self._terminal else 10):
+        if self.quiet or now - self._start < 1 or now - self._last < (0.1 if self._terminal else 10):
             return
         self._last = now
         self._draw(now)
@@ -92,8 +93,8 @@ class Progress:
                 _write("\r" + " " * self._shown + "\r")
                 self._shown = 0
 
-    def __enter__(self) -> Progress:
-        if self._terminal and not self._quiet:
+    def __enter__(self) -> Self:
+        if self._terminal and not self.quiet:
             Thread(target=self._tick, daemon=True).start()
         return self
 

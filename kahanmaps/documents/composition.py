@@ -13,8 +13,8 @@ from flint import fmpq
 
 from kahanmaps.algebra.polynomials import RationalFunction, ring
 from kahanmaps.algebra.text import format_number, parse_rational_function
-from kahanmaps.documents.reader import EXPECTED, KEYS, KINDS, PartReader, json_like, show
-from kahanmaps.errors import InputError, quoted
+from kahanmaps.documents.reader import EXPECTED, KEYS, KINDS, PartReader, json_like
+from kahanmaps.errors import InputError, quoted, show
 from kahanmaps.maps.implicit import BirationalMap
 
 _MOST_FACTORS = 64  # of a composition, those of its parts counted too

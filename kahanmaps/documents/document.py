@@ -18,9 +18,9 @@ from kahanmaps.algebra.roots import Root, parse_root
 from kahanmaps.algebra.text import format_number, parse_polynomial
 from kahanmaps.documents.composition import CompositionReader
 from kahanmaps.documents.equations import without_left_sides
-from kahanmaps.documents.reader import KINDS, json_like, plain_number, show
+from kahanmaps.documents.reader import KINDS, json_like
 from kahanmaps.documents.structured_facts import read_structured_facts
-from kahanmaps.errors import InputError, SystemFileError, quoted, suggestion
+from kahanmaps.errors import InputError, SystemFileError, quoted, show, suggestion
 from kahanmaps.maps.algebraic import AlgebraicMap
 from kahanmaps.maps.bilinear import bilinear_map
 from kahanmaps.maps.explicit import explicit_map
@@ -174,7 +174,9 @@ class DocumentReader(CompositionReader):
                 if root is not None:
                     self._read_root(name, root)
                     continue
-                self.parameters[name] = rational(plain_number(given))
+                if isinstance(given, list | dict):
+                    raise InputError(f"found {show(given)}, expected a number")
+                self.parameters[name] = rational(given)
             except InputError as error:
                 self._mistake(path, str(error))
                 self.parameters[name] = fmpq(1)  # or every use of it would be a mistake of its own
@@ -424,7 +426,7 @@ class DocumentReader(CompositionReader):
                         self._mistake(
                             "catalog.sources", f"unknown source {quoted(str(item))}, expected a key of sources.py"
                         )
-        read_structured_facts(section, self.variables, self._mistake, show)
+        read_structured_facts(section, self.variables, self._mistake)
 
     def _normalised(self) -> dict[str, Any]:
         """The document with its name and the parameters that hold, long integers as text (JSON needs them so)."""

@@ -14,7 +14,7 @@ from kahanmaps.algebra.polynomials import RationalFunction
 from kahanmaps.algebra.roots import Root
 from kahanmaps.algebra.text import format_number, parse_constant, parse_polynomial, parse_rational_function
 from kahanmaps.documents.structured_facts import KEYS as STRUCTURED_KEYS
-from kahanmaps.errors import InputError, UnknownName, counted, quoted
+from kahanmaps.errors import InputError, UnknownName, counted, quoted, show
 from kahanmaps.systems.quadratic import MAX_DIMENSION
 
 KINDS = ("system", "hamiltonian", "family", "bilinear", "map", "composition")
@@ -94,7 +94,7 @@ class PartReader:
     def _text(self, path: str, value: Any) -> str | None:
         if isinstance(value, int | str) and not isinstance(value, bool):
             try:
-                return _plain_text(value)
+                return value if isinstance(value, str) else format_number(fmpq(value))
             except InputError as error:
                 self._mistake(path, str(error))
                 return None
@@ -193,25 +193,3 @@ def json_like(value: Any) -> Any:
     if isinstance(value, int) and value.bit_length() > 1000:
         return format_number(fmpq(value))
     return value
-
-
-def plain_number(value: Any) -> Any:
-    """The value of a parameter. Raises InputError for what is no number by its kind."""
-    if isinstance(value, bool) or not isinstance(value, int | str | fmpq):
-        if isinstance(value, list | dict):
-            raise InputError(f"found {show(value)}, expected a number")
-        return value
-    return value
-
-
-def _plain_text(value: int | str) -> str:
-    return value if isinstance(value, str) else format_number(fmpq(value))
-
-
-def show(value: Any) -> str:
-    """A value for a message, cut where it is long."""
-    try:
-        text = repr(value)
-    except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
-        return "a value too large to show"
-    return text if len(text) <= 60 else f"{text[:40]}...{text[-15:]}"

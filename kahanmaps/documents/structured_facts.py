@@ -25,7 +25,7 @@ from flint import fmpq, fmpq_mpoly
 
 from kahanmaps.algebra.polynomials import monomials, ring
 from kahanmaps.algebra.text import parse_polynomial
-from kahanmaps.errors import InputError, quoted
+from kahanmaps.errors import InputError, quoted, show
 
 GROWTHS = ("bounded", "linear", "quadratic", "exponential")
 VERDICTS = ("integrable", "linearisable", "not integrable")
@@ -58,8 +58,8 @@ def relations(section: Mapping[str, Any], variables: Sequence[str]) -> tuple[Rel
     """
     return tuple(
         Relations(
-            _as_text(table["monomials"]),
-            relation_functions(table["monomials"], variables),
+            given if isinstance(given := table["monomials"], str) else ", ".join(given),
+            relation_functions(given, variables),
             table["dimension"],
         )
         for table in section.get("relations", [])
@@ -104,15 +104,10 @@ def _up_to(text: str, variables: Sequence[str]) -> tuple[fmpq_mpoly, ...]:
     return tuple(context.from_dict({exponent: fmpq(1)}) for exponent in exponents)
 
 
-def _as_text(given: str | Sequence[str]) -> str:
-    return given if isinstance(given, str) else ", ".join(given)
-
-
 def read_structured_facts(
     section: Mapping[str, Any],
     variables: Sequence[str] | None,
     mistake: Callable[[str, str], None],
-    show: Callable[[Any], str],
 ) -> None:
     """Look through the structured facts of a [catalog] section; `mistake(key, sentence)` is told what is wrong."""
     degrees = section.get("degrees", [1])
@@ -125,7 +120,7 @@ def read_structured_facts(
         if key in section and section[key] not in known:
             mistake(f"catalog.{key}", f"found {show(section[key])}, expected one of {', '.join(known)}")
     if "dynamical_degree" in section:
-        _read_dynamical_degree(section["dynamical_degree"], mistake, show)
+        _read_dynamical_degree(section["dynamical_degree"], mistake)
     codimension = section.get("codimension", 0)
     at_most = len(variables) if variables is not None else None
     if not _is_count(codimension) or (at_most is not None and codimension > at_most):
@@ -136,14 +131,14 @@ def read_structured_facts(
         mistake("catalog.relations", f"found {show(tables)}, expected tables [[catalog.relations]]")
         return
     for k, table in enumerate(tables):
-        _read_relation(f"catalog.relations[{k + 1}]", table, variables, mistake, show)
+        _read_relation(f"catalog.relations[{k + 1}]", table, variables, mistake)
 
 
 def _is_count(value: Any) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
-def _read_dynamical_degree(given: Any, mistake: Callable[[str, str], None], show: Callable[[Any], str]) -> None:
+def _read_dynamical_degree(given: Any, mistake: Callable[[str, str], None]) -> None:
     expected = "expected an irreducible polynomial in x with leading coefficient 1"
     if not isinstance(given, str):
         mistake("catalog.dynamical_degree", f"found {show(given)}, {expected}")
@@ -163,7 +158,6 @@ def _read_relation(
     table: Mapping[str, Any],
     variables: Sequence[str] | None,
     mistake: Callable[[str, str], None],
-    show: Callable[[Any], str],
 ) -> None:
     for key in table:
         if key not in _RELATION_KEYS:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 from kahanmaps.errors import InputError
@@ -13,12 +12,12 @@ from kahanmaps.experiments.records import Row
 from kahanmaps.experiments.summary import (
     _WORDS,
     OF_THE_RUN,
-    _approximate,
     _is_number,
     _must_exist,
     _order,
     _place,
     names_of_entry,
+    nearest,
 )
 
 _MOST_CATEGORIES = 60
@@ -97,7 +96,7 @@ def value_pairs(rows: Iterable[Row], x: str, y: str, by: str | None = None) -> P
 def _column(name: str, values: Sequence[Any], words: bool = False) -> Column:
     """The numbers, or the places among the words in their order."""
     if not words and all(_is_number(value) and not isinstance(value, bool) for value in values):
-        return Column(name, [_approximate(Fraction(value)) for value in values], None)
+        return Column(name, [nearest(value) for value in values], None)
     keys = [_order(value) for value in values]
     different = dict(sorted(dict(zip(reversed(keys), reversed(values), strict=True)).items(), key=lambda item: item[0]))
     if len(different) > _MOST_CATEGORIES:

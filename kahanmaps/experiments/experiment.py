@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InputError, suggestion
+from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.experiments.grid import Grid, RationalRange, Values, has_repeats, read_values
-from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of, show
+from kahanmaps.experiments.options import FAMILY, OTHER, VOCABULARY, Option, exact, number_of
 from kahanmaps.experiments.recipes import family_recipe, find_file, recipe_of
 from kahanmaps.experiments.records import Limits, Task, canonical
 from kahanmaps.experiments.registry import MEMBER, MEMBER_OR_OTHER, TaskKind, task_kind

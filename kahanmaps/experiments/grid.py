@@ -14,8 +14,8 @@ from typing import Any
 from flint import fmpq
 
 from kahanmaps.algebra.text import parse_number
-from kahanmaps.errors import InputError
-from kahanmaps.experiments.options import Option, show
+from kahanmaps.errors import InputError, show
+from kahanmaps.experiments.options import Option
 
 _RANGE_FORM = 'expected "FIRST..LAST" or "FIRST..LAST step STEP", e.g. "1/10..1/2 step 1/10"'
 _MOST = 2**62  # values of an axis: Python's `len` ends there

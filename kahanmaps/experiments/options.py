@@ -9,14 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import date, time
 from typing import Any
 
 from flint import fmpq
 
 from kahanmaps.algebra.fields import GF, RR, rational
 from kahanmaps.algebra.text import format_number, format_point, format_univariate, parse_number, parse_point
-from kahanmaps.errors import InputError, suggestion
+from kahanmaps.errors import InputError, show, suggestion
 from kahanmaps.family.draw import MAX_M, parse_chi
 
 _LARGEST = 2**63 - 1
@@ -160,21 +159,6 @@ def _whole(value: Any, expected: str, allowed: Sequence[int]) -> int:
     if number.q != 1 or int(number.p) not in allowed:
         raise InputError(f"found {show(number)}, expected {expected}")
     return int(number.p)
-
-
-def show(value: Any, width: int = 60) -> str:
-    """A value as it might stand in a spec, shortened, with nothing in it that a terminal would obey.
-
-    >>> show(True), show("two"), show({"a": 1})
-    ('true', "'two'", "{'a': 1}")
-    """
-    if isinstance(value, date | time):  # of which datetime is one
-        return value.isoformat()
-    try:
-        found = str(value).lower() if isinstance(value, bool) else repr(value)
-    except (RecursionError, ValueError):  # tables nested by dotted keys; hexadecimal integers of any length
-        return "a value too large to show"
-    return found if len(found) <= width else f"{found[: width - 20]}...{found[-15:]}"
 
 
 def number_of(value: Any) -> fmpq:

@@ -21,8 +21,8 @@ from kahanmaps.algebra.text import format_number
 from kahanmaps.documents.catalog import load, names
 from kahanmaps.documents.document import DocumentReader
 from kahanmaps.documents.files import SystemFile
-from kahanmaps.errors import InputError
-from kahanmaps.experiments.options import FAMILY, show
+from kahanmaps.errors import InputError, show
+from kahanmaps.experiments.options import FAMILY
 from kahanmaps.experiments.records import canonical, digest
 from kahanmaps.family.associated import FamilyMember
 from kahanmaps.family.draw import (

@@ -244,7 +244,7 @@ class _Values:
         ordered = []
         for (_, value), count in self._counts.items():
             exact, text = Fraction(value), str(value)
-            ordered.append((_approximate(exact), exact, len(text), text, value, count))
+            ordered.append((nearest(exact), exact, len(text), text, value, count))
         ordered.sort(key=lambda one: one[:4])
         n = self._counts.total()
         ahead = [(name, -(-percent * n // 100)) for name, percent in reversed(QUANTILES.items())]
@@ -357,7 +357,9 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int)  # true and false among them: who cares asks for them first
 
 
-def _approximate(exact: Fraction) -> float:
+def nearest(value: Any) -> float:
+    """The double nearest to an exact number, infinite where it is beyond their range."""
+    exact = Fraction(value)
     try:
         return float(exact)
     except OverflowError:
@@ -395,6 +397,6 @@ def _shortened(value: Any, digits: int) -> str:
     longest = _LONGEST_SHOWN_NUMBER if is_number else _LONGEST_SHOWN_TEXT
     if len(text) <= longest:
         return text
-    if is_number and 0 < abs(approximation := _approximate(Fraction(value))) < inf:
+    if is_number and 0 < abs(approximation := nearest(value)) < inf:
         return f"~{approximation:.{digits}g}"
     return text[: longest - 3] + "..."

@@ -317,8 +317,9 @@ def analyze(
         reached(found)
     if laboratory.root is not None:
         found.skipped.append(
-            f"over the number field {laboratory.root.number_field}: fixed points, invariant curves, integrals in iterates, the flow, "
-            "Poisson tensors, singularities, symmetries, Hamiltonian structure, the family, commuting systems"
+            f"over the number field {laboratory.root.number_field}: fixed points, invariant curves, integrals in "
+            "iterates, the flow, Poisson tensors, singularities, symmetries, Hamiltonian structure, the family, "
+            "commuting systems"
         )
     elif system is None:
         found.skipped.append(

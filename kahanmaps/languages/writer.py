@@ -43,7 +43,8 @@ def header(formulas: Formulas, command: str, width: int = 100) -> list[str]:
     title = file.catalog.get("title", "")
     lines = [f"{file.name}: {title}" if title else file.name]
     if not formulas.rhs:
-        lines += [f"  {line if len(line) <= width else line[: width - 4] + ' ...'}" for line in map_lines(formulas)]
+        rows = str(formulas.map).split("\n")[:12]
+        lines += [f"  {line if len(line) <= width else line[: width - 4] + ' ...'}" for line in rows]
     elif len(formulas.rhs) <= 12:
         texts = [format_polynomial(polynomial) for polynomial in formulas.rhs]
         lines += [
@@ -73,11 +74,6 @@ def header(formulas: Formulas, command: str, width: int = 100) -> list[str]:
         wrapped += [shown] if keep else textwrap.wrap(shown, width, subsequent_indent="  ", break_long_words=False)
     # Python takes "coding: x" in one of the first two lines of a file for the name of its encoding.
     return [re.sub("coding(?=[:=])", "coding ", line) if k < 2 else line for k, line in enumerate(wrapped)]
-
-
-def map_lines(formulas: Formulas) -> list[str]:
-    """A map that is not Kahan's, line by line; at most twelve."""
-    return str(formulas.map).split("\n")[:12]
 
 
 class _Writer:

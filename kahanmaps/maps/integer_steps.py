@@ -104,7 +104,8 @@ class IntegerSteps:
         return _lowest(*self._constant.whole(right, scale, found.numerators, found.denominator))
 
     def _solution(self, matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:
-        if self._trials and _worth_eliminating(matrix, likely):
+        is_medium = _CRAMER_DIMENSION < matrix.nrows() <= _ELIMINATION_DIMENSION
+        if self._trials and is_medium and likely.bit_length() >= _ELIMINATION_BITS:
             found = _eliminated(matrix, right, likely)
             if found is not None:
                 return found
@@ -152,10 +153,6 @@ _ELIMINATION_DIMENSION = 16  # and above this dimension as well
 _USEFUL_BITS = 64
 _PRIME = 2**61 - 1
 _TRIALS = 2  # where minors share nothing with W for good, elimination and what makes it certain are lost time
-
-
-def _worth_eliminating(matrix: fmpz_mat, likely: fmpz) -> bool:
-    return _CRAMER_DIMENSION < matrix.nrows() <= _ELIMINATION_DIMENSION and likely.bit_length() >= _ELIMINATION_BITS
 
 
 def _eliminated(matrix: fmpz_mat, right: fmpz_mat, likely: fmpz) -> IntegerPoint | None:

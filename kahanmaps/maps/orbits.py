@@ -154,7 +154,8 @@ class Orbit(Displayed):
             try:
                 value = next(images)
             except (SingularStep, StopIteration):
-                self.end = OrbitEnd("singular", step, self._singular_message(step))
+                det = det_of(self.map.denominator_name(self.backward))
+                self.end = OrbitEnd("singular", step, f"{det} = 0 at step {step}: the map has no value there")
                 return
             except PrecisionLost as error:
                 self.end = OrbitEnd("precision", step, f"step {step + 1} cannot be decided: {error}")
@@ -208,9 +209,6 @@ class Orbit(Displayed):
             bits = _bits_of(value) if isinstance(self.map.field, EtaleAlgebra) else 0
             return bits if limit is not None and bits > limit else 0
         return 0 if limit is None else value.exceeding(limit)
-
-    def _singular_message(self, step: int) -> str:
-        return f"{det_of(self.map.denominator_name(self.backward))} = 0 at step {step}: the map has no value there"
 
 
 class _GivenUp(Exception):

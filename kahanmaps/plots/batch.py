@@ -14,7 +14,7 @@ from kahanmaps.errors import InputError
 from kahanmaps.experiments.columns import Column, Pairs
 from kahanmaps.experiments.export import plain as plain_text
 from kahanmaps.experiments.records import Outcome
-from kahanmaps.experiments.summary import VERDICTS, Group, Summary
+from kahanmaps.experiments.summary import VERDICTS, Group, Summary, nearest
 from kahanmaps.plots.figures import beside, drawing, label_of, legend_above, new_figure, plain, points
 from kahanmaps.plots.style import CENTIMETRES_PER_INCH, COLOURS, MARKS, Style
 
@@ -92,7 +92,9 @@ def draw_batch(
             if few is None and any(name in group.numbers for group in groups):
                 _draw_numbers(axes, groups, name, scale)
             else:
-                counts = few or [_flags(group, name) for group in groups]
+                counts = few or [
+                    dict(zip(("true", "false"), group.flags.get(name, (0, 0)), strict=True)) for group in groups
+                ]
                 _draw_bars(axes, counts, f"tasks by {plain(name)}", style)
         if not values:
             _draw_bars(every[0], [_ends(group) for group in groups], "tasks", style)
@@ -155,7 +157,7 @@ def groups_beyond(summary: Summary, name: str) -> int:
     `name` is the name of a number of the summary.
     """
     found = [group.numbers[name].quantiles for group in summary.groups if name in group.numbers]
-    return sum(not all(isfinite(_double(value)) for value in quantiles.values()) for quantiles in found)
+    return sum(not all(isfinite(nearest(value)) for value in quantiles.values()) for quantiles in found)
 
 
 def _aspect(style: Style, groups: int, rows: int) -> float:
@@ -199,11 +201,6 @@ def _ends(group: Group) -> dict[str, int]:
     return {name: count for name, count in counts.items() if count > 0}
 
 
-def _flags(group: Group, name: str) -> dict[str, int]:
-    true, false = group.flags.get(name, (0, 0))
-    return {"true": true, "false": false}
-
-
 def _few_values(groups: Sequence[Group], name: str) -> list[dict[str, int]] | None:
     """How often a number has each of its values, where these are few and some of them are frequent."""
     found = [group.numbers[name] for group in groups if name in group.numbers]
@@ -211,7 +208,7 @@ def _few_values(groups: Sequence[Group], name: str) -> list[dict[str, int]] | No
     if not all(numbers.counts for numbers in found) or not len(values) <= _FEW < max((n.n for n in found), default=0):
         return None
     counts = [group.numbers[name].counts if name in group.numbers else {} for group in groups]
-    told = {value: value if len(value) <= _SHORT else f"{_double(value):.6g}" for value in values}
+    told = {value: value if len(value) <= _SHORT else f"{nearest(value):.6g}" for value in values}
     return [{f"{name} = {told[value]}": count[value] for value in values if value in count} for count in counts]
 
 
@@ -239,15 +236,16 @@ def _draw_bars(axes: Axes, counts: Sequence[dict[str, int]], label: str, style: 
 
 def _draw_numbers(axes: Axes, groups: Sequence[Group], name: str, scale: str | None) -> None:
     found = [(k, group.numbers[name]) for k, group in enumerate(groups) if name in group.numbers]
-    every = np.array([_double(value) for _, numbers in found for value in numbers.quantiles.values()])
+    every = np.array([nearest(value) for _, numbers in found for value in numbers.quantiles.values()])
     if _is_log(scale, every[np.isfinite(every)]):
         axes.set_xscale("log")
     boxes: list[dict[str, Any]] = []
     places = []
     for k, numbers in found:
-        q = {key: _double(value) for key, value in numbers.quantiles.items()}
+        q = {key: nearest(value) for key, value in numbers.quantiles.items()}
         if numbers.n <= _FEW or not all(map(isfinite, q.values())):
-            _dots(axes, list(q.values()), k)
+            dots = [value for value in dict.fromkeys(q.values()) if isfinite(value)]
+            points(axes, dots, [k] * len(dots), color="black", markersize=3)
             continue
         whiskers = {"whislo": q["p5"], "whishi": q["p95"], "fliers": [q["min"], q["max"]]}
         boxes.append({"q1": q["p25"], "med": q["median"], "q3": q["p75"], **whiskers})
@@ -268,18 +266,6 @@ def _draw_numbers(axes: Axes, groups: Sequence[Group], name: str, scale: str | N
             flierprops={"marker": "o", "markersize": 2, "markerfacecolor": "black", "markeredgewidth": 0},
         )
     axes.set_xlabel(_label(name))
-
-
-def _dots(axes: Axes, values: Sequence[float], k: int) -> None:
-    values = [value for value in dict.fromkeys(values) if isfinite(value)]
-    points(axes, values, [k] * len(values), color="black", markersize=3)
-
-
-def _double(value: Any) -> float:
-    try:
-        return float(Fraction(value))
-    except OverflowError:
-        return float("inf")
 
 
 def _is_log(scale: str | None, values: Any) -> bool:

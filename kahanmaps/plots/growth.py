@@ -183,7 +183,7 @@ def _degree_label(name: str, growth: DegreeGrowth) -> str:
     parts = []
     formula = growth.recurrence.closed_form
     if formula and len(formula) <= _LONGEST_FORMULA and ";" not in formula:
-        parts.append(f"$d_n = {_as_formula(formula)}$")
+        parts.append("$d_n = " + re.sub(r"\^([^ ^]*)", r"^{\1}", formula.replace("*", "")) + "$")
     elif growth.growth is not GrowthClass.EXPONENTIAL:
         parts.append(f"{growth.growth}")
     if rate is not None:
@@ -191,11 +191,6 @@ def _degree_label(name: str, growth: DegreeGrowth) -> str:
         number = rate.digits if whole else rf"{float(rate.digits):.5f}\ldots"
         parts.append(rf"$\lambda = {number}$")
     return f"{name}: {', '.join(parts) or str(growth.growth)}"
-
-
-def _as_formula(text: str) -> str:
-    """2*n^2 + 1 for matplotlib."""
-    return re.sub(r"\^([^ ^]*)", r"^{\1}", text.replace("*", ""))
 
 
 def _draw_heights_of(axes: Axes, curves: Sequence[HeightCurve], k: int, from_one: bool) -> None:

@@ -73,7 +73,8 @@ def _lay_out(canvas: Any, columns: int, rows: int) -> None:
         warnings.filterwarnings("error", message="constrained_layout not applied", category=UserWarning)
         try:
             canvas.draw()
-            panels = _panels(canvas.figure)
+            every = [axes for axes in canvas.figure.axes if axes.get_visible()]  # side by side: none inside others
+            panels = [axes for axes in every if axes.get_label() != "<colorbar>"]
             enough = len(panels) < 2 or all(axes.bbox.height >= 4 * _LEAST_ROWS for axes in panels)
         except UserWarning:
             enough = False
@@ -82,11 +83,6 @@ def _lay_out(canvas: Any, columns: int, rows: int) -> None:
             f"found {columns} columns and {rows} rows, expected more for this picture: make the terminal larger, "
             "or write a file with -o"
         )
-
-
-def _panels(figure: Figure) -> list[Any]:
-    """The axes side by side: not those of colour bars, nor those inside others."""
-    return [axes for axes in figure.axes if axes.get_visible() and axes.get_label() != "<colorbar>"]
 
 
 def _visible(figure: Figure, kind: Any) -> list[Any]:

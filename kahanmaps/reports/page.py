@@ -39,7 +39,11 @@ def page(
     note = Section("pictures", "Pictures", f"<p>{text(pictures.note)}</p>" if pictures.note else "")
     present = [section for section in (*sections, note, _remake(recipe, seed)) if section.html]
     links = "".join(f'<li><a href="#{one.id}">{markup.escape(one.title)}</a></li>' for one in present)
-    body = "\n".join(map(_section_html, present))
+    body = "\n".join(
+        f'<section aria-labelledby="{one.id}">\n<h2 id="{one.id}">{markup.escape(one.title)}</h2>\n'
+        f"{one.html}\n</section>"
+        for one in present
+    )
     font = font_face() if "<math" in lead + body else ""
     name = markup.escape(title)
     return f"""<!DOCTYPE html>
@@ -64,11 +68,6 @@ def page(
 </body>
 </html>
 """
-
-
-def _section_html(one: Section) -> str:
-    heading = f'<h2 id="{one.id}">{markup.escape(one.title)}</h2>'
-    return f'<section aria-labelledby="{one.id}">\n{heading}\n{one.html}\n</section>'
 
 
 def wide(table: str) -> str:

@@ -275,7 +275,7 @@ def test_a_sweep_is_the_same_for_the_same_seed_and_generic_members_are_not_slow(
         ({"eps": 0}, "found eps = 0"),
         ({"over": ["c", "eps"], "eps": 1}, "found eps both"),
         ({"primes": (31, 37)}, "three different ones"),
-        ({"primes": (31, 37, 39)}, "three different ones"),
+        ({"primes": (31, 37, 39)}, "found 39 among the primes"),
         ({"terms": 0}, "expected 1 to 14"),
         ({"terms": 14}, "too large to be scanned"),
         ({"jobs": 0}, "expected at least 1"),

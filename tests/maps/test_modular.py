@@ -50,7 +50,8 @@ def exact(system, eps, start, prime, steps, backward=False):
 
 
 def assert_exact(ensemble, system, eps, starts, steps, backward=False):
-    x, at, counts = ensemble.x.tolist(), ensemble.singular_at.tolist(), ensemble.step_counts.tolist()
+    taken = np.where(ensemble.singular_at < 0, ensemble.steps, ensemble.singular_at)
+    x, at, counts = ensemble.x.tolist(), ensemble.singular_at.tolist(), taken.tolist()
     ended = 0
     for i, start in enumerate(starts):
         point, index, singular = exact(system, eps, start, ensemble.prime, steps, backward)

@@ -11,6 +11,7 @@ from kahanmaps.errors import counted, quoted
 from kahanmaps_cli.ensemble_run import FAILURES_SHOWN, FloatRun, ModularRun, Run, structure_for
 from kahanmaps_cli.ensemble_starts import drawn, read_starts
 from kahanmaps_cli.options import (
+    asked_integral,
     backward_option,
     eps_of,
     eps_options,
@@ -21,7 +22,7 @@ from kahanmaps_cli.options import (
     system_options,
 )
 from kahanmaps_cli.outputs import OutputFile
-from kahanmaps_cli.params import Arithmetic
+from kahanmaps_cli.params import Arithmetic, Whole
 from kahanmaps_cli.progress import Progress, say
 from kahanmaps_cli.render import print_json, record_of
 from kahanmaps_cli.signals import interruptible
@@ -50,11 +51,11 @@ _MAX_BITS = 61
     help="float or mod:P, P < 2^61.",
 )
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE.npy", help="Write the points there.")
-@click.option("--every", type=int, metavar="K", help="Write every K-th iterate (default: the start and the last one).")
+@click.option("--every", type=Whole(1), metavar="K", help="Write every K-th iterate (default: the first and the last).")
 @integral_option("Watch an expression in the variables and eps, or an integral of the file by its name.")
 @click.option("--method", type=click.Choice(("generic", "normal-form")), help="Chosen by itself unless given.")
 @click.option("--kernel", type=click.Choice(("numpy", "numba")), help="Makes no difference to numbers, only to speed.")
-@click.option("--threads", type=int, metavar="T", help="For the kernel numba (default: all processors).")
+@click.option("--threads", type=Whole(1), metavar="T", help="For the kernel numba (default: all processors).")
 @click.option("-v", "--verbose", is_flag=True, help="Say on standard error how it is computed.")
 @output_options
 def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> int:
@@ -123,7 +124,7 @@ def command(system: str | None, as_json: bool, quiet: bool, verbose: bool, **opt
 
 def _require_sense(system: str | None, options: dict[str, Any]) -> None:
     """Options that contradict each other, or themselves."""
-    steps, every, output, threads = options["steps"], options["every"], options["output"], options["threads"]
+    steps, every, output = options["steps"], options["every"], options["output"]
     kind, prime = options["arithmetic"]
     if kind not in ("float", "mod"):
         raise click.UsageError(f"found --arithmetic {kind}, expected float or mod:P (one orbit: kahanmaps orbit)")
@@ -143,26 +144,16 @@ def _require_sense(system: str | None, options: dict[str, Any]) -> None:
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
     if steps > _MAX_STEPS:
         raise click.UsageError(f"found --steps {steps}, expected at most {_MAX_STEPS:.0e}: it would take years")
-    if every is not None and every < 1:
-        raise click.UsageError(f"found --every {every}, expected at least 1")
     if every is not None and output is None:
         raise click.UsageError("--every K is for -o FILE.npy")
-    if threads is not None and threads < 1:
-        raise click.UsageError(f"found --threads {threads}, expected at least 1")
     if output is not None and not output.endswith(".npy"):
         raise click.UsageError(f"found -o {quoted(output)}, expected a name that ends with .npy")
 
 
 def _integrals(requests: tuple[tuple[str, str], ...], file: SystemFile) -> dict[str, RationalFunction]:
-    from kahanmaps.algebra.text import parse_rational_function
-
     found: dict[str, RationalFunction] = {}
-    for k, (name, text) in enumerate(requests, start=1):
-        if text in file.integrals:
-            name, function = name or text, file.integrals[text]
-        else:
-            name = name or (text if len(text) <= 30 else f"I{k}")
-            function = parse_rational_function(text, (*file.variables, "eps"), file.parameters)
+    for k, request in enumerate(requests, start=1):
+        name, function = asked_integral(file, *request, f"I{k}")
         if name in found:
             raise click.UsageError(f"found two integrals of the name {name}: write --integral NAME=EXPR")
         found[name] = function

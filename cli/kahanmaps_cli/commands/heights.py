@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 )
 @click.option("--steps", type=int, metavar="N", default=60, show_default=True, help="Steps of each orbit.")
 @click.option(
-    "--max-digits", type=int, metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
+    "--max-digits", type=Whole(1), metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
 )
 @seconds_option(30.0, "Stop after about so many seconds.")
 @seed_option
@@ -92,8 +92,6 @@ def require_heights(options: dict[str, Any]) -> None:
     """Options that contradict each other, or themselves."""
     if options["count"] is not None and options["given"]:
         raise click.UsageError("give --start X or --random N, not both")
-    if options["max_digits"] < 1:
-        raise click.UsageError(f"found --max-digits {options['max_digits']}, expected at least 1")
 
 
 def surveyed(file: SystemFile, eps: Any, options: dict[str, Any], progress: Progress) -> HeightSurvey:

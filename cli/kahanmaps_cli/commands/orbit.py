@@ -26,7 +26,7 @@ from kahanmaps_cli.options import (
 from kahanmaps_cli.orbit_formats import Csv, Json, JsonLines, Npz, OutputFull, Text, Writer, meta_of
 from kahanmaps_cli.orbit_run import OrbitRun
 from kahanmaps_cli.outputs import OutputFile
-from kahanmaps_cli.params import Arithmetic, PointText, Steps
+from kahanmaps_cli.params import Arithmetic, PointText, Steps, Whole
 from kahanmaps_cli.progress import Progress, TimeLeft, say
 from kahanmaps_cli.render import ending
 from kahanmaps_cli.signals import interruptible
@@ -46,7 +46,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
 @eps_options
 @click.option("--steps", type=int, metavar="N", help="How many steps to take.")
 @click.option("--at", type=Steps(), metavar="N1,N2,...", help="Only these iterates, instead of --steps.")
-@click.option("--every", type=int, metavar="K", default=1, show_default=True, help="Only every K-th iterate.")
+@click.option("--every", type=Whole(1), metavar="K", default=1, show_default=True, help="Only every K-th iterate.")
 @backward_option
 @click.option(
     "--arithmetic",
@@ -67,7 +67,7 @@ _STATUS = {"completed": 0, "periodic": 0, "interrupted": 130}
     "A column beside the point: an expression in the variables and eps, the name of an integral of the file, or "
     "the word known for all that theorems give (not in floats)."
 )
-@click.option("--max-digits", type=int, metavar="N", help="Digit budget (exact arithmetic; default 200000).")
+@click.option("--max-digits", type=Whole(1), metavar="N", help="Digit budget (exact arithmetic; default 200000).")
 @click.option("--format", "form", type=click.Choice(_FORMATS), help="Default text, or what the name of FILE says.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output.")
 @click.option("-o", "--output", type=OutputFile(grows=True), metavar="FILE", help="Write to FILE.")
@@ -115,10 +115,6 @@ def command(
         raise click.UsageError(f"found --steps {steps}, expected 0 or more (--backward steps by the inverse map)")
     if at is not None and every != 1:
         raise click.UsageError("give --at N1,N2,... or --every K, not both")
-    if every < 1:
-        raise click.UsageError(f"found --every {every}, expected at least 1")
-    if options["max_digits"] is not None and options["max_digits"] < 1:
-        raise click.UsageError(f"found --max-digits {options['max_digits']}, expected at least 1")
     from kahanmaps.maps.orbits import OrbitEnd
 
     file = load_system(system, options)

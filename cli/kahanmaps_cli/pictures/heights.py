@@ -28,7 +28,7 @@ _EARLY = ("singular",)
 @click.option("--start", "given", type=PointText(), multiple=True, metavar="X", help="Instead: this start. Repeatable.")
 @click.option("--steps", type=int, metavar="N", default=60, show_default=True, help="Steps of each orbit.")
 @click.option(
-    "--max-digits", type=int, metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
+    "--max-digits", type=Whole(1), metavar="N", default=20_000, show_default=True, help="Digit budget of each orbit."
 )
 @seconds_option(30.0, "Stop after about so many seconds.")
 @seed_option

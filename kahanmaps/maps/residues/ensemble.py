@@ -167,7 +167,8 @@ class ModularEnsemble:
         self.system = system
         self.prime = prime
         self.arithmetic = Arithmetic(prime)
-        self.kernel = _chosen(kernel, prime)
+        # Montgomery's form needs an odd modulus.
+        self.kernel = "numpy" if prime == 2 else choose_kernel(kernel, long=True)
         if threads < 1:
             raise InputError(f"found {threads} threads, expected at least 1")
         map_ = as_map(system)
@@ -220,23 +221,13 @@ class ModularEnsemble:
 
     @property
     def x(self) -> Integers:
-        """The points, one in each row: those after `step_counts` steps."""
+        """The points, one in each row: those that the last step reached."""
         return np.ascontiguousarray(self._walker.leave(self._state).T).view(np.int64)
-
-    @property
-    def step_counts(self) -> Integers:
-        """How many steps each orbit has taken."""
-        return np.where(self.singular_at < 0, self.steps, self.singular_at)
 
     @property
     def status(self) -> list[str]:
         """ "completed" or, where the map had no value, "singular", for each orbit."""
         return ["completed" if at < 0 else "singular" for at in self.singular_at.tolist()]
-
-
-def _chosen(kernel: str | None, prime: int) -> str:
-    chosen = choose_kernel(kernel, long=True)
-    return "numpy" if prime == 2 else chosen  # Montgomery's form needs an odd modulus
 
 
 def _residues(starts: Any, dim: int, field: PrimeField) -> Residues:

@@ -24,6 +24,7 @@ from kahanmaps.maps.implicit import BirationalMap
 from kahanmaps.maps.inverse import TooLarge
 from kahanmaps.maps.kahan import as_map
 from kahanmaps.maps.projective import HomogeneousMap, homogeneous_map
+from kahanmaps.maps.residues.relations import inverses
 from kahanmaps.systems.quadratic import QuadraticSystem
 
 Integers = NDArray[np.int64]
@@ -122,16 +123,10 @@ class ProjectiveMap:
 
     def normalised(self, X: Integers) -> Integers:
         """The columns divided by their last coordinate that is not zero; columns of zeros stay."""
-        p = self.prime
         lead = np.zeros(X.shape[1], dtype=np.int64)
         for row in X:
             lead = np.where(row != 0, row, lead)
-        inverse, power, exponent = np.ones_like(lead), lead, p - 2
-        while exponent:
-            if exponent & 1:
-                inverse = inverse * power % p
-            power, exponent = power * power % p, exponent >> 1
-        return X * inverse % p
+        return X * inverses(lead, self.prime) % self.prime
 
     def numbers(self, X: Integers) -> Integers:
         """The numbers of normalised points in columns; -1 for columns of zeros."""

@@ -49,10 +49,10 @@ def ranks(family: Family, members: Members, eps: fmpq | None, top: int, rng: ran
             rows.append(_monomials(X, exponents, p))
             X = image
             continue
-        scale = _inverse(image[:, -1:], p)  # 0 at infinity
+        scale = inverses(image[:, -1:], p)  # 0 at infinity
         image = image * scale % p
         above = _determinant(_derivative(family, values, X, image), p) * (-1) ** family.dim
-        ratio = above * _inverse(_determinant(equation[:, :, :-1], p), p) % p
+        ratio = above * inverses(_determinant(equation[:, :, :-1], p), p) % p
         difference = _monomials(image, exponents, p) - ratio[:, None] * _monomials(X, exponents, p)
         rows.append(difference * (scale != 0) % p)
         X = _points(draw, p, count, family.dim)
@@ -108,7 +108,7 @@ def _reduced(A: Array, p: int) -> tuple[Array, Array, Array]:
         row, there = free.argmax(axis=1), free.any(axis=1)
         pivot = np.where(there, A[every, row, c], 1)
         product = product * pivot % p
-        normed = A[every, row] * _inverse(pivot, p)[:, None] % p
+        normed = A[every, row] * inverses(pivot, p)[:, None] % p
         factor = A[:, :, c] * there[:, None]
         factor[every, row] = 0
         A = (A - factor[:, :, None] * normed[:, None, :]) % p
@@ -135,7 +135,7 @@ def _determinant(A: Array, p: int) -> Array:
     return np.where(whole, product * (-1) ** (inversions % 2), 0) % p
 
 
-def _inverse(x: Array, p: int) -> Array:
+def inverses(x: Array, p: int) -> Array:
     """Inverses modulo p; 0 of 0."""
     found, power, e = np.ones_like(x), x % p, p - 2
     while e:
